@@ -1,0 +1,67 @@
+# Everything is a verb here; `make help` lists them. Set-up is automatic and happens once, in .venv.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+
+PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command -v $$p >/dev/null && $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' && echo $$p && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+UV := $(BIN)/uv
+NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/*)
+
+.PHONY: help train test test-fast lint format bench setup build clean requirements
+
+help:  ## show this list
+	@grep -hE '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | awk -F'\t' '{printf "  make %-13s %s\n", $$1, $$2}'
+
+train: $(VENV)/.built  ## set up if needed, then train a car from camera pixels until it drives 5 of 5 laps
+	$(BIN)/racecraft train --until "5 laps" --video
+
+test: $(VENV)/.built $(VENV)/.dev  ## set up if needed, then run every test
+	$(BIN)/python -m pytest
+
+test-fast: $(VENV)/.built $(VENV)/.dev  ## the tests that take seconds
+	$(BIN)/python -m pytest -m "not slow"
+
+lint: $(VENV)/.built $(VENV)/.dev  ## ruff, mypy --strict and clang-format, changing nothing
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/clang-format --dry-run --Werror native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/tests/*.cpp
+
+format: $(VENV)/.dev  ## apply ruff and clang-format
+	$(BIN)/ruff check --fix-only -q .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/tests/*.cpp
+
+bench: $(VENV)/.built $(VENV)/.dev  ## measure everything, rivals included, and print the table
+	$(BIN)/racecraft bench
+
+setup: $(VENV)/.built  ## only the set-up: .venv with the command .venv/bin/racecraft
+
+build: $(VENV)/.built  ## compile the native core again if its sources changed
+
+clean:  ## remove the environment and everything built
+	rm -rf $(VENV) build
+
+requirements: $(UV)  ## pin the newest allowed versions again
+	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header --extra torch pyproject.toml requirements/build.in -o requirements/train.txt
+	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/dev.in -o requirements/dev.txt
+	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/uv.in -o requirements/uv.txt
+
+$(UV): requirements/uv.txt
+	@test -n "$(PYTHON)" || { echo "Racecraft needs Python 3.11 or newer; none was found on PATH."; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements/uv.txt
+	@touch $(UV)
+
+$(VENV)/.train: $(UV) requirements/train.txt
+	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/train.txt
+	@touch $@
+
+$(VENV)/.dev: $(UV) $(VENV)/.train requirements/dev.txt
+	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/dev.txt
+	@touch $@
+
+$(VENV)/.built: $(VENV)/.train $(NATIVE)
+	PATH="$(CURDIR)/$(BIN):$$PATH" flock $(VENV)/.build-lock $(UV) pip install -q --python $(BIN)/python --no-build-isolation --no-deps -e .
+	@touch $@

@@ -1,0 +1,64 @@
+"""Every error a user can meet: one sentence saying what is wrong with which value, what is allowed, what to do next.
+
+The command line prints ``str(error)`` and, where there is one, ``hint``; it never shows a stack trace for these.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class RacecraftError(Exception):
+    """Base of all errors that Racecraft raises on purpose.
+
+    Args:
+        message: One sentence with the value at fault and what is allowed.
+        hint: What to do next, when the message alone does not say it.
+    """
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class TrackError(RacecraftError, ValueError):
+    """A track's geometry or file is not drivable."""
+
+
+class TrackNotFound(RacecraftError, LookupError):
+    """No track has this name or path."""
+
+
+class ShapeError(RacecraftError, ValueError):
+    """An array has the wrong shape or type."""
+
+
+class NonFiniteAction(RacecraftError, ValueError):
+    """An action holds NaN or infinity."""
+
+
+class ConfigError(RacecraftError, ValueError):
+    """A setting, or a field of one of AWS's files, is outside what is allowed."""
+
+
+class RewardError(RacecraftError, ValueError):
+    """A reward function is not valid, or failed while it ran."""
+
+
+class CheckpointError(RacecraftError, ValueError):
+    """A checkpoint is damaged or does not fit what it is loaded into."""
+
+
+class RunError(RacecraftError, ValueError):
+    """A run folder is missing, in use or unreadable."""
+
+
+class TrainingError(RacecraftError, RuntimeError):
+    """Training cannot go on; the last checkpoint is good."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A suggestion such as ``Did you mean 'oval'?`` for a misspelt name, or an empty string."""
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f"Did you mean '{close[0]}'?" if close else ""
