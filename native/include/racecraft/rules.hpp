@@ -1,0 +1,257 @@
+// The rules of an episode: progress, wheels on track, off track, reversed, immobilised, lap complete, time up.
+//
+// A step is judged at the pose *before* its action acts, as AWS logs it; so a row holds the pose at time t and the
+// command of time t. Thresholds are the original's (simapp: markov/reset, markov/agent_ctrl).
+#pragma once
+
+#include "racecraft/track.hpp"
+#include "racecraft/vehicle.hpp"
+
+namespace racecraft {
+
+constexpr float kReferenceAhead = 0.14f;  // m, from the car origin to the point that x, y and progress speak of
+constexpr float kRearAxleX = -0.08166f;   // m, wheel centres in the car's frame
+constexpr float kFrontAxleX = 0.08231f;
+constexpr float kRearHalfTrack = 0.08105f;
+constexpr float kFrontHalfTrack = 0.0796f;
+constexpr int32_t kReversedSteps = 15;          // consecutive steps of falling progress that end an episode
+constexpr int32_t kImmobilizedSteps = 15;       // consecutive steps without movement that end an episode
+constexpr double kImmobilizedDistance = 0.0003; // m, what counts as no movement in a step
+
+enum class Status : int32_t {
+    prepare = 0,
+    in_progress = 1,
+    lap_complete = 2,
+    crashed = 3,
+    off_track = 4,
+    immobilized = 5,
+    reversed = 6,
+    time_up = 7,
+    pause = 8,
+    park = 9,
+};
+
+// The judged row of a step, the only thing that rewards, logs and race rules read. All double; booleans are 0 or 1.
+#define RC_ROW_COLUMNS(X)                                                                          \
+    X(episode)              /* of this car, from 0 */                                              \
+    X(steps)                /* of this episode; 1 is the prepare step */                           \
+    X(x)                    /* m, 0.14 m ahead of the car origin */                                \
+    X(y)                    /* m */                                                                \
+    X(heading)              /* rad */                                                              \
+    X(steering_angle)       /* rad, commanded */                                                   \
+    X(speed)                /* m/s, commanded */                                                   \
+    X(progress)             /* fraction of a lap since the start of the lap */                     \
+    X(offset)               /* m, signed distance from the centre line, left positive */           \
+    X(projection_distance)  /* m, along the centre line */                                         \
+    X(track_width)          /* m, here */                                                          \
+    X(track_length)         /* m */                                                                \
+    X(closest_prev)         /* waypoint index */                                                   \
+    X(closest_next)         /* waypoint index */                                                   \
+    X(all_wheels_on_track)                                                                         \
+    X(is_offtrack)                                                                                 \
+    X(is_crashed)                                                                                  \
+    X(is_reversed)          /* the car races against the route's own direction */                  \
+    X(status)               /* Status */                                                           \
+    X(time)                 /* s since the episode began */                                        \
+    X(track_index)          /* into the simulation's tracks; reversed twins follow the originals */ \
+    X(actual_speed)         /* m/s */                                                              \
+    X(actual_steering_angle) /* rad */                                                             \
+    X(lap)                  /* laps completed in this episode */
+
+enum RowColumn : int {
+#define RC_INDEX(name) kRow_##name,
+    RC_ROW_COLUMNS(RC_INDEX)
+#undef RC_INDEX
+        kNumRowColumns
+};
+
+// What a critic may know beyond the camera: the state at the current pose, scaled to about unit size.
+#define RC_STATE_COLUMNS(X)                                                          \
+    X(speed)             /* over 4 m/s */                                            \
+    X(lateral_speed)     /* m/s */                                                   \
+    X(yaw_rate)          /* over 4 rad/s */                                          \
+    X(steering)          /* over 30 degrees */                                       \
+    X(offset)            /* over half the track width, left positive */              \
+    X(sin_heading_error) /* against the centre line */                               \
+    X(cos_heading_error)                                                             \
+    X(half_width)        /* m */                                                     \
+    X(curvature_0)       /* 1/m, of the centre line here, left positive */           \
+    X(curvature_1)       /* and further ahead, see kCurvatureAhead */                \
+    X(curvature_2)                                                                   \
+    X(curvature_3)                                                                   \
+    X(curvature_4)                                                                   \
+    X(curvature_5)                                                                   \
+    X(curvature_6)                                                                   \
+    X(curvature_7)
+
+enum StateColumn : int {
+#define RC_INDEX(name) kState_##name,
+    RC_STATE_COLUMNS(RC_INDEX)
+#undef RC_INDEX
+        kNumStateColumns
+};
+
+constexpr int kNumCurvatures = kNumStateColumns - kState_curvature_0;
+constexpr float kCurvatureAhead[kNumCurvatures] = {0.0f, 0.25f, 0.5f, 0.75f, 1.0f, 1.5f, 2.0f, 3.0f};  // m
+
+// What the rules remember of a car between steps.
+struct Episode {
+    int32_t episode;           // of this car, from 0
+    int32_t steps;             // 1 is the prepare step
+    int32_t laps;              // completed in this episode
+    int32_t track;             // geometry in force: index, or index + number of tracks for the reversed twin
+    int32_t falling_steps;     // consecutive steps with falling progress
+    int32_t still_steps;       // consecutive steps without movement
+    int32_t frozen_steps;      // steps the car still stands as a penalty
+    Status status;
+    double progress;           // fraction of the current lap, may exceed [0, 1) by a step
+    double start;              // arc length where the lap began, over track length
+    double last_x, last_y;     // m, reference point at the previous judged step
+    Projection projection;     // of the reference point at the current pose
+};
+
+struct RuleLimits {
+    int32_t laps;         // laps to an episode
+    int32_t max_steps;    // truncates an episode
+    double time_limit;    // s; 0 for none
+};
+
+struct Verdict {
+    bool terminated;
+    bool truncated;
+};
+
+struct ReferencePoint {
+    double x, y;
+};
+
+RC_HD ReferencePoint reference_point(const VehicleState& state) {
+    float sine, cosine;
+    sincos_of(state.heading, sine, cosine);
+    return {static_cast<double>(state.x) + static_cast<double>(kReferenceAhead * cosine),
+            static_cast<double>(state.y) + static_cast<double>(kReferenceAhead * sine)};
+}
+
+// How many of the four wheel centres are on the road.
+RC_HD int32_t wheels_on_road(const TrackGeometry& track, const VehicleState& state) {
+    float sine, cosine;
+    sincos_of(state.heading, sine, cosine);
+    int32_t wheels = 0;
+    for (int i = 0; i < 4; ++i) {
+        const float forward = i < 2 ? kRearAxleX : kFrontAxleX;
+        const float half = i < 2 ? kRearHalfTrack : kFrontHalfTrack;
+        const float left = (i & 1) != 0 ? half : -half;
+        wheels += is_on_road(track, static_cast<double>(state.x + (forward * cosine - left * sine)),
+                             static_cast<double>(state.y + (forward * sine + left * cosine)));
+    }
+    return wheels;
+}
+
+// Difference of two lap fractions on the shorter way round.
+RC_HD double lap_difference(const TrackGeometry& track, double to, double from) {
+    const double difference = to - from;
+    return track.is_closed ? difference - floor_of(difference + 0.5) : difference;
+}
+
+RC_HD void write_row(const TrackGeometry& track, const Episode& episode, const VehicleState& state,
+                     float steering_command, float speed_command, int32_t wheels, bool is_reversed, double* row) {
+    const ReferencePoint reference = reference_point(state);
+    const Projection& projection = episode.projection;
+    row[kRow_episode] = episode.episode;
+    row[kRow_steps] = episode.steps;
+    row[kRow_x] = reference.x;
+    row[kRow_y] = reference.y;
+    row[kRow_heading] = static_cast<double>(state.heading);
+    row[kRow_steering_angle] = static_cast<double>(steering_command);
+    row[kRow_speed] = static_cast<double>(speed_command);
+    row[kRow_progress] = episode.progress;
+    row[kRow_offset] = projection.offset;
+    row[kRow_projection_distance] = projection.arc_length;
+    row[kRow_track_width] = static_cast<double>(table_at(track, track.width_table, projection.arc_length));
+    row[kRow_track_length] = track.length;
+    row[kRow_closest_prev] = projection.segment;
+    row[kRow_closest_next] = projection.segment + 1;
+    row[kRow_all_wheels_on_track] = wheels == 4;
+    row[kRow_is_offtrack] = wheels == 0;
+    row[kRow_is_crashed] = episode.status == Status::crashed;
+    row[kRow_is_reversed] = is_reversed;
+    row[kRow_status] = static_cast<int32_t>(episode.status);
+    row[kRow_time] = episode.steps * (1.0 / 15.0);
+    row[kRow_track_index] = episode.track;
+    row[kRow_actual_speed] = static_cast<double>(state.speed);
+    row[kRow_actual_steering_angle] = static_cast<double>(state.steering);
+    row[kRow_lap] = episode.laps;
+}
+
+// Judges the current pose with the action that is about to act and writes the step's row.
+RC_HD Verdict judge(const TrackGeometry& track, const RuleLimits& limits, const VehicleState& state,
+                    float steering_command, float speed_command, bool is_reversed, Episode& episode, double* row) {
+    const ReferencePoint reference = reference_point(state);
+    const int32_t wheels = wheels_on_road(track, state);
+    episode.steps += 1;
+
+    Verdict verdict{false, false};
+    if (episode.frozen_steps > 0) {
+        episode.frozen_steps -= 1;
+        episode.status = Status::pause;
+        write_row(track, episode, state, steering_command, speed_command, wheels, is_reversed, row);
+    } else {
+        const double here = lap_difference(track, episode.projection.arc_length / track.length, episode.start);
+        const double before = episode.progress;
+        episode.progress = before + lap_difference(track, here, before);
+        episode.falling_steps = episode.progress < before ? episode.falling_steps + 1 : 0;
+        const double dx = reference.x - episode.last_x;
+        const double dy = reference.y - episode.last_y;
+        const bool is_still = dx * dx + dy * dy <= kImmobilizedDistance * kImmobilizedDistance;
+        episode.still_steps = is_still ? episode.still_steps + 1 : 0;
+
+        const bool lap_complete = episode.progress >= 1.0;
+        episode.laps += lap_complete ? 1 : 0;
+        episode.status = Status::in_progress;
+        if (episode.falling_steps >= kReversedSteps) episode.status = Status::reversed;
+        if (episode.still_steps >= kImmobilizedSteps) episode.status = Status::immobilized;
+        if (wheels == 0) episode.status = Status::off_track;
+        if (lap_complete) episode.status = Status::lap_complete;
+        verdict.terminated = lap_complete ? episode.laps >= limits.laps : episode.status != Status::in_progress;
+        write_row(track, episode, state, steering_command, speed_command, wheels, is_reversed, row);
+        if (lap_complete && !verdict.terminated) episode.progress -= 1.0;  // the next lap flies on
+    }
+
+    // Half a step of slack: the clock is a multiple of 1/15 s and the limit need not be.
+    const bool time_up = limits.time_limit > 0.0 && row[kRow_time] >= limits.time_limit - 0.5 / 15.0;
+    if (time_up && !verdict.terminated) {
+        episode.status = Status::time_up;
+        row[kRow_status] = static_cast<int32_t>(Status::time_up);
+    }
+    verdict.truncated = !verdict.terminated && (time_up || episode.steps >= limits.max_steps);
+    episode.last_x = reference.x;
+    episode.last_y = reference.y;
+    return verdict;
+}
+
+// Projects the car at its current pose and describes its state for a critic.
+RC_HD void observe(const TrackGeometry& track, const VehicleState& state, Episode& episode, float* out) {
+    const ReferencePoint reference = reference_point(state);
+    episode.projection = project(track, reference.x, reference.y);
+    const int32_t segment = episode.projection.segment;
+    const float dx = static_cast<float>(track.waypoint_x[segment + 1] - track.waypoint_x[segment]);
+    const float dy = static_cast<float>(track.waypoint_y[segment + 1] - track.waypoint_y[segment]);
+    const float inverse = 1.0f / sqrt_of(dx * dx + dy * dy);
+    float sine, cosine;
+    sincos_of(state.heading, sine, cosine);
+    const float half_width = 0.5f * table_at(track, track.width_table, episode.projection.arc_length);
+    out[kState_speed] = state.speed * (1.0f / kMaxSpeedCommand);
+    out[kState_lateral_speed] = state.lateral_speed;
+    out[kState_yaw_rate] = state.yaw_rate * 0.25f;
+    out[kState_steering] = state.steering * (1.0f / kMaxSteering);
+    out[kState_offset] = static_cast<float>(episode.projection.offset) / half_width;
+    out[kState_sin_heading_error] = (dx * sine - dy * cosine) * inverse;
+    out[kState_cos_heading_error] = (dx * cosine + dy * sine) * inverse;
+    out[kState_half_width] = half_width;
+    for (int i = 0; i < kNumCurvatures; ++i) {
+        out[kState_curvature_0 + i] = table_at(track, track.curvature_table,
+                                               episode.projection.arc_length + static_cast<double>(kCurvatureAhead[i]));
+    }
+}
+
+}  // namespace racecraft

@@ -1,0 +1,253 @@
+#include "engine.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+#include "vehicle_kernel.hpp"
+
+namespace racecraft {
+
+Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
+               std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
+               const CameraSpec* camera, const GreyPalette& palette)
+    : config_(config), tracks_(std::move(tracks)), grounds_(std::move(grounds)), pool_(config.num_threads) {
+    const size_t n = config_.num_envs;
+    vehicles_.resize(kNumVehicleFields * n);
+    parameters_.resize(kNumVehicleParameters * n);
+    steering_command_.resize(n);
+    speed_command_.resize(n);
+    is_moving_.resize(n);
+    state_.resize(kNumStateColumns * n);
+    rows_.resize(kNumRowColumns * n);
+    episodes_.resize(n);
+    track_choice_.resize(n);
+    palettes_.assign(n, palette);
+    flags_ = std::make_unique<bool[]>(2 * n);
+
+    float values[kNumVehicleParameters];
+    std::memcpy(values, &vehicle, sizeof(values));
+    for (size_t env = 0; env < n; ++env) {
+        for (int k = 0; k < kNumVehicleParameters; ++k) parameters_[k * n + env] = values[k];
+        track_choice_[env] = static_cast<int32_t>(env % num_tracks());
+        episodes_[env].episode = -1;
+    }
+    if (camera != nullptr) {
+        camera_ = std::make_unique<CameraModel>(make_camera_model(*camera));
+        frames_.resize(n * static_cast<size_t>(camera->width) * static_cast<size_t>(camera->height));
+    }
+    reset(nullptr);
+}
+
+VehicleState Engine::vehicle(size_t env) const {
+    float values[kNumVehicleFields];
+    for (size_t k = 0; k < kNumVehicleFields; ++k) values[k] = vehicles_[k * num_envs() + env];
+    VehicleState state;
+    std::memcpy(&state, values, sizeof(state));
+    return state;
+}
+
+void Engine::store_vehicle(size_t env, const VehicleState& state) {
+    float values[kNumVehicleFields];
+    std::memcpy(values, &state, sizeof(state));
+    for (size_t k = 0; k < kNumVehicleFields; ++k) vehicles_[k * num_envs() + env] = values[k];
+}
+
+VehicleState Engine::start_pose(size_t env) {
+    const StartRule& rule = config_.start;
+    const TrackGeometry& track = track_of(env);
+    Episode& episode = episodes_[env];
+    const uint32_t car = static_cast<uint32_t>(env);
+    const uint32_t number = static_cast<uint32_t>(episode.episode);
+
+    double fraction = rule.offset;
+    if (rule.spread) fraction += static_cast<double>(env) / static_cast<double>(num_envs());
+    if (rule.mode == StartMode::advance) fraction += rule.advance * episode.episode;
+    if (rule.mode == StartMode::random) {
+        fraction = static_cast<double>(
+            uniform_of(philox(config_.seed, car, number, 0, Purpose::start_position).words[0]));
+    }
+    fraction = track.is_closed ? fraction - floor_of(fraction) : 0.0;
+    episode.start = fraction;
+
+    const double arc_length = fraction * track.length;
+    const double* last = track.arc_length + track.num_waypoints - 1;
+    const double* next = std::upper_bound(track.arc_length, last, arc_length);
+    const size_t segment = static_cast<size_t>(next - track.arc_length) - 1;
+    const double step = track.arc_length[segment + 1] - track.arc_length[segment];
+    const double along = (arc_length - track.arc_length[segment]) / step;
+    const double dx = track.waypoint_x[segment + 1] - track.waypoint_x[segment];
+    const double dy = track.waypoint_y[segment + 1] - track.waypoint_y[segment];
+
+    const RandomBlock random = philox(config_.seed, car, number, 0, Purpose::start_pose);
+    const float lateral = rule.lateral_jitter * symmetric_of(random.words[0]);
+    VehicleState state{};
+    state.x = static_cast<float>(track.waypoint_x[segment] + along * dx - static_cast<double>(lateral) * dy / step);
+    state.y = static_cast<float>(track.waypoint_y[segment] + along * dy + static_cast<double>(lateral) * dx / step);
+    state.heading = wrap_angle(atan2_of(static_cast<float>(dy), static_cast<float>(dx)) +
+                               rule.heading_jitter * symmetric_of(random.words[1]));
+    return state;
+}
+
+void Engine::begin_episode(size_t env) {
+    Episode& episode = episodes_[env];
+    const int32_t number = episode.episode + 1;
+    episode = Episode{};
+    episode.episode = number;
+    const bool reversed = config_.direction == Direction::reverse ||
+                          (config_.direction == Direction::alternate && (number & 1) != 0);
+    episode.track = track_choice_[env] + (reversed ? static_cast<int32_t>(num_tracks()) : 0);
+    const VehicleState state = start_pose(env);
+    store_vehicle(env, state);
+    look(env);
+
+    // The prepare step: the car stands at its start and the row carries no command.
+    const TrackGeometry& track = track_of(env);
+    const ReferencePoint reference = reference_point(state);
+    episode.steps = 1;
+    episode.status = Status::prepare;
+    episode.progress = lap_difference(track, episode.projection.arc_length / track.length, episode.start);
+    episode.last_x = reference.x;
+    episode.last_y = reference.y;
+    write_row(track, episode, state, 0.0f, 0.0f, wheels_on_road(track, state), is_reversed(env),
+              &rows_[env * kNumRowColumns]);
+    terminated()[env] = false;
+    truncated()[env] = false;
+}
+
+void Engine::look(size_t env) {
+    const VehicleState state = vehicle(env);
+    observe(track_of(env), state, episodes_[env], &state_[env * kNumStateColumns]);
+    if (camera_ != nullptr) {
+        const size_t ground = static_cast<size_t>(episodes_[env].track) % num_tracks();
+        const size_t pixels = frames_.size() / num_envs();
+        render_grey(*camera_, *grounds_[ground], palettes_[env], state.x, state.y, state.heading,
+                    &frames_[env * pixels]);
+    }
+}
+
+size_t Engine::chunk_size(size_t most) const {
+    const size_t parts = 4 * static_cast<size_t>(pool_.num_threads());
+    return std::clamp((num_envs() + parts - 1) / parts, size_t{1}, most);
+}
+
+void Engine::reset(const bool* mask) {
+    const size_t chunk = chunk_size(kLanes);
+    pool_.for_each((num_envs() + chunk - 1) / chunk, [&](size_t part) {
+        for (size_t env = part * chunk; env < std::min((part + 1) * chunk, num_envs()); ++env) {
+            if (mask == nullptr || mask[env]) begin_episode(env);
+        }
+    });
+}
+
+void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
+    const size_t n = num_envs();
+    bool any_moving = false;
+    for (size_t env = begin; env < end; ++env) {
+        is_moving_[env] = 0.0f;
+        if (terminated()[env] || truncated()[env]) continue;
+        const float steering = clamp(actions[2 * env], -kMaxSteering, kMaxSteering);
+        const float speed = actions[2 * env + 1];
+        steering_command_[env] = steering;
+        speed_command_[env] = speed == 0.0f ? 0.0f : clamp(speed, kMinSpeedCommand, kMaxSpeedCommand);
+        const Verdict verdict =
+            judge(track_of(env), config_.limits, vehicle(env), steering, speed_command_[env], is_reversed(env),
+                  episodes_[env], &rows_[env * kNumRowColumns]);
+        terminated()[env] = verdict.terminated;
+        truncated()[env] = verdict.truncated;
+        const bool moving = !verdict.terminated && episodes_[env].status != Status::pause;
+        is_moving_[env] = moving ? 1.0f : 0.0f;
+        any_moving |= moving;
+    }
+    if (!any_moving) return;
+
+    float* fields = vehicles_.data();
+    const VehicleArrays arrays{fields,         fields + n,     fields + 2 * n,           fields + 3 * n,
+                               fields + 4 * n, fields + 5 * n, fields + 6 * n,           steering_command_.data(),
+                               speed_command_.data(), is_moving_.data(), parameters_.data(), n};
+    for (size_t env = begin; env < end; env += kLanes) {
+        const int count = static_cast<int>(std::min(end - env, size_t{kLanes}));
+        RC_DISPATCH(advance_vehicles, arrays, env, count, config_.substeps);
+    }
+    for (size_t env = begin; env < end; ++env) {
+        if (is_moving_[env] != 0.0f) look(env);
+    }
+}
+
+void Engine::step(const float* actions) {
+    // With a camera a car costs microseconds, without one nanoseconds: hand out work in matching portions.
+    const size_t chunk = chunk_size(camera_ != nullptr ? kLanes : 64 * kLanes);
+    pool_.for_each((num_envs() + chunk - 1) / chunk, [&](size_t part) {
+        step_chunk(part * chunk, std::min((part + 1) * chunk, num_envs()), actions);
+    });
+}
+
+void Engine::set_pose(size_t env, float x, float y, float heading, float speed) {
+    VehicleState state{};
+    state.x = x;
+    state.y = y;
+    state.heading = wrap_angle(heading);
+    state.speed = speed;
+    store_vehicle(env, state);
+    Episode& episode = episodes_[env];
+    episode.falling_steps = 0;
+    episode.still_steps = 0;
+    terminated()[env] = false;
+    truncated()[env] = false;
+    look(env);
+    const ReferencePoint reference = reference_point(state);
+    episode.last_x = reference.x;
+    episode.last_y = reference.y;
+}
+
+void Engine::freeze(size_t env, int steps) { episodes_[env].frozen_steps = steps; }
+
+template <typename Visitor>
+void Engine::visit_saved(Visitor&& visit) {
+    visit(vehicles_.data(), vehicles_.size() * sizeof(float));
+    visit(parameters_.data(), parameters_.size() * sizeof(float));
+    visit(state_.data(), state_.size() * sizeof(float));
+    visit(rows_.data(), rows_.size() * sizeof(double));
+    visit(episodes_.data(), episodes_.size() * sizeof(Episode));
+    visit(track_choice_.data(), track_choice_.size() * sizeof(int32_t));
+    visit(palettes_.data(), palettes_.size() * sizeof(GreyPalette));
+    visit(flags_.get(), 2 * num_envs() * sizeof(bool));
+}
+
+std::vector<uint8_t> Engine::save() const {
+    std::vector<uint8_t> bytes;
+    const_cast<Engine*>(this)->visit_saved([&](const void* data, size_t size) {
+        const uint8_t* begin = static_cast<const uint8_t*>(data);
+        bytes.insert(bytes.end(), begin, begin + size);
+    });
+    return bytes;
+}
+
+void Engine::load(const uint8_t* bytes, size_t size) {
+    size_t expected = 0;
+    visit_saved([&](const void*, size_t part) { expected += part; });
+    if (size != expected) {
+        throw std::invalid_argument("Saved simulation state has " + std::to_string(size) + " bytes, this simulation needs " +
+                                    std::to_string(expected) + ": it must have the same number of cars and version.");
+    }
+    visit_saved([&](void* data, size_t part) {
+        std::memcpy(data, bytes, part);
+        bytes += part;
+    });
+    // The bytes may come from a file: nothing in them may lead outside this engine's memory.
+    for (size_t env = 0; env < num_envs(); ++env) {
+        const Episode& episode = episodes_[env];
+        const bool valid = episode.track >= 0 && static_cast<size_t>(episode.track) < tracks_.size() &&
+                           track_choice_[env] >= 0 && static_cast<size_t>(track_choice_[env]) < num_tracks();
+        if (!valid) throw std::invalid_argument("Saved simulation state names a track that this simulation lacks.");
+        for (size_t k = 0; k < kNumVehicleFields; ++k) {
+            if (!(std::abs(vehicles_[k * num_envs() + env]) < 1e6f)) {
+                throw std::invalid_argument("Saved simulation state holds a car that is nowhere.");
+            }
+        }
+        look(env);
+    }
+}
+
+}  // namespace racecraft

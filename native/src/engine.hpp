@@ -1,0 +1,105 @@
+// Steps a batch of cars: judge, move, observe, render. One call, no allocation, any number of threads, same bits.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "racecraft/random.hpp"
+#include "racecraft/rules.hpp"
+#include "renderer.hpp"
+#include "thread_pool.hpp"
+#include "track_store.hpp"
+
+namespace racecraft {
+
+enum class StartMode : int32_t { fixed = 0, advance = 1, random = 2 };
+enum class Direction : int32_t { forward = 0, reverse = 1, alternate = 2 };
+
+// Where an episode starts, as a fraction of a lap; an open track always starts at its beginning.
+struct StartRule {
+    StartMode mode;
+    double offset;           // of the first episode
+    double advance;          // added with every episode of a car (mode advance)
+    bool spread;             // spaces the cars of a batch evenly along the lap
+    float lateral_jitter;    // m, uniform in plus or minus
+    float heading_jitter;    // rad, uniform in plus or minus
+};
+
+struct EngineConfig {
+    size_t num_envs;      // N
+    uint64_t seed;
+    int substeps;         // physics steps to a control step
+    int num_threads;      // 0 for one per core
+    RuleLimits limits;
+    StartRule start;
+    Direction direction;
+};
+
+class Engine {
+  public:
+    // Tracks come in order; the reversed twin of track i is track i + num_tracks. Both drive over ground map i.
+    // Without a camera there are no frames.
+    Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
+           std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
+           const CameraSpec* camera, const GreyPalette& palette);
+
+    // Puts the masked cars (all of them without a mask) at the start of their next episode.
+    void reset(const bool* mask);
+    // actions: steering angle in rad and speed in m/s, interleaved (N, 2), finite.
+    void step(const float* actions);
+    // Puts one car somewhere else within its episode; counters of standstill and reversing begin anew.
+    void set_pose(size_t env, float x, float y, float heading, float speed);
+    // Keeps one car standing for so many steps from now on, as a penalty.
+    void freeze(size_t env, int steps);
+
+    size_t num_envs() const { return config_.num_envs; }
+    size_t num_tracks() const { return tracks_.size() / 2; }
+    int num_threads() const { return pool_.num_threads(); }
+    const CameraModel* camera() const { return camera_.get(); }
+    double* rows() { return rows_.data(); }                  // (N, kNumRowColumns)
+    float* state() { return state_.data(); }                 // (N, kNumStateColumns)
+    uint8_t* frames() { return frames_.data(); }             // (N, height, width)
+    bool* terminated() { return flags_.get(); }              // (N,)
+    bool* truncated() { return flags_.get() + num_envs(); }  // (N,)
+    float* vehicles() { return vehicles_.data(); }           // (kNumVehicleFields, N), order of VehicleState
+    float* parameters() { return parameters_.data(); }       // (kNumVehicleParameters, N)
+    int32_t* track_choice() { return track_choice_.data(); } // (N,) track of each car from its next episode on
+    GreyPalette& palette(size_t env) { return palettes_[env]; }
+
+    // Everything that the next step depends on, as plain bytes of this build.
+    std::vector<uint8_t> save() const;
+    // Throws std::invalid_argument if the bytes are not from an engine of this shape.
+    void load(const uint8_t* bytes, size_t size);
+
+  private:
+    static constexpr size_t kNumVehicleFields = sizeof(VehicleState) / sizeof(float);
+
+    const TrackGeometry& track_of(size_t env) const { return tracks_[episodes_[env].track].geometry(); }
+    bool is_reversed(size_t env) const { return static_cast<size_t>(episodes_[env].track) >= num_tracks(); }
+    VehicleState vehicle(size_t env) const;
+    void store_vehicle(size_t env, const VehicleState& state);
+    VehicleState start_pose(size_t env);
+    void begin_episode(size_t env);
+    void look(size_t env);    // observes and renders the current pose
+    void step_chunk(size_t begin, size_t end, const float* actions);
+    size_t chunk_size(size_t most) const;
+
+    template <typename Visitor>
+    void visit_saved(Visitor&& visit);
+
+    EngineConfig config_;
+    std::vector<TrackStore> tracks_;
+    std::vector<std::shared_ptr<const GroundMap>> grounds_;
+    std::unique_ptr<CameraModel> camera_;
+    ThreadPool pool_;
+
+    std::vector<float> vehicles_, parameters_, steering_command_, speed_command_, is_moving_, state_;
+    std::vector<double> rows_;
+    std::vector<uint8_t> frames_;
+    std::vector<Episode> episodes_;
+    std::vector<int32_t> track_choice_;
+    std::vector<GreyPalette> palettes_;
+    std::unique_ptr<bool[]> flags_;  // terminated, then truncated (std::vector<bool> has no bytes to show)
+};
+
+}  // namespace racecraft

@@ -1,0 +1,168 @@
+#include "track_store.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace racecraft {
+namespace {
+
+constexpr double kMargin = 1.0;          // m of grid around the borders: a car that leaves is judged within it
+constexpr double kFinestCell = 0.1;      // m
+constexpr double kMostCells = 20000.0;   // coarser cells beyond, so that a long track still loads at once
+
+void append_ring(std::vector<double>& edges, const std::vector<double>& points) {
+    const size_t count = points.size() / 2;
+    for (size_t i = 0; i < count; ++i) {
+        const size_t next = (i + 1) % count;
+        edges.insert(edges.end(), {points[2 * i], points[2 * i + 1], points[2 * next], points[2 * next + 1]});
+    }
+}
+
+// sqrt, not hypot: IEEE 754 fixes its last bit, a C library's hypot may differ.
+double length_of(double dx, double dy) { return std::sqrt(dx * dx + dy * dy); }
+
+double distance_to_segment(double x, double y, double ax, double ay, double bx, double by) {
+    const double dx = bx - ax;
+    const double dy = by - ay;
+    const double along = clamp(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy), 0.0, 1.0);
+    return length_of(x - (ax + along * dx), y - (ay + along * dy));
+}
+
+}  // namespace
+
+TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& widths,
+                       const std::vector<float>& curvatures, double samples_per_metre)
+    : widths_(widths), curvatures_(curvatures) {
+    const size_t count = outline.num_waypoints;
+    for (size_t i = 0; i < count; ++i) {
+        waypoint_x_.push_back(outline.centerline[2 * i]);
+        waypoint_y_.push_back(outline.centerline[2 * i + 1]);
+        const double step = i == 0 ? 0.0
+                                   : length_of(waypoint_x_[i] - waypoint_x_[i - 1], waypoint_y_[i] - waypoint_y_[i - 1]);
+        arc_length_.push_back(i == 0 ? 0.0 : arc_length_.back() + step);
+    }
+
+    std::vector<double> inner(outline.inner, outline.inner + 2 * count);
+    std::vector<double> outer(outline.outer, outline.outer + 2 * count);
+    if (outline.is_closed) {
+        append_ring(border_, inner);
+        append_ring(border_, outer);
+    } else {
+        std::vector<double> ring = outer;
+        for (size_t i = count; i-- > 0;) ring.insert(ring.end(), {inner[2 * i], inner[2 * i + 1]});
+        append_ring(border_, ring);
+    }
+
+    double x_min = inner[0], x_max = inner[0], y_min = inner[1], y_max = inner[1];
+    for (size_t i = 0; i < border_.size(); i += 2) {
+        x_min = std::min(x_min, border_[i]);
+        x_max = std::max(x_max, border_[i]);
+        y_min = std::min(y_min, border_[i + 1]);
+        y_max = std::max(y_max, border_[i + 1]);
+    }
+    const double width = x_max - x_min + 2.0 * kMargin;
+    const double height = y_max - y_min + 2.0 * kMargin;
+    const double cell = std::max(kFinestCell, std::sqrt(width * height / kMostCells));
+
+    TrackGeometry& g = geometry_;
+    g.num_waypoints = static_cast<int32_t>(count);
+    g.is_closed = outline.is_closed ? 1 : 0;
+    g.length = arc_length_.back();
+    g.waypoint_x = waypoint_x_.data();
+    g.waypoint_y = waypoint_y_.data();
+    g.arc_length = arc_length_.data();
+    g.grid_x = x_min - kMargin;
+    g.grid_y = y_min - kMargin;
+    g.inverse_cell = 1.0 / cell;
+    g.grid_columns = static_cast<int32_t>(std::ceil(width / cell));
+    g.grid_rows = static_cast<int32_t>(std::ceil(height / cell));
+    g.num_samples = static_cast<int32_t>(widths_.size());
+    g.samples_per_metre = samples_per_metre;
+    g.width_table = widths_.data();
+    g.curvature_table = curvatures_.data();
+    build_segments();
+    build_bands();
+}
+
+void TrackStore::build_segments() {
+    TrackGeometry& g = geometry_;
+    const double cell = 1.0 / g.inverse_cell;
+    const double reach = std::sqrt(2.0) * cell;  // twice the half diagonal of a cell
+    const size_t segments = waypoint_x_.size() - 1;
+    std::vector<double> distance(segments);
+    segment_begin_.push_back(0);
+    for (int32_t row = 0; row < g.grid_rows; ++row) {
+        for (int32_t column = 0; column < g.grid_columns; ++column) {
+            const double x = g.grid_x + (column + 0.5) * cell;
+            const double y = g.grid_y + (row + 0.5) * cell;
+            double nearest = 1e300;
+            for (size_t i = 0; i < segments; ++i) {
+                distance[i] = distance_to_segment(x, y, waypoint_x_[i], waypoint_y_[i], waypoint_x_[i + 1],
+                                                  waypoint_y_[i + 1]);
+                nearest = std::min(nearest, distance[i]);
+            }
+            for (size_t i = 0; i < segments; ++i) {
+                if (distance[i] <= nearest + reach + 1e-9) segment_items_.push_back(static_cast<uint16_t>(i));
+            }
+            segment_begin_.push_back(static_cast<uint32_t>(segment_items_.size()));
+        }
+    }
+    g.segment_begin = segment_begin_.data();
+    g.segment_items = segment_items_.data();
+}
+
+void TrackStore::build_bands() {
+    TrackGeometry& g = geometry_;
+    const double cell = 1.0 / g.inverse_cell;
+    band_begin_.push_back(0);
+    for (int32_t row = 0; row < g.grid_rows; ++row) {
+        const double low = g.grid_y + row * cell - 1e-9;
+        const double high = g.grid_y + (row + 1) * cell + 1e-9;
+        for (size_t i = 0; i < border_.size(); i += 4) {
+            const double x0 = border_[i], y0 = border_[i + 1], x1 = border_[i + 2], y1 = border_[i + 3];
+            if (y0 == y1 || std::max(y0, y1) < low || std::min(y0, y1) > high) continue;
+            edge_x0_.push_back(x0);
+            edge_y0_.push_back(y0);
+            edge_y1_.push_back(y1);
+            edge_slope_.push_back((x1 - x0) / (y1 - y0));
+        }
+        band_begin_.push_back(static_cast<uint32_t>(edge_x0_.size()));
+    }
+    g.band_begin = band_begin_.data();
+    g.edge_x0 = edge_x0_.data();
+    g.edge_y0 = edge_y0_.data();
+    g.edge_y1 = edge_y1_.data();
+    g.edge_slope = edge_slope_.data();
+
+    // A cell no border comes near is uniform; its centre then speaks for all of it.
+    const size_t cells = static_cast<size_t>(g.grid_columns) * static_cast<size_t>(g.grid_rows);
+    cell_kind_.assign(cells, kCellOutside);
+    for (size_t i = 0; i < border_.size(); i += 4) {
+        const double x0 = border_[i], y0 = border_[i + 1], x1 = border_[i + 2], y1 = border_[i + 3];
+        const auto index = [&](double value, double origin, int32_t limit) {
+            return std::clamp(static_cast<int32_t>(std::floor((value - origin) * g.inverse_cell)), 0, limit - 1);
+        };
+        const int32_t first_row = index(std::min(y0, y1) - 1e-9, g.grid_y, g.grid_rows);
+        const int32_t last_row = index(std::max(y0, y1) + 1e-9, g.grid_y, g.grid_rows);
+        const int32_t first_column = index(std::min(x0, x1) - 1e-9, g.grid_x, g.grid_columns);
+        const int32_t last_column = index(std::max(x0, x1) + 1e-9, g.grid_x, g.grid_columns);
+        for (int32_t row = first_row; row <= last_row; ++row) {
+            for (int32_t column = first_column; column <= last_column; ++column) {
+                cell_kind_[static_cast<size_t>(row) * g.grid_columns + column] = kCellMixed;
+            }
+        }
+    }
+    g.cell_kind = cell_kind_.data();
+    for (int32_t row = 0; row < g.grid_rows; ++row) {
+        for (int32_t column = 0; column < g.grid_columns; ++column) {
+            uint8_t& kind = cell_kind_[static_cast<size_t>(row) * g.grid_columns + column];
+            if (kind == kCellMixed) continue;
+            kind = kCellMixed;  // asks is_on_road() to count for itself
+            const bool inside =
+                is_on_road(g, g.grid_x + (column + 0.5) * cell, g.grid_y + (row + 0.5) * cell);
+            kind = inside ? kCellInside : kCellOutside;
+        }
+    }
+}
+
+}  // namespace racecraft

@@ -1,0 +1,37 @@
+// Owns the memory behind one TrackGeometry and builds its grid.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "racecraft/track.hpp"
+#include "track_outline.hpp"
+
+namespace racecraft {
+
+class TrackStore {
+  public:
+    // widths and curvatures are samples at i / samples_per_metre along the centre line.
+    TrackStore(const TrackOutline& outline, const std::vector<float>& widths, const std::vector<float>& curvatures,
+               double samples_per_metre);
+    TrackStore(TrackStore&&) = default;
+    TrackStore(const TrackStore&) = delete;
+
+    const TrackGeometry& geometry() const { return geometry_; }
+
+  private:
+    void build_segments();
+    void build_bands();
+
+    TrackGeometry geometry_{};
+    std::vector<double> waypoint_x_, waypoint_y_, arc_length_;
+    std::vector<double> border_;  // x0, y0, x1, y1 of every border edge
+    std::vector<uint8_t> cell_kind_;
+    std::vector<uint32_t> segment_begin_;
+    std::vector<uint16_t> segment_items_;
+    std::vector<uint32_t> band_begin_;
+    std::vector<double> edge_x0_, edge_y0_, edge_y1_, edge_slope_;
+    std::vector<float> widths_, curvatures_;
+};
+
+}  // namespace racecraft

@@ -1,0 +1,71 @@
+#include "vehicle_kernel.hpp"
+
+namespace racecraft::RC_ISA {
+namespace {
+
+struct Lanes {
+    float x[kLanes], y[kLanes], heading[kLanes], speed[kLanes], lateral_speed[kLanes], yaw_rate[kLanes],
+        steering[kLanes];
+};
+
+}  // namespace
+
+void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int substeps) {
+    const float sim_dt = kControlDt / static_cast<float>(substeps);
+    alignas(64) Lanes lanes;
+    alignas(64) float parameters[kNumVehicleParameters][kLanes];
+    alignas(64) float steering_command[kLanes];
+    alignas(64) float speed_command[kLanes];
+    size_t car[kLanes];  // unused lanes repeat the last car and are not stored
+    for (int i = 0; i < kLanes; ++i) car[i] = begin + static_cast<size_t>(i < count ? i : count - 1);
+    for (int i = 0; i < kLanes; ++i) {
+        lanes.x[i] = arrays.x[car[i]];
+        lanes.y[i] = arrays.y[car[i]];
+        lanes.heading[i] = arrays.heading[car[i]];
+        lanes.speed[i] = arrays.speed[car[i]];
+        lanes.lateral_speed[i] = arrays.lateral_speed[car[i]];
+        lanes.yaw_rate[i] = arrays.yaw_rate[car[i]];
+        lanes.steering[i] = arrays.steering[car[i]];
+        steering_command[i] = arrays.steering_command[car[i]];
+        speed_command[i] = arrays.speed_command[car[i]];
+    }
+    for (int k = 0; k < kNumVehicleParameters; ++k) {
+        for (int i = 0; i < kLanes; ++i) parameters[k][i] = arrays.parameters[k * arrays.stride + car[i]];
+    }
+
+    for (int substep = 0; substep < substeps; ++substep) {
+#pragma GCC ivdep
+        for (int i = 0; i < kLanes; ++i) {
+            const VehicleParameters p{
+#define RC_LOAD(name) parameters[kVehicle_##name][i],
+                RC_VEHICLE_PARAMETERS(RC_LOAD)
+#undef RC_LOAD
+            };
+            const VehicleState state{lanes.x[i],     lanes.y[i],
+                                     lanes.heading[i], lanes.speed[i],
+                                     lanes.lateral_speed[i], lanes.yaw_rate[i],
+                                     lanes.steering[i]};
+            const VehicleState next = vehicle_substep(p, state, steering_command[i], speed_command[i], sim_dt);
+            lanes.x[i] = next.x;
+            lanes.y[i] = next.y;
+            lanes.heading[i] = next.heading;
+            lanes.speed[i] = next.speed;
+            lanes.lateral_speed[i] = next.lateral_speed;
+            lanes.yaw_rate[i] = next.yaw_rate;
+            lanes.steering[i] = next.steering;
+        }
+    }
+
+    for (int i = 0; i < count; ++i) {
+        if (arrays.is_moving[car[i]] == 0.0f) continue;
+        arrays.x[car[i]] = lanes.x[i];
+        arrays.y[car[i]] = lanes.y[i];
+        arrays.heading[car[i]] = lanes.heading[i];
+        arrays.speed[car[i]] = lanes.speed[i];
+        arrays.lateral_speed[car[i]] = lanes.lateral_speed[i];
+        arrays.yaw_rate[car[i]] = lanes.yaw_rate[i];
+        arrays.steering[car[i]] = lanes.steering[i];
+    }
+}
+
+}  // namespace racecraft::RC_ISA
