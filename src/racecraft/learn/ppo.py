@@ -1,0 +1,450 @@
+"""Proximal policy optimisation, top to bottom: collect a rollout, estimate advantages, improve the policy.
+
+    environment ──frames, state──▶ collect ──▶ Rollout ──▶ bootstrap, advantages ──▶ update ──▶ new weights
+
+https://arxiv.org/abs/1707.06347, with AWS DeepRacer's variants (whole episodes per iteration, e-greedy
+exploration, Huber value loss) as settings. Anything with ``observe``, ``step`` and ``reset`` can be learned
+from; a `Learner` holds the network.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import CheckpointError, ConfigError, TrainingError
+from racecraft.learn import distributions
+from racecraft.learn.learner import Learner, Minibatch, Objective, UpdateStats
+from racecraft.learn.rollout import Rollout
+
+_VALUE_BATCH = 4096  # observations whose values are computed at once
+
+
+@dataclass(frozen=True, kw_only=True)
+class PPOConfig:
+    """Settings of PPO, by CleanRL's names."""
+
+    num_envs: int = 64
+    """Cars driven at once."""
+    num_steps: int = 32
+    """Steps of each car in one rollout, when episodes_per_iteration is 0."""
+    episodes_per_iteration: int = 0
+    """Train after so many whole episodes, shared between the cars, as AWS does; 0: after num_steps."""
+    max_steps_per_iteration: int = 10_000
+    """Camera steps after which an iteration of whole episodes cuts and bootstraps those still running."""
+    learning_rate: float = 5e-4
+    """Adam's step size."""
+    gamma: float = 0.98
+    """Discount per step of 1/15 s; 0.98 looks about 3 s ahead."""
+    gae_lambda: float = 0.92
+    """0 trusts the critic after one step, 1 trusts only the rewards."""
+    minibatch_size: int = 256
+    """Samples of one gradient step."""
+    update_epochs: int = 3
+    """Passes over each rollout."""
+    clip_coef: float = 0.2
+    """How far the probability ratio may move from 1 within an iteration."""
+    ent_coef: float = 0.01
+    """Weight of the entropy bonus; more explores longer."""
+    vf_coef: float = 0.5
+    """Weight of the value loss."""
+    value_loss: str = "mse"
+    """``"mse"`` or ``"huber"``."""
+    max_grad_norm: float = 0.5
+    """Global gradient norm is scaled down to this; 0 or infinity leaves it alone, as AWS does."""
+    normalize_returns: bool = True
+    """Let the critic predict in units of the returns' running spread, so that rewards may have any scale."""
+    exploration: str = "categorical"
+    """``"categorical"`` samples the policy; ``"e-greedy"`` takes the best action, or any by chance."""
+    epsilon_start: float = 1.0
+    """Chance of a random action in the first step of e-greedy exploration."""
+    epsilon_end: float = 0.05
+    """Chance of a random action after epsilon_steps."""
+    epsilon_steps: int = 10_000
+    """Camera steps over which that chance falls linearly."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot work, naming the field."""
+        for name in ("num_envs", "num_steps", "max_steps_per_iteration", "minibatch_size", "update_epochs"):
+            _require(self, name, getattr(self, name) >= 1, "at least 1")
+        for name in ("gamma", "gae_lambda", "epsilon_start", "epsilon_end"):
+            _require(self, name, 0 <= getattr(self, name) <= 1, "from 0 to 1")
+        for name in ("learning_rate", "ent_coef", "vf_coef"):
+            _require(self, name, 0 <= getattr(self, name) < float("inf"), "a finite number, 0 or more")
+        for name in ("episodes_per_iteration", "epsilon_steps", "max_grad_norm"):
+            _require(self, name, getattr(self, name) >= 0, "0 or more")
+        _require(self, "clip_coef", 0 < self.clip_coef < 1, "between 0 and 1")
+        _require(self, "value_loss", self.value_loss in ("mse", "huber"), "'mse' or 'huber'")
+        _require(
+            self,
+            "exploration",
+            self.exploration in ("categorical", "e-greedy"),
+            "'categorical' or 'e-greedy'",
+        )
+
+    @property
+    def objective(self) -> Objective:
+        """The part of the settings a learner's update needs."""
+        names = [field.name for field in dataclasses.fields(Objective) if hasattr(self, field.name)]
+        return Objective(**{name: getattr(self, name) for name in names})
+
+
+class Environment(Protocol):
+    """A batch of cars to learn from. An episode's last step tells how it ended; ``reset`` begins another."""
+
+    @property
+    def num_envs(self) -> int:
+        """N, the number of cars."""
+
+    def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Camera frames (N, H, W) and privileged state (N, S) at the current poses; views are fine."""
+
+    def step(self, actions: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Drive one step: rewards, terminated, truncated, each (N,).
+
+        Args:
+            actions: Indices int64 (N,), or float32 (N, A) within [-1, 1].
+        """
+
+    def reset(self, mask: NDArray[np.bool_]) -> None:
+        """Put the cars of the mask (N,) at a new start."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class IterationStats:
+    """What one iteration did. The losses are means over its gradient steps."""
+
+    iteration: int
+    """Number of this iteration, from 1."""
+    total_steps: int
+    """Camera steps since the start of training, this iteration included."""
+    num_steps: int
+    """Camera steps of this iteration."""
+    episodes: int
+    """Episodes that ended in this iteration."""
+    mean_return: float
+    """Mean undiscounted sum of rewards of those episodes; NaN where there were none."""
+    mean_length: float
+    """Mean number of steps of those episodes; NaN where there were none."""
+    losses: UpdateStats
+    explained_variance: float
+    """1 - Var(returns - values) / Var(returns): 1 for a perfect critic, 0 for a constant one."""
+    environment_seconds: float
+    """Wall-clock time inside the environment."""
+    policy_seconds: float
+    """Wall-clock time of encoding frames and choosing actions."""
+    update_seconds: float
+    """Wall-clock time of values, advantages and gradient steps."""
+
+
+class PPO:
+    """The algorithm and its place in training.
+
+    Args:
+        config: Settings.
+        learner: The network; it is changed in place.
+        environment: The cars; must have ``config.num_envs`` of them, at the start of an episode.
+        seed: Decides all sampling and shuffling, together with the number of the iteration.
+
+    Raises:
+        ConfigError: The settings do not fit the learner or the environment.
+    """
+
+    def __init__(
+        self, config: PPOConfig, learner: Learner, environment: Environment, *, seed: int = 0
+    ) -> None:
+        spec = learner.spec
+        _require(
+            config,
+            "num_envs",
+            config.num_envs == environment.num_envs,
+            f"the environment's {environment.num_envs}",
+        )
+        if config.exploration == "e-greedy":
+            _require(config, "exploration", spec.is_discrete, "'categorical' for continuous actions")
+        if config.episodes_per_iteration:
+            capacity = -(
+                -config.max_steps_per_iteration // min(config.num_envs, config.episodes_per_iteration)
+            )
+        else:
+            capacity = config.num_steps
+            samples = config.num_steps * config.num_envs
+            _require(
+                config,
+                "minibatch_size",
+                config.minibatch_size <= samples,
+                f"at most num_steps x num_envs = {samples}",
+            )
+        self.config = config
+        self.learner = learner
+        self.environment = environment
+        self.seed = seed
+        self.iteration = 0
+        self.total_steps = 0
+        self._rollout = Rollout(
+            capacity,
+            num_envs=config.num_envs,
+            observation_shape=learner.observation_shape,
+            state_size=spec.state_size,
+            action_size=0 if spec.is_discrete else spec.num_actions,
+        )
+        self._episode_returns = np.zeros(config.num_envs)
+        self._episode_lengths = np.zeros(config.num_envs, np.int64)
+        self._return_scale = np.array(
+            [0.0, 1.0]
+        )  # running mean and spread of the returns, in units of reward
+        self._clocks = {"environment": 0.0, "policy": 0.0, "update": 0.0}
+
+    def iterate(self) -> IterationStats:
+        """Collect one rollout and improve the policy on it.
+
+        Raises:
+            TrainingError: Loss or gradient is not finite; the weights are those of before the iteration.
+        """
+        rng = np.random.default_rng([self.seed, self.iteration])
+        self._clocks = dict.fromkeys(self._clocks, 0.0)
+        finished = self._collect(rng)
+
+        started = time.perf_counter()
+        advantages, returns = self._estimate()
+        losses = self._update(advantages, returns, rng)
+        self._clocks["update"] += time.perf_counter() - started
+
+        rollout = self._rollout
+        used = rollout.is_valid[: rollout.num_steps]
+        variance = float(returns[used].var())
+        self.iteration += 1
+        return IterationStats(
+            iteration=self.iteration,
+            total_steps=self.total_steps,
+            num_steps=int(used.sum()),
+            episodes=len(finished),
+            mean_return=float(np.mean([total for total, _ in finished])) if finished else float("nan"),
+            mean_length=float(np.mean([length for _, length in finished])) if finished else float("nan"),
+            losses=losses,
+            explained_variance=1 - float(advantages[used].var()) / variance if variance > 0 else float("nan"),
+            environment_seconds=self._clocks["environment"],
+            policy_seconds=self._clocks["policy"],
+            update_seconds=self._clocks["update"],
+        )
+
+    # ---- collect: drive until the rollout is full
+
+    def _collect(self, rng: np.random.Generator) -> list[tuple[float, int]]:
+        """Fill the rollout; return (sum of rewards, length) of each episode that ended."""
+        rollout, environment = self._rollout, self.environment
+        num_envs, episodes = self.config.num_envs, self.config.episodes_per_iteration
+        finished: list[tuple[float, int]] = []
+        budget = self.config.max_steps_per_iteration if episodes else self.config.num_steps * num_envs
+        quota = np.full(num_envs, np.iinfo(np.int64).max)  # episodes each car may still begin
+        if episodes:
+            quota = np.array([episodes // num_envs + (car < episodes % num_envs) for car in range(num_envs)])
+            environment.reset(np.ones(num_envs, bool))
+            self._episode_returns[:], self._episode_lengths[:] = 0.0, 0
+        rollout.clear()
+        cut: list[tuple[int, NDArray[np.intp], NDArray[np.uint8], NDArray[np.float32]]] = []
+
+        while budget > 0 and quota.any() and rollout.num_steps < len(rollout.rewards):
+            started = time.perf_counter()
+            frames, states = environment.observe()
+            observations = self.learner.encode(frames)
+            actions, log_probs = self._act(observations, rng)
+            is_driving = quota > 0
+            rollout.add(
+                observations=observations,
+                states=states[:, : rollout.states.shape[2]],
+                actions=actions,
+                log_probs=log_probs,
+                is_valid=is_driving,
+            )
+            acted = time.perf_counter()
+            command = actions if self.learner.spec.is_discrete else actions.clip(-1.0, 1.0)
+            rewards, terminated, truncated = environment.step(command)
+            rollout.finish(rewards=rewards, terminated=terminated, truncated=truncated)
+            budget -= int(is_driving.sum())
+            self.total_steps += int(is_driving.sum())
+
+            # the last frame of a truncated episode is gone after the reset: keep it for its value
+            done = terminated | truncated
+            cars = np.flatnonzero(truncated & ~terminated & is_driving)
+            if len(cars):
+                cut.append((rollout.num_steps - 1, cars, *self._look(cars)))
+            self._episode_returns += rewards
+            self._episode_lengths += 1
+            ended = np.flatnonzero(done & is_driving)
+            finished += zip(
+                self._episode_returns[ended].tolist(), self._episode_lengths[ended].tolist(), strict=True
+            )
+            self._episode_returns[done], self._episode_lengths[done] = 0.0, 0
+            if episodes:
+                quota -= done & is_driving
+            if done.any():
+                environment.reset(done)
+            self._clocks["policy"] += acted - started
+            self._clocks["environment"] += time.perf_counter() - acted
+
+        # every car still under way continues after the last row: its value stands in for what follows
+        last = rollout.num_steps - 1
+        cars = np.flatnonzero(rollout.is_valid[last] & ~rollout.terminated[last] & ~rollout.truncated[last])
+        if len(cars):
+            cut.append((last, cars, *self._look(cars)))
+        for row, cars, observations, states in cut:
+            rollout.next_values[row, cars] = self._values(observations, states)
+        return finished
+
+    def _act(
+        self, observations: NDArray[np.uint8], rng: np.random.Generator
+    ) -> tuple[NDArray[Any], NDArray[np.float32]]:
+        """Explore: actions as the policy drew them, and their log-probabilities under it."""
+        spec, config = self.learner.spec, self.config
+        outputs = self.learner.policy(observations)
+        if not np.isfinite(outputs).all():
+            raise TrainingError(
+                "The policy's outputs are not finite.", hint="Lower learning_rate, or check the reward."
+            )
+        num_cars, is_discrete = len(outputs), spec.is_discrete
+        if config.exploration == "e-greedy":
+            actions = distributions.most_likely(outputs, is_discrete=True)
+            done = min(self.total_steps / config.epsilon_steps, 1.0) if config.epsilon_steps else 1.0
+            epsilon = config.epsilon_start + (config.epsilon_end - config.epsilon_start) * done
+            is_random = rng.random(num_cars) < epsilon
+            actions = np.where(is_random, rng.integers(spec.num_actions, size=num_cars), actions)
+        else:
+            noise = distributions.noise_for(
+                num_cars, num_actions=spec.num_actions, is_discrete=is_discrete, rng=rng
+            )
+            actions = distributions.sample(outputs, noise, is_discrete=is_discrete)
+        return actions, distributions.log_prob(outputs, actions, is_discrete=is_discrete)
+
+    def _look(self, cars: NDArray[np.intp]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Observations and states of some cars where they are now."""
+        frames, states = self.environment.observe()
+        return self.learner.encode(frames[cars]), np.array(states[cars, : self.learner.spec.state_size])
+
+    # ---- estimate: values, advantages, returns
+
+    def _estimate(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Advantages and returns of the rollout, (T, N), in units of reward."""
+        rollout = self._rollout
+        rows = slice(0, rollout.num_steps)
+        shape = rollout.values[rows].shape
+        observations = rollout.observations[rows].reshape(-1, *rollout.observations.shape[2:])
+        states = rollout.states[rows].reshape(-1, rollout.states.shape[2])
+        rollout.values[rows] = self._values(observations, states).reshape(shape)
+        return rollout.advantages(gamma=self.config.gamma, gae_lambda=self.config.gae_lambda)
+
+    def _values(self, observations: NDArray[np.uint8], states: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The critic's values, in units of reward  (N,)."""
+        starts = range(0, len(observations), _VALUE_BATCH)
+        values = [
+            self.learner.values(observations[i : i + _VALUE_BATCH], states[i : i + _VALUE_BATCH])
+            for i in starts
+        ]
+        mean, spread = self._return_scale
+        return np.asarray(np.concatenate(values) * spread + mean, np.float32)
+
+    # ---- update: gradient steps on shuffled minibatches
+
+    def _update(
+        self, advantages: NDArray[np.float32], returns: NDArray[np.float32], rng: np.random.Generator
+    ) -> UpdateStats:
+        config, rollout = self.config, self._rollout
+        used = np.flatnonzero(rollout.is_valid[: rollout.num_steps])
+        self._follow_returns(returns.reshape(-1)[used])
+        mean, spread = self._return_scale
+        b_observations = rollout.observations.reshape(-1, *rollout.observations.shape[2:])
+        b_states = rollout.states.reshape(-1, rollout.states.shape[2])
+        b_actions = rollout.actions.reshape(-1, *rollout.actions.shape[2:])
+        b_log_probs = rollout.log_probs.reshape(-1)
+        b_returns = ((returns - mean) / spread).astype(np.float32).reshape(-1)
+        b_advantages = advantages.reshape(-1)
+        b_advantages = (b_advantages - b_advantages[used].mean()) / (b_advantages[used].std() + 1e-8)
+
+        before = self.learner.weights(), self.learner.optimizer_state()
+        minibatch_size = min(config.minibatch_size, len(used))
+        objective = config.objective
+        stats: list[UpdateStats] = []
+        for _ in range(config.update_epochs):
+            order = rng.permutation(used)
+            for start in range(
+                0, len(used) - minibatch_size + 1, minibatch_size
+            ):  # a last partial one is dropped
+                mb = order[start : start + minibatch_size]
+                minibatch = Minibatch(
+                    observations=b_observations[mb],
+                    states=b_states[mb],
+                    actions=b_actions[mb],
+                    log_probs=b_log_probs[mb],
+                    advantages=b_advantages[mb],
+                    returns=b_returns[mb],
+                )
+                stats.append(self.learner.update(minibatch, objective))
+                if not stats[-1].is_finite:
+                    self.learner.load_weights(before[0])
+                    self.learner.load_optimizer_state(before[1])
+                    raise TrainingError(
+                        f"The loss is {stats[-1].policy_loss + stats[-1].value_loss} with gradient norm "
+                        f"{stats[-1].grad_norm} in iteration {self.iteration + 1}; its weights are discarded.",
+                        hint="Lower learning_rate, set max_grad_norm, or look for huge rewards.",
+                    )
+        names = [field.name for field in dataclasses.fields(UpdateStats)]
+        return UpdateStats(**{name: float(np.mean([getattr(s, name) for s in stats])) for name in names})
+
+    def _follow_returns(self, returns: NDArray[np.float32]) -> None:
+        """Move the critic's unit towards the returns seen lately; the first rollout sets it."""
+        if not self.config.normalize_returns:
+            return
+        seen = np.array([returns.mean(), max(float(returns.std()), 1e-6)], np.float64)
+        self._return_scale = seen if self.iteration == 0 else 0.9 * self._return_scale + 0.1 * seen
+
+    # ---- resume
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Everything needed to continue, except where the cars are: plain arrays by name."""
+        arrays: dict[str, NDArray[Any]] = {
+            "ppo/counters": np.array([self.seed, self.iteration, self.total_steps], np.int64),
+            "ppo/episode_returns": self._episode_returns.copy(),
+            "ppo/episode_lengths": self._episode_lengths.copy(),
+            "ppo/return_scale": self._return_scale.copy(),
+        }
+        arrays |= {f"weights/{name}": array for name, array in self.learner.weights().items()}
+        arrays |= {f"optimizer/{name}": array for name, array in self.learner.optimizer_state().items()}
+        return arrays
+
+    def load_state(self, state: dict[str, NDArray[Any]]) -> None:
+        """Continue from what ``state`` gave.
+
+        Raises:
+            CheckpointError: It belongs to another network or number of cars.
+        """
+        try:
+            counters, returns, lengths, scale = (
+                state[f"ppo/{name}"]
+                for name in ("counters", "episode_returns", "episode_lengths", "return_scale")
+            )
+        except KeyError as error:
+            raise CheckpointError(f"The training state has no entry {error}.") from None
+        if returns.shape != self._episode_returns.shape:
+            raise CheckpointError(
+                f"The training state is of {len(returns)} cars, not of {len(self._episode_returns)}.",
+                hint=f"Resume with num_envs = {len(returns)}.",
+            )
+        self.learner.load_weights(_below("weights/", state))
+        self.learner.load_optimizer_state(_below("optimizer/", state))
+        self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
+        self._episode_returns, self._episode_lengths = returns.copy(), lengths.copy()
+        self._return_scale = scale.copy()
+
+
+def _below(prefix: str, arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def _require(config: PPOConfig, name: str, is_met: bool, allowed: str) -> None:
+    if not is_met:
+        raise ConfigError(f"{name} is {getattr(config, name)!r}, expected {allowed}.")
