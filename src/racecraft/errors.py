@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 
 class RacecraftError(Exception):
@@ -43,7 +44,32 @@ class ConfigError(RacecraftError, ValueError):
 
 
 class RewardError(RacecraftError, ValueError):
-    """A reward function is not valid, or failed while it ran."""
+    """A reward function is not valid, or failed while it ran.
+
+    Args:
+        message: What is wrong, with the line of the user's file.
+        hint: What to do next.
+        line: Line of the user's file, from 1, where it is known.
+        column: Column of that line, from 1, where it is known.
+        row_index: Row of the batch whose call failed.
+        params: The dict that the failing call was given.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        hint: str = "",
+        line: int | None = None,
+        column: int | None = None,
+        row_index: int | None = None,
+        params: dict[str, Any] | None = None,
+    ) -> None:
+        super().__init__(message, hint=hint)
+        self.line = line
+        self.column = column
+        self.row_index = row_index
+        self.params = params
 
 
 class CheckpointError(RacecraftError, ValueError):

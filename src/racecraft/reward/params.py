@@ -1,0 +1,142 @@
+"""One row of the simulation becomes the ``params`` dict of AWS DeepRacer: here and nowhere else.
+
+The worker process loads this file by its path, without the rest of Racecraft, so it imports nothing.
+It runs once per car and step: a copy of a template and plain assignments were the fastest form measured,
+ahead of a dict literal (which CPython merges from pieces) and ``zip``.
+"""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
+
+    Waypoints = list[tuple[float, float]]
+
+DEGREES = 57.29577951308232  # degrees in one radian; the same product as math.degrees
+
+TEMPLATE: dict[str, Any] = {
+    "all_wheels_on_track": False,  # bool: all four wheel centres are on the road
+    "x": 0.0,  # float, m: point 0.14 m ahead of the car's origin
+    "y": 0.0,  # float, m
+    "heading": 0.0,  # float, degrees: -180 to 180, 0 is +x, counter-clockwise positive
+    "distance_from_center": 0.0,  # float, m: at least 0
+    "projection_distance": 0.0,  # float, m along the centre line
+    "progress": 0.0,  # float, percent of the lap since the start of the episode
+    "steps": 0.0,  # float: the first call of an episode sees 2.0
+    "speed": 0.0,  # float, m/s: commanded
+    "steering_angle": 0.0,  # float, degrees: commanded, left positive
+    "track_width": 0.0,  # float, m: at the car
+    "track_length": 0.0,  # float, m
+    "waypoints": [],  # list of (x, y) in m, in the driving direction; first == last on a closed track
+    "closest_waypoints": [0, 0],  # [int, int]: indices of the waypoint behind and the one ahead
+    "is_left_of_center": False,  # bool: relative to the driving direction
+    "is_reversed": False,  # bool: the driving direction is against the track's, not "the car is backwards"
+    "closest_objects": [0, 0],  # [int, int]; the objects' keys have these values when there are none
+    "objects_location": [],  # list of (x, y), m
+    "objects_left_of_center": [],  # list of bool
+    "object_in_camera": False,  # bool
+    "objects_speed": [],  # list of float, m/s
+    "objects_heading": [],  # list of float, rad
+    "objects_distance_from_center": [],  # list of float, m
+    "objects_distance": [],  # list of float, m along the centre line
+    "is_crashed": False,  # bool
+    "is_offtrack": False,  # bool: no wheel is on the road
+    "sim_time": 0.0,  # float, simulated s since the reset
+}
+
+
+def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[str, Any]:
+    """The dict that ``reward_function`` receives.
+
+    Every mutable value is fresh, as AWS makes a deep copy: nothing a function does to it reaches the next call.
+
+    Args:
+        row: One row of the simulation, its values in the order of ``racecraft.sim.columns.ROW_COLUMNS``.
+        waypoints: For every track index, the centre line in the driving direction.
+    """
+    (
+        _episode,
+        steps,
+        x,
+        y,
+        heading,
+        steering_angle,
+        speed,
+        progress,
+        offset,
+        projection_distance,
+        track_width,
+        track_length,
+        closest_prev,
+        closest_next,
+        all_wheels_on_track,
+        is_offtrack,
+        is_crashed,
+        is_reversed,
+        _status,
+        time,
+        track_index,
+        _actual_speed,
+        _actual_steering_angle,
+        _lap,
+    ) = row
+    heading_deg = heading * DEGREES
+    if not -180.0 <= heading_deg <= 180.0:
+        heading_deg = (heading_deg + 180.0) % 360.0 - 180.0
+
+    params = TEMPLATE.copy()
+    params["all_wheels_on_track"] = all_wheels_on_track != 0.0
+    params["x"] = x
+    params["y"] = y
+    params["heading"] = heading_deg
+    params["distance_from_center"] = abs(offset)
+    params["projection_distance"] = projection_distance
+    params["progress"] = progress * 100.0
+    params["steps"] = steps
+    params["speed"] = speed
+    params["steering_angle"] = steering_angle * DEGREES
+    params["track_width"] = track_width
+    params["track_length"] = track_length
+    params["waypoints"] = waypoints[int(track_index)].copy()
+    params["closest_waypoints"] = [int(closest_prev), int(closest_next)]
+    params["is_left_of_center"] = offset > 0.0
+    params["is_reversed"] = is_reversed != 0.0
+    params["closest_objects"] = [0, 0]
+    params["objects_location"] = []
+    params["objects_left_of_center"] = []
+    params["objects_speed"] = []
+    params["objects_heading"] = []
+    params["objects_distance_from_center"] = []
+    params["objects_distance"] = []
+    params["is_crashed"] = is_crashed != 0.0
+    params["is_offtrack"] = is_offtrack != 0.0
+    params["sim_time"] = time
+    return params
+
+
+def format_params(params: dict[str, Any]) -> str:
+    """The dict as an error shows it: six digits, waypoints only counted, no keys of objects that are not there."""
+    parts = []
+    for key, value in params.items():
+        if "object" in key and not params["objects_location"]:
+            continue
+        if key == "waypoints" and isinstance(value, list) and value:
+            text = f"<{len(value)} points from {format_value(value[0])}>"
+        else:
+            text = format_value(value)
+        parts.append(f"'{key}': {text}")
+    return "{" + ", ".join(parts) + "}"
+
+
+def format_value(value: object) -> str:
+    """A number, or a list or tuple of numbers, to six significant digits."""
+    if isinstance(value, float):
+        text = f"{value:.6g}"
+        return text if any(mark in text for mark in ".en") else text + ".0"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(format_value, value)) + "]"
+    if isinstance(value, tuple):
+        return "(" + ", ".join(map(format_value, value)) + ")"
+    return repr(value)

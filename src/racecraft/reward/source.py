@@ -1,0 +1,84 @@
+"""Where reward functions come from: the presets that ship with Racecraft, and files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from racecraft.errors import RewardError, did_you_mean
+
+MAX_CHARACTERS = 140_000  # longest source that AWS accepts
+_PRESETS = Path(__file__).with_name("presets")
+
+
+def preset_names() -> list[str]:
+    """Names of the rewards that ship with Racecraft, in alphabetical order."""
+    return sorted(path.stem for path in _PRESETS.glob("*.py"))
+
+
+def load_preset(name: str) -> str:
+    """The source of a preset.
+
+    Raises:
+        RewardError: There is none of this name.
+    """
+    if name not in preset_names():
+        raise RewardError(
+            f"Reward preset {name!r} does not exist. {did_you_mean(name, preset_names())}".rstrip(),
+            hint=f"The presets are {', '.join(preset_names())}.",
+        )
+    return (_PRESETS / f"{name}.py").read_text(encoding="utf-8")
+
+
+def load_reward(name_or_path: str | Path) -> str:
+    """The source of a reward function.
+
+    Args:
+        name_or_path: A preset's name, or the path of a ``reward_function.py``. A preset goes before a file of the same
+            name; write ``./racing`` to mean the file.
+
+    Raises:
+        RewardError: It is neither, or the file is not UTF-8 text of 1 to 140,000 characters.
+    """
+    if str(name_or_path) in preset_names():
+        return load_preset(str(name_or_path))
+    path = Path(name_or_path).expanduser()
+    try:
+        is_file, is_folder = path.is_file(), path.is_dir()
+    except (OSError, ValueError):  # a name too long, or with a NUL in it
+        is_file = is_folder = False
+    if is_folder:
+        inside = path / "reward_function.py"
+        hint = f"Did you mean '{inside}'?" if inside.is_file() else "Name the file inside it."
+        raise RewardError(f"'{path}' is a folder, expected a reward function's file.", hint=hint)
+    if not is_file:
+        suggestion = did_you_mean(str(name_or_path), [*preset_names(), *_python_files_beside(path)])
+        raise RewardError(
+            f"Reward {str(name_or_path)[:200]!r} is neither a preset nor a file. {suggestion}".rstrip(),
+            hint=f"The presets are {', '.join(preset_names())}.",
+        )
+    try:
+        with path.open("rb") as file:
+            data = file.read(4 * MAX_CHARACTERS + 1)
+        source = data.decode("utf-8-sig")
+    except OSError as error:
+        raise RewardError(f"Reward function '{path}' cannot be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        if len(data) > 4 * MAX_CHARACTERS:
+            raise RewardError(_too_long(path)) from error
+        line = data[: error.start].count(b"\n") + 1
+        raise RewardError(f"Reward function '{path}' is not UTF-8 text: see line {line}.", line=line) from error
+    if len(source) > MAX_CHARACTERS:
+        raise RewardError(_too_long(path))
+    return source
+
+
+def _too_long(path: Path) -> str:
+    return f"Reward function '{path}' has more than {MAX_CHARACTERS:,} characters, the most that AWS accepts."
+
+
+def _python_files_beside(path: Path) -> list[str]:
+    """Paths that the user may have meant, as they would have written them."""
+    try:
+        return [str(file) for file in sorted(path.parent.glob("*.py"))[:100]]
+    except (OSError, ValueError):
+        return []

@@ -1,0 +1,338 @@
+"""The reward function in a process of its own: rows of the simulation in, rewards out.
+
+    with RewardWorker(source, tracks) as worker:
+        rewards = worker(simulation.rows)  # (N, columns) -> (N,)
+
+User code never runs in the trainer. The two processes share memory and ring each other over pipes, once per
+batch; replies are numbers and text, never pickles. Whatever a reward function does, the caller gets rewards or one
+`RewardError` that names the line and the params, within a bounded time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import marshal
+import mmap
+import os
+import re
+import select
+import signal
+import subprocess
+import time
+import weakref
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from racecraft.errors import RewardError, ShapeError
+from racecraft.reward import launch
+from racecraft.reward import worker_process as protocol
+from racecraft.reward.params import format_params, make_params
+from racecraft.sim.columns import ROW_COLUMNS
+
+if TYPE_CHECKING:
+    from racecraft.track.track import Track
+
+Rows = npt.NDArray[np.float64]
+
+TEXT_BYTES = 8 * 1024  # longest description of a failure
+LOG_BYTES = 64 * 1024  # how much of the last printed text is kept
+MAX_BATCH = 4096  # rows per doorbell; larger arrays go over in parts
+
+_TRACK_COLUMN = ROW_COLUMNS.index("track_index")
+_FRAME = re.compile(rf'File "{re.escape(protocol.FILENAME)}", line (\d+)')
+
+
+class RewardWorker:
+    """Calls a user's ``reward_function(params)`` in a separate process.
+
+    A call costs about 2 µs for a short function. After an error the process is gone, and further calls say so.
+    Globals of the user's file live on between calls, as on AWS, where one process drove one car; ``num_cars``
+    keeps that true for a batch.
+
+    Args:
+        source: Text of the user's ``reward_function.py``.
+        tracks: The simulation's tracks; a row's ``track_index`` selects the waypoints, i + len(tracks) means track i
+            driven the other way.
+        seed: Seeds ``random`` and ``numpy.random`` in the process, so that a run repeats.
+        timeout_s: How long one call of the function may take before the process is killed, s.
+        start_timeout_s: How long the top level of the source may take, imports included, s.
+        memory_limit_mb: Address space of the process, MB.
+        num_cars: How many copies of the source's globals there are: row i belongs to car i modulo this. One copy
+            is right for functions that keep no state, and loads fastest; see `keeps_state`.
+
+    Raises:
+        RewardError: The source cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        tracks: Track | Sequence[Track],
+        *,
+        seed: int = 0,
+        timeout_s: float = 5.0,
+        start_timeout_s: float = 30.0,
+        memory_limit_mb: int = 2048,
+        num_cars: int = 1,
+    ) -> None:
+        self._source_lines = source.splitlines()
+        self._waypoints = waypoints_of(tracks if isinstance(tracks, Sequence) else (tracks,))
+        self._timeout_s = timeout_s
+        self._failure: RewardError | None = None
+
+        rewards_offset = MAX_BATCH * len(ROW_COLUMNS) * 8
+        text_offset = rewards_offset + MAX_BATCH * 8
+        log_offset = text_offset + TEXT_BYTES
+        size = log_offset + protocol.SIZE.size + LOG_BYTES
+        descriptor = launch.create_shared_memory(size)
+        try:
+            memory = mmap.mmap(descriptor, size)
+            self._process = launch.start_process(descriptor)
+        finally:
+            os.close(descriptor)
+        self._finalizer = weakref.finalize(self, _end, self._process)
+        self._rows = np.frombuffer(memory, np.float64, MAX_BATCH * len(ROW_COLUMNS)).reshape(MAX_BATCH, -1)
+        self._rewards = np.frombuffer(memory, np.float64, MAX_BATCH, rewards_offset)
+        self._text = memoryview(memory)[text_offset:log_offset]
+        self._log = memoryview(memory)[log_offset:]
+        self._poll = select.poll()
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._requests = self._process.stdin.fileno()
+        self._replies = self._process.stdout.fileno()
+        self._poll.register(self._replies, select.POLLIN | select.POLLHUP)
+
+        setup = {
+            "source": source,
+            "seed": seed % 2**32,
+            "waypoints": self._waypoints,
+            "num_columns": len(ROW_COLUMNS),
+            "num_cars": num_cars,
+            "timeout_s": timeout_s,
+            "memory": descriptor,
+            "memory_size": size,
+            "memory_limit": memory_limit_mb * 2**20,
+            "rewards_offset": rewards_offset,
+            "text_offset": text_offset,
+            "log_offset": log_offset,
+            "params_path": make_params.__code__.co_filename,
+            "package_paths": launch.package_paths(),
+            "trace_signal": int(signal.SIGUSR1),
+        }
+        self._start(marshal.dumps(setup), start_timeout_s)
+
+    def _start(self, setup: bytes, timeout_s: float) -> None:
+        try:
+            with contextlib.suppress(BrokenPipeError), os.fdopen(os.dup(self._requests), "wb") as pipe:
+                pipe.write(protocol.SIZE.pack(len(setup)) + setup)
+            if not self._poll.poll(timeout_s * 1000):
+                raise self._stalled(None, timeout_s)
+            self._read_reply(None, 0)
+        except BaseException:
+            self._finalizer()
+            raise
+
+    def __call__(self, rows: Rows) -> npt.NDArray[np.float64]:
+        """The rewards of a batch of rows.
+
+        Args:
+            rows: Rows of the simulation, columns in the order of ``ROW_COLUMNS``  (N, columns).
+
+        Returns:
+            One reward per row, finite and within ±1e5  (N,).
+
+        Raises:
+            RewardError: The function raised, returned no number, hung or crashed; the worker has ended.
+        """
+        if self._failure is not None:
+            raise RewardError(
+                f"The reward worker ended after an error and cannot be called again: {self._failure}",
+                hint="Correct the reward function and make a new RewardWorker.",
+            ) from self._failure
+        rows = np.asarray(rows, np.float64)
+        if rows.ndim != 2 or rows.shape[1] != len(ROW_COLUMNS):
+            raise ShapeError(
+                f"rows has shape {rows.shape}, expected (N, {len(ROW_COLUMNS)}): one row of sim.rows per car."
+            )
+        if not np.isfinite(rows).all():
+            raise ShapeError("rows holds NaN or infinity; every value of a judged step is finite.")
+        track_index = rows[:, _TRACK_COLUMN]
+        if len(rows) and (track_index.min() < 0 or track_index.max() >= len(self._waypoints)):
+            raise ShapeError(
+                f"rows holds a track_index outside 0 to {len(self._waypoints) - 1}, the worker's tracks."
+            )
+        rewards = np.empty(len(rows))
+        for first in range(0, len(rows), MAX_BATCH):
+            part = rows[first : first + MAX_BATCH]
+            rewards[first : first + len(part)] = self._call(part, first)
+        return rewards
+
+    def _call(self, rows: Rows, first: int) -> npt.NDArray[np.float64]:
+        count = len(rows)
+        self._rows[:count] = rows
+        rewards = self._rewards[:count]
+        rewards.fill(np.nan)  # a finite value says that the row is done
+        try:
+            with contextlib.suppress(BrokenPipeError):
+                os.write(self._requests, protocol.REQUEST.pack(count, first))
+            num_done = 0
+            while not self._poll.poll(self._timeout_s * 1000):
+                before, num_done = num_done, _num_done(rewards)
+                if num_done == before:
+                    raise self._stalled(rows, self._timeout_s, first=first)
+            self._read_reply(rows, first)
+        except BaseException as error:
+            self._failure = (
+                error if isinstance(error, RewardError) else RewardError("a batch was interrupted")
+            )
+            self._finalizer()
+            raise
+        if not (
+            np.abs(rewards) <= protocol.REWARD_LIMIT
+        ).all():  # NaN included: never trust the process's own check
+            self._failure = RewardError("The reward worker answered without all rewards.")
+            self._finalizer()
+            raise self._failure
+        return rewards
+
+    def _read_reply(self, rows: Rows | None, first: int) -> None:
+        """Take the reply that waits in the pipe; anything but success raises."""
+        message = os.read(self._replies, protocol.REPLY.size)
+        if len(message) < protocol.REPLY.size:
+            raise self._crashed(rows, first)
+        status, row, line, size = protocol.REPLY.unpack(message)
+        if status == (protocol.READY if rows is None else protocol.REWARDS):
+            return
+        if status != protocol.FAILED or size > TEXT_BYTES or (rows is not None and row >= len(rows)):
+            raise RewardError(
+                "The reward worker sent a reply that makes no sense: user code wrote into its pipe."
+            )
+        text = bytes(self._text[:size]).decode("utf-8", "replace")
+        raise self._error(text, line, rows, row, first=first)
+
+    def _stalled(self, rows: Rows | None, timeout_s: float, *, first: int = 0) -> RewardError:
+        """The error of a process that makes no progress; asks it for its stack first."""
+        self._process.send_signal(signal.SIGUSR1)
+        line = _line_in(self._read_stderr(timeout_s=1.0))
+        text = f"did not return within {timeout_s:g} s"
+        return self._error(
+            text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first
+        )
+
+    def _crashed(self, rows: Rows | None, first: int) -> RewardError:
+        """The error of a process that ended without a reply."""
+        try:
+            status = self._process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            return RewardError("The reward worker closed its pipe: user code may not touch file descriptors.")
+        stack = self._read_stderr(timeout_s=1.0)
+        line = _line_in(stack)
+        if status < 0:
+            name = signal.Signals(-status).name
+            cause = {
+                "SIGKILL": "killed from outside, or by the system for lack of memory",
+                "SIGSEGV": "a crash, often of endless recursion",
+                "SIGXCPU": "out of processor time",
+            }
+            text = f"ended the worker process with {name}" + (f" ({cause[name]})" if name in cause else "")
+        else:
+            text = f"ended the worker process with exit status {status}"
+        if rows is None and line < 0 and stack:
+            text += f": {stack.strip().splitlines()[-1]}"
+        return self._error(
+            text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first
+        )
+
+    def _error(self, text: str, line: int, rows: Rows | None, row: int, *, first: int) -> RewardError:
+        """One sentence, the line at fault, and the params that the function was called with."""
+        message = f"{protocol.FILENAME}, line {line}: " if line > 0 else f"{protocol.FILENAME}: "
+        message += text if "Error:" in text else f"the reward function {text}"
+        message += "" if message.endswith(".") else "."
+        if 0 < line <= len(self._source_lines):
+            message += f"\n    {self._source_lines[line - 1].strip()}"
+        params: dict[str, Any] | None = None
+        if rows is None:
+            message += "\nIt failed while the file was loaded, before the first call."
+        elif row < len(rows):
+            params = make_params(rows[row].tolist(), self._waypoints)
+            message += f"\nIt was called with params = {format_params(params)}"
+        return RewardError(
+            message,
+            line=line if line > 0 else None,
+            row_index=None if rows is None else first + row,
+            params=params,
+        )
+
+    def _read_stderr(self, timeout_s: float) -> str:
+        """What the process wrote about its own crash, up to 64 KB."""
+        assert self._process.stderr is not None
+        descriptor = self._process.stderr.fileno()
+        os.set_blocking(descriptor, False)
+        deadline = time.monotonic() + timeout_s
+        data = b""
+        while time.monotonic() < deadline and len(data) < 65536:
+            if select.select([descriptor], [], [], 0.05)[0]:
+                part = os.read(descriptor, 65536)
+                if not part:
+                    break
+                data += part
+            elif data:
+                break
+        return data.decode("utf-8", "replace")
+
+    @property
+    def log(self) -> str:
+        """The last 64 KB that the user's function printed."""
+        (written,) = protocol.SIZE.unpack_from(self._log)
+        ring = bytes(self._log[protocol.SIZE.size :])
+        start = written % len(ring)
+        data = ring[:written] if written <= len(ring) else ring[start:] + ring[:start]
+        return data.decode("utf-8", "replace")
+
+    @property
+    def process_id(self) -> int:
+        """Number of the worker process."""
+        return self._process.pid
+
+    def close(self) -> None:
+        """End the process; calling again does nothing."""
+        if self._failure is None:
+            self._failure = RewardError("it was closed")
+        self._finalizer()
+
+    def __enter__(self) -> RewardWorker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def waypoints_of(tracks: Sequence[Track]) -> list[list[tuple[float, float]]]:
+    """The centre lines as AWS hands them out, for each track and then for each driven the other way."""
+    forward = [[(x, y) for x, y in track.centerline.tolist()] for track in tracks]
+    return forward + [line[::-1] for line in forward]
+
+
+def _num_done(rewards: npt.NDArray[np.float64]) -> int:
+    """How many rows have their reward: they are written in order."""
+    missing = np.isnan(rewards)
+    return int(missing.argmax()) if missing.any() else len(rewards)
+
+
+def _line_in(stack: str) -> int:
+    """The innermost line of the user's file in a stack written by faulthandler, or -1."""
+    match = _FRAME.search(stack)
+    return int(match.group(1)) if match else -1
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Kill the process and all that it may have started, and close its pipes."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    for pipe in (process.stdin, process.stdout, process.stderr):
+        if pipe is not None:
+            pipe.close()

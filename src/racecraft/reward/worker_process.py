@@ -1,0 +1,315 @@
+"""The program inside the reward worker process: rows in, rewards out.
+
+``launch.py`` starts it as a bare interpreter, so it imports built-in modules only, and is ready in 20 ms.
+It reads one setup message from stdin, loads the user's source, and then serves batches:
+
+    stdin   REQUEST(count, first_row)       one per batch, the doorbell
+    memory  rows (count, columns) in, rewards (count,) out, text of a failure, ring of the last prints
+    stdout  REPLY(status, row, line, text_size)
+    stderr  the stack that ``faulthandler`` writes when the process crashes or is asked where it hangs
+
+User code sees none of these three: its prints go to the ring, and file descriptors 0 to 2 lead nowhere.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import io
+import marshal
+import mmap
+import os
+import resource
+import struct
+import sys
+import time
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+    from typing import Any
+
+    Reward = Callable[[dict[str, Any]], object]
+
+REQUEST = struct.Struct("<II")  # rows in this batch, index of the first one in the caller's array
+REPLY = struct.Struct("<BIiI")  # status, row, line (-1 unknown), bytes of text
+READY, REWARDS, FAILED = 1, 2, 3  # statuses of a reply
+SIZE = struct.Struct("<Q")  # bytes of the setup message; also the count of printed bytes that heads the ring
+
+FILENAME = "reward_function.py"  # what the user's source is called in every traceback
+REWARD_LIMIT = 1e5  # largest magnitude that AWS accepts
+
+# Events of sys.addaudithook that a reward function has no use for. Refusing them gives an error with its line;
+# it is no sandbox.
+FORBIDDEN_EVENTS = frozenset(
+    (
+        *("os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "os.system", "pty.spawn"),
+        *("subprocess.Popen", "os.kill", "os.killpg", "ctypes.dlopen"),
+        *("socket.__new__", "socket.bind", "socket.connect", "socket.getaddrinfo"),
+    )
+)
+
+
+class BadRewardError(Exception):
+    """What the function returned is not a reward."""
+
+
+class PrintRing(io.TextIOBase):
+    """A text stream into shared memory that keeps the last bytes and never blocks, grows or fails."""
+
+    def __init__(self, memory: memoryview) -> None:
+        self._head = memory[: SIZE.size]
+        self._ring = memory[SIZE.size :]
+        self._written = 0
+
+    def writable(self) -> bool:
+        """Yes."""
+        return True
+
+    def write(self, text: str) -> int:
+        """Append the text, over the oldest bytes when the ring is full."""
+        room = len(self._ring)
+        data = text[-room:].encode("utf-8", "replace")[-room:]
+        start = self._written % room
+        first = min(len(data), room - start)
+        self._ring[start : start + first] = data[:first]
+        self._ring[: len(data) - first] = data[first:]
+        self._written += len(data)
+        SIZE.pack_into(self._head, 0, self._written)
+        return len(text)
+
+
+def main() -> None:
+    """Load the user's source, then serve batches until the caller hangs up or a call fails."""
+    requests, replies, trace = os.dup(0), os.dup(1), os.dup(2)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for standard in (0, 1, 2):
+        os.dup2(nowhere, standard)
+    setup = marshal.loads(read_exactly(requests, SIZE.unpack(read_exactly(requests, SIZE.size))[0]))
+
+    memory = memoryview(mmap.mmap(setup["memory"], setup["memory_size"]))
+    os.close(setup["memory"])
+    sys.stdout = sys.stderr = PrintRing(memory[setup["log_offset"] :])
+    faulthandler.enable(trace, all_threads=False)
+    faulthandler.register(setup["trace_signal"], trace, all_threads=False)
+    server = Server(setup, memory, replies)
+    limit_resources(setup["memory_limit"])
+    try:
+        functions = load_functions(setup)
+    except BaseException as error:
+        server.fail(error, 0)
+        return
+    server.reply(READY)
+    server.serve(requests, functions)
+
+
+class Server:
+    """Answers requests over the shared memory."""
+
+    def __init__(self, setup: dict[str, Any], memory: memoryview, replies: int) -> None:
+        self._make_params = load_make_params(setup["params_path"])
+        self._row = struct.Struct(f"{setup['num_columns']}d")
+        self._rows = memory[: setup["rewards_offset"]]
+        self._rewards = memory[setup["rewards_offset"] : setup["text_offset"]].cast("d")
+        self._text = memory[setup["text_offset"] : setup["log_offset"]]
+        self._waypoints = setup["waypoints"]
+        self._timeout_s = setup["timeout_s"]
+        self._replies = replies
+        self._process_id = os.getpid()
+        self._write = os.write
+
+    def serve(self, requests: int, functions: list[Reward]) -> None:
+        """Serve batches. Row i of the caller's array goes to function i modulo their number."""
+        read, process_time, setrlimit = os.read, time.process_time, resource.setrlimit
+        while True:
+            message = read(requests, REQUEST.size)
+            if len(message) < REQUEST.size:
+                return
+            count, first = REQUEST.unpack(message)
+
+            # A dead man's switch: should the caller die while user code spins, the kernel ends this process.
+            seconds = int(process_time() + self._timeout_s * count) + 60
+            setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
+            if not self._serve_batch(count, first, functions):
+                return
+            self.reply(REWARDS)
+
+    def _serve_batch(self, count: int, first: int, functions: list[Reward]) -> bool:
+        make_params, waypoints, rewards = self._make_params, self._waypoints, self._rewards
+        reward_function, num_functions = functions[0], len(functions)
+        index = 0
+        try:
+            for row in self._row.iter_unpack(self._rows[: count * self._row.size]):
+                if num_functions > 1:
+                    reward_function = functions[(first + index) % num_functions]
+                reward = reward_function(make_params(row, waypoints))
+                if type(reward) is not float:
+                    reward = to_float(reward)
+                if not -REWARD_LIMIT <= reward <= REWARD_LIMIT:
+                    raise BadRewardError(f"returned {reward!r}; a reward is a finite number within ±100000")
+                rewards[index] = reward
+                index += 1
+        except BadRewardError as error:
+            self.fail(error, index, line=line_of_return(reward_function, make_params(row, waypoints)))
+            return False
+        except BaseException as error:
+            self.fail(error, index)
+            return False
+        return True
+
+    def reply(self, status: int, *, row: int = 0, line: int = -1, size: int = 0) -> None:
+        """Ring back."""
+        if os.getpid() != self._process_id:  # a copy that user code forked off: it has no voice
+            os._exit(1)
+        self._write(self._replies, REPLY.pack(status, row, line, size))
+
+    def fail(self, error: BaseException, row: int, *, line: int = -1) -> None:
+        """Report what went wrong; the process ends after this."""
+        if line < 0:
+            line = line_of(error)
+        data = describe(error)[: len(self._text)]
+        self._text[: len(data)] = data
+        self.reply(FAILED, row=row, line=line, size=len(data))
+
+
+def load_make_params(path: str) -> Callable[..., dict[str, Any]]:
+    """``make_params`` of params.py, without importing the package around it."""
+    namespace: dict[str, Any] = {"__name__": "params"}
+    with open(path, encoding="utf-8") as file:
+        exec(compile(file.read(), path, "exec"), namespace)
+    make_params: Callable[..., dict[str, Any]] = namespace["make_params"]
+    return make_params
+
+
+def load_functions(setup: dict[str, Any]) -> list[Reward]:
+    """Run the user's source once per car that keeps its own globals; each run gives one function."""
+    sys.path.extend(setup["package_paths"])
+    source = setup["source"]
+    code = compile(source, FILENAME, "exec", dont_inherit=True)
+
+    # Seeded before the source runs, and imported only where the source can use them: numpy takes 100 ms.
+    if "random" in source:
+        import random
+
+        random.seed(setup["seed"])
+    if any(name in source for name in ("numpy", "scipy", "shapely")):
+        import numpy.random
+
+        numpy.random.seed(setup["seed"])  # noqa: NPY002 - what users call is the global generator
+    sys.addaudithook(guard)
+
+    functions = []
+    for _ in range(setup["num_cars"]):
+        module = type(sys)("reward_function")
+        sys.modules["reward_function"] = module  # dataclasses look up their module by name
+        exec(code, module.__dict__)
+        function = module.__dict__.get("reward_function")
+        if not callable(function):
+            raise BadRewardError("has no function 'reward_function(params)'")
+        functions.append(function)
+    return functions
+
+
+def guard(event: str, arguments: tuple[object, ...]) -> None:
+    """Refuse what a reward function has no use for, at the line that tries it."""
+    if event in FORBIDDEN_EVENTS and arguments[:1] != (None,):
+        raise PermissionError(f"a reward function may not use {event}")
+
+
+def limit_resources(memory_limit: int) -> None:
+    """No file can be written, no process started, and memory ends at ``memory_limit`` bytes."""
+    for kind, limit in (
+        (resource.RLIMIT_AS, memory_limit),
+        (resource.RLIMIT_FSIZE, 0),
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_NOFILE, 64),
+        (resource.RLIMIT_NPROC, 0),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        value = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        try:
+            resource.setrlimit(kind, (value, value))
+        except (OSError, ValueError):  # some systems do not let RLIMIT_AS be lowered
+            continue
+
+
+def to_float(reward: Any) -> float:
+    """What AWS's ``float()`` makes of a bool, an int or a numpy scalar; a text is no number here."""
+    if reward is None:
+        raise BadRewardError("returned None; every path through the function must return a number")
+    if isinstance(reward, (str, bytes, bytearray)):
+        raise BadRewardError(f"returned the text {reward[:50]!r}; a reward is a number")
+    try:
+        return float(reward)
+    except Exception as error:
+        kind = type(reward).__name__
+        raise BadRewardError(f"returned a value of type {kind}, which is not a number") from error
+
+
+def line_of(error: BaseException) -> int:
+    """The deepest line of the user's file in the error's traceback, or -1."""
+    if isinstance(error, SyntaxError) and error.filename == FILENAME and error.lineno is not None:
+        return error.lineno
+    line, step = -1, error.__traceback__
+    while step is not None:
+        if step.tb_frame.f_code.co_filename == FILENAME:
+            line = step.tb_lineno
+        step = step.tb_next
+    return line
+
+
+def line_of_return(reward_function: Reward, params: dict[str, Any]) -> int:
+    """The line that returns the value for these params, found by calling the function again under a trace."""
+    line = -1
+
+    def trace(frame: FrameType, event: str, value: object) -> Any:
+        nonlocal line
+        if frame.f_code.co_filename != FILENAME:
+            return None
+        if event == "return":
+            line = frame.f_lineno  # the outermost frame returns last
+        return trace
+
+    sys.settrace(trace)
+    try:
+        reward_function(params)
+    except BaseException:
+        return -1
+    finally:
+        sys.settrace(None)
+    return line
+
+
+def describe(error: BaseException) -> bytes:
+    """One line about the error, whatever its ``__str__`` does."""
+    kind = type(error).__name__
+    try:
+        text = " ".join(str(error.msg if isinstance(error, SyntaxError) else error)[:2000].split())
+    except BaseException:
+        text = ""
+    if isinstance(error, BadRewardError):
+        message = text
+    elif isinstance(error, SystemExit):
+        message = f"called sys.exit({text})"
+    elif isinstance(error, MemoryError) and not text:
+        message = "MemoryError: the reward function used up its memory limit"
+    else:
+        message = f"{kind}: {text}" if text else kind
+    return message.encode("utf-8", "replace")
+
+
+def read_exactly(descriptor: int, size: int) -> bytes:
+    """Read ``size`` bytes, however many reads it takes."""
+    parts = []
+    while size > 0:
+        part = os.read(descriptor, min(size, 1 << 20))
+        if not part:
+            raise EOFError("the caller hung up during the setup")
+        parts.append(part)
+        size -= len(part)
+    return b"".join(parts)
+
+
+if __name__ == "__main__":
+    main()
+    os._exit(0)  # no atexit handler or thread of user code may hold up the end
