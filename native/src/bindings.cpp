@@ -28,7 +28,7 @@ TrackOutline outline_of(const Points& centerline, const Points& inner, const Poi
     if (count < 2 || count > 65535 || inner.shape(0) != count || outer.shape(0) != count) {
         throw std::invalid_argument("A track needs 2 to 65535 waypoints and borders of the same number of points.");
     }
-    return {count, is_closed, centerline.data(), inner.data(), outer.data()};
+    return {centerline.data(), inner.data(), outer.data(), static_cast<int>(count), is_closed};
 }
 
 // What the engine keeps of one track: its rules' geometry in both directions and the ground that the camera sees.
@@ -71,6 +71,37 @@ nb::tuple names_of(const char* const (&names)[Count]) {
     nb::list list;
     for (const char* name : names) list.append(name);
     return nb::tuple(list);
+}
+
+void bind_camera(nb::module_& m) {
+    nb::class_<CameraSpec>(m, "CameraSpec", "Where a camera sits on the car and what it covers; SI units and radians.")
+        .def(
+            "__init__",
+            [](CameraSpec* self, int width, int height, float hfov, float forward, float left, float above,
+               float pitch) {
+                new (self) CameraSpec{width, height, hfov, pitch, forward, left, above};
+            },
+            "width"_a, "height"_a, "hfov"_a, "forward"_a, "left"_a, "above"_a, "pitch"_a);
+    nb::class_<GreyPalette>(m, "GreyPalette", "Brightness of everything a driver's camera can see.");
+    m.def(
+        "grey_palette",
+        [](const std::string& name) {
+            if (name == "2018") return grey_palette(kPalette2018);
+            if (name == "2020") return grey_palette(kPalette2020);
+            throw std::invalid_argument("Palette '" + name + "' does not exist; choose '2018' or '2020'.");
+        },
+        "name"_a);
+    nb::class_<GroundMap>(m, "GroundMap", "The ground of a track as cameras see it.")
+        .def(
+            "__init__",
+            [](GroundMap* self, const Points& centerline, const Points& inner, const Points& outer, bool is_closed,
+               float texel) {
+                const TrackOutline outline = outline_of(centerline, inner, outer, is_closed);
+                nb::gil_scoped_release release;
+                new (self) GroundMap(outline, GroundOptions{.texel = texel});
+            },
+            "centerline"_a, "inner"_a, "outer"_a, "is_closed"_a, "texel"_a)
+        .def_prop_ro("num_bytes", &GroundMap::num_bytes);
 }
 
 void bind_engine(nb::module_& m) {
@@ -149,8 +180,8 @@ void bind_engine(nb::module_& m) {
         .def_prop_ro("frames",
                      [](nb::handle_t<Engine> self) {
                          Engine& e = nb::cast<Engine&>(self);
-                         const size_t height = e.camera() ? static_cast<size_t>(e.camera()->spec.height) : 0;
-                         const size_t width = e.camera() ? static_cast<size_t>(e.camera()->spec.width) : 0;
+                         const size_t height = e.camera() ? static_cast<size_t>(e.camera()->spec().height) : 0;
+                         const size_t width = e.camera() ? static_cast<size_t>(e.camera()->spec().width) : 0;
                          return Array<uint8_t, 3>(e.frames(), {e.num_envs(), height, width}, self);
                      })
         .def_prop_ro("terminated",
@@ -195,5 +226,6 @@ NB_MODULE(_native, m) {
         return names;
     });
     m.def("set_isa", &racecraft::set_isa, "name"_a);
+    racecraft::bind_camera(m);
     racecraft::bind_engine(m);
 }

@@ -34,7 +34,7 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
         episodes_[env].episode = -1;
     }
     if (camera != nullptr) {
-        camera_ = std::make_unique<CameraModel>(make_camera_model(*camera));
+        camera_ = std::make_unique<CameraModel>(*camera);
         frames_.resize(n * static_cast<size_t>(camera->width) * static_cast<size_t>(camera->height));
     }
     reset(nullptr);

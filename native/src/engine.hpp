@@ -6,7 +6,7 @@
 
 #include "racecraft/random.hpp"
 #include "racecraft/rules.hpp"
-#include "renderer.hpp"
+#include "camera_model.hpp"
 #include "thread_pool.hpp"
 #include "track_store.hpp"
 

@@ -1,16 +1,15 @@
 // A track's lines as they come from Python; what the rules' geometry and the ground map are built from.
 #pragma once
 
-#include <cstddef>
-
 namespace racecraft {
 
+// Each line is (count, 2) row-major, metres. A closed track may repeat its first point at the end.
 struct TrackOutline {
-    size_t num_waypoints;      // W
-    bool is_closed;            // first and last row are then equal
-    const double* centerline;  // m, x and y interleaved   (W, 2)
-    const double* inner;       // m                        (W, 2)
-    const double* outer;       // m                        (W, 2)
+    const double* center;
+    const double* inner;
+    const double* outer;
+    int count;
+    bool is_closed;
 };
 
 }  // namespace racecraft

@@ -33,10 +33,10 @@ double distance_to_segment(double x, double y, double ax, double ay, double bx, 
 TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& widths,
                        const std::vector<float>& curvatures, double samples_per_metre)
     : widths_(widths), curvatures_(curvatures) {
-    const size_t count = outline.num_waypoints;
+    const size_t count = static_cast<size_t>(outline.count);
     for (size_t i = 0; i < count; ++i) {
-        waypoint_x_.push_back(outline.centerline[2 * i]);
-        waypoint_y_.push_back(outline.centerline[2 * i + 1]);
+        waypoint_x_.push_back(outline.center[2 * i]);
+        waypoint_y_.push_back(outline.center[2 * i + 1]);
         const double step = i == 0 ? 0.0
                                    : length_of(waypoint_x_[i] - waypoint_x_[i - 1], waypoint_y_[i] - waypoint_y_[i - 1]);
         arc_length_.push_back(i == 0 ? 0.0 : arc_length_.back() + step);

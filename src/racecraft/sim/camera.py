@@ -1,0 +1,46 @@
+"""Where the driver's camera sits and what it sees; the picture itself is drawn by the native renderer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from racecraft.errors import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraSpec:
+    """The front camera of the original car, 160 x 120 grey at 15 Hz."""
+
+    width: int = 160
+    """Pixels."""
+    height: int = 120
+    """Pixels."""
+    horizontal_fov: float = 1.13
+    """rad, 64.7 degrees."""
+    forward: float = 0.14529
+    """m, lens ahead of the car's origin."""
+    left: float = 0.0
+    """m, lens to the left of the car's centre plane."""
+    above_ground: float = 0.127
+    """m, lens above the road."""
+    pitch: float = 0.2618
+    """rad, downwards; 15 degrees."""
+    palette: str = "2018"
+    """Colours of the world: ``2018`` or ``2020``."""
+
+    def __post_init__(self) -> None:
+        limits = {
+            "width": (8, 2048),
+            "height": (8, 2048),
+            "horizontal_fov": (0.1, 2.8),
+            "forward": (-2.0, 2.0),
+            "left": (-2.0, 2.0),
+            "above_ground": (0.02, 0.9),
+            "pitch": (0.0, 1.5),
+        }
+        for name, (low, high) in limits.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ConfigError(f"Camera setting {name} is {value!r}; allowed is {low} to {high}.")
+        if self.palette not in ("2018", "2020"):
+            raise ConfigError(f"Camera palette is {self.palette!r}; allowed are '2018' and '2020'.")

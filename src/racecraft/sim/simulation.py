@@ -1,0 +1,314 @@
+"""The Python face of the native core: a batch of cars on one or several tracks.
+
+    track -> *simulation* -> observation (frames, state)
+    simulation -> rows -> reward, rules, logs
+
+Every array is a view of the core's own memory: it changes with the next step, so copy what must last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from racecraft import _native
+from racecraft.errors import ConfigError, NonFiniteAction, ShapeError, did_you_mean
+from racecraft.sim.camera import CameraSpec
+from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.vehicle import Vehicle, load_vehicle
+from racecraft.track.track import Track
+
+CONTROL_DT: Final = 1.0 / 15.0
+"""Seconds per control step: one camera image at 15 Hz."""
+MAX_STEERING: Final = np.pi / 6
+"""rad, hard clip of the steering command."""
+TABLE_SPACING: Final = 0.05
+"""m between samples of width and curvature along the centre line."""
+
+START_MODES: Final = ("fixed", "advance", "random")
+DIRECTIONS: Final = ("forward", "reverse", "alternate")
+VEHICLE_FIELDS: Final = ("x", "y", "heading", "speed", "lateral_speed", "yaw_rate", "steering")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Where episodes start. An open track always starts at its beginning."""
+
+    mode: str = "advance"
+    """``fixed``; ``advance`` by 5 % of a lap with every episode, as AWS trains; or ``random`` along the lap."""
+    offset: float = 0.0
+    """Fraction of a lap from the first waypoint."""
+    advance: float = 0.05
+    """Fraction of a lap that a car's start moves on with every episode, in mode ``advance``."""
+    spread: bool = False
+    """Space the cars of a batch evenly along the lap."""
+    lateral_jitter: float = 0.0
+    """m, uniform to either side."""
+    heading_jitter: float = 0.0
+    """rad, uniform to either side."""
+
+    def __post_init__(self) -> None:
+        if self.mode not in START_MODES:
+            hint = did_you_mean(self.mode, START_MODES)
+            raise ConfigError(f"Start mode is {self.mode!r}; allowed are {', '.join(START_MODES)}. {hint}".strip())
+        limits = {
+            "offset": (-1.0, 1.0),
+            "advance": (-1.0, 1.0),
+            "lateral_jitter": (0.0, 1.0),
+            "heading_jitter": (0.0, np.pi),
+        }
+        for name, (low, high) in limits.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ConfigError(f"Start setting {name} is {value!r}; allowed is {low:g} to {high:g}.")
+
+
+class Simulation:
+    """N cars, stepped together at 15 Hz by the native core.
+
+    A step judges every car's pose *before* its action acts (filling `rows`), then moves the cars, then renders what
+    their cameras see, as the original does. A terminated car stands until it is reset. `reset` includes the original's
+    `prepare` step, so the first judged step of an episode has ``steps == 2``.
+
+    Args:
+        tracks: One track, or several to be driven in one batch (car i starts on track i modulo their number).
+        num_envs: Cars, N.
+        seed: Key of every random number; same seed, settings and actions give the same bits.
+        vehicle: Preset name, vehicle file or `Vehicle`.
+        camera: The driver's camera, or None to drive without (much faster).
+        start: Where episodes start.
+        direction: ``forward``, ``reverse``, or ``alternate`` with every episode.
+        laps: Completed laps that end an episode; laps flow without a stop.
+        time_limit: Seconds that truncate an episode; 0 for none.
+        max_steps: Steps that truncate an episode.
+        substeps: Physics steps to a control step.
+        num_threads: 0 takes one per core.
+
+    Attributes:
+        frames: What the cameras see now, uint8 (N, height, width); empty without a camera.
+        rows: The last step as the rules judged it, float64 (N, len(ROW_COLUMNS)).
+        state: Privileged state now, scaled to about unit size, float32 (N, len(STATE_COLUMNS)).
+        terminated: The episode ended by its rules, bool (N,).
+        truncated: The episode was cut by a limit, bool (N,).
+        vehicles: x, y, heading, speed, lateral_speed, yaw_rate, steering (SI), float32 (7, N).
+        parameters: Vehicle parameters per car, writeable, float32 (len(VEHICLE_PARAMETERS), N).
+        track_choice: Track of each car from its next episode on, writeable, int32 (N,).
+
+    Raises:
+        ConfigError: A setting is outside its range.
+        TrackError: A track cannot be driven.
+    """
+
+    def __init__(
+        self,
+        tracks: Track | Sequence[Track],
+        *,
+        num_envs: int = 1,
+        seed: int = 0,
+        vehicle: Vehicle | str = "v5",
+        camera: CameraSpec | None = CameraSpec(),  # noqa: B008 (frozen)
+        start: Start = Start(),  # noqa: B008 (frozen)
+        direction: str = "forward",
+        laps: int = 1,
+        time_limit: float = 0.0,
+        max_steps: int = 100_000,
+        substeps: int = 8,
+        num_threads: int = 0,
+    ) -> None:
+        self.tracks = (tracks,) if isinstance(tracks, Track) else tuple(tracks)
+        if not self.tracks:
+            raise ConfigError("A simulation needs at least one track, got an empty list.")
+        if direction not in DIRECTIONS:
+            raise ConfigError(f"direction is {direction!r}; allowed are {', '.join(DIRECTIONS)}.")
+        _check_range("num_envs", num_envs, 1, 1_000_000)
+        _check_range("seed", seed, 0, 2**64 - 1)
+        _check_range("laps", laps, 1, 1_000_000)
+        _check_range("max_steps", max_steps, 2, 2**31 - 1)
+        _check_range("substeps", substeps, 1, 128)
+        _check_range("num_threads", num_threads, 0, 1024)
+        if not 0.0 <= time_limit < 1e9:
+            raise ConfigError(f"time_limit is {time_limit!r}; allowed is 0 (none) to 1e9 seconds.")
+
+        self.num_envs = num_envs
+        self.seed = seed
+        self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
+        self.camera = camera
+        self.start = start
+        self.direction = direction
+        self.laps = laps
+        self._everyone = np.ones(num_envs, dtype=np.bool_)
+        self._engine = _native.Engine(
+            tracks=[_native_track(track) for track in self.tracks],
+            grounds=[ground_map(track) for track in self.tracks] if camera else [],
+            vehicle=self.vehicle.values(),
+            camera=native_camera(camera) if camera else None,
+            palette=_native.grey_palette(camera.palette if camera else "2018"),
+            num_envs=num_envs,
+            seed=seed,
+            substeps=substeps,
+            num_threads=num_threads,
+            laps=laps,
+            max_steps=max_steps,
+            time_limit=time_limit,
+            start_mode=START_MODES.index(start.mode),
+            start_offset=start.offset,
+            start_advance=start.advance,
+            start_spread=start.spread,
+            lateral_jitter=start.lateral_jitter,
+            heading_jitter=start.heading_jitter,
+            direction=DIRECTIONS.index(direction),
+        )
+        self.frames: NDArray[np.uint8] = self._engine.frames
+        self.rows: NDArray[np.float64] = self._engine.rows
+        self.state: NDArray[np.float32] = self._engine.state
+        self.terminated: NDArray[np.bool_] = self._engine.terminated
+        self.truncated: NDArray[np.bool_] = self._engine.truncated
+        self.vehicles: NDArray[np.float32] = self._engine.vehicles
+        self.parameters: NDArray[np.float32] = self._engine.parameters
+        self.track_choice: NDArray[np.int32] = self._engine.track_choice
+
+    @property
+    def num_threads(self) -> int:
+        """Threads that step the batch, the caller's included."""
+        return int(self._engine.num_threads)
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """One column of `rows` by name, a view (N,)."""
+        return self.rows[:, ROW_COLUMNS.index(name)]
+
+    def reset(self, mask: NDArray[np.bool_] | None = None) -> None:
+        """Put the masked cars (all without a mask) at the start of their next episode.
+
+        Raises:
+            ShapeError: The mask is not bool of shape (N,).
+            ConfigError: `track_choice` names a track that does not exist.
+        """
+        if mask is None:
+            mask = self._everyone
+        mask = np.ascontiguousarray(mask)
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise ShapeError(
+                f"reset mask is {mask.dtype} of shape {mask.shape}, expected bool of shape ({self.num_envs},)."
+            )
+        if self.track_choice.min() < 0 or self.track_choice.max() >= len(self.tracks):
+            raise ConfigError(f"track_choice must be 0 to {len(self.tracks) - 1}, got {self.track_choice.tolist()}.")
+        self._engine.reset(mask)
+
+    def step(self, actions: ArrayLike) -> None:
+        """Judge, move and look: one control step of 1/15 s for every car.
+
+        Args:
+            actions: Steering angle in radians (left positive, clipped to ±30°) and speed in m/s (clipped to 0.1 to 4;
+                exactly 0 asks the car to stop), (N, 2).
+
+        Raises:
+            ShapeError: Wrong shape.
+            NonFiniteAction: An action is NaN or infinite; nothing has moved.
+        """
+        commands = np.ascontiguousarray(actions, dtype=np.float32)
+        if commands.shape != (self.num_envs, 2):
+            raise ShapeError(
+                f"action has shape {commands.shape}, expected ({self.num_envs}, 2): "
+                "one row per car, columns steering_angle [rad] and speed [m/s]."
+            )
+        finite = np.isfinite(commands)
+        if not finite.all():
+            car = int(np.flatnonzero(~finite.all(axis=1))[0])
+            steering, speed = commands[car]
+            raise NonFiniteAction(f"action[{car}] = ({steering}, {speed}); steering_angle and speed must be finite.")
+        self._engine.step(commands)
+
+    def set_pose(self, env: int, x: float, y: float, heading: float, *, speed: float = 0.0) -> None:
+        """Put one car's origin somewhere within its episode, wheels straight; its frame and state follow at once.
+
+        Raises:
+            ConfigError: No such car, or a value that is not finite.
+        """
+        _check_range("env", env, 0, self.num_envs - 1)
+        for name, value in {"x": x, "y": y, "heading": heading, "speed": speed}.items():
+            if not abs(value) < 1e5:
+                raise ConfigError(f"{name} of a pose is {value!r}; it must be finite and below 1e5.")
+        self._engine.set_pose(env, x, y, heading, speed)
+
+    def place(self, env: int, arc_length: float, *, offset: float = 0.0, speed: float = 0.0) -> None:
+        """Put one car on its track, `arc_length` metres along and `offset` metres left of the centre line."""
+        track = self.driven_track(env)
+        heading = float(track.heading_at(arc_length))
+        x, y = track.point_at(arc_length)
+        self.set_pose(env, x - offset * np.sin(heading), y + offset * np.cos(heading), heading, speed=speed)
+
+    def driven_track(self, env: int) -> Track:
+        """The track of a car's current episode, in its driving direction."""
+        index = int(self.column("track_index")[env])
+        track = self.tracks[index % len(self.tracks)]
+        return track.reversed() if index >= len(self.tracks) else track
+
+    def freeze(self, env: int, steps: int) -> None:
+        """Keep one car standing for so many steps from now on, as a penalty; its status is then ``pause``."""
+        _check_range("env", env, 0, self.num_envs - 1)
+        _check_range("steps", steps, 0, 2**31 - 1)
+        self._engine.freeze(env, steps)
+
+    def save(self) -> NDArray[np.uint8]:
+        """Everything the next step depends on, as bytes (B,), for `load` of an equal simulation."""
+        return self._engine.save()
+
+    def load(self, saved: NDArray[np.uint8]) -> None:
+        """Continue from what `save` gave.
+
+        Raises:
+            ShapeError: The bytes are not from a simulation of this shape.
+        """
+        try:
+            self._engine.load(np.ascontiguousarray(saved, dtype=np.uint8))
+        except ValueError as error:
+            raise ShapeError(str(error)) from error
+
+
+def ground_map(track: Track, *, texel: float = 0.01) -> _native.GroundMap:
+    """The ground of a track as the cameras see it, with texels of about `texel` metres."""
+    return _native.GroundMap(track.centerline, track.inner, track.outer, track.is_closed, texel)
+
+
+def native_camera(camera: CameraSpec) -> _native.CameraSpec:
+    """The core's form of a camera."""
+    return _native.CameraSpec(
+        camera.width,
+        camera.height,
+        camera.horizontal_fov,
+        camera.forward,
+        camera.left,
+        camera.above_ground,
+        camera.pitch,
+    )
+
+
+def _native_track(track: Track) -> _native.NativeTrack:
+    twin = track.reversed()
+    count = max(2, int(np.ceil(track.length / TABLE_SPACING)))
+    # On a closed track the sample after the last is the first again; an open one needs both ends.
+    steps = count if track.is_closed else count - 1
+    s = np.arange(count) * (track.length / steps)
+    return _native.NativeTrack(
+        track.centerline,
+        track.inner,
+        track.outer,
+        twin.centerline,
+        twin.inner,
+        twin.outer,
+        track.width_at(s).astype(np.float32),
+        track.curvature_at(s).astype(np.float32),
+        twin.width_at(s).astype(np.float32),
+        twin.curvature_at(s).astype(np.float32),
+        steps / track.length,
+        track.is_closed,
+    )
+
+
+def _check_range(name: str, value: int, low: int, high: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
+        raise ConfigError(f"{name} is {value!r}; allowed is a whole number from {low} to {high}.")
