@@ -1,0 +1,42 @@
+"""What a car may do and see: action spaces, sensors, and AWS's two settings files."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from racecraft.agent.action_space import (
+    PRESETS,
+    ActionSpace,
+    ContinuousActionSpace,
+    DiscreteActionSpace,
+    action_space,
+)
+from racecraft.agent.sensors import LidarConfig, check_sensors, check_simulated, observation_shape
+
+if TYPE_CHECKING:
+    from racecraft.agent.hyperparameters import Hyperparameters
+    from racecraft.agent.model_metadata import ModelMetadata
+
+__all__ = [
+    "PRESETS",
+    "ActionSpace",
+    "ContinuousActionSpace",
+    "DiscreteActionSpace",
+    "Hyperparameters",
+    "LidarConfig",
+    "ModelMetadata",
+    "action_space",
+    "check_sensors",
+    "check_simulated",
+    "observation_shape",
+]
+
+_WITH_PYDANTIC = {"Hyperparameters": "hyperparameters", "ModelMetadata": "model_metadata"}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what reads files on first use: pydantic takes longer to import than all the rest."""
+    if name in _WITH_PYDANTIC:
+        return getattr(import_module(f"racecraft.agent.{_WITH_PYDANTIC[name]}"), name)
+    raise AttributeError(f"module 'racecraft.agent' has no attribute {name!r}")

@@ -1,0 +1,206 @@
+"""Strict reading of the small JSON files a racer brings along, and one sentence for what is wrong in them.
+
+Consoles, scripts and people wrote these files for years, so values may come as strings and fields may be
+missing. Never accepted is a file that says two things at once (duplicate keys) or has numbers that are none.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, TypeVar, get_origin, get_type_hints
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, create_model
+
+from racecraft.errors import ConfigError, did_you_mean
+
+MAX_BYTES = 1 << 20  # bytes; the largest file AWS's console wrote is under 10 kB
+MAX_SHOWN = 60  # characters of a wrong value in a message
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+def read_json_object(path: str | Path, *, max_bytes: int = MAX_BYTES) -> dict[str, Any]:
+    """The JSON object in a UTF-8 file (a byte order mark is fine).
+
+    Raises:
+        ConfigError: Not readable, too large, not UTF-8, not a JSON object, or with duplicate keys or NaN.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = file.read(max_bytes + 1)
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror or error}.") from error
+    if len(data) > max_bytes:
+        raise ConfigError(f"{path} is larger than {max_bytes:,} bytes, too large for a settings file.")
+    return parse_json_object(data, name=str(path))
+
+
+def parse_json_object(data: bytes | str, *, name: str) -> dict[str, Any]:
+    """As :func:`read_json_object`, from memory; ``name`` is what messages call it."""
+    try:
+        text = data.decode("utf-8-sig") if isinstance(data, bytes) else data
+    except UnicodeDecodeError as error:
+        raise ConfigError(
+            f"{name} is not UTF-8 text: byte {error.start} is {data[error.start]:#04x}."
+        ) from error
+    try:
+        document = json.loads(
+            text, object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite_float
+        )
+    except RecursionError as error:
+        raise ConfigError(f"{name} is nested too deeply.") from error
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise ConfigError(f"{name} is not valid JSON: {error.msg} at {where}.") from error
+    except ValueError as error:
+        raise ConfigError(f"{name} is not valid: {error}.") from error
+    if not isinstance(document, dict):
+        raise ConfigError(f"{name} holds a JSON {_json_type(document)}, expected an object {{...}}.")
+    return document
+
+
+def write_json_object(path: str | Path, document: Mapping[str, Any]) -> None:
+    """Write a document as AWS's console does: UTF-8, two spaces.
+
+    Raises:
+        ConfigError: The file cannot be written.
+    """
+    try:
+        Path(path).write_text(json.dumps(document, indent=2), encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    document: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in document:
+            raise ValueError(f"field {key!r} is given twice")
+        document[key] = value
+    return document
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a number that JSON allows")
+
+
+def _finite_float(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is too large for a number")
+    return value
+
+
+def _json_type(value: object) -> str:
+    if isinstance(value, list):
+        return "array"
+    return "string" if isinstance(value, str) else "value"
+
+
+def _not_a_bool(value: object) -> object:
+    if isinstance(value, bool):
+        raise ValueError("true and false are not numbers")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_not_a_bool)]
+"""A finite float, or a string that holds one, as old files have it."""
+
+Whole = Annotated[int, BeforeValidator(_not_a_bool)]
+"""An integer, or a string or float that holds one."""
+
+
+class AwsModel(BaseModel):
+    """Base of the file models: numbers may come as strings, unknown fields are kept in ``model_extra``.
+
+    Every field carries a ``description`` that says what is allowed; messages quote it.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+
+def file_model(settings: type[Any]) -> type[AwsModel]:
+    """The file model of a dataclass: its ``Annotated`` fields, which say what a file may hold."""
+    hints = get_type_hints(settings, include_extras=True)
+    from_file = {
+        f.name: (hints[f.name], f.default) for f in fields(settings) if get_origin(hints[f.name]) is Annotated
+    }
+    model: type[AwsModel] = create_model(settings.__name__, __base__=AwsModel, **from_file)  # type: ignore[call-overload]
+    return model
+
+
+def validate(model: type[_Model], document: Mapping[str, Any], *, name: str) -> _Model:
+    """The document as a model.
+
+    Raises:
+        ConfigError: Names each field at fault, its value, and what is allowed.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        faults = [_sentence(model, fault) for fault in error.errors(include_url=False)]
+        more = f" (and {len(faults) - 3} more)" if len(faults) > 3 else ""
+        message = "; ".join(dict.fromkeys(faults[:3]))
+        raise ConfigError(f"{name}: {message}{more}.") from error
+
+
+def unknown_fields(model: BaseModel, *, name: str) -> tuple[str, ...]:
+    """A sentence for every field the file has and the model does not; such fields have no effect."""
+    known = list(type(model).model_fields)
+    return tuple(
+        f"{name}: unknown field {show(field)} has no effect. {did_you_mean(field, known)}".rstrip()
+        for field in model.model_extra or {}
+    )
+
+
+def show(value: object) -> str:
+    """A value for a message: its repr, shortened."""
+    text = repr(value)
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
+
+
+def _sentence(model: type[BaseModel], fault: Any) -> str:
+    location: tuple[str | int, ...] = fault["loc"]
+    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+    allowed = _description(model, location)
+    if fault["type"] == "missing":
+        return f"{where} is missing{f', allowed: {allowed}' if allowed else ''}"
+    value = show(fault["input"])
+    suggestion = ""
+    if fault["type"] == "literal_error":
+        choices = re.findall("'([^']+)'", fault["ctx"]["expected"])
+        allowed = allowed or ", ".join(choices)
+        suggestion = did_you_mean(fault["input"], choices) if isinstance(fault["input"], str) else ""
+    return f"{where} is {value}, allowed: {allowed or fault['msg']}" + (
+        f" ({suggestion})" if suggestion else ""
+    )
+
+
+def _description(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
+    """What the innermost model field on the way to ``location`` allows."""
+    description, current = "", model
+    for part in location:
+        field = current.model_fields.get(str(part)) if isinstance(part, str) else None
+        if field is None:
+            continue
+        description = field.description or description
+        inner = _inner_model(field.annotation)
+        current = inner if inner is not None else current
+    return description
+
+
+def _inner_model(annotation: Any) -> type[BaseModel] | None:
+    """The model inside ``Model``, ``list[Model]`` or ``Model | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _inner_model(argument)
+        if found is not None:
+            return found
+    return None

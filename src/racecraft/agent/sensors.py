@@ -1,0 +1,88 @@
+"""What a car may see: AWS's sensor names, the rules for combining them, and the shape of each observation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from racecraft.errors import ConfigError, did_you_mean
+
+FRAME_HEIGHT = 120  # pixels
+FRAME_WIDTH = 160  # pixels
+LIDAR_RAYS = 64
+
+CAMERAS = ("FRONT_FACING_CAMERA", "observation", "LEFT_CAMERA", "STEREO_CAMERAS")
+LIDARS = ("LIDAR", "SECTOR_LIDAR", "DISCRETIZED_SECTOR_LIDAR")
+SENSOR_NAMES = CAMERAS + LIDARS
+SIMULATED = ("FRONT_FACING_CAMERA", "observation")
+"""Sensors the simulator can give; ``observation`` is what the front camera was called before 2019."""
+
+
+@dataclass(frozen=True)
+class LidarConfig:
+    """How ``DISCRETIZED_SECTOR_LIDAR`` turns 64 rays into bits."""
+
+    num_sectors: int = 8
+    """Sectors over the whole 300°; divides 64."""
+    num_values_per_sector: int = 8
+    """Distance bins of a sector, one bit each."""
+    clipping_dist: float = 2.0
+    """Metres beyond which a sector counts as free."""
+
+
+def check_sensors(names: Sequence[str]) -> tuple[str, ...]:
+    """The names as a tuple, when they are known and go together: exactly one camera, at most one LIDAR.
+
+    Raises:
+        ConfigError: Says which rule is broken by which name.
+    """
+    for name in names:
+        if name not in SENSOR_NAMES:
+            raise ConfigError(
+                f"sensor {name!r} does not exist, allowed: {', '.join(SENSOR_NAMES)}.",
+                hint=did_you_mean(name, SENSOR_NAMES),
+            )
+    cameras = [name for name in names if name in CAMERAS]
+    lidars = [name for name in names if name in LIDARS]
+    if len(cameras) != 1:
+        raise ConfigError(
+            f"sensor has {len(cameras)} cameras {cameras}, allowed: exactly one of {', '.join(CAMERAS)}."
+        )
+    if len(lidars) > 1:
+        raise ConfigError(
+            f"sensor has {len(lidars)} LIDARs {lidars}, allowed: at most one of {', '.join(LIDARS)}."
+        )
+    return tuple(names)
+
+
+def check_simulated(names: Sequence[str]) -> None:
+    """Refuse sensors that files may name but the simulator does not give yet.
+
+    Raises:
+        ConfigError: Names the sensor.
+    """
+    for name in names:
+        if name not in SIMULATED:
+            raise ConfigError(
+                f"sensor {name!r} cannot be used for training: only the front camera is simulated.",
+                hint='Set "sensor": ["FRONT_FACING_CAMERA"] in model_metadata.json.',
+            )
+
+
+def observation_shape(name: str, *, lidar: LidarConfig | None = None) -> tuple[int, ...]:
+    """Shape of one observation of a sensor as AWS's networks take it: (height, width, channels) or (values,).
+
+    Args:
+        name: One of ``SENSOR_NAMES``.
+        lidar: Sizes of ``DISCRETIZED_SECTOR_LIDAR``; the default configuration when not given.
+    """
+    lidar = lidar or LidarConfig()
+    shapes: dict[str, tuple[int, ...]] = {
+        "STEREO_CAMERAS": (FRAME_HEIGHT, FRAME_WIDTH, 2),
+        "LIDAR": (LIDAR_RAYS,),
+        "SECTOR_LIDAR": (8,),
+        "DISCRETIZED_SECTOR_LIDAR": (lidar.num_sectors * lidar.num_values_per_sector,),
+    }
+    if name not in SENSOR_NAMES:
+        raise ConfigError(f"sensor {name!r} does not exist.", hint=did_you_mean(name, SENSOR_NAMES))
+    return shapes.get(name, (FRAME_HEIGHT, FRAME_WIDTH, 1))

@@ -1,0 +1,113 @@
+import dataclasses
+import json
+from pathlib import Path
+
+import pytest
+
+from racecraft.agent import Hyperparameters
+from racecraft.errors import ConfigError
+
+SHARED = Path(__file__).parents[3] / "shared"
+
+
+def test_real_file_is_read_and_written_to_the_byte(tmp_path):
+    path = SHARED / "logs/drfc/hyperparameters.json"
+    if not path.exists():
+        pytest.skip("shared/logs is not there")
+    settings = Hyperparameters.load(path)
+    assert settings.discount_factor == 0.95
+    assert settings.notes == ()
+    settings.save(tmp_path / "hyperparameters.json")
+    assert (tmp_path / "hyperparameters.json").read_bytes() == path.read_bytes()
+
+
+def test_all_real_runs_are_accepted():
+    files = sorted((SHARED / "traces").glob("*.json"))
+    if not files:
+        pytest.skip("shared/traces is not there")
+    for path in files:
+        document = json.loads(path.read_text())["hyperparameters"]
+        assert Hyperparameters.from_dict(document).to_dict() == document
+
+
+def test_missing_fields_get_the_defaults_of_aws_code():
+    assert Hyperparameters.from_dict({}) == Hyperparameters()
+    assert Hyperparameters().discount_factor == 0.999
+
+
+def test_numbers_may_be_strings():
+    settings = Hyperparameters.from_dict(
+        {"batch_size": "128", "lr": "0.0005", "num_epochs": "5", "epsilon_steps": 1e4}
+    )
+    assert (settings.batch_size, settings.lr, settings.num_epochs, settings.epsilon_steps) == (
+        128,
+        0.0005,
+        5,
+        10_000,
+    )
+    assert isinstance(settings.batch_size, int)
+
+
+def test_unknown_fields_are_reported_and_kept():
+    settings = Hyperparameters.from_dict({"learning_rate": 1, "num_epoch": 3}, name="h.json")
+    assert settings.notes[1] == "h.json: unknown field 'num_epoch' has no effect. Did you mean 'num_epochs'?"
+    assert settings.to_dict()["learning_rate"] == 1
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "allowed"),
+    [
+        ("batch_size", 100, "32, 64, 128, 256 or 512"),
+        ("num_epochs", 2, "3 to 10"),
+        ("num_epochs", 3.5, "3 to 10"),
+        ("lr", 0.1, "1e-08 to 0.001"),
+        ("lr", "nan", "1e-08 to 0.001"),
+        ("lr", True, "1e-08 to 0.001"),
+        ("lr", None, "1e-08 to 0.001"),
+        ("lr", [0.1], "1e-08 to 0.001"),
+        ("beta_entropy", -0.1, "0 to 1"),
+        ("discount_factor", 1.01, "0 to 1"),
+        ("loss_type", "hubert", "'huber' or 'mean squared error' (Did you mean 'huber'?)"),
+        ("num_episodes_between_training", 0, "1 to 100"),
+        ("exploration_type", "greedy", "'categorical' or 'e-greedy'"),
+        ("e_greedy_value", 2, "0 to 1"),
+        ("epsilon_steps", 0, "1 or more"),
+        ("stack_size", 0, "1 or more"),
+        ("term_cond_max_episodes", -1, "1 or more"),
+        ("term_cond_avg_score", "high", "a number"),
+        ("sac_alpha", 1.5, "0 to 1"),
+    ],
+)
+def test_wrong_field_names_itself_its_value_and_the_range(field, value, allowed):
+    for make in (
+        lambda: Hyperparameters.from_dict({field: value}),
+        lambda: Hyperparameters(**{field: value}),
+    ):
+        with pytest.raises(ConfigError) as error:
+            make()
+        assert f"{field} is {value!r}, allowed: {allowed}" in str(error.value)
+
+
+def test_every_field_has_a_range_in_words():
+    from racecraft.agent.hyperparameters import _file
+
+    assert all(field.description for field in _file().model_fields.values())
+    assert len(_file().model_fields) == 14
+
+
+def test_sac_trains_after_every_episode():
+    Hyperparameters(num_episodes_between_training=1).check_algorithm("sac")
+    Hyperparameters().check_algorithm("clipped_ppo")
+    with pytest.raises(ConfigError, match="num_episodes_between_training is 20, allowed: 1 with 'sac'"):
+        Hyperparameters().check_algorithm("sac")
+
+
+def test_ppo_settings_are_named_as_the_learner_names_them():
+    ppo = pytest.importorskip("racecraft.learn.ppo")
+    settings = Hyperparameters(batch_size=128, lr=1e-4, loss_type="huber", exploration_type="e-greedy")
+    config = ppo.PPOConfig(**settings.to_ppo())
+    assert (config.minibatch_size, config.learning_rate, config.value_loss) == (128, 1e-4, "huber")
+    assert (config.gae_lambda, config.clip_coef, config.gamma) == (0.95, 0.2, 0.999)
+    assert (config.exploration, config.epsilon_end, config.epsilon_steps) == ("e-greedy", 0.05, 10_000)
+    assert config.episodes_per_iteration == 20
+    assert set(settings.to_ppo()) <= {field.name for field in dataclasses.fields(ppo.PPOConfig)}

@@ -1,0 +1,167 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from racecraft.agent import ContinuousActionSpace, LidarConfig, ModelMetadata, action_space
+from racecraft.errors import ConfigError
+
+SHARED = Path(__file__).parents[3] / "shared"
+CAMERA = ["FRONT_FACING_CAMERA"]
+TWO = [{"steering_angle": -10, "speed": 1}, {"steering_angle": 10, "speed": 1}]
+LIMITS = {"steering_angle": {"low": -20, "high": 25}, "speed": {"low": 1, "high": 3.5}}
+
+
+def test_real_file_is_read_and_written_unchanged(tmp_path):
+    path = SHARED / "logs/drfc/model_metadata.json"
+    if not path.exists():
+        pytest.skip("shared/logs is not there")
+    metadata = ModelMetadata.load(path)
+    assert (metadata.version, metadata.sensors, metadata.action_space.size) == (
+        "4",
+        ("FRONT_FACING_CAMERA",),
+        14,
+    )
+    assert metadata.notes == ()
+    metadata.save(tmp_path / "again.json")
+    assert json.loads((tmp_path / "again.json").read_text()) == json.loads(path.read_text())
+
+
+def test_all_real_runs_are_accepted():
+    files = sorted((SHARED / "traces").glob("*.json"))
+    if not files:
+        pytest.skip("shared/traces is not there")
+    fields = ("action_space", "sensor", "neural_network", "training_algorithm", "action_space_type")
+    for path in files:
+        run = json.loads(path.read_text())
+        document = run.get("model_metadata") or {name: run[name] for name in fields}
+        metadata = ModelMetadata.from_dict(document)
+        assert metadata.action_space.to_aws() == document["action_space"]
+        assert ModelMetadata.from_dict(metadata.to_dict()) == metadata
+
+
+def test_ancient_file_with_45_degrees():
+    actions = [
+        {"steering_angle": a, "speed": s} for a, s in ((45, 0.8), (-45, 0.8), (22.5, 0.8), (-22.5, 0.8))
+    ]
+    metadata = ModelMetadata.from_dict({"action_space": actions}, name="old.json")
+    assert (metadata.version, metadata.sensors) == ("1", ("observation",))
+    assert metadata.neural_network == "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
+    assert metadata.notes[0].startswith("old.json: action_space[0].steering_angle is 45, driven as 30")
+    with pytest.raises(ConfigError, match=r"action_space\[0\].steering_angle is 45, allowed: -30 to 30"):
+        ModelMetadata.from_dict({"action_space": actions, "version": "5"})
+
+
+def test_missing_version_depends_on_the_sensor():
+    assert ModelMetadata.from_dict({"action_space": TWO, "sensor": CAMERA}).version == "2"
+    assert ModelMetadata.from_dict({"action_space": TWO}).version == "1"
+
+
+@pytest.mark.parametrize("version", ["5", 5, 5.0, "5.0"])
+def test_version_may_be_a_number(version):
+    assert ModelMetadata.from_dict({"action_space": TWO, "version": version}).version == "5"
+
+
+def test_continuous_and_lidar_round_trip():
+    document = {
+        "action_space": LIMITS,
+        "action_space_type": "continuous",
+        "training_algorithm": "sac",
+        "sensor": ["STEREO_CAMERAS", "DISCRETIZED_SECTOR_LIDAR"],
+        "neural_network": "DEEP_CONVOLUTIONAL_NETWORK",
+        "version": "6",
+        "lidar_config": {"num_sectors": "16", "num_values_per_sector": 4, "clipping_dist": 1.5},
+        "preview": True,
+    }
+    metadata = ModelMetadata.from_dict(document, name="m.json")
+    assert isinstance(metadata.action_space, ContinuousActionSpace)
+    assert metadata.lidar == LidarConfig(16, 4, 1.5)
+    assert metadata.notes == ("m.json: unknown field 'preview' has no effect.",)
+    assert metadata.to_dict() == {**document, "lidar_config": {**document["lidar_config"], "num_sectors": 16}}
+
+
+def test_continuous_is_inferred_where_the_type_is_missing():
+    assert ModelMetadata.from_dict({"action_space": LIMITS}).action_space.kind == "continuous"
+
+
+def test_notes_for_slow_continuous_and_odd_index():
+    slow = {**LIMITS, "speed": {"low": 0.1, "high": 1}}
+    assert "below 0.5 m/s" in ModelMetadata.from_dict({"action_space": slow}).notes[0]
+    odd = [{**TWO[0], "index": 1}, {**TWO[1], "index": 0}]
+    assert "action_space[0].index is 1" in ModelMetadata.from_dict({"action_space": odd}).notes[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"action_space": None}, "action_space is None, allowed: a list of 2 to 30 actions"),
+        ({"action_space": TWO[:1]}, "allowed: a list of 2 to 30 actions"),
+        ({"action_space": TWO * 16}, "allowed: a list of 2 to 30 actions"),
+        (
+            {"action_space": [*TWO, {"speed": 1}]},
+            "action_space[2].steering_angle is missing, allowed: -30 to 30 degrees",
+        ),
+        (
+            {"action_space": [*TWO, {"steering_angle": 1, "speed": "fast"}]},
+            "action_space[2].speed is 'fast', allowed: 0.1",
+        ),
+        (
+            {"action_space": [*TWO, {"steering_angle": 1, "speed": 0}]},
+            "action_space[2].speed is 0, allowed: 0.1 to 4 m/s",
+        ),
+        (
+            {"action_space": [*TWO, {"steering_angle": 1, "speed": 4.5}]},
+            "speed is 4.5, allowed: 0.1 to 4 m/s",
+        ),
+        (
+            {"action_space": [*TWO, {"steering_angle": -31, "speed": 4}]},
+            "steering_angle is -31, allowed: -30 to 30",
+        ),
+        ({"action_space": [*TWO, 3]}, "action_space[2] is 3"),
+        (
+            {"action_space": {**LIMITS, "speed": {"low": 1}}, "action_space_type": "continuous"},
+            "speed.high is missing",
+        ),
+        (
+            {"action_space": {**LIMITS, "speed": {"low": 1, "high": 9}}, "action_space_type": "continuous"},
+            "action_space.speed.high is 9, allowed: 0.1 to 4 m/s",
+        ),
+        ({"action_space": LIMITS, "action_space_type": "discrete"}, "allowed: a list of 2 to 30 actions"),
+        ({"action_space_type": "continuous"}, "allowed: an object with steering_angle and speed"),
+        ({"action_space_type": "discreet"}, "'discrete' or 'continuous' (Did you mean 'discrete'?)"),
+        (
+            {"sensor": "FRONT_FACING_CAMERA"},
+            "sensor is 'FRONT_FACING_CAMERA', allowed: a list of sensor names",
+        ),
+        ({"sensor": []}, "sensor has 0 cameras"),
+        ({"sensor": [*CAMERA, "LEFT_CAMERA"]}, "sensor has 2 cameras"),
+        ({"sensor": [*CAMERA, "LIDAR", "SECTOR_LIDAR"]}, "sensor has 2 LIDARs"),
+        ({"sensor": ["FRONT_CAMERA"]}, "sensor 'FRONT_CAMERA' does not exist"),
+        ({"neural_network": "DEEP"}, "neural_network is 'DEEP', allowed: DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"),
+        ({"training_algorithm": "ppo"}, "training_algorithm is 'ppo', allowed: 'clipped_ppo' or 'sac'"),
+        ({"training_algorithm": "sac"}, "'sac' needs action_space_type 'continuous'"),
+        ({"version": "7"}, "version is '7', allowed: '1' to '6'"),
+        ({"version": True}, "version is True"),
+        ({"lidar_config": {"num_sectors": 7}}, "lidar_config.num_sectors is 7, allowed: a divisor of 64"),
+        ({"lidar_config": {"clipping_dist": -1}}, "lidar_config.clipping_dist is -1, allowed: above 0.15"),
+    ],
+)
+def test_wrong_field_names_itself_its_value_and_what_is_allowed(change, words):
+    document = {"action_space": TWO, "sensor": CAMERA, "version": "5", **change}
+    with pytest.raises(ConfigError) as error:
+        ModelMetadata.from_dict(document, name="m.json")
+    assert words in str(error.value)
+    assert str(error.value).startswith("m.json: ")
+
+
+def test_default_is_what_a_new_model_gets():
+    metadata = ModelMetadata()
+    assert metadata.action_space == action_space("default")
+    assert ModelMetadata.from_dict(metadata.to_dict()) == metadata
+    with pytest.raises(ConfigError, match="version is '9'"):
+        ModelMetadata(version="9")
+
+
+def test_save_says_why_it_cannot(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be written: No such file"):
+        ModelMetadata().save(tmp_path / "none" / "model_metadata.json")
