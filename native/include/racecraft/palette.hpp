@@ -1,0 +1,76 @@
+// Colours of the world: a palette per car turns material coverage into brightness after the fetch.
+#pragma once
+
+#include "racecraft/ground.hpp"
+
+namespace racecraft {
+
+constexpr int32_t kNumWalls =
+    4;  // in the order +x, +y, -x, -y (where the wall stands, seen from the room's centre)
+
+struct GreyPalette {
+    uint8_t ground[kNumMaterials];  // by Material
+    uint8_t wall[kNumWalls];
+    uint8_t sky;
+    uint8_t outside;  // the floor beyond the walls, seen only from above them
+};
+
+struct RgbPalette {
+    uint8_t ground[kNumMaterials][3];
+    uint8_t wall[kNumWalls][3];
+    uint8_t sky[3];
+    uint8_t outside[3];
+};
+
+// The 2018 world (re:Invent 2018). Walls differ in brightness by direction, as its lamps left them.
+constexpr RgbPalette kPalette2018 = {{{95, 136, 104}, {36, 49, 64}, {194, 194, 190}, {194, 117, 0}},
+                                     {{16, 29, 34}, {9, 17, 20}, {4, 7, 8}, {2, 3, 4}},
+                                     {178, 180, 182},
+                                     {58, 64, 66}};
+
+// The world of the later tracks.
+constexpr RgbPalette kPalette2020 = {{{126, 133, 65}, {64, 63, 61}, {223, 223, 222}, {225, 143, 0}},
+                                     {{16, 29, 34}, {9, 17, 20}, {4, 7, 8}, {2, 3, 4}},
+                                     {178, 180, 182},
+                                     {58, 64, 66}};
+
+// Luma of ITU-R BT.601 with the original's weights 0.2989, 0.587, 0.114, rounded to nearest.
+RC_HD uint8_t grey_of(const uint8_t* rgb) {
+    return static_cast<uint8_t>((2989 * rgb[0] + 5870 * rgb[1] + 1140 * rgb[2] + 5000) / 10000);
+}
+
+RC_HD GreyPalette grey_palette(const RgbPalette& colours) {
+    GreyPalette grey{};
+    for (int32_t i = 0; i < kNumMaterials; ++i) grey.ground[i] = grey_of(colours.ground[i]);
+    for (int32_t i = 0; i < kNumWalls; ++i) grey.wall[i] = grey_of(colours.wall[i]);
+    grey.sky = grey_of(colours.sky);
+    grey.outside = grey_of(colours.outside);
+    return grey;
+}
+
+// A palette in the form the inner loop wants; see shade_edge() and shade_coverage().
+struct ShadeTable {
+    int32_t blend[kNumMaterialPairs];
+    uint32_t weights;
+    int32_t wall[kNumWalls];  // brightness times 64
+    int32_t sky;
+    int32_t outside;
+};
+
+RC_HD ShadeTable shade_table(const GreyPalette& palette) {
+    ShadeTable table{};
+    for (int32_t i = 0; i < kNumMaterialPairs; ++i) {
+        const int32_t below = palette.ground[kMaterialPairs[i].below];
+        const int32_t above = palette.ground[kMaterialPairs[i].above];
+        table.blend[i] = static_cast<int32_t>(static_cast<uint32_t>(above - below) << 16) | below;
+    }
+    for (int32_t i = 0; i < kNumMaterials; ++i) {
+        table.weights |= static_cast<uint32_t>(palette.ground[i]) << (8 * i);
+    }
+    for (int32_t i = 0; i < kNumWalls; ++i) table.wall[i] = kCoverageUnit * palette.wall[i];
+    table.sky = kCoverageUnit * palette.sky;
+    table.outside = kCoverageUnit * palette.outside;
+    return table;
+}
+
+}  // namespace racecraft

@@ -1,0 +1,504 @@
+// From polylines to texels: blocks of 16 x 16 texels know the few border segments and dashes near them, so
+// each texel finds its nearest border exactly and in constant time; blocks without any are filled in one go.
+#include "ground_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace racecraft {
+namespace {
+
+constexpr double kDashWidth = 0.0254;     // m
+constexpr double kDashLength = 0.05;      // m
+constexpr double kDashPeriod = 0.10;      // m, stretched so that a closed track has a whole number of dashes
+constexpr int kBlock = 16;                // texels
+constexpr int kMaxTexelsPerSide = 16384;  // keeps 16.16 fixed point far from overflow
+constexpr double kReach = 0.9;  // texels from a texel's centre within which a border is worth storing
+
+struct Point {
+    double x, y;
+};
+
+struct Segment {
+    Point a, b;
+};
+
+// A dash of the centre line: an oriented rectangle.
+struct Dash {
+    Point center, along;
+    double half_length;
+};
+
+std::vector<Point> read_points(const double* values, int count, const char* name) {
+    std::vector<Point> points;
+    for (int i = 0; i < count; ++i) {
+        const Point p = {values[2 * i], values[2 * i + 1]};
+        if (!std::isfinite(p.x) || !std::isfinite(p.y)) {
+            throw std::invalid_argument("Track " + std::string(name) + "[" + std::to_string(i) +
+                                        "] is not finite; every coordinate must be a number in metres.");
+        }
+        if (points.empty() || p.x != points.back().x || p.y != points.back().y) points.push_back(p);
+    }
+    if (points.size() > 1 && points.front().x == points.back().x && points.front().y == points.back().y) {
+        points.pop_back();
+    }
+    if (points.size() < 2) {
+        throw std::invalid_argument("Track " + std::string(name) + " has fewer than two different points.");
+    }
+    return points;
+}
+
+void add_ring(const std::vector<Point>& points, std::vector<Segment>& segments) {
+    for (size_t i = 0; i < points.size(); ++i)
+        segments.push_back({points[i], points[(i + 1) % points.size()]});
+}
+
+std::vector<Dash> place_dashes(std::vector<Point> line, bool is_closed) {
+    if (is_closed) line.push_back(line.front());
+    std::vector<double> arc_length = {0.0};
+    for (size_t i = 1; i < line.size(); ++i) {
+        const double dx = line[i].x - line[i - 1].x;
+        const double dy = line[i].y - line[i - 1].y;
+        arc_length.push_back(arc_length.back() + std::sqrt(dx * dx + dy * dy));
+    }
+    const double length = arc_length.back();
+    const int count = static_cast<int>(std::min(std::max(1.0, std::floor(length / kDashPeriod + 0.5)), 1e6));
+    const double period = length / count;
+    size_t segment = 0;
+    const auto point_at = [&](double s) {
+        while (segment > 0 && arc_length[segment] > s) --segment;
+        while (segment + 2 < line.size() && arc_length[segment + 1] < s) ++segment;
+        const double t = (s - arc_length[segment]) / (arc_length[segment + 1] - arc_length[segment]);
+        return Point{line[segment].x + t * (line[segment + 1].x - line[segment].x),
+                     line[segment].y + t * (line[segment + 1].y - line[segment].y)};
+    };
+    std::vector<Dash> dashes;
+    for (int i = 0; i < count; ++i) {
+        const Point a = point_at(i * period);
+        const Point b = point_at(std::min(i * period + kDashLength, length));
+        const double dx = b.x - a.x;
+        const double dy = b.y - a.y;
+        const double chord = std::sqrt(dx * dx + dy * dy);
+        if (chord < 1e-6) continue;
+        dashes.push_back({{0.5 * (a.x + b.x), 0.5 * (a.y + b.y)}, {dx / chord, dy / chord}, 0.5 * chord});
+    }
+    return dashes;
+}
+
+// The nearest border of a point: distance, positive on the pair's upper side, and the unit normal towards
+// that side.
+struct Border {
+    double distance;
+    Point normal;
+    int pair;
+};
+
+// Distance to the segment and the vector from its nearest point.
+double distance_to(const Segment& segment, Point p, Point& away) {
+    const double dx = segment.b.x - segment.a.x;
+    const double dy = segment.b.y - segment.a.y;
+    const double along = ((p.x - segment.a.x) * dx + (p.y - segment.a.y) * dy) / (dx * dx + dy * dy);
+    const double t = std::min(std::max(along, 0.0), 1.0);
+    away = {p.x - (segment.a.x + t * dx), p.y - (segment.a.y + t * dy)};
+    return std::sqrt(away.x * away.x + away.y * away.y);
+}
+
+// Signed distance into the dash and its gradient; outside a corner it points to the corner.
+double depth_in(const Dash& dash, Point p, Point& gradient) {
+    const double dx = p.x - dash.center.x;
+    const double dy = p.y - dash.center.y;
+    const double along = dx * dash.along.x + dy * dash.along.y;
+    const double across = dy * dash.along.x - dx * dash.along.y;
+    const double over_end = std::fabs(along) - dash.half_length;
+    const double over_side = std::fabs(across) - 0.5 * kDashWidth;
+    double toward_end = over_end > over_side ? 1.0 : 0.0;
+    double toward_side = 1.0 - toward_end;
+    double outside = std::max(over_end, over_side);
+    if (over_end > 0.0 && over_side > 0.0) {
+        outside = std::sqrt(over_end * over_end + over_side * over_side);
+        toward_end = over_end / outside;
+        toward_side = over_side / outside;
+    }
+    const double u = along < 0.0 ? toward_end : -toward_end;
+    const double v = across < 0.0 ? toward_side : -toward_side;
+    gradient = {u * dash.along.x - v * dash.along.y, u * dash.along.y + v * dash.along.x};
+    return -outside;
+}
+
+uint32_t pack(int x, int y, int offset, int pair) {
+    return static_cast<uint32_t>(x & 255) | static_cast<uint32_t>(y & 255) << 8 |
+           static_cast<uint32_t>(offset & 255) << 16 | static_cast<uint32_t>(pair) << 24;
+}
+
+int rounded(double value) {
+    return static_cast<int>(std::floor(value + 0.5));
+}
+
+constexpr int kPairOfBand[2] = {0, 1};  // field to edge line, edge line to road
+constexpr int kPairOfDash = 2;          // road to centre line
+
+uint32_t pure_texel(Material material) {
+    switch (material) {
+        case kEdgeLine:
+            return pack(0, 0, 127, 0);
+        case kRoad:
+            return pack(0, 0, 127, 1);
+        case kCenterLine:
+            return pack(0, 0, 127, 2);
+        default:
+            return pack(0, 0, -127, 0);
+    }
+}
+
+uint32_t edge_texel(const Border& border, double texel) {
+    const double distance = border.distance / texel;
+    if (std::fabs(distance) > kReach) {
+        const MaterialPair pair = kMaterialPairs[border.pair];
+        return pure_texel(static_cast<Material>(distance > 0.0 ? pair.above : pair.below));
+    }
+    const int x = rounded(kEdgeNormalScale * border.normal.x);
+    const int y = rounded(kEdgeNormalScale * border.normal.y);
+    const int offset = rounded((kEdgeDistanceScale * distance - 127.5 * (x + y)) / kEdgeOffsetScale);
+    return pack(x, y, std::clamp(offset, -127, 127), border.pair);
+}
+
+// Share of the unit square above the border of an edge texel (area of a square cut by a straight line).
+double share_above(uint32_t texel) {
+    const double x = static_cast<int8_t>(texel & 255);
+    const double y = static_cast<int8_t>(texel >> 8 & 255);
+    const double offset = static_cast<int8_t>(texel >> 16 & 255);
+    const double high = std::max(std::fabs(x), std::fabs(y)) * 256.0;
+    const double low = std::min(std::fabs(x), std::fabs(y)) * 256.0;
+    const double center = 127.5 * (x + y) + kEdgeOffsetScale * offset;
+    const double depth = std::fabs(center);
+    const double reach = 0.5 * (high + low);
+    double share = 1.0;
+    if (depth < 0.5 * (high - low)) {
+        share = 0.5 + depth / high;
+    } else if (depth < reach) {
+        share = 1.0 - (reach - depth) * (reach - depth) / (2.0 * high * low);
+    }
+    return center < 0.0 ? 1.0 - share : share;
+}
+
+// Exact coverage while the pyramid is built, in 1/65536 of a texel; sums to 65536.
+struct Coverage {
+    uint32_t share[kNumMaterials];
+};
+
+Coverage coverage_of(uint32_t texel) {
+    const MaterialPair pair = kMaterialPairs[texel >> 24];
+    const uint32_t above = static_cast<uint32_t>(rounded(65536.0 * share_above(texel)));
+    Coverage coverage{};
+    coverage.share[pair.above] += above;
+    coverage.share[pair.below] += 65536u - above;
+    return coverage;
+}
+
+// Divides the parts, which sum to 4 * 65536, by divisor, which divides that sum, so that the results still
+// sum up: the largest remainders are rounded up.
+void share_out(const uint32_t* parts, uint32_t divisor, uint32_t* results) {
+    uint32_t missing = 4u * 65536u / divisor;
+    uint32_t remainders[kNumMaterials];
+    for (int i = 0; i < kNumMaterials; ++i) {
+        results[i] = parts[i] / divisor;
+        remainders[i] = parts[i] % divisor;
+        missing -= results[i];
+    }
+    for (; missing > 0; --missing) {
+        const auto largest = std::max_element(remainders, remainders + kNumMaterials) - remainders;
+        ++results[largest];
+        remainders[largest] = 0;
+    }
+}
+
+// Segments or dashes by the blocks that they may touch.
+class Bins {
+  public:
+    Bins(int columns, int rows, Point origin, double block_size)
+        : columns_(columns),
+          rows_(rows),
+          origin_(origin),
+          block_size_(block_size),
+          bins_(size_t(columns) * rows) {}
+
+    void add(uint32_t item, Point low, Point high) {
+        const int x0 = std::max(0, column(low.x)), x1 = std::min(columns_ - 1, column(high.x));
+        const int y0 = std::max(0, row(low.y)), y1 = std::min(rows_ - 1, row(high.y));
+        for (int y = y0; y <= y1; ++y) {
+            for (int x = x0; x <= x1; ++x) bins_[size_t(y) * columns_ + x].push_back(item);
+        }
+    }
+    Point block_center(int x, int y) const {
+        return {origin_.x + (x + 0.5) * block_size_, origin_.y + (y + 0.5) * block_size_};
+    }
+    std::vector<uint32_t>& at(int x, int y) { return bins_[size_t(y) * columns_ + x]; }
+
+  private:
+    int column(double x) const { return static_cast<int>(std::floor((x - origin_.x) / block_size_)); }
+    int row(double y) const { return static_cast<int>(std::floor((y - origin_.y) / block_size_)); }
+
+    int columns_, rows_;
+    Point origin_;
+    double block_size_;
+    std::vector<std::vector<uint32_t>> bins_;
+};
+
+class Painter {
+  public:
+    Painter(std::vector<Segment> borders, std::vector<Dash> dashes, Point origin, double texel, int columns,
+            int rows)
+        : borders_(std::move(borders)),
+          dashes_(std::move(dashes)),
+          origin_(origin),
+          texel_(texel),
+          block_columns_((columns + kBlock - 1) / kBlock),
+          block_rows_((rows + kBlock - 1) / kBlock),
+          near_borders_(block_columns_, block_rows_, origin, texel * kBlock),
+          near_dashes_(block_columns_, block_rows_, origin, texel * kBlock) {
+        const double reach = kEdgeLineWidth + 2.0 * texel;
+        for (uint32_t i = 0; i < borders_.size(); ++i) {
+            const Segment& s = borders_[i];
+            near_borders_.add(i, {std::min(s.a.x, s.b.x) - reach, std::min(s.a.y, s.b.y) - reach},
+                              {std::max(s.a.x, s.b.x) + reach, std::max(s.a.y, s.b.y) + reach});
+        }
+        for (uint32_t i = 0; i < dashes_.size(); ++i) {
+            const Dash& d = dashes_[i];
+            const double r = d.half_length + 0.5 * kDashWidth + 2.0 * texel;
+            near_dashes_.add(i, {d.center.x - r, d.center.y - r}, {d.center.x + r, d.center.y + r});
+        }
+    }
+
+    // Calls store(column, row, texel) for every texel.
+    template <typename Store>
+    void paint(int columns, int rows, const Store& store) {
+        std::vector<std::vector<double>> crossings(kBlock);
+        for (int by = 0; by < block_rows_; ++by) {
+            for (int r = 0; r < kBlock; ++r) find_crossings(by * kBlock + r, crossings[r]);
+            for (int bx = 0; bx < block_columns_; ++bx) {
+                keep_near(bx, by);
+                const auto& segments = near_borders_.at(bx, by);
+                const auto& dashes = near_dashes_.at(bx, by);
+                const int x1 = std::min(columns, (bx + 1) * kBlock);
+                const int y1 = std::min(rows, (by + 1) * kBlock);
+                for (int y = by * kBlock; y < y1; ++y) {
+                    const auto& line = crossings[y - by * kBlock];
+                    for (int x = bx * kBlock; x < x1; ++x) {
+                        const Point p = {origin_.x + (x + 0.5) * texel_, origin_.y + (y + 0.5) * texel_};
+                        // The nearest blocks without a border are of one material: ask once, store for all.
+                        const bool is_road =
+                            (std::upper_bound(line.begin(), line.end(), p.x) - line.begin()) % 2 == 1;
+                        if (segments.empty() && dashes.empty()) {
+                            const uint32_t texel = pure_texel(is_road ? kRoad : kField);
+                            for (; x < x1; ++x) store(x, y, texel);
+                        } else {
+                            store(x, y, texel_at(p, is_road, segments, dashes));
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+  private:
+    // Bins are by bounding box; drop what the block's circle cannot reach.
+    void keep_near(int bx, int by) {
+        const Point center = near_borders_.block_center(bx, by);
+        const double reach = kEdgeLineWidth + (1.5 + 0.7072 * kBlock) * texel_;
+        auto& segments = near_borders_.at(bx, by);
+        segments.erase(std::remove_if(segments.begin(), segments.end(),
+                                      [&](uint32_t i) {
+                                          Point away;
+                                          return distance_to(borders_[i], center, away) > reach;
+                                      }),
+                       segments.end());
+    }
+
+    void find_crossings(int row, std::vector<double>& line) const {
+        const double y = origin_.y + (row + 0.5) * texel_;
+        line.clear();
+        for (const Segment& s : borders_) {
+            if ((s.a.y <= y) != (s.b.y <= y))
+                line.push_back(s.a.x + (y - s.a.y) / (s.b.y - s.a.y) * (s.b.x - s.a.x));
+        }
+        std::sort(line.begin(), line.end());
+    }
+
+    bool is_inside(Point p) const {
+        bool inside = false;
+        for (const Segment& s : borders_) {
+            if ((s.a.y <= p.y) != (s.b.y <= p.y) &&
+                p.x < s.a.x + (p.y - s.a.y) / (s.b.y - s.a.y) * (s.b.x - s.a.x)) {
+                inside = !inside;
+            }
+        }
+        return inside;
+    }
+
+    uint32_t texel_at(Point p, bool is_road, const std::vector<uint32_t>& segments,
+                      const std::vector<uint32_t>& dashes) const {
+        double nearest = 1e300;
+        Point away{};
+        const Segment* border = nullptr;
+        for (const uint32_t i : segments) {
+            Point vector;
+            const double distance = distance_to(borders_[i], p, vector);
+            if (distance < nearest) {
+                nearest = distance;
+                away = vector;
+                border = &borders_[i];
+            }
+        }
+        Border best = {is_road ? 1e3 : -1e3, {0.0, 0.0}, kPairOfBand[is_road ? 1 : 0]};
+        double into_road = best.distance;  // distance to the road's border, positive on the road
+        if (border != nullptr) {
+            Point normal;
+            if (nearest > 1e-9) {
+                const double scale = (is_road ? 1.0 : -1.0) / nearest;
+                normal = {away.x * scale, away.y * scale};
+            } else {  // the texel's centre is on the border: ask a little to the left which side the road is
+                      // on
+                const double dx = border->b.x - border->a.x;
+                const double dy = border->b.y - border->a.y;
+                const double size = std::sqrt(dx * dx + dy * dy);
+                normal = {-dy / size, dx / size};
+                if (!is_inside({p.x + 1e-6 * normal.x, p.y + 1e-6 * normal.y}))
+                    normal = {-normal.x, -normal.y};
+            }
+            into_road = is_road ? nearest : -nearest;
+            const double into_asphalt = into_road - kEdgeLineWidth;
+            best = std::fabs(into_road) < std::fabs(into_asphalt)
+                       ? Border{into_road, normal, kPairOfBand[0]}
+                       : Border{into_asphalt, normal, kPairOfBand[1]};
+        }
+        if (into_road > kEdgeLineWidth) {
+            for (const uint32_t i : dashes) {
+                Point gradient;
+                const double depth = depth_in(dashes_[i], p, gradient);
+                if (depth > 0.0 || std::fabs(depth) < std::fabs(best.distance))
+                    best = {depth, gradient, kPairOfDash};
+            }
+        }
+        return edge_texel(best, texel_);
+    }
+
+    std::vector<Segment> borders_;
+    std::vector<Dash> dashes_;
+    Point origin_;
+    double texel_;
+    int block_columns_, block_rows_;
+    Bins near_borders_, near_dashes_;
+};
+
+}  // namespace
+
+GroundMap::GroundMap(const TrackOutline& outline, const GroundOptions& options) {
+    const auto center = read_points(outline.center, outline.count, "centerline");
+    const auto inner = read_points(outline.inner, outline.count, "inner border");
+    const auto outer = read_points(outline.outer, outline.count, "outer border");
+    if (!(options.texel >= 0.001f && options.texel <= 1.0f)) {
+        throw std::invalid_argument("Ground texel = " + std::to_string(options.texel) +
+                                    " m must lie between 0.001 and 1 m; 0.01 is usual.");
+    }
+
+    std::vector<Segment> borders;
+    if (outline.is_closed) {
+        add_ring(outer, borders);
+        add_ring(inner, borders);
+    } else {
+        std::vector<Point> road = outer;
+        road.insert(road.end(), inner.rbegin(), inner.rend());
+        add_ring(road, borders);
+    }
+    Point low = {1e300, 1e300};
+    Point high = {-1e300, -1e300};
+    for (const auto* line : {&center, &inner, &outer}) {
+        for (const Point& p : *line) {
+            low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+            high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+        }
+    }
+    view_.min_x = static_cast<float>(low.x) - kRoomMargin;
+    view_.min_y = static_cast<float>(low.y) - kRoomMargin;
+    view_.max_x = static_cast<float>(high.x) + kRoomMargin;
+    view_.max_y = static_cast<float>(high.y) + kRoomMargin;
+    const double size_x = static_cast<double>(view_.max_x) - view_.min_x;
+    const double size_y = static_cast<double>(view_.max_y) - view_.min_y;
+
+    // The finest allowed texel whose pyramid fits: 4/3 of level 0, and a little for rings and rounding to
+    // tiles.
+    double texel = 0.01;
+    view_.exponent = 0;
+    while (texel > options.texel * 1.4143f) texel *= 0.5, --view_.exponent;
+    while (texel * 1.4143f < options.texel || size_x / texel > kMaxTexelsPerSide ||
+           size_y / texel > kMaxTexelsPerSide ||
+           size_x / texel * size_y / texel * 4.0 * 1.4 > static_cast<double>(options.max_bytes)) {
+        texel *= 2.0, ++view_.exponent;
+    }
+    view_.texel = static_cast<float>(texel);
+
+    int columns = static_cast<int>(std::ceil(size_x / texel));
+    int rows = static_cast<int>(std::ceil(size_y / texel));
+    size_t total = 0;
+    double level_texel = texel;
+    while (true) {
+        GroundLevel& level = view_.levels[view_.num_levels++];
+        level.columns = columns;
+        level.rows = rows;
+        level.offset = static_cast<uint32_t>(total);
+        level.tiles_per_row = (columns + 2 + 3) / 4;
+        level.texels_per_metre = static_cast<float>(1.0 / level_texel);
+        total += size_t(level.tiles_per_row) * ((rows + 2 + 3) / 4) * 16;
+        if (view_.num_levels == kMaxGroundLevels || std::max(columns, rows) <= 4) break;
+        columns = (columns + 1) / 2;
+        rows = (rows + 1) / 2;
+        level_texel *= 2.0;
+    }
+    // Ring and padding are field; coverage bytes and edge texels say so differently.
+    texels_.assign(total, kCoverageUnit << (8 * kField));
+    std::fill(texels_.begin(), texels_.begin() + (view_.num_levels > 1 ? view_.levels[1].offset : total),
+              pure_texel(kField));
+    view_.texels = texels_.data();
+
+    const auto index = [](const GroundLevel& level, int column, int row) {
+        return texel_index(level, static_cast<uint32_t>(column + 1) << 16,
+                           static_cast<uint32_t>(row + 1) << 16);
+    };
+    const GroundLevel& base = view_.levels[0];
+    Painter painter(std::move(borders), place_dashes(center, outline.is_closed), {view_.min_x, view_.min_y},
+                    texel, base.columns, base.rows);
+    painter.paint(base.columns, base.rows,
+                  [&](int column, int row, uint32_t value) { texels_[index(base, column, row)] = value; });
+
+    std::vector<Coverage> finer;
+    for (int l = 1; l < view_.num_levels; ++l) {
+        const GroundLevel& below = view_.levels[l - 1];
+        const GroundLevel& level = view_.levels[l];
+        std::vector<Coverage> coverage(size_t(level.columns) * level.rows);
+        for (int row = 0; row < level.rows; ++row) {
+            for (int column = 0; column < level.columns; ++column) {
+                uint32_t sum[kNumMaterials] = {};
+                for (int k = 0; k < 4; ++k) {
+                    const int x = 2 * column + (k & 1);
+                    const int y = 2 * row + (k >> 1);
+                    Coverage part = {{65536u, 0, 0, 0}};
+                    if (x < below.columns && y < below.rows) {
+                        part = l == 1 ? coverage_of(texels_[index(below, x, y)])
+                                      : finer[size_t(y) * below.columns + x];
+                    }
+                    for (int m = 0; m < kNumMaterials; ++m) sum[m] += part.share[m];
+                }
+                uint32_t bytes[kNumMaterials];
+                share_out(sum, 4u * 65536u / kCoverageUnit, bytes);
+                share_out(sum, 4, coverage[size_t(row) * level.columns + column].share);
+                texels_[index(level, column, row)] =
+                    bytes[0] | bytes[1] << 8 | bytes[2] << 16 | bytes[3] << 24;
+            }
+        }
+        finer = std::move(coverage);
+    }
+}
+
+}  // namespace racecraft
