@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from racecraft.errors import ConfigError, ShapeError
+from racecraft.learn import NetworkSpec, networks
+from racecraft.learn.networks import initial_weights, network_names, parameter_count, weight_shapes
+
+SHALLOW = "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
+
+
+def test_shallow_has_aws_size_per_tower():
+    spec = NetworkSpec(name=SHALLOW, num_actions=10)
+    assert networks.flat_size(spec) == 11264
+    convs = (8 * 8 * 32 + 32) + (4 * 4 * 32 * 64 + 64) + (3 * 3 * 64 * 64 + 64)
+    body = convs + 11264 * 512 + 512
+    assert body == 5_839_520  # the 5.84 M of AWS
+    assert parameter_count(spec, tower="policy") == body + 512 * 10 + 10
+    assert parameter_count(spec, tower="critic") == body + 512 + 1
+
+
+def test_default_network_is_small():
+    spec = NetworkSpec(num_actions=10, state_size=20)
+    assert network_names()[0] == spec.name
+    assert parameter_count(spec) < 60_000
+
+
+@pytest.mark.parametrize("name", network_names())
+def test_privileged_critic_replaces_only_the_critic(name):
+    camera, privileged = (weight_shapes(NetworkSpec(name=name, num_actions=4, state_size=s)) for s in (0, 12))
+    policy = {key: shape for key, shape in camera.items() if key.startswith("policy.")}
+    assert policy == {key: shape for key, shape in privileged.items() if key.startswith("policy.")}
+    assert privileged["critic.dense1.weight"] == (64, 12)
+
+
+def test_misspelt_network_gets_a_suggestion():
+    with pytest.raises(ConfigError, match="does not exist") as caught:
+        networks.architecture("RACECRAFT_SMAL")
+    assert "RACECRAFT_SMALL" in caught.value.hint
+
+
+def test_encode_averages_squares_and_folds_blocks():
+    spec = NetworkSpec(num_actions=2)
+    frames = np.random.default_rng(0).integers(0, 256, (3, 120, 160), dtype=np.uint8)
+    observations = networks.encode(spec, frames)
+    assert observations.shape == (3, *networks.observation_shape(spec)) == (3, 15, 20, 16)
+    pooled = np.floor(frames.reshape(3, 60, 2, 80, 2).mean((2, 4)) + 0.5)
+    for row, column, pixel in [(0, 0, 0), (14, 19, 15), (7, 3, 6)]:
+        y, x = 4 * row + pixel // 4, 4 * column + pixel % 4
+        np.testing.assert_array_equal(observations[:, row, column, pixel], pooled[:, y, x])
+
+
+@pytest.mark.parametrize("name", network_names())
+def test_encode_returns_its_own_copy(name):
+    frames = np.zeros((2, 120, 160), np.uint8)
+    observations = networks.encode(NetworkSpec(name=name, num_actions=2), frames)
+    frames[:] = 9
+    assert not observations.any()
+    assert observations.flags.c_contiguous
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [np.zeros((1, 60, 80), np.uint8), np.zeros((1, 120, 160), np.float32), np.zeros((120, 160), np.uint8)],
+)
+def test_encode_refuses_other_images(frames):
+    with pytest.raises(ShapeError, match="expected"):
+        networks.encode(NetworkSpec(num_actions=2), frames)
+
+
+def test_initial_weights_are_orthogonal_and_repeatable():
+    spec = NetworkSpec(num_actions=5, state_size=8)
+    weights, again, other = (initial_weights(spec, seed=seed) for seed in (4, 4, 5))
+    for name, array in weights.items():
+        assert array.shape == weight_shapes(spec)[name]
+        np.testing.assert_array_equal(array, again[name])
+    assert not np.array_equal(weights["policy.conv1.weight"], other["policy.conv1.weight"])
+    matrix = weights["policy.conv2.weight"].reshape(32, -1)
+    np.testing.assert_allclose(matrix @ matrix.T, 2 * np.eye(32), atol=1e-5)
+    assert abs(weights["policy.head.weight"]).max() < 0.011
+
+
+def test_too_small_frames_are_refused():
+    with pytest.raises(ConfigError, match="too small"):
+        weight_shapes(NetworkSpec(num_actions=2, frame_shape=(16, 16)))

@@ -1,0 +1,272 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from conftest import StripeWorld
+
+from racecraft.errors import CheckpointError, ConfigError, TrainingError
+from racecraft.learn import PPO, NetworkSpec, PPOConfig
+from racecraft.learn.torch_learner import TorchLearner
+
+
+def ppo_for(config: PPOConfig, *, seed: int = 0, spec: NetworkSpec | None = None, **world) -> PPO:
+    learner = TorchLearner(spec or NetworkSpec(num_actions=3, state_size=2), seed=seed, num_threads=2)
+    return PPO(config, learner, StripeWorld(config.num_envs, seed=seed, **world), seed=seed)
+
+
+def assert_same_weights(a: PPO, b: PPO) -> None:
+    for name, array in a.learner.weights().items():
+        np.testing.assert_array_equal(array, b.learner.weights()[name], err_msg=name)
+
+
+@pytest.mark.parametrize("is_discrete", [True, False])
+def test_learns_to_centre_the_stripe(is_discrete):
+    config = PPOConfig(
+        num_envs=32, num_steps=16, minibatch_size=128, update_epochs=4, learning_rate=1e-3, ent_coef=0.0
+    )
+    spec = NetworkSpec(num_actions=3 if is_discrete else 1, is_discrete=is_discrete, state_size=2)
+    ppo = ppo_for(config, spec=spec)
+    rewards = []
+    for _ in range(30):
+        ppo.iterate()
+        rewards.append(ppo._rollout.rewards.mean())
+    assert np.mean(rewards[:2]) < 0.65
+    assert np.mean(rewards[-3:]) > 0.78
+
+
+def test_learns_from_rewards_of_any_scale():
+    class LoudWorld(StripeWorld):
+        def step(self, actions):
+            rewards, terminated, truncated = super().step(actions)
+            return 1e4 * rewards - 3e4, terminated, truncated
+
+    config = PPOConfig(num_envs=32, num_steps=16, minibatch_size=128, update_epochs=4, learning_rate=1e-3)
+    learner = TorchLearner(NetworkSpec(num_actions=3, state_size=2), num_threads=2)
+    ppo = PPO(config, learner, LoudWorld(32), seed=0)
+    stats = [ppo.iterate() for _ in range(20)]
+    assert stats[-1].losses.value_loss < 10
+    assert stats[-1].explained_variance > 0.5
+
+
+def test_the_same_seed_gives_the_same_bits(config):
+    first, second, other = (ppo_for(config, seed=seed) for seed in (3, 3, 4))
+    for ppo in (first, second, other):
+        for _ in range(3):
+            ppo.iterate()
+    assert_same_weights(first, second)
+    assert not np.array_equal(
+        first.learner.weights()["policy.head.weight"], other.learner.weights()["policy.head.weight"]
+    )
+
+
+def test_saved_and_loaded_training_continues_to_the_bit(config):
+    straight, resumed = ppo_for(config, seed=3), ppo_for(config, seed=8)
+    for _ in range(2):
+        straight.iterate()
+    resumed.load_state({name: array.copy() for name, array in straight.state().items()})
+    world = straight.environment
+    resumed.environment._offset, resumed.environment._age = world._offset.copy(), world._age.copy()
+    resumed.environment._rng.bit_generator.state = world._rng.bit_generator.state
+    a, b = straight.iterate(), resumed.iterate()
+    clocks = dict.fromkeys(("environment_seconds", "policy_seconds", "update_seconds"), 0.0)
+    assert dataclasses.replace(a, **clocks) == dataclasses.replace(b, **clocks)
+    assert_same_weights(straight, resumed)
+
+
+@pytest.mark.parametrize("missing", ["ppo/counters", "weights/policy.head.bias", "optimizer/step"])
+def test_damaged_state_is_refused(config, missing):
+    ppo = ppo_for(config)
+    state = ppo.state()
+    del state[missing]
+    with pytest.raises(CheckpointError):
+        ppo.load_state(state)
+
+
+def test_state_of_another_number_of_cars_is_refused(config):
+    state = ppo_for(dataclasses.replace(config, num_envs=8)).state()
+    with pytest.raises(CheckpointError, match="8 cars"):
+        ppo_for(config).load_state(state)
+
+
+def test_learning_rate_zero_leaves_the_weights(config):
+    ppo = ppo_for(dataclasses.replace(config, learning_rate=0.0))
+    before = ppo.learner.weights()
+    ppo.iterate()
+    for name, array in ppo.learner.weights().items():
+        np.testing.assert_array_equal(array, before[name])
+
+
+def test_truncated_steps_bootstrap_the_last_frame_before_the_reset(config):
+    ppo = ppo_for(dataclasses.replace(config, num_steps=9), time_limit=5)
+    seen = []
+    reset = ppo.environment.reset
+
+    def spy(mask):
+        _, states = ppo.environment.observe()
+        seen.append((ppo._rollout.num_steps - 1, mask.copy(), states.copy()))
+        reset(mask)
+
+    ppo.environment.reset = spy
+    values = ppo._values
+    ppo._values = lambda observations, states: states[:, 0] + 100.0  # a critic that repeats the offset
+    ppo.iterate()
+    ppo._values = values
+    rollout = ppo._rollout
+    assert rollout.truncated[4].any()
+    for row, mask, states in seen:
+        for car in np.flatnonzero(mask & rollout.truncated[row]):
+            assert rollout.next_values[row, car] == np.float32(states[car, 0] + 100)
+    alive = ~rollout.truncated[8] & ~rollout.terminated[8]
+    _, states = ppo.environment.observe()
+    np.testing.assert_array_equal(rollout.next_values[8, alive], states[alive, 0] + 100)
+    assert (rollout.next_values[rollout.terminated] == 0).all()
+
+
+def test_whole_episodes_are_shared_between_the_cars(config):
+    config = dataclasses.replace(config, num_envs=4, episodes_per_iteration=6, minibatch_size=16)
+    ppo = ppo_for(config, time_limit=7)
+    for _ in range(2):
+        stats = ppo.iterate()
+        rollout = ppo._rollout
+        ends = (rollout.terminated | rollout.truncated) & rollout.is_valid
+        assert stats.episodes == 6
+        assert ends[: rollout.num_steps].sum(0).tolist() == [2, 2, 1, 1]
+        assert stats.num_steps == rollout.is_valid[: rollout.num_steps].sum()
+        for car in range(4):  # nothing counts after a car's last episode
+            assert ends[np.flatnonzero(rollout.is_valid[: rollout.num_steps, car]).max(), car]
+
+
+def test_fewer_episodes_than_cars(config):
+    ppo = ppo_for(dataclasses.replace(config, episodes_per_iteration=3, minibatch_size=8), time_limit=6)
+    stats = ppo.iterate()
+    assert stats.episodes == 3
+    assert not ppo._rollout.is_valid[:, 3:].any()
+
+
+def test_whole_episodes_stop_at_the_limit_of_steps(config):
+    config = dataclasses.replace(config, num_envs=4, episodes_per_iteration=4, max_steps_per_iteration=50)
+    ppo = ppo_for(config, time_limit=10**6)
+    stats = ppo.iterate()
+    assert 50 <= stats.num_steps < 54
+    last = ppo._rollout.num_steps - 1
+    alive = ppo._rollout.is_valid[last] & ~ppo._rollout.terminated[last]
+    assert (ppo._rollout.next_values[last, alive] != 0).all()
+
+
+def test_an_iteration_smaller_than_a_minibatch_still_learns(config):
+    config = dataclasses.replace(config, episodes_per_iteration=1, minibatch_size=512)
+    ppo = ppo_for(config, time_limit=3)
+    before = ppo.learner.weights()["policy.head.bias"]
+    ppo.iterate()
+    assert not np.array_equal(before, ppo.learner.weights()["policy.head.bias"])
+
+
+def test_a_partial_minibatch_is_dropped(config):
+    ppo = ppo_for(dataclasses.replace(config, minibatch_size=50, update_epochs=3))
+    sizes = []
+    update = ppo.learner.update
+    ppo.learner.update = lambda minibatch, objective: (
+        sizes.append(len(minibatch.returns)),
+        update(minibatch, objective),
+    )[1]
+    ppo.iterate()
+    assert sizes == [50] * 6  # 128 samples: two of 50 in each of three passes
+
+
+def test_advantages_are_normalized_over_the_rollout(config):
+    ppo = ppo_for(dataclasses.replace(config, update_epochs=1))
+    seen = []
+    update = ppo.learner.update
+    ppo.learner.update = lambda minibatch, objective: (
+        seen.append(minibatch.advantages),
+        update(minibatch, objective),
+    )[1]
+    ppo.iterate()
+    everything = np.concatenate(seen)
+    assert everything.mean() == pytest.approx(0, abs=1e-5)
+    assert everything.std() == pytest.approx(1, abs=1e-4)
+
+
+def test_e_greedy_falls_from_all_random_to_its_end(config):
+    config = dataclasses.replace(
+        config,
+        num_envs=200,
+        num_steps=2,
+        exploration="e-greedy",
+        epsilon_steps=1600,
+        epsilon_end=0.1,
+        learning_rate=0.0,
+    )
+    ppo = ppo_for(config)
+    shares = []
+    for _ in range(7):
+        ppo.iterate()
+        outputs = ppo.learner.policy(ppo._rollout.observations.reshape(-1, *ppo.learner.observation_shape))
+        shares.append((ppo._rollout.actions.ravel() == outputs.argmax(1)).mean())
+    assert shares[0] == pytest.approx(
+        1 / 3 + 0.1 * 2 / 3, abs=0.12
+    )  # epsilon about 0.9 in the first iteration
+    assert shares[-1] == pytest.approx(0.9 + 0.1 / 3, abs=0.04)
+
+
+def test_nan_reward_stops_training_and_keeps_the_weights(config):
+    class BrokenWorld(StripeWorld):
+        def step(self, actions):
+            rewards, terminated, truncated = super().step(actions)
+            return np.where(np.arange(len(rewards)) == 3, np.nan, rewards), terminated, truncated
+
+    learner = TorchLearner(NetworkSpec(num_actions=3, state_size=2))
+    ppo = PPO(config, learner, BrokenWorld(config.num_envs))
+    before = learner.weights()
+    with pytest.raises(TrainingError, match="iteration 1"):
+        ppo.iterate()
+    for name, array in learner.weights().items():
+        np.testing.assert_array_equal(array, before[name])
+
+
+def test_continuous_commands_stay_within_bounds(config):
+    commands = []
+
+    class Recorder(StripeWorld):
+        def step(self, actions):
+            commands.append(actions.copy())
+            return super().step(actions)
+
+    learner = TorchLearner(NetworkSpec(num_actions=1, is_discrete=False, state_size=2))
+    ppo = PPO(config, learner, Recorder(config.num_envs))
+    ppo.iterate()
+    assert abs(np.concatenate(commands)).max() == 1.0
+    assert abs(ppo._rollout.actions).max() > 1.0  # the density is that of the unclipped action
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("num_envs", 0),
+        ("gamma", 1.1),
+        ("gamma", float("nan")),
+        ("learning_rate", float("inf")),
+        ("learning_rate", -1e-4),
+        ("clip_coef", 0.0),
+        ("value_loss", "mae"),
+        ("exploration", "boltzmann"),
+        ("update_epochs", 0),
+        ("epsilon_end", -0.1),
+        ("max_grad_norm", -1.0),
+    ],
+)
+def test_impossible_settings_name_themselves(field, value):
+    with pytest.raises(ConfigError, match=f"^{field} is"):
+        PPOConfig(**{field: value})
+
+
+def test_settings_must_fit_environment_and_learner(config, learner):
+    with pytest.raises(ConfigError, match="num_envs"):
+        PPO(config, learner, StripeWorld(4))
+    with pytest.raises(ConfigError, match="minibatch_size"):
+        PPO(dataclasses.replace(config, minibatch_size=129), learner, StripeWorld(16))
+    continuous = TorchLearner(NetworkSpec(num_actions=1, is_discrete=False))
+    with pytest.raises(ConfigError, match="exploration"):
+        PPO(dataclasses.replace(config, exploration="e-greedy"), continuous, StripeWorld(16))
