@@ -1,6 +1,7 @@
 // The border between Python and the core: shapes are checked in racecraft.sim, arrays are shared without a copy.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -21,6 +22,8 @@ template <typename T, int Dimensions>
 using Array = nb::ndarray<nb::numpy, T, nb::ndim<Dimensions>, nb::c_contig>;
 using Points = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 using Table = nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Mask = nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Seeds = nb::ndarray<const uint64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Bytes = nb::ndarray<const uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 TrackOutline outline_of(const Points& centerline, const Points& inner, const Points& outer, bool is_closed) {
@@ -140,13 +143,15 @@ void bind_engine(nb::module_& m) {
             "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a, "direction"_a)
         .def(
             "reset",
-            [](Engine& self, nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu> mask) {
+            [](Engine& self, Mask mask, std::optional<Seeds> seeds) {
                 if (mask.shape(0) != self.num_envs()) throw std::invalid_argument("Wrong length of the reset mask.");
-                const bool* data = mask.data();
+                if (seeds && seeds->shape(0) != self.num_envs()) throw std::invalid_argument("Wrong number of seeds.");
+                const bool* masked = mask.data();
+                const uint64_t* keys = seeds ? seeds->data() : nullptr;
                 nb::gil_scoped_release release;
-                self.reset(data);
+                keys != nullptr ? self.reset(masked, keys) : self.reset(masked);
             },
-            "mask"_a)
+            "mask"_a, "seeds"_a = nb::none())
         .def(
             "step",
             [](Engine& self, nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu> actions) {

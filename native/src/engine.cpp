@@ -23,6 +23,8 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
     rows_.resize(kNumRowColumns * n);
     episodes_.resize(n);
     track_choice_.resize(n);
+    seeds_.assign(n, config_.seed);
+    streams_.resize(n);
     palettes_.assign(n, palette);
     flags_ = std::make_unique<bool[]>(2 * n);
 
@@ -31,6 +33,7 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
     for (size_t env = 0; env < n; ++env) {
         for (int k = 0; k < kNumVehicleParameters; ++k) parameters_[k * n + env] = values[k];
         track_choice_[env] = static_cast<int32_t>(env % num_tracks());
+        streams_[env] = static_cast<uint32_t>(env);
         episodes_[env].episode = -1;
     }
     if (camera != nullptr) {
@@ -58,7 +61,8 @@ VehicleState Engine::start_pose(size_t env) {
     const StartRule& rule = config_.start;
     const TrackGeometry& track = track_of(env);
     Episode& episode = episodes_[env];
-    const uint32_t car = static_cast<uint32_t>(env);
+    const uint64_t seed = seeds_[env];
+    const uint32_t car = streams_[env];
     const uint32_t number = static_cast<uint32_t>(episode.episode);
 
     double fraction = rule.offset;
@@ -66,7 +70,7 @@ VehicleState Engine::start_pose(size_t env) {
     if (rule.mode == StartMode::advance) fraction += rule.advance * episode.episode;
     if (rule.mode == StartMode::random) {
         fraction = static_cast<double>(
-            uniform_of(philox(config_.seed, car, number, 0, Purpose::start_position).words[0]));
+            uniform_of(philox(seed, car, number, 0, Purpose::start_position).words[0]));
     }
     fraction = track.is_closed ? fraction - floor_of(fraction) : 0.0;
     episode.start = fraction;
@@ -80,7 +84,7 @@ VehicleState Engine::start_pose(size_t env) {
     const double dx = track.waypoint_x[segment + 1] - track.waypoint_x[segment];
     const double dy = track.waypoint_y[segment + 1] - track.waypoint_y[segment];
 
-    const RandomBlock random = philox(config_.seed, car, number, 0, Purpose::start_pose);
+    const RandomBlock random = philox(seed, car, number, 0, Purpose::start_pose);
     const float lateral = rule.lateral_jitter * symmetric_of(random.words[0]);
     VehicleState state{};
     state.x = static_cast<float>(track.waypoint_x[segment] + along * dx - static_cast<double>(lateral) * dy / step);
@@ -139,6 +143,16 @@ void Engine::reset(const bool* mask) {
             if (mask == nullptr || mask[env]) begin_episode(env);
         }
     });
+}
+
+void Engine::reset(const bool* mask, const uint64_t* seeds) {
+    for (size_t env = 0; env < num_envs(); ++env) {
+        if (!mask[env]) continue;
+        seeds_[env] = seeds[env];
+        streams_[env] = 0;
+        episodes_[env].episode = -1;
+    }
+    reset(mask);
 }
 
 void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
@@ -211,6 +225,8 @@ void Engine::visit_saved(Visitor&& visit) {
     visit(rows_.data(), rows_.size() * sizeof(double));
     visit(episodes_.data(), episodes_.size() * sizeof(Episode));
     visit(track_choice_.data(), track_choice_.size() * sizeof(int32_t));
+    visit(seeds_.data(), seeds_.size() * sizeof(uint64_t));
+    visit(streams_.data(), streams_.size() * sizeof(uint32_t));
     visit(palettes_.data(), palettes_.size() * sizeof(GreyPalette));
     visit(flags_.get(), 2 * num_envs() * sizeof(bool));
 }

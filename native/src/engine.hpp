@@ -45,6 +45,9 @@ class Engine {
 
     // Puts the masked cars (all of them without a mask) at the start of their next episode.
     void reset(const bool* mask);
+    // As reset, but the masked cars begin anew: each draws from now on as the first car of an engine with its seed (N,),
+    // and its next episode is its first.
+    void reset(const bool* mask, const uint64_t* seeds);
     // actions: steering angle in rad and speed in m/s, interleaved (N, 2), finite.
     void step(const float* actions);
     // Puts one car somewhere else within its episode; counters of standstill and reversing begin anew.
@@ -98,6 +101,8 @@ class Engine {
     std::vector<uint8_t> frames_;
     std::vector<Episode> episodes_;
     std::vector<int32_t> track_choice_;
+    std::vector<uint64_t> seeds_;        // (N,) with its stream, the key of each car's random numbers
+    std::vector<uint32_t> streams_;      // (N,)
     std::vector<GreyPalette> palettes_;
     std::unique_ptr<bool[]> flags_;  // terminated, then truncated (std::vector<bool> has no bytes to show)
 };

@@ -54,7 +54,9 @@ class Start:
     def __post_init__(self) -> None:
         if self.mode not in START_MODES:
             hint = did_you_mean(self.mode, START_MODES)
-            raise ConfigError(f"Start mode is {self.mode!r}; allowed are {', '.join(START_MODES)}. {hint}".strip())
+            raise ConfigError(
+                f"Start mode is {self.mode!r}; allowed are {', '.join(START_MODES)}. {hint}".strip()
+            )
         limits = {
             "offset": (-1.0, 1.0),
             "advance": (-1.0, 1.0),
@@ -180,11 +182,18 @@ class Simulation:
         """One column of `rows` by name, a view (N,)."""
         return self.rows[:, ROW_COLUMNS.index(name)]
 
-    def reset(self, mask: NDArray[np.bool_] | None = None) -> None:
+    def reset(
+        self, mask: NDArray[np.bool_] | None = None, *, seeds: NDArray[np.uint64] | None = None
+    ) -> None:
         """Put the masked cars (all without a mask) at the start of their next episode.
 
+        Args:
+            mask: The cars to reset, bool (N,).
+            seeds: Begin anew: the masked cars start their first episode and draw, from now on, as the only car
+                of a simulation with this seed would, uint64 (N,).
+
         Raises:
-            ShapeError: The mask is not bool of shape (N,).
+            ShapeError: The mask is not bool, or the seeds are not uint64, of shape (N,).
             ConfigError: `track_choice` names a track that does not exist.
         """
         if mask is None:
@@ -194,9 +203,18 @@ class Simulation:
             raise ShapeError(
                 f"reset mask is {mask.dtype} of shape {mask.shape}, expected bool of shape ({self.num_envs},)."
             )
+        if seeds is not None:
+            seeds = np.ascontiguousarray(seeds)
+            if seeds.shape != (self.num_envs,) or seeds.dtype != np.uint64:
+                raise ShapeError(
+                    f"seeds are {seeds.dtype} of shape {seeds.shape}, "
+                    f"expected uint64 of shape ({self.num_envs},)."
+                )
         if self.track_choice.min() < 0 or self.track_choice.max() >= len(self.tracks):
-            raise ConfigError(f"track_choice must be 0 to {len(self.tracks) - 1}, got {self.track_choice.tolist()}.")
-        self._engine.reset(mask)
+            raise ConfigError(
+                f"track_choice must be 0 to {len(self.tracks) - 1}, got {self.track_choice.tolist()}."
+            )
+        self._engine.reset(mask, seeds)
 
     def step(self, actions: ArrayLike) -> None:
         """Judge, move and look: one control step of 1/15 s for every car.
@@ -219,7 +237,9 @@ class Simulation:
         if not finite.all():
             car = int(np.flatnonzero(~finite.all(axis=1))[0])
             steering, speed = commands[car]
-            raise NonFiniteAction(f"action[{car}] = ({steering}, {speed}); steering_angle and speed must be finite.")
+            raise NonFiniteAction(
+                f"action[{car}] = ({steering}, {speed}); steering_angle and speed must be finite."
+            )
         self._engine.step(commands)
 
     def set_pose(self, env: int, x: float, y: float, heading: float, *, speed: float = 0.0) -> None:
