@@ -50,7 +50,8 @@ TEMPLATE: dict[str, Any] = {
 def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[str, Any]:
     """The dict that ``reward_function`` receives.
 
-    Every mutable value is fresh, as AWS makes a deep copy: nothing a function does to it reaches the next call.
+    Every mutable value is fresh, as AWS makes a deep copy: nothing a function does to it reaches the next
+    call.
 
     Args:
         row: One row of the simulation, its values in the order of ``racecraft.sim.columns.ROW_COLUMNS``.
@@ -117,7 +118,7 @@ def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[st
 
 
 def format_params(params: dict[str, Any]) -> str:
-    """The dict as an error shows it: six digits, waypoints only counted, no keys of objects that are not there."""
+    """The dict as an error shows it: six digits, waypoints only counted, no keys of missing objects."""
     parts = []
     for key, value in params.items():
         if "object" in key and not params["objects_location"]:

@@ -33,8 +33,8 @@ def load_reward(name_or_path: str | Path) -> str:
     """The source of a reward function.
 
     Args:
-        name_or_path: A preset's name, or the path of a ``reward_function.py``. A preset goes before a file of the same
-            name; write ``./racing`` to mean the file.
+        name_or_path: A preset's name, or the path of a ``reward_function.py``. A preset goes before a file of
+            the same name; write ``./racing`` to mean the file.
 
     Raises:
         RewardError: It is neither, or the file is not UTF-8 text of 1 to 140,000 characters.
@@ -66,7 +66,9 @@ def load_reward(name_or_path: str | Path) -> str:
         if len(data) > 4 * MAX_CHARACTERS:
             raise RewardError(_too_long(path)) from error
         line = data[: error.start].count(b"\n") + 1
-        raise RewardError(f"Reward function '{path}' is not UTF-8 text: see line {line}.", line=line) from error
+        raise RewardError(
+            f"Reward function '{path}' is not UTF-8 text: see line {line}.", line=line
+        ) from error
     if len(source) > MAX_CHARACTERS:
         raise RewardError(_too_long(path))
     return source

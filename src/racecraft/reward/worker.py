@@ -4,8 +4,8 @@
         rewards = worker(simulation.rows)  # (N, columns) -> (N,)
 
 User code never runs in the trainer. The two processes share memory and ring each other over pipes, once per
-batch; replies are numbers and text, never pickles. Whatever a reward function does, the caller gets rewards or one
-`RewardError` that names the line and the params, within a bounded time.
+batch; replies are numbers and text, never pickles. Whatever a reward function does, the caller gets rewards
+or one `RewardError` that names the line and the params, within a bounded time.
 """
 
 from __future__ import annotations
@@ -48,19 +48,19 @@ _FRAME = re.compile(rf'File "{re.escape(protocol.FILENAME)}", line (\d+)')
 class RewardWorker:
     """Calls a user's ``reward_function(params)`` in a separate process.
 
-    A call costs about 2 µs for a short function. After an error the process is gone, and further calls say so.
-    Globals of the user's file live on between calls, as on AWS, where one process drove one car; ``num_cars``
-    keeps that true for a batch.
+    A call costs about 2 µs for a short function. After an error the process is gone, and further calls say
+    so. Globals of the user's file live on between calls, as on AWS, where one process drove one car;
+    ``num_cars`` keeps that true for a batch.
 
     Args:
         source: Text of the user's ``reward_function.py``.
-        tracks: The simulation's tracks; a row's ``track_index`` selects the waypoints, i + len(tracks) means track i
-            driven the other way.
+        tracks: The simulation's tracks; a row's ``track_index`` selects the waypoints, i + len(tracks) means
+            track i driven the other way.
         seed: Seeds ``random`` and ``numpy.random`` in the process, so that a run repeats.
         timeout_s: How long one call of the function may take before the process is killed, s.
         start_timeout_s: How long the top level of the source may take, imports included, s.
         memory_limit_mb: Address space of the process, MB.
-        num_cars: How many copies of the source's globals there are: row i belongs to car i modulo this. One copy
+        num_cars: How many copies of the source's globals there are: row i belongs to car i modulo this. One
             is right for functions that keep no state, and loads fastest; see `keeps_state`.
 
     Raises:
@@ -82,6 +82,7 @@ class RewardWorker:
         self._waypoints = waypoints_of(tracks if isinstance(tracks, Sequence) else (tracks,))
         self._timeout_s = timeout_s
         self._failure: RewardError | None = None
+        self._num_read = 0  # bytes of the log
 
         rewards_offset = MAX_BATCH * len(ROW_COLUMNS) * 8
         text_offset = rewards_offset + MAX_BATCH * 8
@@ -283,13 +284,14 @@ class RewardWorker:
                 break
         return data.decode("utf-8", "replace")
 
-    @property
-    def log(self) -> str:
-        """The last 64 KB that the user's function printed."""
+    def read_log(self) -> str:
+        """What the user's function printed since the last call of this, or the last 64 KB of it."""
         (written,) = protocol.SIZE.unpack_from(self._log)
         ring = bytes(self._log[protocol.SIZE.size :])
-        start = written % len(ring)
-        data = ring[:written] if written <= len(ring) else ring[start:] + ring[:start]
+        count = max(min(written - self._num_read, LOG_BYTES), 0)
+        self._num_read = written
+        end = written % LOG_BYTES
+        data = ring[end - count : end] if count <= end else ring[LOG_BYTES - (count - end) :] + ring[:end]
         return data.decode("utf-8", "replace")
 
     @property

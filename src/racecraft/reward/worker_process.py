@@ -37,10 +37,11 @@ READY, REWARDS, FAILED = 1, 2, 3  # statuses of a reply
 SIZE = struct.Struct("<Q")  # bytes of the setup message; also the count of printed bytes that heads the ring
 
 FILENAME = "reward_function.py"  # what the user's source is called in every traceback
+STEPS = 1  # column of a row that counts the episode's steps from 1, the prepare step
 REWARD_LIMIT = 1e5  # largest magnitude that AWS accepts
 
-# Events of sys.addaudithook that a reward function has no use for. Refusing them gives an error with its line;
-# it is no sandbox.
+# Events of sys.addaudithook that a reward function has no use for. Refusing them gives an error with its
+# line; it is no sandbox.
 FORBIDDEN_EVENTS = frozenset(
     (
         *("os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "os.system", "pty.spawn"),
@@ -140,6 +141,10 @@ class Server:
         index = 0
         try:
             for row in self._row.iter_unpack(self._rows[: count * self._row.size]):
+                if row[STEPS] < 2.0:  # the prepare step: AWS does not call the function, the reward is 0
+                    rewards[index] = 0.0
+                    index += 1
+                    continue
                 if num_functions > 1:
                     reward_function = functions[(first + index) % num_functions]
                 reward = reward_function(make_params(row, waypoints))

@@ -1,4 +1,4 @@
-"""Stay inside the borders: any line will do, as long as all wheels are on the road with a little room to spare."""
+"""Stay inside the borders: any line will do, as long as all wheels are on the road with room to spare."""
 
 MARGIN = 0.05  # metres that must be left between the car's middle and the border
 

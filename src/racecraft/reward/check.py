@@ -1,0 +1,274 @@
+"""The static check of a reward function: what can be seen wrong without running it, with its place.
+
+It follows AWS's validator (the same allowed and forbidden things, the same length) without its false
+alarms: a variable ``payload``, a dict's own ``load`` or an import inside a function are fine. It is a help
+to the user and no border against a hostile one; that border is the worker process.
+"""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from racecraft.errors import RewardError, did_you_mean
+from racecraft.reward.imports import ImportRules
+from racecraft.reward.names import undefined_names
+from racecraft.reward.params import TEMPLATE
+from racecraft.reward.source import MAX_CHARACTERS
+from racecraft.reward.worker_process import FILENAME
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with a reward function."""
+
+    line: int
+    """Line in the source, from 1."""
+    column: int
+    """Column in that line, from 1."""
+    message: str
+    """What is wrong, in one sentence."""
+    hint: str = ""
+    """What to do about it."""
+    severity: Literal["error", "warning"] = "error"
+    """Errors would stop a run or are not allowed; a warning may be what the user means."""
+
+    def __str__(self) -> str:
+        hint = f" {self.hint}" if self.hint else ""
+        return f"{FILENAME}, line {self.line}, column {self.column}: {self.message}{hint}"
+
+
+def check_reward(source: str) -> list[Problem]:
+    """All problems that can be seen in the source, in the order of its lines."""
+    try:
+        problems = list(_problems(source))
+    except (RecursionError, MemoryError):
+        problems = [Problem(1, 1, "The source is nested too deeply to be read.")]
+    return sorted(set(problems), key=lambda problem: (problem.line, problem.column, problem.severity))
+
+
+def validate_reward(source: str) -> None:
+    """Raise for the first error that `check_reward` finds; warnings pass.
+
+    Raises:
+        RewardError: The source has an error; ``line`` and ``column`` say where.
+    """
+    errors = [problem for problem in check_reward(source) if problem.severity == "error"]
+    if errors:
+        more = f" ({len(errors) - 1} more)" if len(errors) > 1 else ""
+        raise RewardError(f"{errors[0]}{more}", line=errors[0].line, column=errors[0].column)
+
+
+def _problems(source: str) -> Iterator[Problem]:
+    if not source.strip():
+        yield Problem(
+            1, 1, "The source is empty.", "Write 'def reward_function(params):' and return a number."
+        )
+        return
+    if len(source) > MAX_CHARACTERS:
+        yield Problem(
+            1, 1, f"The source has {len(source):,} characters; AWS accepts up to {MAX_CHARACTERS:,}."
+        )
+        return
+    tree, findings = _parse(source)
+    yield from findings
+    if tree is None:
+        return
+    yield from _check_reward_function(tree)
+    yield from (_at(*finding) for finding in ImportRules(tree).findings())
+    for node, name, known in undefined_names(source, tree):
+        yield _at(node, f"The name '{name}' is not defined.", did_you_mean(name, known))
+
+
+def _parse(source: str) -> tuple[ast.Module | None, list[Problem]]:
+    """The syntax tree, or None; with Python's own errors and warnings about it."""
+    findings = []
+    tree: ast.Module | None = None
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            tree = ast.parse(source, FILENAME)
+            compile(
+                tree, FILENAME, "exec"
+            )  # finds more: a 'return' outside of a function, a 'nonlocal' without one
+        except SyntaxError as error:
+            tree = None
+            message = f"{type(error).__name__}: {error.msg}."
+            findings.append(Problem(max(error.lineno or 1, 1), max(error.offset or 1, 1), message))
+        except ValueError as error:  # a NUL, or half of a surrogate pair
+            tree = None
+            findings.append(Problem(1, 1, f"The source is not text that Python reads: {error}."))
+    for warning in caught:
+        text = str(warning.message).rstrip(".") + "."
+        findings.append(Problem(warning.lineno or 1, 1, text, severity="warning"))
+    return tree, findings
+
+
+def _check_reward_function(tree: ast.Module) -> Iterator[Problem]:
+    functions = [node for node in tree.body if isinstance(node, Function)]
+    found = [function for function in functions if function.name == "reward_function"]
+    if not found:
+        names = [function.name for function in functions]
+        close = did_you_mean("reward_function", names)
+        node = next((f for f in functions if f"'{f.name}'" in close), None)
+        where = (node.lineno, node.col_offset + 1) if node else (1, 1)
+        hint = close or "AWS calls 'def reward_function(params):' at the top level of the file."
+        yield Problem(*where, "There is no function 'reward_function' at the top level.", hint)
+        return
+    for function in found[1:]:
+        yield _at(
+            function, f"'reward_function' is defined again; the first one is in line {found[0].lineno}."
+        )
+    function = found[-1]
+    if isinstance(function, ast.AsyncFunctionDef):
+        yield _at(function, "'reward_function' is 'async', expected a plain function.", "Remove 'async'.")
+        return
+    yield from _check_signature(function)
+    yield from _check_returns(function)
+    yield from _check_keys(tree, function)
+
+
+def _check_signature(function: Function) -> Iterator[Problem]:
+    arguments = function.args
+    positional = [*arguments.posonlyargs, *arguments.args]
+    if len(positional) != 1 or arguments.vararg or arguments.kwonlyargs or arguments.kwarg:
+        count = len(positional) + len(arguments.kwonlyargs) + bool(arguments.vararg) + bool(arguments.kwarg)
+        yield _at(
+            function,
+            f"'reward_function' has {count} parameters, expected exactly one.",
+            "Write 'def reward_function(params):' and read params['speed'] and the others from the dict.",
+        )
+
+
+def _check_returns(function: Function) -> Iterator[Problem]:
+    nodes = list(_own_nodes(function))
+    generator = next((node for node in nodes if isinstance(node, (ast.Yield, ast.YieldFrom))), None)
+    if generator is not None:
+        yield _at(
+            generator, "'reward_function' has a 'yield', so it returns a generator instead of a number."
+        )
+        return
+    returns = [node for node in nodes if isinstance(node, ast.Return)]
+    empty = [node for node in returns if node.value is None or _is_constant(node.value, None)]
+    falls_through = _completes(function.body)
+    if len(returns) == len(empty) and (falls_through or empty):
+        yield _at(function, "'reward_function' never returns a value.", "End it with 'return float(reward)'.")
+        return
+    for node in empty:
+        yield _at(node, "This returns None, which stops the run.", "Return a number.", "warning")
+    if falls_through:
+        yield _at(
+            function,
+            "'reward_function' can reach its end without a 'return', which gives None and stops the run.",
+            "End it with 'return float(reward)'.",
+            "warning",
+        )
+    for node in returns:
+        if isinstance(node.value, (ast.Constant, ast.JoinedStr)) and not _is_constant(node.value, None):
+            value = node.value.value if isinstance(node.value, ast.Constant) else ""
+            if not isinstance(value, (bool, int, float)):
+                yield _at(node, f"This returns a value of type {type(value).__name__}, expected a number.")
+
+
+def _check_keys(tree: ast.Module, function: Function) -> Iterator[Problem]:
+    """Keys that the params dict does not have. A function that changes or replaces the dict is left alone."""
+    arguments = [*function.args.posonlyargs, *function.args.args]
+    if not arguments:
+        return
+    name = arguments[0].arg
+    reads: list[tuple[ast.expr, str, bool]] = []  # where, key, does it raise
+    written, tested = set[str](), set[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and node.id == name and not isinstance(node.ctx, ast.Load):
+            return
+        if (
+            isinstance(node, ast.Subscript)
+            and _is_name(node.value, name)
+            and (key := _text(node.slice)) is not None
+        ):
+            if isinstance(node.ctx, ast.Load):
+                reads.append((node.slice, key, True))
+            else:
+                written.add(key)
+        elif (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Attribute)
+            and _is_name(node.func.value, name)
+        ):
+            if node.func.attr in ("get", "pop") and node.args and (key := _text(node.args[0])) is not None:
+                reads.append((node.args[0], key, False))
+            elif node.func.attr in ("update", "setdefault"):
+                return
+        elif isinstance(node, ast.Compare) and (key := _text(node.left)) is not None:
+            tested.add(key)
+    guarded = {id(inner) for node in ast.walk(tree) if isinstance(node, ast.Try) for inner in ast.walk(node)}
+    for where, key, raises in reads:
+        if key not in TEMPLATE and key not in written and key not in tested:
+            is_error = raises and id(where) not in guarded
+            hint = did_you_mean(key, TEMPLATE) or f"The keys are {', '.join(TEMPLATE)}."
+            yield _at(where, f"{name} has no key '{key}'.", hint, "error" if is_error else "warning")
+
+
+def _completes(body: list[ast.stmt]) -> bool:
+    """Whether the run can get past the last of these statements."""
+    return all(_can_pass(statement) for statement in body)
+
+
+def _can_pass(statement: ast.stmt) -> bool:
+    match statement:
+        case ast.Return() | ast.Raise():
+            return False
+        case ast.If():
+            return _completes(statement.body) or _completes(statement.orelse)
+        case ast.While(test=ast.Constant(value=value)) if value:
+            return any(isinstance(node, ast.Break) for node in ast.walk(statement))
+        case ast.With():
+            return _completes(statement.body)
+        case ast.Try():
+            handled = any(_completes(handler.body) for handler in statement.handlers)
+            passes = _completes([*statement.body, *statement.orelse]) or handled
+            return passes and _completes(statement.finalbody)
+        case ast.Match():
+            last = statement.cases[-1]
+            is_total = (
+                last.guard is None and isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None
+            )
+            return not is_total or any(_completes(case.body) for case in statement.cases)
+        case _:
+            return True
+
+
+def _own_nodes(function: Function) -> Iterator[ast.AST]:
+    """The nodes of a function's body, without those of functions and classes inside it."""
+    waiting: list[ast.AST] = list(function.body)
+    while waiting:
+        node = waiting.pop()
+        yield node
+        if not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)):
+            waiting.extend(ast.iter_child_nodes(node))
+
+
+def _at(
+    node: ast.expr | ast.stmt | ast.alias,
+    message: str,
+    hint: str = "",
+    severity: Literal["error", "warning"] = "error",
+) -> Problem:
+    return Problem(node.lineno, node.col_offset + 1, message, hint, severity)
+
+
+def _is_name(node: ast.expr, name: str) -> bool:
+    return isinstance(node, ast.Name) and node.id == name
+
+
+def _is_constant(node: ast.expr, value: object) -> bool:
+    return isinstance(node, ast.Constant) and node.value is value
+
+
+def _text(node: ast.expr) -> str | None:
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None

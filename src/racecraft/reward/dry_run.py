@@ -1,0 +1,208 @@
+"""Try a reward function on situations of a real track before training, a row each, start to finish.
+
+`dry_run` calls the function once per situation and hands back its reward, or the error with line and
+params. After an error the situations that follow are tried all the same, in a new worker.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from racecraft.errors import RewardError
+from racecraft.reward.params import make_params
+from racecraft.reward.worker import RewardWorker, waypoints_of
+from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+
+if TYPE_CHECKING:
+    from racecraft.track.track import Track
+
+STEP_SECONDS = 1.0 / 15.0  # between two calls for the same car
+FRONT = 0.14  # m from the car's origin to the point that x, y and progress mean
+TYPICAL_SPEED = 1.5  # m/s
+HALF_CAR = 0.08  # m from the car's middle line to its wheels
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """A moment that a car can be in, as the row that the simulation would report."""
+
+    name: str
+    """Short name, unique among the situations."""
+    description: str
+    """What the car is doing, in one sentence."""
+    row: npt.NDArray[np.float64]
+    """The moment, (columns,) in the order of ``ROW_COLUMNS``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a reward function made of a situation."""
+
+    situation: Situation
+    """The situation."""
+    params: dict[str, Any]
+    """The dict that the function was given."""
+    reward: float | None
+    """The reward, or None after an error."""
+    error: RewardError | None
+    """The error, or None."""
+    printed: str
+    """What the function printed, up to 64 KB."""
+
+
+def dry_run(source: str, track: Track, *, timeout_s: float = 1.0, seed: int = 0) -> list[Outcome]:
+    """Call a reward function once in every situation.
+
+    Args:
+        source: Text of the user's ``reward_function.py``.
+        track: The track that the situations lie on.
+        timeout_s: How long one call may take, s.
+        seed: Seeds ``random`` and ``numpy.random``.
+
+    Raises:
+        RewardError: The source cannot be loaded at all.
+    """
+    waypoints = waypoints_of([track])
+    outcomes: list[Outcome] = []
+    worker: RewardWorker | None = None
+    try:
+        for situation in situations(track):
+            if worker is None:
+                worker = RewardWorker(source, track, seed=seed, timeout_s=timeout_s)
+            reward, error = None, None
+            try:
+                reward = float(worker(situation.row[None])[0])
+            except RewardError as caught:
+                error = caught
+            params = make_params(situation.row.tolist(), waypoints)
+            outcomes.append(Outcome(situation, params, reward, error, worker.read_log()))
+            if error is not None:
+                worker.close()
+                worker = None
+    finally:
+        if worker is not None:
+            worker.close()
+    return outcomes
+
+
+def situations(track: Track) -> list[Situation]:
+    """The moments to try, all on the given track."""
+    places = np.linspace(0.0, track.length, 400, endpoint=False)
+    curvature = track.curvature_at(places)
+    straight = float(places[np.abs(curvature).argmin()])
+    left, right = float(places[curvature.argmax()]), float(places[curvature.argmin()])
+    half = 0.5 * float(track.width_at(straight))
+    other_way = track.reversed()
+    return [
+        Situation(
+            "start",
+            "First step of an episode, on the start line.",
+            _row(track, FRONT, steps=2, progress=FRONT / track.length),
+        ),
+        Situation("straight", "Straight ahead on the centre line.", _row(track, straight, steps=40)),
+        Situation(
+            "bend left",
+            "In the tightest bend to the left, steering into it.",
+            _row(track, left, steps=60, steering_angle=math.radians(20)),
+        ),
+        Situation(
+            "bend right",
+            "In the tightest bend to the right, steering into it.",
+            _row(track, right, steps=80, steering_angle=math.radians(-20)),
+        ),
+        Situation("slow", "On the centre line at half a metre a second.", _row(track, straight, speed=0.5)),
+        Situation("fast", "On the centre line at four metres a second.", _row(track, straight, speed=4.0)),
+        Situation(
+            "left edge",
+            "Two wheels over the left border.",
+            _row(track, straight, steps=90, offset=half, wheels_on_track=False),
+        ),
+        Situation(
+            "right edge",
+            "Inside the right border, by a wheel's width.",
+            _row(track, straight, steps=90, offset=-(half - HALF_CAR - 0.03)),
+        ),
+        Situation(
+            "sideways",
+            "On the centre line, looking across the track.",
+            _row(track, straight, steps=90, heading_error=math.radians(80)),
+        ),
+        Situation(
+            "backwards",
+            "On the centre line, looking the wrong way.",
+            _row(track, straight, steps=90, heading_error=math.pi),
+        ),
+        Situation(
+            "off track",
+            "All wheels beyond the right border, end of the episode.",
+            _row(track, straight, steps=95, offset=-(half + 0.2), wheels_on_track=False, status="off_track"),
+        ),
+        Situation(
+            "other way",
+            "On the centre line, driving the track in the other direction.",
+            _row(other_way, track.length - straight, steps=40, is_reversed=True),
+        ),
+        Situation(
+            "on pace",
+            "After exactly 100 steps, two thirds of the lap done.",
+            _row(track, track.length * 2 / 3, steps=100, progress=2 / 3),
+        ),
+        Situation(
+            "finish",
+            "The lap is complete.",
+            _row(track, track.length, steps=200, progress=1.0, status="lap_complete"),
+        ),
+    ]
+
+
+def _row(
+    track: Track,
+    s: float,
+    *,
+    steps: int = 50,
+    speed: float = TYPICAL_SPEED,
+    steering_angle: float = 0.0,
+    offset: float = 0.0,
+    heading_error: float = 0.0,
+    progress: float | None = None,
+    wheels_on_track: bool = True,
+    is_reversed: bool = False,
+    status: str = "in_progress",
+) -> npt.NDArray[np.float64]:
+    """The row of a car ``s`` metres along the track and ``offset`` metres left of its centre line."""
+    direction = float(track.heading_at(s))
+    center = track.point_at(s)
+    place = s % track.length if track.is_closed else min(s, track.length)
+    following = int(np.searchsorted(track.arc_length, place, side="right").clip(1, len(track.arc_length) - 1))
+    values = {
+        "episode": 0,
+        "steps": steps,
+        "x": center[0] - offset * math.sin(direction),
+        "y": center[1] + offset * math.cos(direction),
+        "heading": math.remainder(direction + heading_error, math.tau),
+        "steering_angle": steering_angle,
+        "speed": speed,
+        "progress": s / track.length if progress is None else progress,
+        "offset": offset,
+        "projection_distance": place,
+        "track_width": float(track.width_at(s)),
+        "track_length": track.length,
+        "closest_prev": following - 1,
+        "closest_next": following,
+        "all_wheels_on_track": wheels_on_track,
+        "is_offtrack": status == "off_track",
+        "is_crashed": status == "crashed",
+        "is_reversed": is_reversed,
+        "status": STATUS_NAMES.index(status),
+        "time": steps * STEP_SECONDS,
+        "track_index": int(is_reversed),
+        "actual_speed": speed,
+        "actual_steering_angle": steering_angle,
+        "lap": int(status == "lap_complete"),
+    }
+    return np.array([values[column] for column in ROW_COLUMNS], np.float64)

@@ -1,0 +1,242 @@
+"""What a reward function may import and call: AWS's rules, applied to a name's meaning, not its spelling."""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from collections.abc import Iterator
+from typing import Final, Literal
+
+from racecraft.errors import did_you_mean
+from racecraft.reward.names import bound_names
+
+Severity = Literal["error", "warning"]
+Finding = tuple[ast.expr | ast.stmt, str, str, Severity]  # where, message, hint, severity
+
+AWS_MODULES: Final = ("math", "random", "numpy", "scipy", "shapely")
+PLAIN_MODULES: Final = (  # of the standard library: they compute and reach no files, network or processes
+    *(
+        "__future__",
+        "abc",
+        "array",
+        "bisect",
+        "cmath",
+        "collections",
+        "copy",
+        "dataclasses",
+        "datetime",
+        "decimal",
+    ),
+    *(
+        "enum",
+        "fractions",
+        "functools",
+        "heapq",
+        "itertools",
+        "json",
+        "numbers",
+        "operator",
+        "re",
+        "statistics",
+    ),
+    *("string", "time", "types", "typing", "warnings"),
+)
+FORBIDDEN_MODULES: Final = (  # parts of allowed packages that read or write files, or load foreign code
+    *(
+        "numpy.ctypeslib",
+        "numpy.f2py",
+        "numpy.distutils",
+        "numpy.testing",
+        "numpy.lib.format",
+        "numpy.lib.npyio",
+    ),
+    *("scipy.io", "scipy.datasets", "shapely.plotting"),
+)
+FILE_FUNCTIONS: Final = frozenset(  # of numpy and scipy
+    (
+        *("DataSource", "fromfile", "fromregex", "genfromtxt", "load", "loadtxt", "memmap", "open_memmap"),
+        *("save", "savetxt", "savez", "savez_compressed"),
+    )
+)
+FORBIDDEN_NAMES: Final = frozenset(
+    (
+        *("open", "exec", "eval", "compile", "input", "breakpoint", "exit", "quit"),
+        *("__import__", "__builtins__", "__loader__", "__spec__"),
+    )
+)
+FORBIDDEN_ATTRIBUTES: Final = frozenset(  # ways from any object to the interpreter's inside
+    (
+        *("__bases__", "__base__", "__mro__", "__subclasses__", "__globals__", "__builtins__", "__code__"),
+        *(
+            "__closure__",
+            "__getattribute__",
+            "__import__",
+            "__loader__",
+            "__spec__",
+            "__reduce__",
+            "__reduce_ex__",
+        ),
+        *("f_back", "f_globals", "f_builtins", "f_locals", "gi_frame", "tb_frame"),
+    )
+)
+
+
+class ImportRules:
+    """Follows every imported name through the source."""
+
+    def __init__(self, tree: ast.Module) -> None:
+        self._tree = tree
+        self._bound = bound_names(tree)
+        self._meaning: dict[str, str] = {}  # local name -> dotted name of what was imported under it
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                for alias in node.names:
+                    self._meaning[alias.asname or alias.name.split(".")[0]] = (
+                        alias.name if alias.asname else alias.name.split(".")[0]
+                    )
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                for alias in node.names:
+                    self._meaning[alias.asname or alias.name] = f"{node.module}.{alias.name}"
+
+    def findings(self) -> Iterator[Finding]:
+        """Everything imported, called or reached that is not allowed."""
+        for node in ast.walk(self._tree):
+            if isinstance(node, ast.Import):
+                for alias in node.names:
+                    yield from _check_module(node, alias.name)
+            elif isinstance(node, ast.ImportFrom):
+                yield from _check_import_from(node)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                yield from self._check_name(node)
+            elif isinstance(node, ast.Attribute):
+                yield from self._check_attribute(node)
+            elif isinstance(node, ast.Call):
+                yield from self._check_call(node)
+
+    def _check_name(self, node: ast.Name) -> Iterator[Finding]:
+        if node.id in FORBIDDEN_NAMES and node.id not in self._bound:
+            yield node, f"'{node.id}' is not allowed in a reward function.", "", "error"
+
+    def _check_attribute(self, node: ast.Attribute) -> Iterator[Finding]:
+        if node.attr in FORBIDDEN_ATTRIBUTES:
+            yield node, f"'.{node.attr}' is not allowed in a reward function.", "", "error"
+            return
+        meaning = self._resolve(node)
+        if meaning is None:
+            return
+        if _is_file_function(meaning):
+            hint = "Write the numbers into the source, for example as a list."
+            yield node, f"'{meaning}' reads or writes files, which is not allowed.", hint, "error"
+        elif meaning in FORBIDDEN_MODULES or (node.attr.startswith("_") and not node.attr.startswith("__")):
+            yield node, f"'{meaning}' is not allowed in a reward function.", "", "error"
+
+    def _check_call(self, node: ast.Call) -> Iterator[Finding]:
+        function = node.func
+        meaning = self._resolve(function)
+        if isinstance(function, ast.Attribute) and function.attr == "tofile" and "tofile" not in self._bound:
+            yield node, "'.tofile()' writes a file, which is not allowed.", "", "error"
+        elif meaning in ("time.time", "time.perf_counter", "time.monotonic", "datetime.datetime.now"):
+            hint = "Simulated time is params['sim_time'], or params['steps'] / 15."
+            message = f"'{meaning}' is the clock on the wall, and the simulator is hundreds of times faster."
+            yield node, message, hint, "warning"
+        elif meaning in ("numpy.random.default_rng", "random.Random") and not node.args + node.keywords:
+            yield (
+                node,
+                f"'{meaning}()' without a seed makes runs that cannot be repeated.",
+                "Give it a seed.",
+                "warning",
+            )
+        elif isinstance(function, ast.Name) and function.id in ("getattr", "setattr") and len(node.args) > 1:
+            name = node.args[1]
+            if isinstance(name, ast.Constant) and name.value in FORBIDDEN_ATTRIBUTES:
+                yield node, f"'.{name.value}' is not allowed in a reward function.", "", "error"
+
+    def _resolve(self, node: ast.expr) -> str | None:
+        """The dotted name behind an expression such as ``np.linalg.norm``, or None without an import."""
+        parts: list[str] = []
+        while isinstance(node, ast.Attribute):
+            parts.append(node.attr)
+            node = node.value
+        if not isinstance(node, ast.Name) or node.id not in self._meaning:
+            return None
+        return ".".join([self._meaning[node.id], *reversed(parts)])
+
+
+def keeps_state(source: str) -> bool:
+    """Whether the source remembers something between calls, as far as can be seen.
+
+    True for ``global``, and for changes inside a function to an attribute, item or container that is not
+    its own. Such functions need one copy of their globals per car (``num_cars`` of the worker) to mean what
+    they meant on AWS.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        tree = ast.parse(source)
+    top = {name for statement in tree.body for name in bound_names(statement, into_functions=False)} | {
+        "self",
+        "cls",
+    }
+    changers = (
+        "append",
+        "appendleft",
+        "extend",
+        "insert",
+        "add",
+        "update",
+        "setdefault",
+        "pop",
+        "clear",
+        "remove",
+    )
+    for function in ast.walk(tree):
+        if not isinstance(function, ast.FunctionDef) or function.name == "__init__":
+            continue
+        own = {argument.arg for argument in function.args.args} - {"self", "cls"}
+        for node in ast.walk(function):
+            if isinstance(node, (ast.Global, ast.Nonlocal)):
+                return True
+            target: ast.expr | None = None
+            if isinstance(node, (ast.Attribute, ast.Subscript)) and not isinstance(node.ctx, ast.Load):
+                target = node.value
+            elif (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Attribute)
+                and node.func.attr in changers
+            ):
+                target = node.func.value
+            while isinstance(target, (ast.Attribute, ast.Subscript)):
+                target = target.value
+            if isinstance(target, ast.Name) and target.id in top - own:
+                return True
+    return False
+
+
+def _check_import_from(node: ast.ImportFrom) -> Iterator[Finding]:
+    if node.level or not node.module:
+        yield node, "A reward function is one file; relative imports are not allowed.", "", "error"
+        return
+    problems = list(_check_module(node, node.module))
+    yield from problems
+    if problems:
+        return
+    for alias in node.names:
+        meaning = f"{node.module}.{alias.name}"
+        if _is_file_function(meaning):
+            yield node, f"'{meaning}' reads or writes files, which is not allowed.", "", "error"
+        elif meaning in FORBIDDEN_MODULES or (alias.name.startswith("_") and node.module != "__future__"):
+            yield node, f"'{meaning}' is not allowed in a reward function.", "", "error"
+
+
+def _check_module(node: ast.stmt, module: str) -> Iterator[Finding]:
+    top = module.split(".")[0]
+    if top not in AWS_MODULES + PLAIN_MODULES:
+        hint = did_you_mean(top, AWS_MODULES)
+        allowed = f"Allowed are {', '.join(AWS_MODULES)}, and plain modules such as itertools."
+        yield node, f"'import {module}' is not allowed in a reward function.", hint or allowed, "error"
+    elif any(f"{module}.".startswith(f"{forbidden}.") for forbidden in FORBIDDEN_MODULES):
+        yield node, f"'import {module}' is not allowed: it reads or writes files.", "", "error"
+
+
+def _is_file_function(meaning: str) -> bool:
+    package, _, name = meaning.partition(".")
+    return package in ("numpy", "scipy") and name.rpartition(".")[2] in FILE_FUNCTIONS

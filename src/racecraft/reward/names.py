@@ -1,0 +1,75 @@
+"""Which names a source binds, and which it uses without binding them."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import symtable
+from collections.abc import Iterator
+
+# The worker's interpreter starts without 'site', which would add exit, quit, help and others.
+BUILTIN_NAMES = frozenset(dir(builtins)) - {"exit", "quit", "help", "copyright", "credits", "license"}
+MODULE_NAMES = frozenset(("__name__", "__doc__", "__annotations__", "__class__"))
+
+
+def bound_names(tree: ast.AST, *, into_functions: bool = True) -> set[str]:
+    """Every name that is assigned, defined, imported or a parameter somewhere in the tree."""
+    names = set()
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            names.add(node.id)
+        elif isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            names.add(node.name)
+            if not into_functions:
+                continue
+        elif isinstance(node, ast.arg):
+            names.add(node.arg)
+        elif isinstance(node, ast.alias):
+            names.add(node.asname or node.name.split(".")[0])
+        elif (isinstance(node, ast.ExceptHandler) and node.name) or (
+            isinstance(node, (ast.MatchAs, ast.MatchStar)) and node.name
+        ):
+            names.add(node.name)
+        waiting.extend(ast.iter_child_nodes(node))
+    return names
+
+
+def undefined_names(source: str, tree: ast.Module) -> Iterator[tuple[ast.Name, str, list[str]]]:
+    """Names that no scope binds: where each is used first, the name, and what it could mean."""
+    if any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in ast.walk(tree)):
+        return
+    scopes = list(_scopes(symtable.symtable(source, "reward_function.py", "exec")))
+    module, *inner = scopes
+    known = {
+        symbol.get_name() for symbol in module.get_symbols() if symbol.is_assigned() or symbol.is_imported()
+    }
+    known |= {
+        symbol.get_name()
+        for scope in inner
+        for symbol in scope.get_symbols()
+        if symbol.is_declared_global() and symbol.is_assigned()
+    }
+    missing = {
+        symbol.get_name()
+        for scope in scopes
+        for symbol in scope.get_symbols()
+        if symbol.is_referenced() and (symbol.is_global() or scope is module)
+    }
+    missing -= known | BUILTIN_NAMES | MODULE_NAMES
+    if not missing:
+        return
+    candidates = sorted(bound_names(tree) | {name for name in BUILTIN_NAMES if name.islower()})
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id in missing:
+            missing.remove(node.id)
+            yield node, node.id, candidates
+
+
+def _scopes(table: symtable.SymbolTable) -> Iterator[symtable.SymbolTable]:
+    waiting = [table]
+    while waiting:
+        scope = waiting.pop()
+        yield scope
+        waiting.extend(scope.get_children())
