@@ -141,7 +141,7 @@ class Server:
         index = 0
         try:
             for row in self._row.iter_unpack(self._rows[: count * self._row.size]):
-                if row[STEPS] < 2.0:  # the prepare step: AWS does not call the function, the reward is 0
+                if row[STEPS] == 1.0:  # the prepare step: AWS does not call the function, the reward is 0
                     rewards[index] = 0.0
                     index += 1
                     continue
