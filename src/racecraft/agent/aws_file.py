@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeVar, get_origin, get_type_hints
@@ -125,11 +125,18 @@ class AwsModel(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
 
-def file_model(settings: type[Any]) -> type[AwsModel]:
-    """The file model of a dataclass: its ``Annotated`` fields, which say what a file may hold."""
+def file_model(settings: type[Any], *, rename: Callable[[str], str] = str) -> type[AwsModel]:
+    """The file model of a dataclass: its ``Annotated`` fields, which say what a file may hold.
+
+    Args:
+        settings: The dataclass.
+        rename: From a field's name to the file's name for it.
+    """
     hints = get_type_hints(settings, include_extras=True)
     from_file = {
-        f.name: (hints[f.name], f.default) for f in fields(settings) if get_origin(hints[f.name]) is Annotated
+        rename(f.name): (hints[f.name], f.default)
+        for f in fields(settings)
+        if get_origin(hints[f.name]) is Annotated
     }
     model: type[AwsModel] = create_model(settings.__name__, __base__=AwsModel, **from_file)  # type: ignore[call-overload]
     return model

@@ -1,0 +1,350 @@
+"""Checkpoints that survive a kill at any moment: safetensors files and a manifest that is written last.
+
+    checkpoints/000020480-1f3a9b2c.safetensors   step, and the first 8 digits of the file's SHA-256
+    checkpoints/manifest.json                    size, checksum, score, metrics of each; best and last
+
+A file is believed only when its size and checksum are right. When the manifest itself is lost, the files and
+their names are enough to do without it. Nothing here is ever unpickled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+import time
+import warnings
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import CheckpointError, did_you_mean
+from racecraft.run.atomic import TEMPORARY, write_file, write_json
+
+FORMAT = 1
+KEEP = 4  # as AWS: the last four and the best
+MAX_FILE_BYTES = 1 << 33  # 8 GiB; AWS's networks with Adam's state take 140 MB
+MAX_MANIFEST_BYTES = 1 << 22
+MANIFEST = "manifest.json"
+_NAME = re.compile(r"(\d{9,18})-([0-9a-f]{8})\.safetensors")
+_HEADER_KEY = "racecraft"  # the one entry of the safetensors header's metadata: a JSON text
+
+
+class CheckpointWarning(UserWarning):
+    """A checkpoint was damaged and another one was used."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of the manifest."""
+
+    step: int
+    """Camera steps of training behind it."""
+    file: str
+    """Name in the folder."""
+    size: int
+    """Bytes."""
+    sha256: str
+    """Of the whole file, hexadecimal."""
+    time_stamp: float
+    """When it was saved, s since 1970."""
+    score: tuple[float, ...] | None
+    """What makes one better than another, most important first, larger is better; None when not evaluated."""
+    metrics: dict[str, float | None]
+    """Numbers to show beside it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """What was saved."""
+
+    step: int
+    arrays: dict[str, NDArray[Any]]
+    """Weights and optimizer state by name; the arrays are writable and belong to the caller."""
+    metadata: dict[str, Any]
+    metrics: dict[str, float | None]
+    score: tuple[float, ...] | None
+    path: Path
+
+
+class CheckpointStore:
+    """The checkpoints of one run.
+
+    Args:
+        folder: Where they lie; made when the first one is saved.
+        keep: How many of the last ones stay, beside the best.
+        aws_index: Where to write AWS's ``deepracer_checkpoints.json``, if anywhere.
+    """
+
+    def __init__(self, folder: str | Path, *, keep: int = KEEP, aws_index: Path | None = None) -> None:
+        self.folder = Path(folder)
+        self.keep = keep
+        self.aws_index = aws_index
+
+    def save(
+        self,
+        step: int,
+        arrays: Mapping[str, NDArray[Any]],
+        *,
+        metadata: Mapping[str, Any] | None = None,
+        metrics: Mapping[str, float] | None = None,
+        score: Sequence[float] | None = None,
+    ) -> Path:
+        """Save a checkpoint, then remove what need not be kept.
+
+        Args:
+            step: Camera steps of training so far.
+            arrays: Numeric arrays by name.
+            metadata: Any JSON: settings, counters, states of random generators.
+            metrics: Numbers to show in lists of checkpoints.
+            score: Most important number first, larger is better; of equal ones the later is best, as at AWS.
+
+        Raises:
+            CheckpointError: It could not be saved; the earlier ones are as good as before.
+        """
+        time_stamp = time.time()
+        shown = {name: float(v) if math.isfinite(v) else None for name, v in (metrics or {}).items()}
+        ranked = None if score is None else tuple(map(float, score))
+        if ranked is not None and not all(map(math.isfinite, ranked)):
+            raise CheckpointError(f"score is {ranked}, allowed: finite numbers.")
+        header = {
+            "step": step,
+            "time_stamp": time_stamp,
+            "score": ranked,
+            "metrics": shown,
+            "metadata": metadata or {},
+        }
+        data = _encode(arrays, header)
+        digest = hashlib.sha256(data).hexdigest()
+        entry = Entry(
+            step, f"{step:09d}-{digest[:8]}.safetensors", len(data), digest, time_stamp, ranked, shown
+        )
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            kept = self._kept([*(e for e in self.entries() if e.file != entry.file), entry])
+            write_file(self.folder / entry.file, data)
+            self._write_manifest(kept)
+        except OSError as error:
+            self._prune()
+            raise CheckpointError(
+                f"Checkpoint {step} could not be saved in {self.folder}: {error.strerror or error}.",
+                hint="The earlier checkpoints are good. Free disk space or repair permissions, then resume.",
+            ) from error
+        self._prune()
+        return self.folder / entry.file
+
+    def load(self, which: str | int = "last") -> Checkpoint:
+        """Load the last, the best, or the checkpoint of a step.
+
+        A damaged last or best one is passed over with a `CheckpointWarning` for the next best there is.
+
+        Args:
+            which: ``"last"``, ``"best"`` or a step.
+
+        Raises:
+            CheckpointError: There is none, or none that is whole.
+        """
+        entries = self.entries()
+        if not entries:
+            raise CheckpointError(f"{self.folder} has no checkpoint.", hint="Train first, or check the path.")
+        if which == "last":
+            candidates = list(reversed(entries))
+        elif which == "best":
+            ranked = sorted((_rank(entry), place) for place, entry in enumerate(entries))
+            candidates = [entries[place] for _, place in reversed(ranked)]
+        elif isinstance(which, int):
+            candidates = [entry for entry in reversed(entries) if entry.step == which][:1]
+        else:
+            hint = did_you_mean(which, ("last", "best"))
+            raise CheckpointError(f"checkpoint is {which!r}, allowed: 'last', 'best' or a step.", hint=hint)
+        if not candidates:
+            steps = ", ".join(str(entry.step) for entry in entries)
+            raise CheckpointError(f"{self.folder} has no checkpoint of step {which}, allowed: {steps}.")
+        damage = []
+        for entry in candidates:
+            try:
+                checkpoint = self._read(entry)
+            except CheckpointError as error:
+                damage.append(str(error))
+                continue
+            if damage:
+                warnings.warn(f"{' '.join(damage)} Using step {entry.step}.", CheckpointWarning, stacklevel=2)
+            return checkpoint
+        raise CheckpointError(" ".join(damage), hint="No other checkpoint of this run is whole.")
+
+    def entries(self) -> list[Entry]:
+        """All checkpoints in the order they were saved; those found in the folder if the manifest is damaged."""
+        try:
+            return self._read_manifest()
+        except FileNotFoundError:
+            reason = "is missing"
+        except (OSError, ValueError, TypeError, KeyError) as error:
+            reason = f"is damaged ({error})"
+        entries = self._scan()
+        if entries:
+            warnings.warn(
+                f"{self.folder / MANIFEST} {reason}; {len(entries)} whole checkpoints were found beside it.",
+                CheckpointWarning,
+                stacklevel=2,
+            )
+        return entries
+
+    @property
+    def last(self) -> Entry | None:
+        """The checkpoint saved last."""
+        return next(reversed(self.entries()), None)
+
+    @property
+    def best(self) -> Entry | None:
+        """The checkpoint with the highest score; without any score the last one."""
+        return _best(self.entries())
+
+    def _kept(self, entries: list[Entry]) -> list[Entry]:
+        best = _best(entries)
+        return [entry for entry in entries if entry in entries[-self.keep :] or entry is best]
+
+    def _write_manifest(self, entries: list[Entry]) -> None:
+        best = _best(entries) or entries[-1]
+        lines = [asdict(entry) for entry in entries]
+        document = {"format": FORMAT, "best": best.file, "last": entries[-1].file, "checkpoints": lines}
+        write_json(self.folder / MANIFEST, document)
+        if self.aws_index is not None:
+            self.aws_index.parent.mkdir(parents=True, exist_ok=True)
+            write_json(self.aws_index, {"best_checkpoint": _aws(best), "last_checkpoint": _aws(entries[-1])})
+
+    def _read_manifest(self) -> list[Entry]:
+        with (self.folder / MANIFEST).open("rb") as file:
+            data = file.read(MAX_MANIFEST_BYTES + 1)
+        if len(data) > MAX_MANIFEST_BYTES:
+            raise ValueError(f"larger than {MAX_MANIFEST_BYTES:,} bytes")
+        try:
+            document = json.loads(data)
+        except RecursionError as error:
+            raise ValueError("nested too deeply") from error
+        if document["format"] != FORMAT:
+            raise CheckpointError(
+                f"{self.folder / MANIFEST} has format {document['format']!r}, this version reads {FORMAT}.",
+                hint="Update Racecraft.",
+            )
+        return [_entry(line) for line in document["checkpoints"]]
+
+    def _scan(self) -> list[Entry]:
+        """Entries of the whole files in the folder, oldest first: what a rebuilt manifest holds."""
+        entries = []
+        for path in self.folder.glob("*.safetensors"):
+            name = _NAME.fullmatch(path.name)
+            with suppress(OSError, ValueError, KeyError, TypeError):
+                data = _read_capped(path)
+                digest = hashlib.sha256(data).hexdigest()
+                if name is None or digest[:8] != name[2]:
+                    continue
+                header = {**_decode(data)[1], "file": path.name, "size": len(data), "sha256": digest}
+                entries.append(_entry(header))
+        return sorted(entries, key=lambda entry: entry.time_stamp)
+
+    def _read(self, entry: Entry) -> Checkpoint:
+        path = self.folder / entry.file
+        try:
+            size = path.stat().st_size
+            if size != entry.size:
+                raise CheckpointError(f"{path} has {size:,} bytes instead of {entry.size:,}.")
+            data = _read_capped(path)
+        except OSError as error:
+            raise CheckpointError(f"{path} cannot be read: {error.strerror or error}.") from error
+        if hashlib.sha256(data).hexdigest() != entry.sha256:
+            raise CheckpointError(f"{path} is damaged: its checksum is wrong.")
+        try:
+            arrays, header = _decode(data)
+        except (ValueError, KeyError, TypeError) as error:
+            raise CheckpointError(f"{path} is not a checkpoint of Racecraft: {error}.") from error
+        return Checkpoint(entry.step, arrays, dict(header["metadata"]), entry.metrics, entry.score, path)
+
+    def _prune(self) -> None:
+        """Remove files that the manifest on disk does not list: old checkpoints and unfinished ones."""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            listed = {entry.file for entry in self._read_manifest()}
+            for path in self.folder.iterdir():
+                unfinished = path.name.endswith(TEMPORARY)
+                if unfinished or (_NAME.fullmatch(path.name) and path.name not in listed):
+                    path.unlink()
+
+
+def _rank(entry: Entry) -> tuple[float, ...]:
+    return entry.score if entry.score is not None else (-math.inf,)
+
+
+def _best(entries: list[Entry]) -> Entry | None:
+    return max(reversed(entries), key=_rank, default=None)
+
+
+def _aws(entry: Entry) -> dict[str, Any]:
+    metric = entry.score[0] if entry.score else None
+    return {"name": entry.file, "avg_eval_metric": metric, "time_stamp": entry.time_stamp}
+
+
+def _entry(line: Mapping[str, Any]) -> Entry:
+    """An entry from JSON, refused unless every value is what it has to be."""
+    entry = Entry(
+        step=int(line["step"]),
+        file=str(line["file"]),
+        size=int(line["size"]),
+        sha256=str(line["sha256"]),
+        time_stamp=float(line["time_stamp"]),
+        score=None if line["score"] is None else tuple(map(float, line["score"])),
+        metrics=dict(line["metrics"]),
+    )
+    name = _NAME.fullmatch(entry.file)
+    if name is None or int(name[1]) != entry.step or not entry.sha256.startswith(name[2]):
+        raise ValueError(f"{entry.file!r} is not the name of a checkpoint of step {entry.step}")
+    return entry
+
+
+def _read_capped(path: Path) -> bytes:
+    if path.stat().st_size > MAX_FILE_BYTES:
+        raise ValueError(f"{path} is larger than {MAX_FILE_BYTES:,} bytes")
+    return path.read_bytes()
+
+
+def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> bytes:
+    from safetensors.numpy import save
+
+    plain = {}
+    for name, values in arrays.items():
+        array = np.asarray(values)
+        if array.dtype.kind not in "biuf":
+            raise CheckpointError(
+                f"array {name!r} has type {array.dtype}, allowed: booleans, integers, floats."
+            )
+        plain[name] = np.asarray(array, dtype=array.dtype.newbyteorder("="), order="C")
+    try:
+        text = json.dumps(header, allow_nan=False, default=_plain)
+    except (TypeError, ValueError) as error:
+        raise CheckpointError(f"metadata of a checkpoint must be JSON: {error}.") from error
+    return bytes(save(plain, metadata={_HEADER_KEY: text}))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{type(value).__name__} {value!r} has no JSON form")
+
+
+def _decode(data: bytes) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    try:
+        arrays = {name: np.array(values) for name, values in load(data).items()}
+        length = int.from_bytes(data[:8], "little")
+        header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"][_HEADER_KEY])
+    except (SafetensorError, RecursionError) as error:
+        raise ValueError(str(error)) from error
+    if not isinstance(header, dict):
+        raise ValueError("its header is not an object")
+    return arrays, header

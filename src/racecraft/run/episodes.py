@@ -1,0 +1,94 @@
+"""From the rows of many cars at once to a sequence of whole episodes, as AWS's single car would have driven them.
+
+AWS's logs and metrics number episodes one after the other on one simulated clock. Here cars drive side by side, so an
+episode gets its number and its place on the clock when it ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+
+STEP_SECONDS = 1 / 15
+_STEPS, _PROGRESS, _STATUS, _TIME = (
+    ROW_COLUMNS.index(name) for name in ("steps", "progress", "status", "time")
+)
+
+
+@dataclass(frozen=True)
+class Episode:
+    """How an episode went."""
+
+    number: int
+    """From 0, in the order in which the episodes of the run ended."""
+    env: int
+    """The car that drove it."""
+    steps: int
+    """Steps, with the first one that only prepares."""
+    reward: float
+    """Sum of its rewards."""
+    progress: float
+    """Share of the lap at the end, 0 to 1."""
+    status: str
+    """Why it ended, of STATUS_NAMES; ``in_progress`` when it was cut."""
+    start_time: float
+    """On the run's simulated clock, s."""
+    duration: float
+    """Simulated s."""
+
+    @property
+    def end_time(self) -> float:
+        """On the run's simulated clock, s."""
+        return self.start_time + self.duration
+
+
+class EpisodeCounter:
+    """Adds up the steps of N cars into episodes.
+
+    Args:
+        num_envs: N.
+        number: Number of the next episode; a resumed run goes on counting.
+        clock: Simulated time at which it begins, s.
+    """
+
+    def __init__(self, num_envs: int, *, number: int = 0, clock: float = 0.0) -> None:
+        self.number = number
+        self.clock = clock
+        self._rewards = np.zeros(num_envs)
+
+    def update(self, rows: NDArray[np.float64], rewards: ArrayLike, done: NDArray[np.bool_]) -> list[Episode]:
+        """Count one step of every car and return the episodes it ended.
+
+        Args:
+            rows: The judged rows of the step   (N, len(ROW_COLUMNS)).
+            rewards: Their rewards   (N,).
+            done: Which episodes end with this step, terminated or truncated   (N,).
+        """
+        self._rewards += rewards
+        return [self._end(int(env), rows[env]) for env in np.flatnonzero(done)]
+
+    def place(self, duration: float) -> float:
+        """Put something of this duration, an evaluation episode say, on the clock; returns when it starts."""
+        start = self.clock
+        self.clock = start + duration + STEP_SECONDS
+        return start
+
+    def _end(self, env: int, row: NDArray[np.float64]) -> Episode:
+        duration = float(row[_TIME])
+        episode = Episode(
+            number=self.number,
+            env=env,
+            steps=int(row[_STEPS]),
+            reward=float(self._rewards[env]),
+            progress=float(row[_PROGRESS]),
+            status=STATUS_NAMES[int(row[_STATUS])],
+            start_time=self.place(duration),
+            duration=duration,
+        )
+        self.number += 1
+        self._rewards[env] = 0.0
+        return episode

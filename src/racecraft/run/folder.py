@@ -1,0 +1,292 @@
+"""The run folder: everything about one model, in AWS's layout where AWS has one.
+
+runs/<name>/run.json                      what is needed to repeat the run
+            reward_function.py  model_metadata.json  hyperparameters.json  training_params.yaml
+            metrics/                      TrainingMetrics.json, EvaluationMetrics-<time>.json
+            training-simtrace/            <iteration>-iteration.csv
+            evaluation-<time>/            evaluation-simtrace/, pictures
+            mp4/  model/  events/         videos, AWS's index of checkpoints, TensorBoard
+            checkpoints/                  weights, see racecraft.run.checkpoint
+"""
+
+from __future__ import annotations
+
+import platform
+import re
+import time
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.run.atomic import write_file, write_json
+from racecraft.run.checkpoint import CheckpointStore
+from racecraft.run.lock import exclusive_lock
+
+if TYPE_CHECKING:
+    from racecraft.agent import Hyperparameters, ModelMetadata
+    from racecraft.run.training_params import TrainingParams
+
+FORMAT = 1
+MAX_NAME = 64  # characters, as in AWS's console
+MAX_REWARD_BYTES = 4 * 140_000  # AWS allows 140,000 characters
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # devices on Windows
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """The content of ``run.json``: with the files beside it, all that is needed to repeat a run."""
+
+    seed: int
+    """Seed of every random number of the run."""
+    track: str
+    """Name or path of the track."""
+    track_digest: str
+    """SHA-256 of its geometry, which the name alone does not fix."""
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Every other setting, as JSON."""
+    created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    """When the run began, ISO 8601 in UTC."""
+    versions: dict[str, str] = field(default_factory=lambda: _versions())
+    """Versions of what may change the result, and the machine."""
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """One run on disk; `create` makes a new one, `open` finds an old one."""
+
+    path: Path
+
+    @classmethod
+    def create(cls, root: str | Path, *, name: str | None = None, prefix: str = "run") -> RunFolder:
+        """Make a new folder.
+
+        Args:
+            root: Folder of all runs, made when missing.
+            name: 1 to 64 letters, digits, dots, hyphens and underscores; made from prefix and time when not given.
+            prefix: Anything; a track's name, say.
+
+        Raises:
+            RunError: The name is not allowed or taken, or the folder cannot be made.
+        """
+        root = Path(root)
+        if name is not None:
+            names = [_checked(name)]
+        else:
+            stem = f"{sanitize_name(prefix)[:40]}-{time.strftime('%Y%m%d-%H%M%S')}"
+            names = [stem, *(f"{stem}-{count}" for count in range(2, 1000))]
+        for candidate in names:
+            path = root / candidate
+            try:
+                root.mkdir(parents=True, exist_ok=True)
+                path.mkdir()
+            except FileExistsError:
+                continue
+            except OSError as error:
+                raise RunError(f"{path} cannot be made: {error.strerror or error}.") from error
+            return cls(path)
+        raise RunError(
+            f"{root / names[0]} exists.", hint="Choose another name, or continue it with --resume."
+        )
+
+    @classmethod
+    def open(cls, path: str | Path) -> RunFolder:
+        """Find a run by its folder.
+
+        Raises:
+            RunError: There is none, or it holds no run.
+        """
+        path = Path(path)
+        if not path.is_dir():
+            siblings = [run.path.name for run in list_runs(path.parent)]
+            raise RunError(f"There is no run {str(path)!r}.", hint=did_you_mean(path.name, siblings))
+        if not (path / "run.json").is_file():
+            raise RunError(f"{path} holds no run: run.json is missing.")
+        return cls(path)
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.path.name
+
+    @property
+    def reward_function(self) -> Path:
+        """The reward function's source."""
+        return self.path / "reward_function.py"
+
+    @property
+    def model_metadata(self) -> Path:
+        """Action space, sensors, network."""
+        return self.path / "model_metadata.json"
+
+    @property
+    def hyperparameters(self) -> Path:
+        """AWS's hyperparameters, where the run has them."""
+        return self.path / "hyperparameters.json"
+
+    @property
+    def training_params(self) -> Path:
+        """AWS's settings of the training job."""
+        return self.path / "training_params.yaml"
+
+    @property
+    def training_metrics(self) -> Path:
+        """Every episode's result."""
+        return self.path / "metrics" / "TrainingMetrics.json"
+
+    @property
+    def training_simtrace(self) -> Path:
+        """Every step of training, a file per iteration."""
+        return self.path / "training-simtrace"
+
+    @property
+    def videos(self) -> Path:
+        """MP4 files."""
+        return self.path / "mp4"
+
+    @property
+    def events(self) -> Path:
+        """TensorBoard's files."""
+        return self.path / "events"
+
+    @property
+    def checkpoints(self) -> CheckpointStore:
+        """Weights, with AWS's index of them in ``model/``."""
+        return CheckpointStore(
+            self.path / "checkpoints", aws_index=self.path / "model" / "deepracer_checkpoints.json"
+        )
+
+    def evaluation(self, stamp: str) -> Path:
+        """Folder of the evaluation begun at ``stamp`` (YYYYmmddHHMMSS)."""
+        return self.path / f"evaluation-{stamp}"
+
+    def evaluation_metrics(self, stamp: str) -> Path:
+        """Results of that evaluation."""
+        return self.path / "metrics" / f"EvaluationMetrics-{stamp}.json"
+
+    def lock(self) -> AbstractContextManager[None]:
+        """Keep others from writing to this run during a ``with`` block; RunError when it is in use."""
+        return exclusive_lock(self.path / ".lock")
+
+    def write_info(self, info: RunInfo) -> None:
+        """Write ``run.json``."""
+        self._write(self.path / "run.json", {"format": FORMAT, **asdict(info)})
+
+    def read_info(self) -> RunInfo:
+        """Read ``run.json``.
+
+        Raises:
+            RunError: It is missing, damaged or of a later version.
+        """
+        from racecraft.agent.aws_file import read_json_object
+
+        path = self.path / "run.json"
+        try:
+            document = read_json_object(path)
+            if document.pop("format") != FORMAT:
+                raise RunError(
+                    f"{path} was written by another version of Racecraft.", hint="Update Racecraft."
+                )
+            return RunInfo(**document)
+        except (ConfigError, KeyError, TypeError) as error:
+            raise RunError(f"{self.path} cannot be opened: {error}") from error
+
+    def write_inputs(
+        self,
+        *,
+        reward_function: str,
+        model_metadata: ModelMetadata,
+        hyperparameters: Hyperparameters | None = None,
+        training_params: TrainingParams | None = None,
+    ) -> None:
+        """Write what the run is made from, each in AWS's file."""
+        self._write(self.reward_function, reward_function)
+        self._write(self.model_metadata, model_metadata.to_dict())
+        if hyperparameters is not None:
+            self._write(self.hyperparameters, hyperparameters.to_dict())
+        if training_params is not None:
+            self._write(self.training_params, training_params.to_yaml())
+
+    def read_reward_function(self) -> str:
+        """Source of the reward function.
+
+        Raises:
+            RunError: It is missing, too large or not UTF-8.
+        """
+        path = self.reward_function
+        try:
+            with path.open("rb") as file:
+                data = file.read(MAX_REWARD_BYTES + 1)
+            if len(data) > MAX_REWARD_BYTES:
+                raise RunError(f"{path} is larger than {MAX_REWARD_BYTES:,} bytes.")
+            return data.decode("utf-8-sig")
+        except OSError as error:
+            raise RunError(f"{path} cannot be read: {error.strerror or error}.") from error
+        except UnicodeDecodeError as error:
+            raise RunError(f"{path} is not UTF-8 text.") from error
+
+    def read_model_metadata(self) -> ModelMetadata:
+        """Action space, sensors, network. Raises ConfigError where a value is not allowed."""
+        from racecraft.agent import ModelMetadata
+
+        return ModelMetadata.load(self.model_metadata)
+
+    def read_hyperparameters(self) -> Hyperparameters | None:
+        """AWS's hyperparameters, or None where the run has no such file."""
+        from racecraft.agent import Hyperparameters
+
+        return Hyperparameters.load(self.hyperparameters) if self.hyperparameters.exists() else None
+
+    def read_training_params(self) -> TrainingParams | None:
+        """AWS's training settings, or None where the run has no such file."""
+        from racecraft.run.training_params import TrainingParams
+
+        return TrainingParams.load(self.training_params) if self.training_params.exists() else None
+
+    def _write(self, path: Path, content: str | dict[str, Any]) -> None:
+        try:
+            if isinstance(content, str):
+                write_file(path, content.encode())
+            else:
+                write_json(path, content)
+        except (OSError, ValueError, TypeError) as error:
+            raise RunError(
+                f"{path} cannot be written: {getattr(error, 'strerror', None) or error}."
+            ) from error
+
+
+def list_runs(root: str | Path) -> list[RunFolder]:
+    """The runs in a folder, oldest name first."""
+    try:
+        return [RunFolder(path.parent) for path in sorted(Path(root).glob("*/run.json"))]
+    except OSError:
+        return []
+
+
+def sanitize_name(text: str) -> str:
+    """The nearest name a folder may have: ``Mein Auto #1`` becomes ``Mein-Auto-1``."""
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-._")[:MAX_NAME].rstrip("-._")
+    return f"run-{name}".rstrip("-")[:MAX_NAME] if not name or _RESERVED.fullmatch(name) else name
+
+
+def _checked(name: str) -> str:
+    if len(name) > MAX_NAME or not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.endswith("."):
+        raise RunError(
+            f"Name {name!r} is not allowed: 1 to {MAX_NAME} letters, digits, dots, hyphens and underscores.",
+            hint=f"Use '{sanitize_name(name)}'.",
+        )
+    return name
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
+    for package in ("racecraft", "numpy", "torch"):
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return versions

@@ -1,0 +1,318 @@
+"""The sim-trace: every step of every episode, in the CSV files that DeepRacer's log tools read.
+
+Cars drive side by side, but the files hold one whole episode after the other, as AWS's single car wrote them, so a
+car's steps wait in memory until its episode ends. Numbers have full precision, angles are in degrees.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from racecraft.agent import ActionSpace, DiscreteActionSpace
+from racecraft.errors import RunError
+from racecraft.run.episodes import STEP_SECONDS, Episode
+from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+
+if TYPE_CHECKING:
+    from racecraft.track.track import Track
+
+COLUMNS = (
+    "episode",
+    "steps",
+    "X",
+    "Y",
+    "yaw",
+    "steer",
+    "throttle",
+    "action",
+    "reward",
+    "done",
+    "all_wheels_on_track",
+    "progress",
+    "closest_waypoint",
+    "track_len",
+    "tstamp",
+    "episode_status",
+    "pause_duration",
+    "obstacle_crash_counter",
+    "wall_clock",
+)
+WRITTEN = COLUMNS[:18]  # what simulator versions from 5.3 to 5 write; version 6 adds wall_clock
+READABLE = (15, 17, 18, 19)  # columns of the four eras
+MAX_EPISODE_ROWS = 20_000  # 22 simulated minutes; the middle of a longer episode is left out
+MAX_BYTES = 1 << 31  # of all files of a run; beyond it every other iteration is removed
+MAX_READ_ROWS = 2_000_000
+
+_KEPT = (
+    "steps",
+    "x",
+    "y",
+    "heading",
+    "steering_angle",
+    "speed",
+    "progress",
+    "closest_prev",
+    "closest_next",
+    "all_wheels_on_track",
+    "status",
+    "time",
+    "track_index",
+    "track_length",
+)
+_KEPT_INDICES = np.array([ROW_COLUMNS.index(name) for name in _KEPT])
+_WIDTH = len(_KEPT) + 2  # and the index of the action, and the reward
+_COMPACT_EVERY = 512  # steps after which running episodes are packed
+
+
+class SimTraceWriter:
+    """Writes ``<iteration>-iteration.csv`` files into a folder.
+
+    Args:
+        folder: Made when the first episode is written.
+        num_envs: N, the number of cars.
+        tracks: The simulation's tracks, in its order; they tell which waypoint is the closest.
+        action_space: What the actions mean.
+        iteration: Number of the first file.
+        max_bytes: Of all files together. When they grow past it, every other iteration is removed and not written
+            any more, so that what remains still covers the whole run.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        num_envs: int,
+        tracks: Sequence[Track],
+        action_space: ActionSpace,
+        iteration: int = 0,
+        max_bytes: int = MAX_BYTES,
+    ) -> None:
+        self.folder = folder
+        self.iteration = iteration
+        self.max_bytes = max_bytes
+        self._action_space = action_space
+        self._waypoints = [track.centerline for track in (*tracks, *(track.reversed() for track in tracks))]
+        self._stride = 1
+        self._file: TextIO | None = None
+        self._steps: list[NDArray[np.float64]] = []  # (N, _WIDTH) each
+        self._first = [0] * num_envs  # index into _steps where a car's episode begins
+        self._packed: list[list[NDArray[np.float64]]] = [
+            [] for _ in range(num_envs)
+        ]  # its steps before _steps
+
+    def write(
+        self,
+        rows: NDArray[np.float64],
+        *,
+        actions: ArrayLike,
+        rewards: ArrayLike,
+        ended: Iterable[Episode] = (),
+    ) -> None:
+        """Note one step of every car, and write the episodes it ended.
+
+        Args:
+            rows: The judged rows of the step   (N, len(ROW_COLUMNS)).
+            actions: What the policy gave   (N,) indices or (N, 2) in [-1, 1].
+            rewards: Rewards of the step   (N,).
+            ended: The episodes that end with it, as `EpisodeCounter.update` returns them.
+        """
+        step = np.zeros((len(rows), _WIDTH))
+        step[:, : len(_KEPT)] = rows[:, _KEPT_INDICES]
+        step[:, -1] = rewards
+        if isinstance(self._action_space, DiscreteActionSpace):
+            step[:, -2] = actions
+        self._steps.append(step)
+        for episode in ended:
+            table = self._take(episode.env)
+            if self.iteration % self._stride == 0:
+                self._write(self._lines(table, episode))
+        if len(self._steps) >= _COMPACT_EVERY:
+            self._compact()
+
+    def next_iteration(self) -> None:
+        """Begin the next file; episodes go to the file of the iteration in which they end."""
+        self.close()
+        self.iteration += 1
+
+    def close(self) -> None:
+        """Finish the current file. Episodes that have not ended are not written."""
+        if self._file is None:
+            return
+        try:
+            self._file.close()
+            self._thin()
+        except OSError as error:
+            raise RunError(f"{self.folder} cannot be written: {error.strerror or error}.") from error
+        finally:
+            self._file = None
+
+    def _take(self, env: int) -> NDArray[np.float64]:
+        """The steps of a car's episode   (T, _WIDTH); the next one begins after them."""
+        recent = [step[env] for step in self._steps[self._first[env] :]]
+        table = np.concatenate([*self._packed[env], recent]) if recent else np.concatenate(self._packed[env])
+        self._first[env] = len(self._steps)
+        self._packed[env] = []
+        return table
+
+    def _compact(self) -> None:
+        """Let go of steps of ended episodes: keep only each running one's own, of bounded length."""
+        for env, first in enumerate(self._first):
+            recent = [step[env] for step in self._steps[first:]]
+            if recent and sum(map(len, self._packed[env])) < MAX_EPISODE_ROWS:
+                self._packed[env].append(np.array(recent))
+            self._first[env] = 0
+        self._steps.clear()
+
+    def _lines(self, table: NDArray[np.float64], episode: Episode) -> str:
+        """An episode's rows as text, with AWS's ``prepare`` row before the first."""
+        (
+            steps,
+            x,
+            y,
+            heading,
+            steer,
+            speed,
+            progress,
+            previous,
+            following,
+            on_track,
+            status,
+            time_,
+            track,
+            length,
+        ) = table[:, : len(_KEPT)].T
+        waypoints = self._waypoints[int(track[0])]
+        behind, ahead = waypoints[previous.astype(int)], waypoints[following.astype(int)]
+        nearer_ahead = np.hypot(ahead[:, 0] - x, ahead[:, 1] - y) < np.hypot(
+            behind[:, 0] - x, behind[:, 1] - y
+        )
+        closest = np.where(nearer_ahead, following, previous).astype(int) % (len(waypoints) - 1)
+        if isinstance(self._action_space, DiscreteActionSpace):
+            indices = table[:, -2].astype(int)
+            names = [str(index) for index in indices]
+            degrees, throttle = np.array(self._action_space.to_degrees())[indices].T.tolist()
+        else:
+            degrees, throttle = np.degrees(steer).tolist(), speed.tolist()
+            names = [f"[{angle!r} {value!r}]" for angle, value in zip(degrees, throttle, strict=True)]
+        yaw = np.degrees(np.arctan2(np.sin(heading), np.cos(heading)))
+        columns: list[Iterable[object]] = [
+            steps.tolist(),
+            x.tolist(),
+            y.tolist(),
+            yaw.tolist(),
+            degrees,
+            throttle,
+            names,
+            table[:, -1].tolist(),
+            [False] * (len(table) - 1) + [True],
+            (on_track > 0).tolist(),
+            [100 if share >= 1 else 100 * share for share in progress.tolist()],
+            closest.tolist(),
+            length.tolist(),
+            np.round(episode.start_time + time_, 3).tolist(),
+            [STATUS_NAMES[code] for code in status.astype(int)],
+        ]
+        rows = list(zip(*columns, strict=True))
+        prepare = list(rows[0])
+        prepare[0] = 1.0
+        prepare[7], prepare[8], prepare[14] = 0.0, False, "prepare"
+        prepare[13] = round(episode.start_time + float(time_[0]) - STEP_SECONDS, 3)
+        number = episode.number
+        return "".join(
+            f"{number},{a!r},{b!r},{c!r},{d!r},{e!r},{f!r},{g},{h!r},{i},{j},{k!r},{m},{n!r},{o!r},{p},0.0,0\n"
+            for a, b, c, d, e, f, g, h, i, j, k, m, n, o, p in (prepare, *rows)
+        )
+
+    def _write(self, text: str) -> None:
+        try:
+            if self._file is None:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                path = self.folder / f"{self.iteration}-iteration.csv"
+                self._file = path.open("w", encoding="utf-8", newline="", buffering=1 << 16)
+                self._file.write(",".join(WRITTEN) + "\n")
+            self._file.write(text)
+        except OSError as error:
+            raise RunError(f"{self.folder} cannot be written: {error.strerror or error}.") from error
+
+    def _thin(self) -> None:
+        """Remove every other iteration while the files are larger than allowed."""
+        sizes = {path: path.stat().st_size for path in self.folder.glob("*-iteration.csv")}
+        while sum(sizes.values()) > self.max_bytes and len(sizes) > 1:
+            self._stride *= 2
+            for path in list(sizes):
+                number = path.name.removesuffix("-iteration.csv")
+                if number.isdecimal() and int(number) % self._stride:
+                    path.unlink()
+                    del sizes[path]
+            if self._stride > max(1, self.iteration):
+                return
+
+
+def read_simtrace(path: str | Path, *, max_rows: int = MAX_READ_ROWS) -> dict[str, NDArray[Any]]:
+    """The columns of a sim-trace file of any era, by name.
+
+    Args:
+        path: A CSV file with 15, 17, 18 or 19 columns; the header may be missing, unknown columns are left out.
+        max_rows: Longer files are refused.
+
+    Returns:
+        Arrays   (R,): whole numbers int64, ``done`` and ``all_wheels_on_track`` bool, ``episode_status`` str,
+        ``action`` int64, or float64 (R, 2) of steering and speed; everything else float64.
+
+    Raises:
+        RunError: Not readable, not a sim-trace, or too long; names the line.
+    """
+    path = Path(path)
+    rows: list[list[str]] = []
+    names: list[str] | None = None
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            for row in csv.reader(file):
+                if names is None:
+                    names = row if row[:1] == ["episode"] else list(COLUMNS[: len(row)])
+                    if len([name for name in names if name in COLUMNS]) not in READABLE:
+                        raise RunError(f"{path} has {len(row)} columns, a sim-trace has 15, 17, 18 or 19.")
+                    if names is row:
+                        continue
+                if len(row) != len(names):
+                    line = len(rows) + 2
+                    raise RunError(f"{path} has {len(row)} columns in line {line}, expected {len(names)}.")
+                if len(rows) >= max_rows:
+                    raise RunError(f"{path} has more than {max_rows:,} rows.")
+                rows.append(row)
+    except OSError as error:
+        raise RunError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise RunError(f"{path} is not a sim-trace: {error}.") from error
+    if names is None:
+        raise RunError(f"{path} is empty.")
+    columns = dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
+    try:
+        return {name: _parse(name, columns[name]) for name in names if name in COLUMNS}
+    except (ValueError, OverflowError) as error:
+        raise RunError(f"{path} is not a sim-trace: {error}.") from error
+
+
+def _parse(name: str, texts: tuple[str, ...]) -> NDArray[Any]:
+    """A column's values; a ValueError says what is wrong."""
+    if name == "episode_status":
+        return np.array(texts, dtype=np.str_)
+    if name in ("done", "all_wheels_on_track"):
+        if wrong := set(texts) - {"True", "False", "0", "1"}:
+            raise ValueError(f"{name} is {min(wrong)[:40]!r}, allowed: True or False")
+        return np.array([text in ("True", "1") for text in texts], dtype=np.bool_)
+    if name == "action" and any(text.startswith("[") for text in texts):
+        return np.array([text.strip("[]").split() for text in texts], dtype=np.float64).reshape(-1, 2)
+    values = np.array(texts, dtype=np.float64)
+    if name in ("episode", "steps", "action", "closest_waypoint", "obstacle_crash_counter"):
+        whole = values.astype(np.int64)
+        if not np.array_equal(whole, values):
+            raise ValueError(f"{name} is not a whole number in every row")
+        return whole
+    return values

@@ -1,0 +1,124 @@
+"""AWS's ``training_params.yaml``: where and how to race. Keys that mean nothing here are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, validate
+from racecraft.errors import ConfigError
+from racecraft.run.atomic import write_file
+
+MAX_BYTES = 1 << 18
+RaceType = Literal["TIME_TRIAL", "OBJECT_AVOIDANCE", "HEAD_TO_BOT", "HEAD_TO_MODEL", "F1"]
+_YES_NO = "true or false"
+
+
+@dataclass(frozen=True)
+class TrainingParams:
+    """The settings of a training job; each field is the AWS key of the same name in capitals."""
+
+    world_name: Annotated[str, Field(min_length=1, max_length=200, description="a track's name")] = (
+        "reinvent_base"
+    )
+    """Track."""
+    race_type: Annotated[RaceType, Field(description="TIME_TRIAL, OBJECT_AVOIDANCE, HEAD_TO_BOT, ...")] = (
+        "TIME_TRIAL"
+    )
+    """What else is on the track."""
+    reverse_dir: Annotated[bool, Field(description=_YES_NO)] = False
+    """Drive against the track's direction."""
+    alternate_driving_direction: Annotated[bool, Field(description=_YES_NO)] = False
+    """Change direction with every training episode."""
+    change_start_position: Annotated[bool, Field(description=_YES_NO)] = True
+    """Start every training episode a little further on."""
+    round_robin_advance_dist: Annotated[
+        Number, Field(ge=0, le=1, description="0 to 1, a share of the lap")
+    ] = 0.05
+    """How much further."""
+    start_position_offset: Annotated[Number, Field(ge=0, le=1, description="0 to 1, a share of the lap")] = (
+        0.0
+    )
+    """Where the first episode starts."""
+    enable_domain_randomization: Annotated[bool, Field(description=_YES_NO)] = False
+    """Change light and colours with every episode."""
+    min_eval_trials: Annotated[Whole, Field(ge=1, le=1000, description="1 to 1000")] = 5
+    """Evaluation episodes after each iteration."""
+    best_model_metric: Annotated[
+        Literal["progress", "reward", "laptime"], Field(description="'progress', 'reward' or 'laptime'")
+    ] = "progress"
+    """What makes a checkpoint the best."""
+
+    extra: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Keys of the file that mean nothing here; kept and written back."""
+
+    @classmethod
+    def load(cls, path: str | Path) -> TrainingParams:
+        """From AWS's file.
+
+        Raises:
+            ConfigError: Names the file, the key, its value and what is allowed.
+        """
+        return cls.from_yaml(_read(Path(path)), name=str(path))
+
+    @classmethod
+    def from_yaml(cls, text: str, *, name: str = "training_params") -> TrainingParams:
+        """From the file's text; ``name`` is what messages call it. A list of one is taken for its element."""
+        import yaml
+
+        try:
+            if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text, Loader=yaml.SafeLoader)):
+                raise ConfigError(f"{name} has a YAML alias (*...), which is not allowed.")
+            document = yaml.safe_load(text)
+        except (yaml.YAMLError, RecursionError, ValueError) as error:
+            if isinstance(error, ConfigError):
+                raise
+            mark = getattr(error, "problem_mark", None)
+            where = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+            raise ConfigError(f"{name} is not valid YAML{where}.") from error
+        if document is None:
+            document = {}
+        if not isinstance(document, dict) or not all(isinstance(key, str) for key in document):
+            raise ConfigError(f"{name} is not a list of settings such as 'WORLD_NAME: oval'.")
+        single = {k: v[0] if isinstance(v, list) and len(v) == 1 else v for k, v in document.items()}
+        known = {key: single[key] for key in _file().model_fields if key in single}
+        checked = validate(_file(), known, name=name)
+        values = {key.lower(): getattr(checked, key) for key in _file().model_fields}
+        return cls(**values, extra={key: value for key, value in document.items() if key not in known})
+
+    def to_yaml(self) -> str:
+        """The text of AWS's file."""
+        import yaml
+
+        own = {f.name.upper(): getattr(self, f.name) for f in fields(self) if f.name != "extra"}
+        return str(yaml.safe_dump({**own, **self.extra}, sort_keys=False))
+
+    def save(self, path: str | Path) -> None:
+        """Write AWS's file."""
+        try:
+            write_file(Path(path), self.to_yaml().encode())
+        except OSError as error:
+            raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _read(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise ConfigError(f"{path} is larger than {MAX_BYTES:,} bytes, too large for a settings file.")
+        return data.decode("utf-8-sig")
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path} is not UTF-8 text.") from error
+
+
+@cache
+def _file() -> type[AwsModel]:
+    return file_model(TrainingParams, rename=str.upper)
