@@ -1,4 +1,5 @@
-// The border between Python and the core: shapes are checked in racecraft.sim, arrays are shared without a copy.
+// The border between Python and the core: shapes are checked in racecraft.sim, arrays are shared without a
+// copy.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
@@ -29,12 +30,14 @@ using Bytes = nb::ndarray<const uint8_t, nb::ndim<1>, nb::c_contig, nb::device::
 TrackOutline outline_of(const Points& centerline, const Points& inner, const Points& outer, bool is_closed) {
     const size_t count = centerline.shape(0);
     if (count < 2 || count > 65535 || inner.shape(0) != count || outer.shape(0) != count) {
-        throw std::invalid_argument("A track needs 2 to 65535 waypoints and borders of the same number of points.");
+        throw std::invalid_argument(
+            "A track needs 2 to 65535 waypoints and borders of the same number of points.");
     }
     return {centerline.data(), inner.data(), outer.data(), static_cast<int>(count), is_closed};
 }
 
-// What the engine keeps of one track: its rules' geometry in both directions and the ground that the camera sees.
+// What the engine keeps of one track: its rules' geometry in both directions and the ground that the camera
+// sees.
 struct NativeTrack {
     Points centerline, inner, outer;
     Points reversed_centerline, reversed_inner, reversed_outer;
@@ -46,18 +49,20 @@ struct NativeTrack {
         const Table& width = reversed ? reversed_widths : widths;
         const Table& curvature = reversed ? reversed_curvatures : curvatures;
         if (width.shape(0) < 2 || width.shape(0) != curvature.shape(0)) {
-            throw std::invalid_argument("Width and curvature tables need the same number of samples, at least 2.");
+            throw std::invalid_argument(
+                "Width and curvature tables need the same number of samples, at least 2.");
         }
-        return TrackStore(reversed ? outline_of(reversed_centerline, reversed_inner, reversed_outer, is_closed)
-                                   : outline_of(centerline, inner, outer, is_closed),
-                          std::vector<float>(width.data(), width.data() + width.shape(0)),
-                          std::vector<float>(curvature.data(), curvature.data() + curvature.shape(0)),
-                          samples_per_metre);
+        return TrackStore(
+            reversed ? outline_of(reversed_centerline, reversed_inner, reversed_outer, is_closed)
+                     : outline_of(centerline, inner, outer, is_closed),
+            std::vector<float>(width.data(), width.data() + width.shape(0)),
+            std::vector<float>(curvature.data(), curvature.data() + curvature.shape(0)), samples_per_metre);
     }
 };
 
 VehicleParameters vehicle_of(const std::vector<float>& values) {
-    if (values.size() != kNumVehicleParameters) throw std::invalid_argument("Wrong number of vehicle parameters.");
+    if (values.size() != kNumVehicleParameters)
+        throw std::invalid_argument("Wrong number of vehicle parameters.");
     VehicleParameters parameters;
     std::memcpy(&parameters, values.data(), sizeof(parameters));
     return parameters;
@@ -77,13 +82,12 @@ nb::tuple names_of(const char* const (&names)[Count]) {
 }
 
 void bind_camera(nb::module_& m) {
-    nb::class_<CameraSpec>(m, "CameraSpec", "Where a camera sits on the car and what it covers; SI units and radians.")
+    nb::class_<CameraSpec>(m, "CameraSpec",
+                           "Where a camera sits on the car and what it covers; SI units and radians.")
         .def(
             "__init__",
             [](CameraSpec* self, int width, int height, float hfov, float forward, float left, float above,
-               float pitch) {
-                new (self) CameraSpec{width, height, hfov, pitch, forward, left, above};
-            },
+               float pitch) { new (self) CameraSpec{width, height, hfov, pitch, forward, left, above}; },
             "width"_a, "height"_a, "hfov"_a, "forward"_a, "left"_a, "above"_a, "pitch"_a);
     nb::class_<GreyPalette>(m, "GreyPalette", "Brightness of everything a driver's camera can see.");
     m.def(
@@ -97,8 +101,8 @@ void bind_camera(nb::module_& m) {
     nb::class_<GroundMap>(m, "GroundMap", "The ground of a track as cameras see it.")
         .def(
             "__init__",
-            [](GroundMap* self, const Points& centerline, const Points& inner, const Points& outer, bool is_closed,
-               float texel) {
+            [](GroundMap* self, const Points& centerline, const Points& inner, const Points& outer,
+               bool is_closed, float texel) {
                 const TrackOutline outline = outline_of(centerline, inner, outer, is_closed);
                 nb::gil_scoped_release release;
                 new (self) GroundMap(outline, GroundOptions{.texel = texel});
@@ -109,43 +113,50 @@ void bind_camera(nb::module_& m) {
 
 void bind_engine(nb::module_& m) {
     nb::class_<NativeTrack>(m, "NativeTrack", "Both directions of one track, as arrays in metres.")
-        .def(nb::init<Points, Points, Points, Points, Points, Points, Table, Table, Table, Table, double, bool>(),
-             "centerline"_a, "inner"_a, "outer"_a, "reversed_centerline"_a, "reversed_inner"_a, "reversed_outer"_a,
-             "widths"_a, "curvatures"_a, "reversed_widths"_a, "reversed_curvatures"_a, "samples_per_metre"_a,
-             "is_closed"_a);
+        .def(nb::init<Points, Points, Points, Points, Points, Points, Table, Table, Table, Table, double,
+                      bool>(),
+             "centerline"_a, "inner"_a, "outer"_a, "reversed_centerline"_a, "reversed_inner"_a,
+             "reversed_outer"_a, "widths"_a, "curvatures"_a, "reversed_widths"_a, "reversed_curvatures"_a,
+             "samples_per_metre"_a, "is_closed"_a);
 
     nb::class_<Engine>(m, "Engine", "A batch of cars; see racecraft.sim.Simulation, its Python face.")
         .def(
             "__init__",
             [](Engine* self, const std::vector<const NativeTrack*>& tracks,
                const std::vector<std::shared_ptr<GroundMap>>& grounds, const std::vector<float>& vehicle,
-               const CameraSpec* camera, const GreyPalette& palette, size_t num_envs, uint64_t seed, int substeps,
-               int num_threads, int laps, int max_steps, double time_limit, int start_mode, double start_offset,
-               double start_advance, bool start_spread, float lateral_jitter, float heading_jitter, int direction) {
+               const CameraSpec* camera, const GreyPalette& palette, size_t num_envs, uint64_t seed,
+               int substeps, int num_threads, int laps, int max_steps, double time_limit, int start_mode,
+               double start_offset, double start_advance, bool start_spread, float lateral_jitter,
+               float heading_jitter, int direction) {
                 std::vector<TrackStore> stores;
                 for (const bool reversed : {false, true}) {
                     for (const NativeTrack* track : tracks) stores.push_back(track->store(reversed));
                 }
-                const EngineConfig config{num_envs,
-                                          seed,
-                                          substeps,
-                                          num_threads,
-                                          RuleLimits{laps, max_steps, time_limit},
-                                          StartRule{static_cast<StartMode>(start_mode), start_offset, start_advance,
-                                                    start_spread, lateral_jitter, heading_jitter},
-                                          static_cast<Direction>(direction)};
-                new (self) Engine(config, std::move(stores),
-                                  std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
-                                  vehicle_of(vehicle), camera, palette);
+                const EngineConfig config{
+                    num_envs,
+                    seed,
+                    substeps,
+                    num_threads,
+                    RuleLimits{laps, max_steps, time_limit},
+                    StartRule{static_cast<StartMode>(start_mode), start_offset, start_advance, start_spread,
+                              lateral_jitter, heading_jitter},
+                    static_cast<Direction>(direction)};
+                new (self)
+                    Engine(config, std::move(stores),
+                           std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
+                           vehicle_of(vehicle), camera, palette);
             },
-            "tracks"_a, "grounds"_a, "vehicle"_a, "camera"_a.none(), "palette"_a, "num_envs"_a, "seed"_a, "substeps"_a,
-            "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a, "start_offset"_a,
-            "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a, "direction"_a)
+            "tracks"_a, "grounds"_a, "vehicle"_a, "camera"_a.none(), "palette"_a, "num_envs"_a, "seed"_a,
+            "substeps"_a, "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a,
+            "start_offset"_a, "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a,
+            "direction"_a)
         .def(
             "reset",
             [](Engine& self, Mask mask, std::optional<Seeds> seeds) {
-                if (mask.shape(0) != self.num_envs()) throw std::invalid_argument("Wrong length of the reset mask.");
-                if (seeds && seeds->shape(0) != self.num_envs()) throw std::invalid_argument("Wrong number of seeds.");
+                if (mask.shape(0) != self.num_envs())
+                    throw std::invalid_argument("Wrong length of the reset mask.");
+                if (seeds && seeds->shape(0) != self.num_envs())
+                    throw std::invalid_argument("Wrong number of seeds.");
                 const bool* masked = mask.data();
                 const uint64_t* keys = seeds ? seeds->data() : nullptr;
                 nb::gil_scoped_release release;
@@ -154,8 +165,10 @@ void bind_engine(nb::module_& m) {
             "mask"_a, "seeds"_a = nb::none())
         .def(
             "step",
-            [](Engine& self, nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu> actions) {
-                if (actions.shape(0) != self.num_envs()) throw std::invalid_argument("Wrong number of actions.");
+            [](Engine& self,
+               nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu> actions) {
+                if (actions.shape(0) != self.num_envs())
+                    throw std::invalid_argument("Wrong number of actions.");
                 const float* data = actions.data();
                 nb::gil_scoped_release release;
                 self.step(data);
@@ -163,14 +176,16 @@ void bind_engine(nb::module_& m) {
             "actions"_a)
         .def("set_pose", &Engine::set_pose, "env"_a, "x"_a, "y"_a, "heading"_a, "speed"_a)
         .def("freeze", &Engine::freeze, "env"_a, "steps"_a)
-        .def("save", [](const Engine& self) {
-            const std::vector<uint8_t> bytes = self.save();
-            uint8_t* data = new uint8_t[bytes.size()];
-            std::memcpy(data, bytes.data(), bytes.size());
-            const nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<uint8_t*>(p); });
-            return Array<uint8_t, 1>(data, {bytes.size()}, owner);
-        })
-        .def("load", [](Engine& self, Bytes bytes) { self.load(bytes.data(), bytes.shape(0)); }, "state"_a)
+        .def("save",
+             [](const Engine& self) {
+                 const std::vector<uint8_t> bytes = self.save();
+                 uint8_t* data = new uint8_t[bytes.size()];
+                 std::memcpy(data, bytes.data(), bytes.size());
+                 const nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<uint8_t*>(p); });
+                 return Array<uint8_t, 1>(data, {bytes.size()}, owner);
+             })
+        .def(
+            "load", [](Engine& self, Bytes bytes) { self.load(bytes.data(), bytes.shape(0)); }, "state"_a)
         .def_prop_ro("num_threads", &Engine::num_threads)
         .def_prop_ro("rows",
                      [](nb::handle_t<Engine> self) {
@@ -185,7 +200,8 @@ void bind_engine(nb::module_& m) {
         .def_prop_ro("frames",
                      [](nb::handle_t<Engine> self) {
                          Engine& e = nb::cast<Engine&>(self);
-                         const size_t height = e.camera() ? static_cast<size_t>(e.camera()->spec().height) : 0;
+                         const size_t height =
+                             e.camera() ? static_cast<size_t>(e.camera()->spec().height) : 0;
                          const size_t width = e.camera() ? static_cast<size_t>(e.camera()->spec().width) : 0;
                          return Array<uint8_t, 3>(e.frames(), {e.num_envs(), height, width}, self);
                      })
@@ -202,8 +218,8 @@ void bind_engine(nb::module_& m) {
         .def_prop_ro("vehicles",
                      [](nb::handle_t<Engine> self) {
                          Engine& e = nb::cast<Engine&>(self);
-                         return Array<float, 2>(e.vehicles(), {sizeof(VehicleState) / sizeof(float), e.num_envs()},
-                                                self);
+                         return Array<float, 2>(e.vehicles(),
+                                                {sizeof(VehicleState) / sizeof(float), e.num_envs()}, self);
                      })
         .def_prop_ro("parameters",
                      [](nb::handle_t<Engine> self) {
@@ -227,7 +243,8 @@ NB_MODULE(_native, m) {
     m.def("isa", [] { return std::string(racecraft::isa_name(racecraft::current_isa())); });
     m.def("available_isas", [] {
         std::vector<std::string> names;
-        for (const racecraft::Isa isa : racecraft::available_isas()) names.push_back(racecraft::isa_name(isa));
+        for (const racecraft::Isa isa : racecraft::available_isas())
+            names.push_back(racecraft::isa_name(isa));
         return names;
     });
     m.def("set_isa", &racecraft::set_isa, "name"_a);

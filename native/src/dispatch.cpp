@@ -12,11 +12,12 @@ bool can_run(Isa isa) {
         case Isa::portable:
             return true;
         case Isa::avx2:
-            return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
+            return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                   __builtin_cpu_supports("bmi2");
         case Isa::avx512:
-            return can_run(Isa::avx2) && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-                   __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-                   __builtin_cpu_supports("avx512vnni");
+            return can_run(Isa::avx2) && __builtin_cpu_supports("avx512f") &&
+                   __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
+                   __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vnni");
     }
     return false;
 #else
@@ -39,7 +40,9 @@ std::vector<Isa> available_isas() {
     return isas;
 }
 
-Isa current_isa() { return chosen().load(std::memory_order_relaxed); }
+Isa current_isa() {
+    return chosen().load(std::memory_order_relaxed);
+}
 
 const char* isa_name(Isa isa) {
     switch (isa) {
@@ -62,7 +65,8 @@ void set_isa(const std::string& name) {
         }
         allowed += std::string(allowed.empty() ? "'" : ", '") + isa_name(isa) + "'";
     }
-    throw std::invalid_argument("Instruction set '" + name + "' cannot run here; choose one of " + allowed + ".");
+    throw std::invalid_argument("Instruction set '" + name + "' cannot run here; choose one of " + allowed +
+                                ".");
 }
 
 }  // namespace racecraft

@@ -23,12 +23,10 @@ void set_isa(const std::string& name);
 
 // Calls FUNCTION of the namespace of the instruction set in force.
 #if defined(RC_HAVE_avx512)
-#define RC_DISPATCH(FUNCTION, ...)                                          \
-    (::racecraft::current_isa() == ::racecraft::Isa::avx512                 \
-         ? ::racecraft::avx512::FUNCTION(__VA_ARGS__)                       \
-         : ::racecraft::current_isa() == ::racecraft::Isa::avx2             \
-               ? ::racecraft::avx2::FUNCTION(__VA_ARGS__)                   \
-               : ::racecraft::portable::FUNCTION(__VA_ARGS__))
+#define RC_DISPATCH(FUNCTION, ...)                                                                       \
+    (::racecraft::current_isa() == ::racecraft::Isa::avx512 ? ::racecraft::avx512::FUNCTION(__VA_ARGS__) \
+     : ::racecraft::current_isa() == ::racecraft::Isa::avx2 ? ::racecraft::avx2::FUNCTION(__VA_ARGS__)   \
+                                                            : ::racecraft::portable::FUNCTION(__VA_ARGS__))
 #define RC_FOR_EACH_ISA(X) X(portable) X(avx2) X(avx512)
 #else
 #define RC_DISPATCH(FUNCTION, ...) ::racecraft::portable::FUNCTION(__VA_ARGS__)

@@ -69,27 +69,26 @@ VehicleState Engine::start_pose(size_t env) {
     if (rule.spread) fraction += static_cast<double>(env) / static_cast<double>(num_envs());
     if (rule.mode == StartMode::advance) fraction += rule.advance * episode.episode;
     if (rule.mode == StartMode::random) {
-        fraction = static_cast<double>(
-            uniform_of(philox(seed, car, number, 0, Purpose::start_position).words[0]));
+        fraction =
+            static_cast<double>(uniform_of(philox(seed, car, number, 0, Purpose::start_position).words[0]));
     }
     fraction = track.is_closed ? fraction - floor_of(fraction) : 0.0;
     episode.start = fraction;
 
     const double arc_length = fraction * track.length;
-    const double* last = track.arc_length + track.num_waypoints - 1;
-    const double* next = std::upper_bound(track.arc_length, last, arc_length);
-    const size_t segment = static_cast<size_t>(next - track.arc_length) - 1;
-    const double step = track.arc_length[segment + 1] - track.arc_length[segment];
-    const double along = (arc_length - track.arc_length[segment]) / step;
-    const double dx = track.waypoint_x[segment + 1] - track.waypoint_x[segment];
-    const double dy = track.waypoint_y[segment + 1] - track.waypoint_y[segment];
+    const Segment* last = track.segments + track.num_segments - 1;
+    const Segment* segment = track.segments;
+    while (segment < last && segment[1].arc_length <= arc_length) ++segment;
+    const double along = arc_length - segment->arc_length;
+    const double ux = segment->dx * segment->inverse_length;
+    const double uy = segment->dy * segment->inverse_length;
 
     const RandomBlock random = philox(seed, car, number, 0, Purpose::start_pose);
-    const float lateral = rule.lateral_jitter * symmetric_of(random.words[0]);
+    const double lateral = static_cast<double>(rule.lateral_jitter * symmetric_of(random.words[0]));
     VehicleState state{};
-    state.x = static_cast<float>(track.waypoint_x[segment] + along * dx - static_cast<double>(lateral) * dy / step);
-    state.y = static_cast<float>(track.waypoint_y[segment] + along * dy + static_cast<double>(lateral) * dx / step);
-    state.heading = wrap_angle(atan2_of(static_cast<float>(dy), static_cast<float>(dx)) +
+    state.x = static_cast<float>(segment->x + along * ux - lateral * uy);
+    state.y = static_cast<float>(segment->y + along * uy + lateral * ux);
+    state.heading = wrap_angle(atan2_of(static_cast<float>(uy), static_cast<float>(ux)) +
                                rule.heading_jitter * symmetric_of(random.words[1]));
     return state;
 }
@@ -108,13 +107,13 @@ void Engine::begin_episode(size_t env) {
 
     // The prepare step: the car stands at its start and the row carries no command.
     const TrackGeometry& track = track_of(env);
-    const ReferencePoint reference = reference_point(state);
     episode.steps = 1;
     episode.status = Status::prepare;
-    episode.progress = lap_difference(track, episode.projection.arc_length / track.length, episode.start);
-    episode.last_x = reference.x;
-    episode.last_y = reference.y;
-    write_row(track, episode, state, 0.0f, 0.0f, wheels_on_road(track, state), is_reversed(env),
+    episode.progress =
+        lap_difference(track, episode.projection.arc_length * track.inverse_length, episode.start);
+    episode.last_x = episode.reference_x;
+    episode.last_y = episode.reference_y;
+    write_row(track, episode, state, 0.0f, 0.0f, wheels_on_road(track, state, episode), is_reversed(env),
               &rows_[env * kNumRowColumns]);
     terminated()[env] = false;
     truncated()[env] = false;
@@ -166,8 +165,8 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
         steering_command_[env] = steering;
         speed_command_[env] = speed == 0.0f ? 0.0f : clamp(speed, kMinSpeedCommand, kMaxSpeedCommand);
         const Verdict verdict =
-            judge(track_of(env), config_.limits, vehicle(env), steering, speed_command_[env], is_reversed(env),
-                  episodes_[env], &rows_[env * kNumRowColumns]);
+            judge(track_of(env), config_.limits, vehicle(env), steering, speed_command_[env],
+                  is_reversed(env), episodes_[env], &rows_[env * kNumRowColumns]);
         terminated()[env] = verdict.terminated;
         truncated()[env] = verdict.truncated;
         const bool moving = !verdict.terminated && episodes_[env].status != Status::pause;
@@ -177,9 +176,18 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
     if (!any_moving) return;
 
     float* fields = vehicles_.data();
-    const VehicleArrays arrays{fields,         fields + n,     fields + 2 * n,           fields + 3 * n,
-                               fields + 4 * n, fields + 5 * n, fields + 6 * n,           steering_command_.data(),
-                               speed_command_.data(), is_moving_.data(), parameters_.data(), n};
+    const VehicleArrays arrays{fields,
+                               fields + n,
+                               fields + 2 * n,
+                               fields + 3 * n,
+                               fields + 4 * n,
+                               fields + 5 * n,
+                               fields + 6 * n,
+                               steering_command_.data(),
+                               speed_command_.data(),
+                               is_moving_.data(),
+                               parameters_.data(),
+                               n};
     for (size_t env = begin; env < end; env += kLanes) {
         const int count = static_cast<int>(std::min(end - env, size_t{kLanes}));
         RC_DISPATCH(advance_vehicles, arrays, env, count, config_.substeps);
@@ -210,12 +218,13 @@ void Engine::set_pose(size_t env, float x, float y, float heading, float speed) 
     terminated()[env] = false;
     truncated()[env] = false;
     look(env);
-    const ReferencePoint reference = reference_point(state);
-    episode.last_x = reference.x;
-    episode.last_y = reference.y;
+    episode.last_x = episode.reference_x;
+    episode.last_y = episode.reference_y;
 }
 
-void Engine::freeze(size_t env, int steps) { episodes_[env].frozen_steps = steps; }
+void Engine::freeze(size_t env, int steps) {
+    episodes_[env].frozen_steps = steps;
+}
 
 template <typename Visitor>
 void Engine::visit_saved(Visitor&& visit) {
@@ -244,8 +253,9 @@ void Engine::load(const uint8_t* bytes, size_t size) {
     size_t expected = 0;
     visit_saved([&](const void*, size_t part) { expected += part; });
     if (size != expected) {
-        throw std::invalid_argument("Saved simulation state has " + std::to_string(size) + " bytes, this simulation needs " +
-                                    std::to_string(expected) + ": it must have the same number of cars and version.");
+        throw std::invalid_argument("Saved simulation state has " + std::to_string(size) +
+                                    " bytes, this simulation needs " + std::to_string(expected) +
+                                    ": it must have the same number of cars and version.");
     }
     visit_saved([&](void* data, size_t part) {
         std::memcpy(data, bytes, part);
@@ -256,7 +266,8 @@ void Engine::load(const uint8_t* bytes, size_t size) {
         const Episode& episode = episodes_[env];
         const bool valid = episode.track >= 0 && static_cast<size_t>(episode.track) < tracks_.size() &&
                            track_choice_[env] >= 0 && static_cast<size_t>(track_choice_[env]) < num_tracks();
-        if (!valid) throw std::invalid_argument("Saved simulation state names a track that this simulation lacks.");
+        if (!valid)
+            throw std::invalid_argument("Saved simulation state names a track that this simulation lacks.");
         for (size_t k = 0; k < kNumVehicleFields; ++k) {
             if (!(std::abs(vehicles_[k * num_envs() + env]) < 1e6f)) {
                 throw std::invalid_argument("Saved simulation state holds a car that is nowhere.");

@@ -1,12 +1,13 @@
-// Steps a batch of cars: judge, move, observe, render. One call, no allocation, any number of threads, same bits.
+// Steps a batch of cars: judge, move, observe, render. One call, no allocation, any number of threads, same
+// bits.
 #pragma once
 
 #include <memory>
 #include <vector>
 
+#include "camera_model.hpp"
 #include "racecraft/random.hpp"
 #include "racecraft/rules.hpp"
-#include "camera_model.hpp"
 #include "thread_pool.hpp"
 #include "track_store.hpp"
 
@@ -18,18 +19,18 @@ enum class Direction : int32_t { forward = 0, reverse = 1, alternate = 2 };
 // Where an episode starts, as a fraction of a lap; an open track always starts at its beginning.
 struct StartRule {
     StartMode mode;
-    double offset;           // of the first episode
-    double advance;          // added with every episode of a car (mode advance)
-    bool spread;             // spaces the cars of a batch evenly along the lap
-    float lateral_jitter;    // m, uniform in plus or minus
-    float heading_jitter;    // rad, uniform in plus or minus
+    double offset;         // of the first episode
+    double advance;        // added with every episode of a car (mode advance)
+    bool spread;           // spaces the cars of a batch evenly along the lap
+    float lateral_jitter;  // m, uniform in plus or minus
+    float heading_jitter;  // rad, uniform in plus or minus
 };
 
 struct EngineConfig {
-    size_t num_envs;      // N
+    size_t num_envs;  // N
     uint64_t seed;
-    int substeps;         // physics steps to a control step
-    int num_threads;      // 0 for one per core
+    int substeps;     // physics steps to a control step
+    int num_threads;  // 0 for one per core
     RuleLimits limits;
     StartRule start;
     Direction direction;
@@ -37,16 +38,16 @@ struct EngineConfig {
 
 class Engine {
   public:
-    // Tracks come in order; the reversed twin of track i is track i + num_tracks. Both drive over ground map i.
-    // Without a camera there are no frames.
+    // Tracks come in order; the reversed twin of track i is track i + num_tracks. Both drive over ground map
+    // i. Without a camera there are no frames.
     Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
            std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
            const CameraSpec* camera, const GreyPalette& palette);
 
     // Puts the masked cars (all of them without a mask) at the start of their next episode.
     void reset(const bool* mask);
-    // As reset, but the masked cars begin anew: each draws from now on as the first car of an engine with its seed (N,),
-    // and its next episode is its first.
+    // As reset, but the masked cars begin anew: each draws from now on as the first car of an engine with its
+    // seed (N,), and its next episode is its first.
     void reset(const bool* mask, const uint64_t* seeds);
     // actions: steering angle in rad and speed in m/s, interleaved (N, 2), finite.
     void step(const float* actions);
@@ -66,7 +67,9 @@ class Engine {
     bool* truncated() { return flags_.get() + num_envs(); }  // (N,)
     float* vehicles() { return vehicles_.data(); }           // (kNumVehicleFields, N), order of VehicleState
     float* parameters() { return parameters_.data(); }       // (kNumVehicleParameters, N)
-    int32_t* track_choice() { return track_choice_.data(); } // (N,) track of each car from its next episode on
+    int32_t* track_choice() {
+        return track_choice_.data();
+    }  // (N,) track of each car from its next episode on
     GreyPalette& palette(size_t env) { return palettes_[env]; }
 
     // Everything that the next step depends on, as plain bytes of this build.
@@ -83,7 +86,7 @@ class Engine {
     void store_vehicle(size_t env, const VehicleState& state);
     VehicleState start_pose(size_t env);
     void begin_episode(size_t env);
-    void look(size_t env);    // observes and renders the current pose
+    void look(size_t env);  // observes and renders the current pose
     void step_chunk(size_t begin, size_t end, const float* actions);
     size_t chunk_size(size_t most) const;
 
@@ -101,8 +104,8 @@ class Engine {
     std::vector<uint8_t> frames_;
     std::vector<Episode> episodes_;
     std::vector<int32_t> track_choice_;
-    std::vector<uint64_t> seeds_;        // (N,) with its stream, the key of each car's random numbers
-    std::vector<uint32_t> streams_;      // (N,)
+    std::vector<uint64_t> seeds_;    // (N,) with its stream, the key of each car's random numbers
+    std::vector<uint32_t> streams_;  // (N,)
     std::vector<GreyPalette> palettes_;
     std::unique_ptr<bool[]> flags_;  // terminated, then truncated (std::vector<bool> has no bytes to show)
 };

@@ -46,9 +46,9 @@ class ThreadPool {
     std::condition_variable wake_;
     std::condition_variable finished_;
     Loop loop_{};
-    size_t generation_ = 0;   // guarded by mutex_; counts loops, so that a worker joins each once
-    size_t busy_ = 0;         // guarded by mutex_; workers that have not left the current loop
-    bool stopping_ = false;   // guarded by mutex_
+    size_t generation_ = 0;  // guarded by mutex_; counts loops, so that a worker joins each once
+    size_t busy_ = 0;        // guarded by mutex_; workers that have not left the current loop
+    bool stopping_ = false;  // guarded by mutex_
     std::atomic<size_t> next_{0};
     std::vector<std::thread> workers_;
 };

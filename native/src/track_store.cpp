@@ -6,9 +6,9 @@
 namespace racecraft {
 namespace {
 
-constexpr double kMargin = 1.0;          // m of grid around the borders: a car that leaves is judged within it
-constexpr double kFinestCell = 0.1;      // m
-constexpr double kMostCells = 20000.0;   // coarser cells beyond, so that a long track still loads at once
+constexpr double kMargin = 1.0;         // m of grid around the borders: a car that leaves is judged within it
+constexpr double kFinestCell = 0.1;     // m
+constexpr double kMostCells = 20000.0;  // coarser cells beyond, so that a long track still loads at once
 
 void append_ring(std::vector<double>& edges, const std::vector<double>& points) {
     const size_t count = points.size() / 2;
@@ -19,13 +19,24 @@ void append_ring(std::vector<double>& edges, const std::vector<double>& points) 
 }
 
 // sqrt, not hypot: IEEE 754 fixes its last bit, a C library's hypot may differ.
-double length_of(double dx, double dy) { return std::sqrt(dx * dx + dy * dy); }
+double length_of(double dx, double dy) {
+    return std::sqrt(dx * dx + dy * dy);
+}
 
-double distance_to_segment(double x, double y, double ax, double ay, double bx, double by) {
-    const double dx = bx - ax;
-    const double dy = by - ay;
-    const double along = clamp(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy), 0.0, 1.0);
-    return length_of(x - (ax + along * dx), y - (ay + along * dy));
+double distance_to(const Segment& segment, double x, double y) {
+    const double rx = x - segment.x;
+    const double ry = y - segment.y;
+    const double share =
+        (rx * segment.dx + ry * segment.dy) * segment.inverse_length * segment.inverse_length;
+    const double along = clamp(share, 0.0, 1.0);
+    return length_of(rx - along * segment.dx, ry - along * segment.dy);
+}
+
+// Appends what lies kTableReach beyond the end, so that a table needs no wrapping when it is read.
+void extend(std::vector<float>& table, double samples_per_metre, bool is_closed) {
+    const size_t count = table.size();
+    const size_t reach = static_cast<size_t>(static_cast<double>(kTableReach) * samples_per_metre) + 3;
+    for (size_t i = 0; i < reach; ++i) table.push_back(is_closed ? table[i % count] : table[count - 1]);
 }
 
 }  // namespace
@@ -34,13 +45,21 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
                        const std::vector<float>& curvatures, double samples_per_metre)
     : widths_(widths), curvatures_(curvatures) {
     const size_t count = static_cast<size_t>(outline.count);
-    for (size_t i = 0; i < count; ++i) {
-        waypoint_x_.push_back(outline.center[2 * i]);
-        waypoint_y_.push_back(outline.center[2 * i + 1]);
-        const double step = i == 0 ? 0.0
-                                   : length_of(waypoint_x_[i] - waypoint_x_[i - 1], waypoint_y_[i] - waypoint_y_[i - 1]);
-        arc_length_.push_back(i == 0 ? 0.0 : arc_length_.back() + step);
+    double arc_length = 0.0;
+    for (size_t i = 0; i + 1 < count; ++i) {
+        Segment segment{};
+        segment.x = outline.center[2 * i];
+        segment.y = outline.center[2 * i + 1];
+        segment.dx = outline.center[2 * i + 2] - segment.x;
+        segment.dy = outline.center[2 * i + 3] - segment.y;
+        segment.arc_length = arc_length;
+        segment.length = length_of(segment.dx, segment.dy);
+        segment.inverse_length = 1.0 / segment.length;
+        arc_length += segment.length;
+        segments_.push_back(segment);
     }
+    extend(widths_, samples_per_metre, outline.is_closed);
+    extend(curvatures_, samples_per_metre, outline.is_closed);
 
     std::vector<double> inner(outline.inner, outline.inner + 2 * count);
     std::vector<double> outer(outline.outer, outline.outer + 2 * count);
@@ -65,19 +84,17 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
     const double cell = std::max(kFinestCell, std::sqrt(width * height / kMostCells));
 
     TrackGeometry& g = geometry_;
-    g.num_waypoints = static_cast<int32_t>(count);
+    g.num_segments = static_cast<int32_t>(segments_.size());
     g.is_closed = outline.is_closed ? 1 : 0;
-    g.length = arc_length_.back();
-    g.waypoint_x = waypoint_x_.data();
-    g.waypoint_y = waypoint_y_.data();
-    g.arc_length = arc_length_.data();
+    g.length = arc_length;
+    g.inverse_length = 1.0 / arc_length;
+    g.segments = segments_.data();
     g.grid_x = x_min - kMargin;
     g.grid_y = y_min - kMargin;
     g.inverse_cell = 1.0 / cell;
     g.grid_columns = static_cast<int32_t>(std::ceil(width / cell));
     g.grid_rows = static_cast<int32_t>(std::ceil(height / cell));
-    g.num_samples = static_cast<int32_t>(widths_.size());
-    g.samples_per_metre = samples_per_metre;
+    g.samples_per_metre = static_cast<float>(samples_per_metre);
     g.width_table = widths_.data();
     g.curvature_table = curvatures_.data();
     build_segments();
@@ -88,20 +105,18 @@ void TrackStore::build_segments() {
     TrackGeometry& g = geometry_;
     const double cell = 1.0 / g.inverse_cell;
     const double reach = std::sqrt(2.0) * cell;  // twice the half diagonal of a cell
-    const size_t segments = waypoint_x_.size() - 1;
-    std::vector<double> distance(segments);
+    std::vector<double> distance(segments_.size());
     segment_begin_.push_back(0);
     for (int32_t row = 0; row < g.grid_rows; ++row) {
         for (int32_t column = 0; column < g.grid_columns; ++column) {
             const double x = g.grid_x + (column + 0.5) * cell;
             const double y = g.grid_y + (row + 0.5) * cell;
             double nearest = 1e300;
-            for (size_t i = 0; i < segments; ++i) {
-                distance[i] = distance_to_segment(x, y, waypoint_x_[i], waypoint_y_[i], waypoint_x_[i + 1],
-                                                  waypoint_y_[i + 1]);
+            for (size_t i = 0; i < segments_.size(); ++i) {
+                distance[i] = distance_to(segments_[i], x, y);
                 nearest = std::min(nearest, distance[i]);
             }
-            for (size_t i = 0; i < segments; ++i) {
+            for (size_t i = 0; i < segments_.size(); ++i) {
                 if (distance[i] <= nearest + reach + 1e-9) segment_items_.push_back(static_cast<uint16_t>(i));
             }
             segment_begin_.push_back(static_cast<uint32_t>(segment_items_.size()));
@@ -140,7 +155,8 @@ void TrackStore::build_bands() {
     for (size_t i = 0; i < border_.size(); i += 4) {
         const double x0 = border_[i], y0 = border_[i + 1], x1 = border_[i + 2], y1 = border_[i + 3];
         const auto index = [&](double value, double origin, int32_t limit) {
-            return std::clamp(static_cast<int32_t>(std::floor((value - origin) * g.inverse_cell)), 0, limit - 1);
+            return std::clamp(static_cast<int32_t>(std::floor((value - origin) * g.inverse_cell)), 0,
+                              limit - 1);
         };
         const int32_t first_row = index(std::min(y0, y1) - 1e-9, g.grid_y, g.grid_rows);
         const int32_t last_row = index(std::max(y0, y1) + 1e-9, g.grid_y, g.grid_rows);

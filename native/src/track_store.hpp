@@ -12,8 +12,8 @@ namespace racecraft {
 class TrackStore {
   public:
     // widths and curvatures are samples at i / samples_per_metre along the centre line.
-    TrackStore(const TrackOutline& outline, const std::vector<float>& widths, const std::vector<float>& curvatures,
-               double samples_per_metre);
+    TrackStore(const TrackOutline& outline, const std::vector<float>& widths,
+               const std::vector<float>& curvatures, double samples_per_metre);
     TrackStore(TrackStore&&) = default;
     TrackStore(const TrackStore&) = delete;
 
@@ -24,7 +24,7 @@ class TrackStore {
     void build_bands();
 
     TrackGeometry geometry_{};
-    std::vector<double> waypoint_x_, waypoint_y_, arc_length_;
+    std::vector<Segment> segments_;
     std::vector<double> border_;  // x0, y0, x1, y1 of every border edge
     std::vector<uint8_t> cell_kind_;
     std::vector<uint32_t> segment_begin_;

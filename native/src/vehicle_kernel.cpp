@@ -8,12 +8,18 @@ struct Lanes {
         steering[kLanes];
 };
 
+struct ConstantLanes {
+#define RC_FIELD(name) float name[kLanes];
+    RC_VEHICLE_CONSTANTS(RC_FIELD)
+#undef RC_FIELD
+};
+
 }  // namespace
 
 void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int substeps) {
     const float sim_dt = kControlDt / static_cast<float>(substeps);
     alignas(64) Lanes lanes;
-    alignas(64) float parameters[kNumVehicleParameters][kLanes];
+    alignas(64) ConstantLanes constants;
     alignas(64) float steering_command[kLanes];
     alignas(64) float speed_command[kLanes];
     size_t car[kLanes];  // unused lanes repeat the last car and are not stored
@@ -29,23 +35,26 @@ void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int 
         steering_command[i] = arrays.steering_command[car[i]];
         speed_command[i] = arrays.speed_command[car[i]];
     }
-    for (int k = 0; k < kNumVehicleParameters; ++k) {
-        for (int i = 0; i < kLanes; ++i) parameters[k][i] = arrays.parameters[k * arrays.stride + car[i]];
+    for (int i = 0; i < kLanes; ++i) {
+#define RC_LOAD(name) arrays.parameters[kVehicle_##name * arrays.stride + car[i]],
+        const VehicleConstants c = vehicle_constants({RC_VEHICLE_PARAMETERS(RC_LOAD)});
+#undef RC_LOAD
+#define RC_STORE(name) constants.name[i] = c.name;
+        RC_VEHICLE_CONSTANTS(RC_STORE)
+#undef RC_STORE
     }
 
     for (int substep = 0; substep < substeps; ++substep) {
 #pragma GCC ivdep
         for (int i = 0; i < kLanes; ++i) {
-            const VehicleParameters p{
-#define RC_LOAD(name) parameters[kVehicle_##name][i],
-                RC_VEHICLE_PARAMETERS(RC_LOAD)
+#define RC_LOAD(name) constants.name[i],
+            const VehicleConstants c{RC_VEHICLE_CONSTANTS(RC_LOAD)};
 #undef RC_LOAD
-            };
-            const VehicleState state{lanes.x[i],     lanes.y[i],
-                                     lanes.heading[i], lanes.speed[i],
-                                     lanes.lateral_speed[i], lanes.yaw_rate[i],
-                                     lanes.steering[i]};
-            const VehicleState next = vehicle_substep(p, state, steering_command[i], speed_command[i], sim_dt);
+            const VehicleState state{
+                lanes.x[i],        lanes.y[i],       lanes.heading[i], lanes.speed[i], lanes.lateral_speed[i],
+                lanes.yaw_rate[i], lanes.steering[i]};
+            const VehicleState next =
+                vehicle_substep(c, state, steering_command[i], speed_command[i], sim_dt);
             lanes.x[i] = next.x;
             lanes.y[i] = next.y;
             lanes.heading[i] = next.heading;

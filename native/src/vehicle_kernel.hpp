@@ -25,8 +25,8 @@ struct VehicleArrays {
 };
 
 // Advances cars [begin, begin + count), count in 1..kLanes, by one control step of `substeps` physics steps.
-#define RC_DECLARE(isa)                                                                    \
-    namespace isa {                                                                        \
+#define RC_DECLARE(isa)                                                                        \
+    namespace isa {                                                                            \
     void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int substeps); \
     }
 RC_FOR_EACH_ISA(RC_DECLARE)

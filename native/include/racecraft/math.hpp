@@ -1,7 +1,8 @@
 // Our own elementary functions: the same bits on every compiler, optimisation level, CPU and GPU.
 //
-// Only +, -, *, / and sqrt are used, which IEEE 754 defines to the last bit, in a fixed order and without fused
-// multiply-add (-ffp-contract=off). All functions are branch-free, so a loop over cars turns into vector code.
+// Only +, -, *, / and sqrt are used, which IEEE 754 defines to the last bit, in a fixed order and without
+// fused multiply-add (-ffp-contract=off). All functions are branch-free, so a loop over cars turns into
+// vector code.
 #pragma once
 
 #include "racecraft/platform.hpp"
@@ -30,8 +31,12 @@ RC_HD T clamp(T value, T low, T high) {
     return min_of(max_of(value, low), high);
 }
 
-RC_HD float abs_of(float value) { return value < 0.0f ? -value : value; }
-RC_HD double abs_of(double value) { return value < 0.0 ? -value : value; }
+RC_HD float abs_of(float value) {
+    return value < 0.0f ? -value : value;
+}
+RC_HD double abs_of(double value) {
+    return value < 0.0 ? -value : value;
+}
 
 // Largest integer not above value, for |value| < 2^31; truncation and one correction vectorise everywhere.
 RC_HD float floor_of(float value) {
@@ -44,27 +49,39 @@ RC_HD double floor_of(double value) {
     return truncated > value ? truncated - 1.0 : truncated;
 }
 
-RC_HD float sqrt_of(float value) { return sqrtf(value); }
-RC_HD double sqrt_of(double value) { return sqrt(value); }
+// Nearest integer, halves away from zero, for |value| < 2^31: rounds -value to minus what it rounds value to.
+RC_HD float round_of(float value) {
+    return static_cast<float>(static_cast<int32_t>(value + (value < 0.0f ? -0.5f : 0.5f)));
+}
 
-// Angle in (-pi, pi] up to rounding; exact for |angle| below a few thousand turns.
+RC_HD float sqrt_of(float value) {
+    return sqrtf(value);
+}
+RC_HD double sqrt_of(double value) {
+    return sqrt(value);
+}
+
+// Angle in [-pi, pi] up to the rounding of the number of turns; error below 1e-6 for a few thousand turns,
+// none without.
 RC_HD float wrap_angle(float angle) {
-    const float turns = floor_of(angle * (1.0f / kTwoPi) + 0.5f);
+    const float turns = round_of(angle * (1.0f / kTwoPi));
     // 2*pi in two parts (Cody and Waite), so that subtracting whole turns loses nothing.
     return (angle - turns * 6.28125f) - turns * 1.9353071795864769e-3f;
 }
 
-// sin and cos together, absolute error below 1e-7 for |angle| < 1000 rad (checked in native/tests/math_test.cpp).
-// Minimax polynomials on [-pi/4, pi/4] as in Cephes sinf/cosf (Moshier, 1984).
+// sin and cos together, absolute error below 1e-7 for |angle| < 1000 rad (checked in
+// native/tests/math_test.cpp). Minimax polynomials on [-pi/4, pi/4] as in Cephes sinf/cosf (Moshier, 1984).
+// Odd and even to the bit, so that a mirrored car is a car's mirror image.
 RC_HD void sincos_of(float angle, float& sine, float& cosine) {
-    const float quadrant = floor_of(angle * 0.636619772367581343f + 0.5f);
+    const float quadrant = round_of(angle * 0.636619772367581343f);
     float r = angle - quadrant * 1.5703125f;
     r = r - quadrant * 4.8375129699707031e-4f;
     r = r - quadrant * 7.5495075e-8f;
     const float r2 = r * r;
     const float s = r + r * r2 * (-1.6666654611e-1f + r2 * (8.3321608736e-3f + r2 * -1.9515295891e-4f));
-    const float c = 1.0f - 0.5f * r2 +
-                    r2 * r2 * (4.166664568298827e-2f + r2 * (-1.388731625493765e-3f + r2 * 2.443315711809948e-5f));
+    const float c =
+        1.0f - 0.5f * r2 +
+        r2 * r2 * (4.166664568298827e-2f + r2 * (-1.388731625493765e-3f + r2 * 2.443315711809948e-5f));
     const int32_t q = static_cast<int32_t>(quadrant) & 3;
     const bool swap = (q & 1) != 0;
     const float sine_of_r = swap ? c : s;

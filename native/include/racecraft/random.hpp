@@ -1,14 +1,16 @@
-// Counter-based random numbers: Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11).
+// Counter-based random numbers: Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3",
+// SC11).
 //
-// A number depends only on what it is for (seed, environment, episode, step, purpose), so batch size, thread count
-// and the order of calls cannot change it, and nothing has to be stored.
+// A number depends only on what it is for (seed, environment, episode, step, purpose), so batch size, thread
+// count and the order of calls cannot change it, and nothing has to be stored.
 #pragma once
 
 #include "racecraft/platform.hpp"
 
 namespace racecraft {
 
-// What a random number is for; one value each, never reused, so that adding one leaves the others as they were.
+// What a random number is for; one value each, never reused, so that adding one leaves the others as they
+// were.
 enum class Purpose : uint32_t {
     start_position = 1,  // where along the lap an episode starts
     start_pose = 2,      // lateral and heading jitter of the start
@@ -38,9 +40,13 @@ RC_HD RandomBlock philox(uint64_t seed, uint32_t env, uint32_t episode, uint32_t
 }
 
 // Uniform in [0, 1), 24 random bits, exact in float.
-RC_HD float uniform_of(uint32_t word) { return static_cast<float>(word >> 8) * (1.0f / 16777216.0f); }
+RC_HD float uniform_of(uint32_t word) {
+    return static_cast<float>(word >> 8) * (1.0f / 16777216.0f);
+}
 
 // Uniform in [-1, 1).
-RC_HD float symmetric_of(uint32_t word) { return 2.0f * uniform_of(word) - 1.0f; }
+RC_HD float symmetric_of(uint32_t word) {
+    return 2.0f * uniform_of(word) - 1.0f;
+}
 
 }  // namespace racecraft

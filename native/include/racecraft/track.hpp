@@ -1,10 +1,11 @@
-// A track as the rules see it: polylines in metres plus a uniform grid that answers "which segment is nearest" and
-// "is this point on the road" exactly, touching a handful of numbers instead of the whole track.
+// A track as the rules see it: polylines in metres plus a uniform grid that answers "which segment is
+// nearest" and "is this point on the road" exactly, touching a handful of numbers instead of the whole track.
 //
 //   grid cell -> the few centre-line segments that can be nearest to any point of the cell
 //             -> inside / outside the road, or mixed: then count border crossings in the cell's row band
 //
-// TrackGeometry only points at memory owned by TrackStore (native/src/track_store.hpp), so the same struct serves a GPU.
+// TrackGeometry only points at memory owned by TrackStore (native/src/track_store.hpp), so the same struct
+// serves a GPU.
 #pragma once
 
 #include "racecraft/math.hpp"
@@ -13,60 +14,65 @@ namespace racecraft {
 
 enum CellKind : uint8_t { kCellOutside = 0, kCellInside = 1, kCellMixed = 2 };
 
-struct TrackGeometry {
-    int32_t num_waypoints;          // W; closed tracks repeat the first waypoint at the end
-    int32_t is_closed;              // 1 or 0
-    double length;                  // m, of the centre line
-    const double* waypoint_x;       // m                                     (W,)
-    const double* waypoint_y;       // m                                     (W,)
-    const double* arc_length;       // m, from the first waypoint            (W,)
+constexpr float kTableReach = 3.0f;  // m that a table may be read ahead of a place on the track
 
-    double grid_x, grid_y;          // m, lower left corner of the grid
-    double inverse_cell;            // 1/m
+// One piece of the centre line, between a waypoint and the next.
+struct Segment {
+    double x, y;            // m, where it starts
+    double dx, dy;          // m, from its start to its end
+    double arc_length;      // m, of its start
+    double length;          // m
+    double inverse_length;  // 1/m
+};
+
+struct TrackGeometry {
+    int32_t num_segments;     // W - 1
+    int32_t is_closed;        // 1 or 0
+    double length;            // m, of the centre line
+    double inverse_length;    // 1/m
+    const Segment* segments;  //                                       (W - 1,)
+
+    double grid_x, grid_y;  // m, lower left corner of the grid
+    double inverse_cell;    // 1/m
     int32_t grid_columns, grid_rows;
     const uint8_t* cell_kind;       // CellKind                              (rows * columns,)
     const uint32_t* segment_begin;  // first candidate segment of a cell     (rows * columns + 1,)
     const uint16_t* segment_items;  // candidate segments, ascending per cell
 
-    const uint32_t* band_begin;     // first border edge of a grid row       (rows + 1,)
-    const double* edge_x0;          // m, border edges that reach into a row band
+    const uint32_t* band_begin;  // first border edge of a grid row       (rows + 1,)
+    const double* edge_x0;       // m, border edges that reach into a row band
     const double* edge_y0;
     const double* edge_y1;
-    const double* edge_slope;       // dx/dy; 0 for horizontal edges, which never count
+    const double* edge_slope;  // dx/dy; 0 for horizontal edges, which never count
 
-    int32_t num_samples;            // of the tables over arc length
-    double samples_per_metre;       // 1/m
-    const float* width_table;       // m, local track width                  (num_samples,)
-    const float* curvature_table;   // 1/m, left positive                    (num_samples,)
+    // Samples along the centre line; they go on kTableReach beyond the end (around again, or standing still).
+    float samples_per_metre;       // 1/m
+    const float* width_table;      // m, local track width
+    const float* curvature_table;  // 1/m, left positive
 };
 
 // Where a point is, seen from the centre line.
 struct Projection {
-    double arc_length;   // m, in [0, length)
-    double offset;       // m, left of the direction of travel positive
-    int32_t segment;     // waypoints segment and segment + 1 enclose arc_length
+    double arc_length;  // m, in [0, length)
+    double offset;      // m, left of the direction of travel positive
+    int32_t segment;    // waypoints segment and segment + 1 enclose arc_length
 };
 
-RC_HD Projection project_onto_segment(const TrackGeometry& track, int32_t segment, double x, double y,
+RC_HD Projection project_onto_segment(const TrackGeometry& track, int32_t index, double x, double y,
                                       double& squared_distance) {
-    const double ax = track.waypoint_x[segment];
-    const double ay = track.waypoint_y[segment];
-    const double dx = track.waypoint_x[segment + 1] - ax;
-    const double dy = track.waypoint_y[segment + 1] - ay;
-    const double squared_length = dx * dx + dy * dy;
-    const double along = clamp(((x - ax) * dx + (y - ay) * dy) / squared_length, 0.0, 1.0);
-    const double ox = x - (ax + along * dx);
-    const double oy = y - (ay + along * dy);
+    const Segment& segment = track.segments[index];
+    const double rx = x - segment.x;
+    const double ry = y - segment.y;
+    const double share =
+        (rx * segment.dx + ry * segment.dy) * segment.inverse_length * segment.inverse_length;
+    const double along = clamp(share, 0.0, 1.0);
+    const double ox = rx - along * segment.dx;
+    const double oy = ry - along * segment.dy;
     squared_distance = ox * ox + oy * oy;
-    Projection projection;
-    projection.arc_length =
-        track.arc_length[segment] + along * (track.arc_length[segment + 1] - track.arc_length[segment]);
-    // The side is that of the segment; its magnitude is the true distance also beyond the segment's ends.
-    const double cross = dx * (y - ay) - dy * (x - ax);
-    const double distance = sqrt_of(squared_distance);
-    projection.offset = cross < 0.0 ? -distance : distance;
-    projection.segment = segment;
-    return projection;
+    // The side is that of the segment; the magnitude, taken by project(), is the true distance also beyond
+    // its ends.
+    const double cross = segment.dx * ry - segment.dy * rx;
+    return {segment.arc_length + along * segment.length, cross < 0.0 ? -1.0 : 1.0, index};
 }
 
 RC_HD Projection project(const TrackGeometry& track, double x, double y) {
@@ -74,7 +80,7 @@ RC_HD Projection project(const TrackGeometry& track, double x, double y) {
     const double row = floor_of((y - track.grid_y) * track.inverse_cell);
     const bool in_grid = column >= 0.0 && row >= 0.0 && column < track.grid_columns && row < track.grid_rows;
     uint32_t begin = 0;
-    uint32_t end = static_cast<uint32_t>(track.num_waypoints - 1);
+    uint32_t end = static_cast<uint32_t>(track.num_segments);
     if (in_grid) {
         const int32_t cell = static_cast<int32_t>(row) * track.grid_columns + static_cast<int32_t>(column);
         begin = track.segment_begin[cell];
@@ -91,9 +97,11 @@ RC_HD Projection project(const TrackGeometry& track, double x, double y) {
             best = candidate;
         }
     }
+    best.offset *= sqrt_of(best_distance);
     // A projection that falls on a waypoint belongs to the segment that starts there.
-    if (best.arc_length >= track.arc_length[best.segment + 1]) {
-        if (best.segment + 2 < track.num_waypoints) {
+    const Segment& segment = track.segments[best.segment];
+    if (best.arc_length >= segment.arc_length + segment.length) {
+        if (best.segment + 1 < track.num_segments) {
             best.segment += 1;
         } else if (track.is_closed) {
             best.segment = 0;
@@ -125,21 +133,15 @@ RC_HD bool is_on_road(const TrackGeometry& track, double x, double y) {
     return (crossings & 1) != 0;
 }
 
-// Linear interpolation in a table over arc length; wraps on a closed track, clamps on an open one.
-RC_HD float table_at(const TrackGeometry& track, const float* table, double arc_length) {
-    double position = arc_length * track.samples_per_metre;
-    const double count = static_cast<double>(track.num_samples);
-    if (track.is_closed) {
-        position = position - floor_of(position / count) * count;
-    } else {
-        position = clamp(position, 0.0, count - 1.0);
-    }
-    int32_t index = static_cast<int32_t>(position);
-    index = index < track.num_samples ? index : track.num_samples - 1;
-    int32_t next = index + 1;
-    next = next < track.num_samples ? next : (track.is_closed ? 0 : index);
-    const float weight = static_cast<float>(position - index);
-    return table[index] + weight * (table[next] - table[index]);
+// Where a table is read for a place on the track, in samples.
+RC_HD float table_position(const TrackGeometry& track, double arc_length) {
+    return static_cast<float>(arc_length) * track.samples_per_metre;
+}
+
+// Linear interpolation between two samples.
+RC_HD float table_at(const float* table, float position) {
+    const int32_t index = static_cast<int32_t>(position);
+    return table[index] + (position - static_cast<float>(index)) * (table[index + 1] - table[index]);
 }
 
 }  // namespace racecraft
