@@ -1,0 +1,33 @@
+"""Tracks: geometry, a library of our own, files of others, a generator, pictures. First word of the data-flow line.
+
+track -> simulation -> observation -> policy -> action
+"""
+
+from racecraft.track.corners import TrackCorner, find_corners
+from racecraft.track.generator import generate_track
+from racecraft.track.library import Course, course, track_names
+from racecraft.track.load import load_track
+from racecraft.track.picture import TrackPicture, describe, draw_contact_sheet, draw_track
+from racecraft.track.readers import read_centerline_csv, read_route, read_track, save_route
+from racecraft.track.track import Track
+from racecraft.track.validate import validate
+
+__all__ = [
+    "Course",
+    "Track",
+    "TrackCorner",
+    "TrackPicture",
+    "course",
+    "describe",
+    "draw_contact_sheet",
+    "draw_track",
+    "find_corners",
+    "generate_track",
+    "load_track",
+    "read_centerline_csv",
+    "read_route",
+    "read_track",
+    "save_route",
+    "track_names",
+    "validate",
+]
