@@ -35,6 +35,28 @@ ROW_COLUMNS: Final = (
     "lap",  # completed laps
 )
 
+STATE_COLUMNS: Final = (
+    "speed",  # over 4 m/s
+    "lateral_speed",  # m/s
+    "yaw_rate",  # over 4 rad/s
+    "steering",  # of the front wheels, over 30 degrees
+    "offset",  # from the centre line over half the track width, left positive
+    "sin_heading_error",  # heading of the car against that of the centre line
+    "cos_heading_error",
+    "half_width",  # m, half the track width at the car
+    "curvature_0",  # 1/m, of the centre line at the car, left positive
+    "curvature_1",  # and further ahead, at CURVATURE_AHEAD
+    "curvature_2",
+    "curvature_3",
+    "curvature_4",
+    "curvature_5",
+    "curvature_6",
+    "curvature_7",
+)
+
+CURVATURE_AHEAD: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
+"""m ahead of the car where the curvature columns of the state look."""
+
 STATUS_NAMES: Final = (
     "prepare",
     "in_progress",
