@@ -1,6 +1,6 @@
-"""Tracks: geometry, a library of our own, files of others, a generator, pictures. First word of the data-flow line.
+"""Tracks: geometry, a library of our own, files of others, a generator, pictures.
 
-track -> simulation -> observation -> policy -> action
+The first word of the data-flow line: track -> simulation -> observation -> policy -> action
 """
 
 from racecraft.track.corners import TrackCorner, find_corners

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,7 +74,7 @@ class Canvas:
         """
         fine, width = self._fine(points), max(1, round(width_px * OVERSAMPLING))
         radius = width / 2
-        for index, (start, end) in enumerate(zip(fine, fine[1:], strict=False)):
+        for index, (start, end) in enumerate(pairwise(fine)):
             piece = colors[index] if colors else color
             self._draw.line([start, end], fill=piece, width=width)
             for x, y in (start, end) if is_round else ():

@@ -23,7 +23,7 @@ class TrackCorner:
     apex: float
     """Where half of the turn is done, metres."""
     end: float
-    """Where the road is straight again, metres; beyond the track's length if the corner spans the start line."""
+    """Where the road is straight again, metres; beyond the length if the corner spans the start line."""
     turn: float
     """Change of heading, radians, positive to the left."""
     radius: float

@@ -1,10 +1,10 @@
-"""Draws a road from a few corners: straights, arcs and eased transitions, as a race designer would with a ruler.
+r"""Draws a road from a few corners: straights, arcs and eased transitions, as with ruler and compass.
 
 corner = (x, y, radius)        the road heads for (x, y) and takes the corner on an arc of that radius
 
        x-------.               1. straights between the corners, an arc of the given radius in each
-      /  arc    \\              2. a sliding mean of `ease` metres, twice: a uniform cubic B-spline through fine
-     /           x                samples, so curvature rises and falls without a jump, as a driver steers
+      /  arc    \              2. a sliding mean of `ease` metres, twice (a cubic B-spline of the samples),
+     /           x                so curvature rises and falls without a jump, as a driver steers
 ----x                          3. waypoints at equal distances, borders at half the width to each side
 """
 
@@ -29,8 +29,8 @@ def trace_corners(corners: Sequence[Corner], *, is_closed: bool = True, ease: fl
     """The smooth line through a table of corners, finely sampled.
 
     Args:
-        corners: (x, y, radius) in metres, in driving direction. A closed line starts halfway between the last corner
-            and the first; an open one starts at the first and ends at the last, whose radii do not matter.
+        corners: (x, y, radius) in metres, in driving direction. A closed line starts halfway between the
+            last corner and the first; an open one runs from the first to the last, whose radii do not matter.
         is_closed: Whether the last corner leads back to the first.
         ease: Length of the sliding mean, metres.
 
@@ -108,7 +108,7 @@ def _corner_arc(before: Floats, corner: Floats, after: Floats, radius: float) ->
 
 
 def _slide(line: Floats, is_closed: bool, ease: float) -> Floats:
-    """Mean over a window of `ease` metres round each sample; an open line is continued straight beyond its ends."""
+    """Mean over `ease` metres round each sample; an open line goes on straight beyond its ends."""
     half = max(1, round(ease / 2 / _FINE))
     if is_closed:
         body = line[:-1]

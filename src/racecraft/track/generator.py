@@ -2,10 +2,10 @@
 
 Two kinds of layout, as the seed has it, both rounded by `curve.trace_corners`:
 
-    street    the outline of a few random squares that hang together, shaken: parallel roads, right angles, hairpins
+    street    the outline of random squares that hang together, shaken: parallel roads, right angles, hairpins
     country   points around a middle, some pulled in: sweepers, long bends, open radii
 
-A draft that comes too close to itself or bends too tightly is thrown away and the next one drawn; after many, an oval.
+A draft that comes too close to itself or bends too tightly is thrown away; after many of them, an oval.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def generate_track(
 
     Args:
         seed: Any integer from 0.
-        length: Length of a lap, metres, 12 to 200 and at least 14 times the width; met to 1 %. Default: 16 to 45, by seed.
+        length: Length of a lap, metres, 12 to 200 and at least 14 times the width; met to 1 %. Default: 16
+            to 45, by seed.
         width: Width of the road, metres, 0.5 to 2. Default: 0.7 to 1.1, by seed.
         difficulty: 0 (few, wide bends) to 1 (many, tight ones).
 
@@ -59,17 +60,23 @@ def generate_track(
     lap = lap if length is None else float(length)
     if lap < SHORTEST_LAP * road_width:
         raise TrackError(
-            f"length is {lap:g} m at a width of {road_width:g} m; a lap is at least {SHORTEST_LAP:g} times the width."
+            f"length is {lap:g} m at a width of {road_width:g} m; "
+            f"a lap is at least {SHORTEST_LAP:g} times the width."
         )
     given = "".join(f",{key}={_plain(value)}" for key, value in options.items() if value is not None)
     name = f"generated:{int(seed)}{given}"
     is_clockwise = rng.random() < 0.5
     is_street = rng.random() < 0.5
+    roundness = (0.05 if is_street else 0.13) * lap  # metres of radius that chance may add to the tightest
     for draft in range(_DRAFTS):
         # a draft that fails too often was too ambitious: become simpler
         ambition = difficulty * (1.0 - draft / _DRAFTS)
         corners = (_street if is_street else _country)(rng, lap, road_width, ambition)
-        line = _fit(corners, lap, road_width, rng, ambition) if corners is not None else None
+        line = (
+            None
+            if corners is None
+            else _fit(corners, lap, road_width, rng, roundness * (1.0 - 0.8 * ambition))
+        )
         if line is not None and _is_clear(line, road_width):
             break
     else:
@@ -129,7 +136,8 @@ def _street(rng: random.Random, lap: float, width: float, difficulty: float) -> 
     points = points + np.array([[_between(rng, -shake, shake), _between(rng, -shake, shake)] for _ in points])
     points = points * np.array([stretch, 1.0])
     cos, sin = math.cos(angle), math.sin(angle)
-    return points @ np.array([[cos, sin], [-sin, cos]])
+    turned: Floats = points @ np.array([[cos, sin], [-sin, cos]])
+    return turned
 
 
 def _country(rng: random.Random, lap: float, width: float, difficulty: float) -> Floats | None:
@@ -147,10 +155,10 @@ def _country(rng: random.Random, lap: float, width: float, difficulty: float) ->
     return np.array(points)
 
 
-def _fit(points: Floats, lap: float, width: float, rng: random.Random, difficulty: float) -> Floats | None:
+def _fit(points: Floats, lap: float, width: float, rng: random.Random, roundness: float) -> Floats | None:
     """The rounded line through a polygon, scaled to the length of the lap; none if a bend gets too tight."""
     tightest = _tightest(width)
-    wanted = [tightest * (1.05 + (2.6 - 1.4 * difficulty) * rng.random() ** 1.5) for _ in points]
+    wanted = [1.05 * tightest + (0.3 * tightest + roundness) * rng.random() for _ in points]
     scale = 1.1 * lap / float(arc_length(np.concatenate((points, points[:1])))[-1])
     for _ in range(4):
         corners = _rounded(points * scale, wanted, tightest)
@@ -250,7 +258,8 @@ def _outline(squares: set[tuple[int, int]]) -> Floats:
         path.append(step[path[-1]])
     points = np.array(path, dtype=np.float64)
     is_corner = ((np.roll(points, -1, axis=0) - points) != (points - np.roll(points, 1, axis=0))).any(axis=1)
-    return points[is_corner]
+    corners: Floats = points[is_corner]
+    return corners
 
 
 # --- small words

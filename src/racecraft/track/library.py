@@ -187,7 +187,11 @@ _LIST = (
         corners=tuple(
             corner
             for axis in (0, 120, 240)
-            for corner in (_polar(2.0, axis - 60, 1.0), _polar(5.0, axis - 17, 1.2), _polar(5.0, axis + 17, 1.2))
+            for corner in (
+                _polar(2.0, axis - 60, 1.0),
+                _polar(5.0, axis - 17, 1.2),
+                _polar(5.0, axis + 17, 1.2),
+            )
         ),
     ),
     Course(
@@ -212,7 +216,16 @@ _LIST = (
         display_name="Bottleneck",
         description="A road that narrows from 1.2 m to 0.7 m: aim before you arrive.",
         difficulty=3,
-        width=((0.0, 1.2), (0.16, 1.2), (0.28, 0.7), (0.46, 0.7), (0.56, 1.1), (0.7, 1.1), (0.82, 0.8), (1.0, 1.2)),
+        width=(
+            (0.0, 1.2),
+            (0.16, 1.2),
+            (0.28, 0.7),
+            (0.46, 0.7),
+            (0.56, 1.1),
+            (0.7, 1.1),
+            (0.82, 0.8),
+            (1.0, 1.2),
+        ),
         corners=(
             (8.6, 0, 1.3),
             (9.4, 3.2, 1.2),
@@ -316,7 +329,14 @@ _LIST = (
         difficulty=2,
         width=0.9,
         ease=0.6,
-        corners=((5.2, -1.2, 2.4), (9.6, 2.6, 1.1), (8.2, 4.4, 1.1), (4.7, 1.6, 1.6), (0.2, 3.2, 1.1), (-0.6, 0.6, 1.1)),
+        corners=(
+            (5.2, -1.2, 2.4),
+            (9.6, 2.6, 1.1),
+            (8.2, 4.4, 1.1),
+            (4.7, 1.6, 1.6),
+            (0.2, 3.2, 1.1),
+            (-0.6, 0.6, 1.1),
+        ),
     ),
     Course(
         name="grand_circuit",

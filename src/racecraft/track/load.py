@@ -17,8 +17,9 @@ def load_track(name_or_path: str | Path) -> Track:
     """A track of the library, of a file, or drawn from a seed.
 
     Args:
-        name_or_path: A name of `track_names()`, such as ``"oval"``; a path to an .npy route or a centre-line .csv; or
-            ``"generated:7"`` for `generate_track(7)`, with options as in ``"generated:7,length=40,difficulty=0.9"``.
+        name_or_path: A name of `track_names()`, such as ``"oval"``; a path to an .npy route or a centre-line
+            .csv; or ``"generated:7"`` for `generate_track(7)`, with options as in
+            ``"generated:7,length=40,difficulty=0.9"``.
 
     Raises:
         TrackNotFound: Nothing has this name.

@@ -1,7 +1,7 @@
-"""Pictures of tracks that one would hang on a wall: `draw_track`, `draw_contact_sheet`, and `TrackPicture` underneath.
+"""Pictures of tracks to hang on a wall: `draw_track`, `draw_contact_sheet`, `TrackPicture` underneath.
 
-`TrackPicture` draws the sheet and the road and keeps the way from metres to pixels, so that a racing line can be laid over
-the road before the captions come on top:
+`TrackPicture` draws the sheet and the road and keeps the way from metres to pixels, so that a racing line
+can be laid over the road before the captions come on top:
 
     picture = TrackPicture(track, width_px=1600)
     picture.canvas.line(places, (230, 80, 60), width_px=3)      # places in metres, (P, 2)
@@ -144,7 +144,7 @@ class TrackPicture:
             canvas.text((x, y), str(number), PAPER, size=1.25 * self._unit, weight=0.02, anchor="mm")
 
     def _free_place(self, corner: TrackCorner, reach: float, taken: list[Floats]) -> Floats | None:
-        """A place for a disc of radius `reach`, metres, off the road and apart from the others; the best side first."""
+        """A place for a disc of radius `reach`, metres, off the road and apart from the others."""
         outside = 1.0 if corner.turn > 0 else -1.0
         for side, out in ((outside, 1.0), (-outside, 1.0), (outside, 1.6), (-outside, 1.6)):
             for slide in (0.0, 0.12, -0.12, 0.24, -0.24, 0.36, -0.36, 0.48, -0.48):
@@ -260,6 +260,9 @@ def describe(track: Track) -> tuple[str, str]:
     if track.name in track_names():
         design = course(track.name)
         return design.display_name, design.description
+    if track.name.startswith("generated:"):
+        seed, *options = track.name.removeprefix("generated:").split(",")
+        return f"Seed {seed}", ", ".join(["Drawn by the generator", *options]).replace("=", " ")
     kind = "Closed circuit" if track.is_closed else "Open road"
     return track.name.replace("_", " ").strip() or "Track", f"{kind} of {len(track.centerline)} waypoints"
 
@@ -298,7 +301,8 @@ def _canvas_for(
 
 
 def _fitted(
-    canvas: Canvas, place: tuple[float, float], words: str, *, size: float, room: float, weight: float = 0.0, is_soft: bool = False
+    canvas: Canvas, place: tuple[float, float], words: str, *,
+    size: float, room: float, weight: float = 0.0, is_soft: bool = False,
 ) -> None:  # fmt: skip
     """Writes words no wider than `room`: smaller if need be, and cut if they would get too small to read."""
     smallest = 0.6 * size

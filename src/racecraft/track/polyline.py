@@ -51,8 +51,8 @@ def project(queries: Floats, points: Floats, arc: Floats) -> tuple[Floats, Float
         arc: Its arc length, (W,).
 
     Returns:
-        Distance along the polyline (Q,) and signed distance from it, left positive (Q,). Of several places that are
-        equally near, the first counts.
+        Distance along the polyline (Q,) and signed distance from it, left positive (Q,). Of several places
+        that are equally near, the first counts.
     """
     start, step = points[:-1], np.diff(points, axis=0)
     squared = np.einsum("wi,wi->w", step, step)
@@ -73,7 +73,7 @@ def project(queries: Floats, points: Floats, arc: Floats) -> tuple[Floats, Float
 
 
 def signed_area(ring: Floats) -> float:
-    """Area inside a ring, positive when it runs counter-clockwise. Taken about the first point, against cancellation."""
+    """Area inside a ring, positive when it runs counter-clockwise."""
     x, y = (ring - ring[0]).T
     return 0.5 * float(np.dot(x[:-1], y[1:]) - np.dot(x[1:], y[:-1]))
 

@@ -1,7 +1,8 @@
-"""Reads and writes the track files of others: AWS DeepRacer routes (.npy) and F1TENTH or TUM centre lines (.csv).
+"""Reads and writes the files of others: AWS DeepRacer routes (.npy), F1TENTH and TUM centre lines (.csv).
 
-A file is untrusted: its size is capped before it is read, its header is judged before its data, nothing is unpickled, and
-the track it describes goes through `validate`. Every refusal is a `TrackError` that names the file.
+A file is untrusted: its size is capped before it is read, its header is judged before its data, nothing is
+unpickled, and the track it describes goes through `validate`. Every refusal is a `TrackError` that names the
+file.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from racecraft.errors import TrackError, TrackNotFound
 from racecraft.track.polyline import Floats, signed_area
 from racecraft.track.track import CLOSED_GAP, Track
-from racecraft.track.validate import MAX_WAYPOINTS, check_rows, validate
+from racecraft.track.validate import MAX_WAYPOINTS, MIN_WAYPOINTS, check_rows, validate
 
 MAX_FILE_BYTES = 2_000_000  # AWS's largest route has 19 kB; 10,000 waypoints of text fit in well
 MAX_HEADER_BYTES = 1_000  # of an .npy file; numpy writes 118
@@ -27,7 +28,7 @@ CSV_COLUMNS = ("x_m", "y_m", "w_tr_right_m", "w_tr_left_m")
 
 
 def read_route(path: str | Path) -> Track:
-    """A track from AWS DeepRacer's route format: float (W, 6), columns centre x, y, inner x, y, outer x, y, metres.
+    """A track from an AWS DeepRacer route: float (W, 6), centre x, y, inner x, y, outer x, y, metres.
 
     It is closed when its last row repeats the first.
 
@@ -44,9 +45,9 @@ def read_route(path: str | Path) -> Track:
 def read_centerline_csv(path: str | Path) -> Track:
     """A track from the centre-line table of F1TENTH and TUM: x_m, y_m, w_tr_right_m, w_tr_left_m, metres.
 
-    Commas, semicolons, tabs or spaces separate; the names may be missing, stand in the first line, or follow a ``#``.
-    With names, the columns may come in any order and beside others. The line closes if its ends are near each other,
-    whether or not the last row repeats the first.
+    Commas, semicolons, tabs or spaces separate; the names may be missing, stand in the first line, or follow
+    a ``#``. With names, the columns may come in any order and beside others. The line closes if its ends are
+    near each other, whether or not the last row repeats the first.
 
     Raises:
         TrackNotFound: There is no such file.
@@ -55,25 +56,22 @@ def read_centerline_csv(path: str | Path) -> Track:
     path = Path(path)
     rows = _parse_csv(_read_bytes(path), path)
     check_rows({"centerline": rows[:, :2]}, name=path.stem)
-    widths = rows[:, 2:]
-    if not (np.isfinite(widths).all() and (widths >= 0.0).all() and (widths.sum(axis=1) > 0.0).all()):
-        row = int(
-            np.flatnonzero(
-                ~(np.isfinite(widths) & (widths >= 0.0)).all(axis=1) | ~(widths.sum(axis=1) > 0.0)
-            )[0]
-        )
-        right, left = widths[row]
+    if (bad := np.flatnonzero(~((rows[:, 2:] >= 0.0) & np.isfinite(rows[:, 2:])).all(axis=1))).size:
+        right, left = rows[bad[0], 2:]
         raise TrackError(
-            f"{path.name}: row {row} is {right:g} m wide to the right and {left:g} m to the left; both are >= 0."
+            f"{path.name}: the road is {right:g} m wide to the right and {left:g} m to the left at waypoint {bad[0]}; "
+            "widths are finite and not negative."
         )
-    rows = _without_repeats(rows)
-    centre = rows[:, :2]
-    gap = float(np.hypot(*(centre[0] - centre[-1])))
-    is_closed = gap <= 3.0 * float(np.hypot(*np.diff(centre, axis=0).T).max())
+    rows = rows[np.concatenate(([True], np.hypot(*np.diff(rows[:, :2], axis=0).T) > CLOSED_GAP))]
+    if len(rows) < MIN_WAYPOINTS:
+        raise TrackError(
+            f"{path.name} has {len(rows)} different waypoints; at least {MIN_WAYPOINTS} are needed."
+        )
+    steps = np.hypot(*np.diff(rows[:, :2], axis=0).T)
+    gap = float(np.hypot(*(rows[0, :2] - rows[-1, :2])))
+    is_closed = gap <= 3.0 * float(steps.max()) and gap < 0.5 * float(steps.sum())
     if is_closed:
         rows = np.concatenate((rows if gap > CLOSED_GAP else rows[:-1], rows[:1]))
-    if len(rows) < 3:
-        raise TrackError(f"{path.name} has {len(rows)} different waypoints; a track needs four or more.")
     centre, right_width, left_width = rows[:, :2], rows[:, 2:3], rows[:, 3:4]
     normal = _left_normals(centre, is_closed=is_closed)
     left, right = (
@@ -99,7 +97,8 @@ def read_track(path: str | Path) -> Track:
     if suffix == ".csv":
         return read_centerline_csv(path)
     raise TrackError(
-        f"{path.name!r} is not a track file; allowed are .npy (AWS route, 6 columns) and .csv (centre line with widths)."
+        f"{path.name!r} is not a track file; "
+        "allowed are .npy (AWS route, 6 columns) and .csv (centre line with widths)."
     )
 
 
@@ -169,7 +168,8 @@ def _parse_npy(content: bytes, path: Path) -> Floats:
         raise TrackError(f"{path.name} holds {str(dtype)[:60]!r} values; a route is float64 or float32.")
     if len(shape) != 2 or shape[1] != 2 * len(ROUTE_COLUMNS):
         raise TrackError(
-            f"{path.name} has shape {str(shape)[:60]}; a route has (W, 6): centre x, y, inner x, y, outer x, y in metres."
+            f"{path.name} has shape {str(shape)[:60]}; "
+            "a route has (W, 6): centre x, y, inner x, y, outer x, y in metres."
         )
     if not 0 <= shape[0] <= MAX_WAYPOINTS:
         raise TrackError(f"{path.name} claims {shape[0]:,} waypoints; at most {MAX_WAYPOINTS:,} are allowed.")
@@ -204,7 +204,8 @@ def _parse_csv(content: bytes, path: Path) -> Floats:
             raise TrackError(f"{path.name} has more than {MAX_WAYPOINTS:,} waypoints.", hint="Resample it.")
         if len(fields) <= max(columns) or (columns == (0, 1, 2, 3) and len(fields) != 4):
             raise TrackError(
-                f"{path.name}, line {number} has {len(fields)} columns; a centre line has {', '.join(CSV_COLUMNS)}.",
+                f"{path.name}, line {number} has {len(fields)} columns; "
+                f"a centre line has {', '.join(CSV_COLUMNS)}.",
                 hint="Other columns are allowed when the first line names them.",
             )
         try:
@@ -236,24 +237,20 @@ def _is_number(field: str) -> bool:
     return True
 
 
-def _without_repeats(rows: Floats) -> Floats:
-    return rows[np.concatenate(([True], np.hypot(*np.diff(rows[:, :2], axis=0).T) > CLOSED_GAP))]
-
-
 def _left_normals(centre: Floats, *, is_closed: bool) -> Floats:
     """Unit vectors square to the chord between both neighbours, to the left, (W, 2)."""
     chord = np.gradient(centre, axis=0)
     if is_closed:
         chord[0] = chord[-1] = centre[1] - centre[-2]
     length = np.maximum(np.hypot(*chord.T), 1e-12)
-    return np.stack([-chord[:, 1], chord[:, 0]], axis=1) / length[:, None]
+    return np.asarray(np.stack([-chord[:, 1], chord[:, 0]], axis=1) / length[:, None])
 
 
 def _unfold(border: Floats, centre: Floats) -> Floats:
     """Pulls straight where a border runs backwards, as it does inside bends tighter than the half width.
 
-    A folded piece makes both its ends give way to the points around them, until none is left or it is clearly hopeless;
-    what stays folded is refused by `validate` later.
+    A folded piece makes both its ends give way to the points around them, until none is left or it is
+    clearly hopeless; what stays folded is refused by `validate` later.
     """
     border = border.copy()
     is_closed = bool((centre[0] == centre[-1]).all())

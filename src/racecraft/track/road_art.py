@@ -1,8 +1,9 @@
-"""Paints a road on a canvas: ground, shadow, kerbs, surface, lines, start line. What `picture` frames and captions."""
+"""Paints a road on a canvas: shadow, kerbs, surface, lines, start line. `picture` frames and captions it."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,9 +32,9 @@ _SMOOTH = 5  # pieces that each piece between two waypoints is drawn with
 
 
 class Ribbon:
-    """The road as three smooth curves over the distance along it. For looks only: the polyline stays the truth.
+    """The road as three smooth curves over the distance along it, for looks: the polyline stays the truth.
 
-    Sides are -1 for left and +1 for right, as `across` runs from -1 on the left border to +1 on the right one.
+    Sides are -1 for the left border and +1 for the right one.
     """
 
     def __init__(self, track: Track) -> None:
@@ -54,15 +55,15 @@ class Ribbon:
     def leftwards(self, s: float) -> Floats:
         """Unit vector square to the centre line, to its left, (2,)."""
         ahead = self.place(s + 0.02) - self.place(s - 0.02)
-        return np.array([-ahead[1], ahead[0]]) / np.hypot(*ahead)
+        return np.asarray(np.array([-ahead[1], ahead[0]]) / np.hypot(*ahead))
 
     def beside(self, s: ArrayLike, side: float, out: float) -> Floats:
-        """Places `out` metres outside a border, square to it; negative is on the road. Shape (...,) to (..., 2)."""
+        """Places `out` metres outside a border; negative is on the road. Shape (...,) to (..., 2)."""
         arc, border, normal = self._borders[side]
         return np.asarray(self._at(s, arc, border) + out * self._at(s, arc, normal))
 
     def strip(self, s: Floats, side: float, out: tuple[float, float]) -> Floats:
-        """Outline of a strip along a border, from `out[0]` to `out[1]` metres outside of it: (2 P, 2) for `s` (P,)."""
+        """Outline of a strip between two distances outside a border, metres: (2 P, 2) for `s` (P,)."""
         near, far = (self.beside(s, side, distance) for distance in out)
         return np.concatenate((near, far[::-1]))
 
@@ -79,7 +80,8 @@ class Ribbon:
     def _border(self, track: Track, side: float) -> tuple[Floats, Floats, Floats]:
         """Arc length (P,), places (P, 2) and outward normals (P, 2) of a border.
 
-        Rows of foreign routes need not be square to the road, so each place's distance along it is that of its projection.
+        Rows of foreign routes need not be square to the road, so each place's distance along it is that of
+        its projection.
         """
         border = self.right if side > 0 else self.left
         shift = track.project(border)[0] - self._arc
@@ -136,13 +138,13 @@ def _paint_kerb(canvas: Canvas, ribbon: Ribbon, corner: TrackCorner) -> None:
     along = arc_length(ribbon.beside(fine, side, 0.0))  # stripes of one length on the border itself
     num_stripes = 2 * max(1, round(along[-1] / KERB_STRIPE / 2)) + 1
     marks = np.interp(np.linspace(0.0, along[-1], num_stripes + 1), along, fine)
-    for index, (begin, stop) in enumerate(zip(marks, marks[1:], strict=False)):
+    for index, (begin, stop) in enumerate(pairwise(marks)):
         outline = ribbon.strip(np.linspace(begin, stop, 4), side, (-EDGE_LINE[0] / 2, KERB_WIDTH))
         canvas.polygon(outline, KERB[index % 2])
 
 
 def _paint_start(canvas: Canvas, track: Track, ribbon: Ribbon) -> float:
-    """A chequered line square across the start, and chevrons that point the way. Returns where these end, metres."""
+    """A chequered line at the start, and chevrons that point the way. Returns where these end, metres."""
     heading = float(track.heading_at(0.0))
     ahead, leftwards = (
         np.array([math.cos(heading), math.sin(heading)]),
@@ -177,13 +179,13 @@ def _right_of(line: Floats, *, is_closed: bool) -> Floats:
     tangent = np.gradient(line, axis=0)
     if is_closed:
         tangent[0] = tangent[-1] = line[1] - line[-2]
-    return (
-        np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.maximum(np.hypot(*tangent.T), 1e-12)[:, None]
-    )
+    normal: Floats = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    normal /= np.maximum(np.hypot(*normal.T), 1e-12)[:, None]
+    return normal
 
 
 def _smooth(points: Floats, *, is_closed: bool) -> Floats:
-    """A curve through the points (W, D), with `_SMOOTH` samples a piece and slopes weighted for uneven spacing."""
+    """A curve through the points (W, D), `_SMOOTH` samples a piece, slopes weighted for uneven spacing."""
     before = points[-2:-1] if is_closed else 2 * points[:1] - points[1:2]
     after = points[1:2] if is_closed else 2 * points[-1:] - points[-2:-1]
     padded = np.concatenate((before, points, after))

@@ -1,10 +1,11 @@
 """`Track`: the road as three polylines, and every question about it as a function of the distance along it.
 
-The waypoints *are* the polyline: length and projection are those of straight pieces between them, not of a curve fitted
-through them, so that progress agrees with AWS DeepRacer's to the last digit. Only curvature looks wider than one piece.
+The waypoints *are* the polyline: length and projection are those of straight pieces between them, not of a
+curve fitted through them, so that progress agrees with AWS DeepRacer's to the last digit. Only curvature
+looks wider than one piece.
 
          outer  o---------o---------o
-                |         |         |        one waypoint = one row: centre, inner and outer point side by side
+                |         |         |        a waypoint is a row: centre, inner and outer side by side
     centerline  +----s--->+---------+
                 |         |         |        offset: metres left of the centre line, in driving direction
          inner  o---------o---------o
@@ -39,7 +40,8 @@ CURVATURE_WINDOW = 0.15  # metres to each side over which the heading difference
 class Track:
     """A closed circuit or an open stretch of road. Arrays are float64, C-contiguous and read-only.
 
-    Consecutive duplicate waypoints are removed on construction. Geometry is taken as given: `validate` judges it.
+    Consecutive duplicate waypoints are removed on construction. Geometry is taken as given: `validate`
+    judges it.
 
     Raises:
         ShapeError: The lines are not three arrays of the same shape (W, 2).
@@ -63,7 +65,8 @@ class Track:
         for name, line in lines.items():
             if line.shape != shape or line.ndim != 2 or line.shape[1] != 2:
                 raise ShapeError(
-                    f"{name} of track {self.name!r} has shape {line.shape}, expected (W, 2) for all three lines."
+                    f"{name} of track {self.name!r} has shape {line.shape}, "
+                    "expected (W, 2) for all three lines."
                 )
             if not np.isfinite(line).all():
                 row = int(np.flatnonzero(~np.isfinite(line).all(axis=1))[0])
@@ -124,7 +127,8 @@ class Track:
     def bounds(self) -> tuple[float, float, float, float]:
         """Smallest box around the road: x_min, y_min, x_max, y_max, metres."""
         points = np.concatenate((self.centerline, self.inner, self.outer))
-        return (*map(float, points.min(axis=0)), *map(float, points.max(axis=0)))  # type: ignore[return-value]
+        (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+        return x_min, y_min, x_max, y_max
 
     @cached_property
     def inner_is_left(self) -> bool:
@@ -145,7 +149,7 @@ class Track:
 
     @cached_property
     def direction(self) -> str:
-        """``counter-clockwise`` or ``clockwise``; on an open track, the first when the inner border is on the left."""
+        """``counter-clockwise`` or ``clockwise``; an open track is the first if its inner border is left."""
         is_left = signed_area(self.centerline) > 0.0 if self.is_closed else self.inner_is_left
         return "counter-clockwise" if is_left else "clockwise"
 
@@ -162,18 +166,18 @@ class Track:
         return hashlib.sha256(rows.astype("<f8").tobytes()).hexdigest()
 
     def reversed(self) -> Track:
-        """The same road driven the other way, with the same first waypoint if closed; borders keep their names."""
+        """The same road driven the other way, from the same start if closed; borders keep their names."""
         lines = {name: getattr(self, name)[::-1] for name in ("centerline", "inner", "outer")}
         return replace(self, **lines)
 
-    # --- along the track; every `s` is in metres, of any shape, taken round a closed track and clamped to an open one
+    # --- along the track; `s` is in metres, of any shape, taken round a closed track, clamped on an open one
 
     def point_at(self, s: ArrayLike) -> Floats:
         """Points of the centre line, metres. Shape (...,) to (..., 2)."""
         return interpolate(self.centerline, self.arc_length, self._on_track(s))
 
     def heading_at(self, s: ArrayLike) -> Floats:
-        """Heading of the piece of centre line at `s`, radians in [-pi, pi); at a waypoint, towards the next one."""
+        """Heading of the piece of line at `s`, radians in [-pi, pi); at a waypoint, towards the next one."""
         piece = np.searchsorted(self.arc_length, self._on_track(s), side="right") - 1
         return wrap_angle(self._headings[np.minimum(piece, len(self._headings) - 1)])
 
@@ -184,9 +188,9 @@ class Track:
     def curvature_at(self, s: ArrayLike) -> Floats:
         """Curvature of the centre line, 1/metre, positive to the left.
 
-        The difference of the heading over 0.15 m to each side (over the mean distance of waypoints if that is more),
-        where the heading runs straight from the middle of one piece to the middle of the next. So it is continuous,
-        and its mean over a stretch is that stretch's turn.
+        The difference of the heading over 0.15 m to each side (over the mean distance of waypoints if that
+        is more), where the heading runs straight from the middle of one piece to the middle of the next. So
+        it is continuous, and its mean over a stretch is that stretch's turn.
         """
         s = self._on_track(s)
         middle, heading = self._heading_knots
@@ -202,7 +206,8 @@ class Track:
             points: Metres, (..., 2).
 
         Returns:
-            Distance along the centre line (...,) from 0 to `length`, and offset from it (...,), left positive.
+            Distance along the centre line (...,) from 0 to `length`, and offset from it (...,), left
+            positive.
         """
         queries = as_points(points)
         s, offset = project(queries.reshape(-1, 2), self.centerline, self.arc_length)
@@ -220,7 +225,7 @@ class Track:
 
     @cached_property
     def _heading_knots(self) -> tuple[Floats, Floats]:
-        """Arc length and heading at the middle of each piece; of a closed track, a lap before and after as well."""
+        """Arc length and heading at the middle of each piece; if closed, also a lap before and after."""
         middle, heading = (self.arc_length[1:] + self.arc_length[:-1]) / 2, self._headings
         if not self.is_closed:
             return middle, heading

@@ -1,10 +1,12 @@
 """Refuses a track that cannot be driven, with the reason and the place. Bounded in time for any input.
 
-Foreign files go through here; the library's own tracks are validated by the tests instead, so loading one stays free of
-shapely. Each check below assumes the ones before it, and the first that fails speaks.
+Foreign files go through here; the library's own tracks are validated by the tests instead, so loading one
+stays free of shapely. Each check below assumes the ones before it, and the first that fails speaks.
 """
 
 from __future__ import annotations
+
+from itertools import combinations
 
 import numpy as np
 
@@ -46,15 +48,15 @@ def check_rows(lines: dict[str, Floats], *, name: str) -> None:
         if bad.size:
             x, y = line[bad[0]]
             raise TrackError(
-                f"Track {name!r}: {line_name}[{bad[0]}] is ({x:g}, {y:g}); coordinates are metres, finite and within "
-                f"{MAX_COORDINATE:,.0f} of the origin."
+                f"Track {name!r}: {line_name}[{bad[0]}] is ({x:g}, {y:g}); coordinates are metres, "
+                f"finite and within {MAX_COORDINATE:,.0f} of the origin."
             )
     repeated = np.flatnonzero(np.hypot(*np.diff(centerline, axis=0).T) <= SAME_POINT)
     allowed = max(2, num_points // 50)
     if repeated.size > allowed:
         raise TrackError(
-            f"Track {name!r} repeats {repeated.size} of its {num_points} waypoints, the first at row {repeated[0] + 1}; "
-            f"at most {allowed} repeats are taken as harmless.",
+            f"Track {name!r} repeats {repeated.size} of its {num_points} waypoints, "
+            f"the first at row {repeated[0] + 1}; at most {allowed} repeats are taken as harmless.",
             hint="Remove consecutive duplicates.",
         )
 
@@ -62,8 +64,9 @@ def check_rows(lines: dict[str, Floats], *, name: str) -> None:
 def validate(track: Track) -> None:
     """Refuses a track that cannot be driven.
 
-    A good track has a centre line and borders that cross neither themselves nor each other, a width of at least 0.1 m
-    everywhere, borders that run along the centre line, and, if closed, an inner border inside the outer one.
+    A good track has a centre line and borders that cross neither themselves nor each other, a width of at
+    least 0.1 m everywhere, borders that run along the centre line, and, if closed, an inner border inside
+    the outer one.
 
     Raises:
         TrackError: With the first reason found and, where there is one, the place.
@@ -105,8 +108,8 @@ def _check_centerline(track: Track) -> None:
     if turn[sharpest] > MAX_TURN:
         x, y = steps[: sharpest + 1].sum(axis=0) + track.centerline[0]
         raise TrackError(
-            f"Track {name!r} turns by {np.degrees(turn[sharpest]):.0f} degrees at one waypoint, near ({x:.2f}, {y:.2f}); "
-            f"at most {np.degrees(MAX_TURN):.0f} are allowed."
+            f"Track {name!r} turns by {np.degrees(turn[sharpest]):.0f} degrees at one waypoint, "
+            f"near ({x:.2f}, {y:.2f}); at most {np.degrees(MAX_TURN):.0f} are allowed."
         )
 
 
@@ -116,14 +119,15 @@ def _check_widths(track: Track) -> None:
         if not MIN_WIDTH <= widths[row] <= MAX_WIDTH:
             allowed = MIN_WIDTH if limit == "at least" else MAX_WIDTH
             raise TrackError(
-                f"Track {name!r} is {widths[row]:.3g} m wide at waypoint {row}; {limit} {allowed:g} m is allowed."
+                f"Track {name!r} is {widths[row]:.3g} m wide at waypoint {row}; "
+                f"{limit} {allowed:g} m is allowed."
             )
     detour = np.hypot(*(track.centerline - track.inner).T) + np.hypot(*(track.centerline - track.outer).T)
     row = int((detour / widths).argmax())
     if detour[row] > MAX_DETOUR * widths[row]:
         raise TrackError(
-            f"Track {name!r}: at waypoint {row} the centre line is not between its borders; row by row, inner and "
-            "outer point must face each other across the centre.",
+            f"Track {name!r}: at waypoint {row} the centre line is not between its borders; "
+            "row by row, inner and outer point must face each other across the centre.",
             hint="Do the borders start at the same place and run the same way as the centre line?",
         )
 
@@ -132,29 +136,23 @@ def _check_crossings(track: Track) -> None:
     import shapely
 
     name = track.name
-    lines = {
-        "centre line": shapely.LineString(track.centerline),
-        "inner border": shapely.LineString(track.inner),
-        "outer border": shapely.LineString(track.outer),
-    }
+    points = {"centre line": track.centerline, "inner border": track.inner, "outer border": track.outer}
+    lines = {line_name: shapely.LineString(line) for line_name, line in points.items()}
     for line_name, line in lines.items():
         if not line.is_simple:
-            raise TrackError(
-                f"Track {name!r}: its {line_name} crosses or touches itself{_where(line, line)}."
-            )
-    names = list(lines)
-    for a, b in ((0, 1), (0, 2), (1, 2)):
-        first, second = lines[names[a]], lines[names[b]]
-        if first.intersects(second):
-            raise TrackError(f"Track {name!r}: its {names[a]} crosses its {names[b]}{_where(first, second)}.")
+            place = _where(points[line_name], points[line_name])
+            raise TrackError(f"Track {name!r}: its {line_name} crosses or touches itself{place}.")
+    for first, second in combinations(points, 2):
+        if lines[first].intersects(lines[second]):
+            place = _where(points[first], points[second])
+            raise TrackError(f"Track {name!r}: its {first} crosses its {second}{place}.")
     if track.is_closed:
-        road_is_ring = shapely.Polygon(track.outer).contains(lines["inner border"])
-        centre_between = shapely.Polygon(track.outer).contains(lines["centre line"]) and not shapely.Polygon(
-            track.inner
-        ).contains(lines["centre line"])
-        if not (road_is_ring and centre_between):
+        inside, outside = shapely.Polygon(track.inner), shapely.Polygon(track.outer)
+        centre = lines["centre line"]
+        if not outside.contains(inside) or not outside.contains(centre) or inside.contains(centre):
             raise TrackError(
-                f"Track {name!r}: its inner border does not lie inside its outer border with the centre line between.",
+                f"Track {name!r}: its inner border does not lie inside its outer one, "
+                "with the centre line between.",
                 hint="Columns 3 and 4 are the inner border, 5 and 6 the outer one.",
             )
         if (signed_area(track.inner) > 0) != (signed_area(track.outer) > 0):
@@ -167,22 +165,20 @@ def _is_ring(line: Floats) -> bool:
     return bool((line[0] == line[-1]).all())
 
 
-def _where(first: object, second: object) -> str:
-    """The place of a crossing, for the message: the first piece of `first` that meets a piece of `second` unduly."""
+def _where(first: Floats, second: Floats) -> str:
+    """The first place where two lines meet, for the message; joints within one line do not count."""
     import shapely
 
-    points, others = shapely.get_coordinates(first), shapely.get_coordinates(second)
-    pieces = shapely.linestrings(np.stack((points[:-1], points[1:]), axis=1))
-    other_pieces = shapely.linestrings(np.stack((others[:-1], others[1:]), axis=1))
-    tree = shapely.STRtree(other_pieces)
+    others = np.asarray(shapely.linestrings(np.stack((second[:-1], second[1:]), axis=1)))
+    tree = shapely.STRtree(others)
+    pieces = np.asarray(shapely.linestrings(np.stack((first[:-1], first[1:]), axis=1)))
     for start in range(0, len(pieces), 64):
         index, other = tree.query(pieces[start : start + 64], predicate="intersects")
         index = index + start
         if first is second:
             apart = np.abs(index - other)
-            unduly = (apart > 1) & (apart < len(pieces) - 1)
-            index = index[unduly]
+            index = index[(apart > 1) & (apart < len(pieces) - 1)]
         if index.size:
-            x, y = points[index.min()]
+            x, y = first[index.min()]
             return f" near ({x:.2f}, {y:.2f})"
     return ""
