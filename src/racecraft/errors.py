@@ -39,6 +39,10 @@ class NonFiniteAction(RacecraftError, ValueError):
     """An action holds NaN or infinity."""
 
 
+class ResetNeeded(RacecraftError, RuntimeError):
+    """An episode is over, or none has begun, and a step was asked for."""
+
+
 class ConfigError(RacecraftError, ValueError):
     """A setting, or a field of one of AWS's files, is outside what is allowed."""
 

@@ -1,0 +1,23 @@
+"""Racecraft's ids in Gymnasium's registry."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import gymnasium
+
+ENV_ID: Final = "Racecraft-v0"
+
+
+def register_environments() -> None:
+    """Make ``gymnasium.make`` and ``gymnasium.make_vec`` know Racecraft; calling again does nothing.
+
+    Importing `racecraft.env` does this. Gymnasium has no plug-in mechanism since 1.0, so either that import
+    comes first or the id names it: ``gymnasium.make("racecraft.env:Racecraft-v0")``.
+    """
+    if ENV_ID not in gymnasium.registry:
+        gymnasium.register(
+            id=ENV_ID,
+            entry_point="racecraft.env.racecraft_env:RacecraftEnv",
+            vector_entry_point="racecraft.env.vector_env:RacecraftVectorEnv",
+        )

@@ -1,0 +1,141 @@
+"""What both environments adapt: cars on tracks, with an action space, an observation and a reward."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from racecraft.agent import ActionSpace, ModelMetadata
+from racecraft.agent import action_space as preset_action_space
+from racecraft.env.info import LapClock
+from racecraft.env.observation import ObservationKind, Observer, check_kind
+from racecraft.env.rewards import RewardFunction, open_reward
+from racecraft.errors import ConfigError
+from racecraft.sim import CameraSpec, Simulation, Start, Vehicle
+from racecraft.track import Track, load_track
+
+
+class TaskSettings(TypedDict, total=False):
+    """Keyword arguments that both environments share; `DrivingTask` has their defaults and checks them."""
+
+    reward: str | Path | RewardFunction
+    """Preset, path of a ``reward_function.py``, its text, or a trusted callable of AWS's params dict."""
+    action_space: str | Path | ActionSpace
+    """Preset, path of a ``model_metadata.json``, or an action space."""
+    observation: ObservationKind
+    """``camera``, ``state`` or ``both``."""
+    camera: CameraSpec
+    """The driver's camera."""
+    vehicle: str | Vehicle
+    """Preset, vehicle file, or vehicle."""
+    start: str | Start
+    """Where episodes start: ``random`` along the lap, ``advance``, ``fixed``, or a `Start`."""
+    direction: str
+    """``forward``, ``reverse``, or ``alternate`` with every episode."""
+    laps: int
+    """Completed laps that end an episode."""
+    max_episode_steps: int
+    """Steps of 1/15 s that truncate an episode."""
+
+
+class DrivingTask:
+    """N cars with a reward; the environments only translate it into Gymnasium's words.
+
+    Attributes:
+        simulation: The cars.
+        action_space: What a policy's actions mean.
+        observer: What the cars see.
+    """
+
+    def __init__(
+        self,
+        track: str | Path | Track | Sequence[str | Path | Track],
+        *,
+        num_envs: int,
+        num_threads: int,
+        has_pictures: bool = False,
+        reward: str | Path | RewardFunction = "racing",
+        action_space: str | Path | ActionSpace = "default",
+        observation: ObservationKind = "camera",
+        camera: CameraSpec = CameraSpec(),  # noqa: B008 (frozen)
+        vehicle: str | Vehicle = "v5",
+        start: str | Start = "random",
+        direction: str = "forward",
+        laps: int = 1,
+        max_episode_steps: int = 3000,
+    ) -> None:
+        check_kind(observation)
+        if isinstance(max_episode_steps, bool) or not isinstance(max_episode_steps, int | np.integer):
+            raise ConfigError(f"max_episode_steps is {max_episode_steps!r}, expected a whole number.")
+        if not 1 <= max_episode_steps < 2**31 - 1:
+            raise ConfigError(f"max_episode_steps is {max_episode_steps}, allowed: 1 to {2**31 - 2}.")
+        tracks = [track] if isinstance(track, str | Path | Track) else list(track)
+        self.action_space = _action_space(action_space)
+        self.simulation = Simulation(
+            [item if isinstance(item, Track) else load_track(item) for item in tracks],
+            num_envs=num_envs,
+            vehicle=vehicle,
+            camera=None if observation == "state" and not has_pictures else camera,
+            start=start if isinstance(start, Start) else Start(mode=start),
+            direction=direction,
+            laps=laps,
+            max_steps=int(max_episode_steps) + 1,  # the simulation counts the prepare step
+            num_threads=num_threads,
+        )
+        self.observer = Observer(self.simulation, kind=observation)
+        self._lap_clock = LapClock(num_envs)
+        self._reward = open_reward(reward, tracks=self.simulation.tracks, num_envs=num_envs)
+
+    @property
+    def done(self) -> NDArray[np.bool_]:
+        """The cars whose episode is over (N,)."""
+        return self.simulation.terminated | self.simulation.truncated
+
+    def reset(self, mask: NDArray[np.bool_], *, seeds: NDArray[np.uint64] | None = None) -> None:
+        """Start the masked cars' next episode, or with seeds their first."""
+        self.simulation.reset(mask, seeds=seeds)
+        self._lap_clock.restart(mask)
+        if seeds is not None and mask.all():
+            self._reward.restart(int(seeds[0]))
+
+    def step(self, actions: ArrayLike, *, reset: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+        """One step of every car, and its reward (N,).
+
+        Args:
+            actions: In the form of the action space.
+            reset: Cars whose episode is over; they begin the next one instead of acting, with reward 0.
+        """
+        self.simulation.step(self.action_space.to_commands(actions))
+        if reset is not None and reset.any():
+            self.reset(reset)
+        return self._reward(self.simulation.rows)
+
+    def lap_times(self) -> tuple[NDArray[np.bool_], NDArray[np.float64]] | None:
+        """Which cars completed a lap in this step and their times in s; to be asked once per step."""
+        simulation = self.simulation
+        return self._lap_clock.completed(simulation.column("status"), simulation.column("time"))
+
+    def close(self) -> None:
+        """End the reward's process; calling again does nothing."""
+        self._reward.close()
+
+
+def seed_key(seed: Any) -> int:
+    """A seed as the simulation takes it.
+
+    Raises:
+        ConfigError: It is not a whole number from 0 to 2**64 - 1.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < 2**64:
+        raise ConfigError(f"seed is {seed!r}, expected a whole number from 0 to 2**64 - 1.")
+    return int(seed)
+
+
+def _action_space(value: str | Path | ActionSpace) -> ActionSpace:
+    if isinstance(value, Path) or (isinstance(value, str) and value.endswith(".json")):
+        return ModelMetadata.load(value).action_space
+    return preset_action_space(value) if isinstance(value, str) else value
