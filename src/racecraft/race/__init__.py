@@ -1,0 +1,29 @@
+"""How good a driver is: evaluation, rules, statistics, standings, video and the picture of the racing line."""
+
+from racecraft.race.autopilot import Autopilot
+from racecraft.race.evaluation import Completion, completion, evaluate, trial_simulation
+from racecraft.race.recording import Recording
+from racecraft.race.results import Evaluation, Lap, Trial
+from racecraft.race.rules import RULE_SETS, RaceRules
+from racecraft.race.standings import RANKINGS, places, ranking_score
+from racecraft.race.statistics import Interval, mean_interval, wilson_interval
+
+__all__ = [
+    "RANKINGS",
+    "RULE_SETS",
+    "Autopilot",
+    "Completion",
+    "Evaluation",
+    "Interval",
+    "Lap",
+    "RaceRules",
+    "Recording",
+    "Trial",
+    "completion",
+    "evaluate",
+    "mean_interval",
+    "places",
+    "ranking_score",
+    "trial_simulation",
+    "wilson_interval",
+]

@@ -1,0 +1,212 @@
+"""`evaluate`: how good a policy is, by the rules of a race, from several starts driven side by side.
+
+    frames -> *policy* -> commands -> simulation -> judged rows -> marshal -> laps, resets, penalties
+                                          ^------- put back, freeze -------'
+
+`completion` is the small form for use during training: one lap, nobody put back, one simulation reused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import ConfigError, ShapeError
+from racecraft.race.default_reward import centerline_rewards
+from racecraft.race.marshal import Marshal
+from racecraft.race.placement import driven_track, line_up
+from racecraft.race.results import Evaluation
+from racecraft.race.rules import RULE_SETS, RaceRules
+from racecraft.sim.camera import CameraSpec
+from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim.simulation import CONTROL_DT, Simulation, Start
+from racecraft.sim.vehicle import Vehicle
+from racecraft.track.track import Track
+
+MAX_STEPS: Final = 100_000
+"""Steps to a lap after which a car that neither arrives nor errs is stopped, as in the original."""
+SIGHTS: Final = ("frames", "state")
+
+_STATUS, _PROGRESS, _TIME = (ROW_COLUMNS.index(name) for name in ("status", "progress", "time"))
+_LAP_COMPLETE = STATUS_NAMES.index("lap_complete")
+
+Driver = Callable[[NDArray[Any]], NDArray[np.float32]]
+"""From what N cars see to commands (N, 2), without chance: a `racecraft.race.policy.Policy`, or a state's."""
+
+
+def evaluate(
+    policy: Driver,
+    track: Track,
+    *,
+    rules: RaceRules = RULE_SETS["drfc"],
+    num_trials: int = 5,
+    seed: int = 0,
+    vehicle: Vehicle | str = "v5",
+    camera: CameraSpec = CameraSpec(),  # noqa: B008 (frozen)
+    sees: str = "frames",
+    num_threads: int = 0,
+) -> Evaluation:
+    """Race a policy against the clock, several times side by side.
+
+    Trials differ by their starts only: trial 0 is exact, the others are off by the rules' jitter, drawn from
+    the seed and the trial's number. So a trial does not depend on how many others there are, and a seed
+    repeats it exactly, as far as the policy gives one car the same commands in any batch.
+
+    Args:
+        policy: What drives: called with a view of all frames uint8 (N, 120, 160), or with the state.
+        track: Where.
+        rules: Laps, resets, penalties, starts.
+        num_trials: Cars side by side, 1 to 1000.
+        seed: Of the starts.
+        vehicle: Preset name, vehicle file or `Vehicle`.
+        camera: What the cars see with.
+        sees: ``frames``, or ``state`` for a policy that drives by the privileged state, without a camera.
+        num_threads: Of the simulation; 0 takes one per core.
+
+    Raises:
+        ConfigError: A setting is outside its range.
+        ShapeError: The policy's commands do not have the shape (N, 2).
+        NonFiniteAction: A command is NaN or infinite.
+    """
+    simulation = trial_simulation(
+        track,
+        rules=rules,
+        num_trials=num_trials,
+        seed=seed,
+        vehicle=vehicle,
+        camera=_needed(camera, sees),
+        num_threads=num_threads,
+    )
+    sight = simulation.frames if sees == "frames" else simulation.state
+    marshal = Marshal(simulation, rules, seed=seed)
+    while marshal.is_racing:
+        simulation.step(_checked(policy(sight), num_trials))
+        marshal.judge()
+    return Evaluation(track=track, rules=rules, seed=seed, trials=marshal.trials())
+
+
+def trial_simulation(
+    track: Track,
+    *,
+    rules: RaceRules = RULE_SETS["first_lap"],
+    num_trials: int = 5,
+    seed: int = 0,
+    vehicle: Vehicle | str = "v5",
+    camera: CameraSpec | None = CameraSpec(),  # noqa: B008 (frozen)
+    num_threads: int = 0,
+) -> Simulation:
+    """A simulation by the rules, a car for each trial: what `evaluate` makes and `completion` reuses."""
+    if isinstance(num_trials, bool) or not isinstance(num_trials, int) or not 1 <= num_trials <= 1000:
+        raise ConfigError(f"num_trials is {num_trials!r}; allowed is a whole number from 1 to 1000.")
+    laps = rules.laps if rules.is_continuous and track.is_closed else 1  # of one simulated episode
+    return Simulation(
+        track,
+        num_envs=num_trials,
+        seed=seed,
+        vehicle=vehicle,
+        camera=camera,
+        start=Start(mode="fixed", offset=rules.start_offset),
+        direction=rules.direction,
+        laps=laps,
+        max_steps=laps * MAX_STEPS,
+        num_threads=num_threads,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Completion:
+    """How far each car got on its first lap."""
+
+    completions: NDArray[np.float64]
+    """Fraction of the lap driven, 0 to 1  (N,)."""
+    lap_times: NDArray[np.float64]
+    """s of completed laps, NaN for the others  (N,)."""
+    rewards: NDArray[np.float64]
+    """Sum of AWS's default reward, which evaluation logs whatever the policy was trained with  (N,)."""
+    statuses: tuple[str, ...]
+    """How each car's lap ended  (N,)."""
+
+    @property
+    def laps_completed(self) -> int:
+        """Cars that completed the lap."""
+        return int(np.isfinite(self.lap_times).sum())
+
+    @property
+    def mean_completion(self) -> float:
+        """Mean of `completions`."""
+        return float(self.completions.mean())
+
+    @property
+    def best_lap(self) -> float | None:
+        """Fastest completed lap, s."""
+        return float(np.nanmin(self.lap_times)) if self.laps_completed else None
+
+
+def completion(
+    policy: Driver,
+    simulation: Simulation,
+    *,
+    rules: RaceRules = RULE_SETS["first_lap"],
+    seed: int = 0,
+    sees: str = "frames",
+    max_seconds: float = 0.0,
+) -> Completion:
+    """How far a policy gets on the first lap with nobody to put it back: the judgement used during training.
+
+    Args:
+        policy: What drives.
+        simulation: From `trial_simulation`, with the same rules; it is reset first and can be used again.
+        rules: Its starts are used: jitter as in `evaluate`, so equal seeds mean equal starts.
+        seed: Of the starts.
+        sees: ``frames`` or ``state``, as for `evaluate`.
+        max_seconds: Simulated seconds after which a slow car is stopped; 0 for none.
+
+    Raises:
+        ConfigError: `sees` is unknown, or ``frames`` from a simulation without a camera.
+        ShapeError: The policy's commands do not have the shape (N, 2).
+        NonFiniteAction: A command is NaN or infinite.
+    """
+    _needed(simulation.camera, sees)
+    if simulation.laps != 1:
+        raise ConfigError(f"completion judges one lap; the simulation was made for {simulation.laps}.")
+    sight = simulation.frames if sees == "frames" else simulation.state
+    line_up(simulation, driven_track(simulation.tracks[0], rules), rules, seed=seed)
+    rewards = np.zeros(simulation.num_envs)
+    is_running = np.ones(simulation.num_envs, dtype=np.bool_)
+    for _ in range(round(max_seconds / CONTROL_DT) if max_seconds > 0.0 else MAX_STEPS):
+        simulation.step(_checked(policy(sight), simulation.num_envs))
+        rewards += is_running * centerline_rewards(simulation.rows)
+        is_running = ~(simulation.terminated | simulation.truncated)
+        if not is_running.any():
+            break
+    status = simulation.rows[:, _STATUS].astype(int)
+    is_complete = status == _LAP_COMPLETE
+    return Completion(
+        completions=np.where(is_complete, 1.0, simulation.rows[:, _PROGRESS].clip(0.0, 1.0)),
+        lap_times=np.where(is_complete, simulation.rows[:, _TIME], np.nan),
+        rewards=rewards,
+        statuses=tuple(STATUS_NAMES[code] for code in status),
+    )
+
+
+def _needed(camera: CameraSpec | None, sees: str) -> CameraSpec | None:
+    if sees not in SIGHTS:
+        raise ConfigError(f"sees is {sees!r}; allowed are 'frames' and 'state'.")
+    if sees == "state":
+        return None
+    if camera is None:
+        raise ConfigError("A policy that sees frames needs a camera; give one, or evaluate with sees='state'.")
+    return camera
+
+
+def _checked(commands: NDArray[np.float32], num_cars: int) -> NDArray[np.float32]:
+    if np.shape(commands) != (num_cars, 2):
+        raise ShapeError(
+            f"The policy's commands have shape {np.shape(commands)}, expected ({num_cars}, 2): "
+            "one row per car, columns steering_angle [rad] and speed [m/s]."
+        )
+    return commands

@@ -1,0 +1,58 @@
+"""What one trial did, step by step: the source of its video, its racing line and its log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.track.track import Track
+
+REFERENCE_AHEAD = 0.14
+"""m from the car's origin to the point that x and y speak of."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """The judged rows of a trial, one per control step, prepare steps included; T steps."""
+
+    track: Track
+    """In driving direction."""
+    rows: NDArray[np.float64]
+    """As the simulation gave them, with `lap` counted over the whole trial  (T, len(ROW_COLUMNS))."""
+    clock: NDArray[np.float64]
+    """s since the trial began; the rows' own `time` begins anew with every standing start  (T,)."""
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """A column of the rows by name, as a view  (T,)."""
+        return self.rows[:, ROW_COLUMNS.index(name)]
+
+    @cached_property
+    def origins(self) -> NDArray[np.float64]:
+        """x, y of the car's origin, m  (T, 2)."""
+        heading = self.column("heading")
+        ahead = REFERENCE_AHEAD * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        return np.asarray(np.stack([self.column("x"), self.column("y")], axis=1) - ahead)
+
+    @cached_property
+    def statuses(self) -> list[str]:
+        """Status of every step by name  (T,)."""
+        return [STATUS_NAMES[code] for code in self.column("status").astype(int)]
+
+    @cached_property
+    def lap_numbers(self) -> NDArray[np.int64]:
+        """The lap that every step belongs to, from 1; the step that completes a lap is its last  (T,)."""
+        completed = self.column("lap").astype(np.int64)
+        is_last = self.column("status") == STATUS_NAMES.index("lap_complete")
+        return np.asarray(completed + 1 - is_last)
+
+    def lap(self, number: int) -> Recording:
+        """The steps of one lap, numbered from 1."""
+        steps = self.lap_numbers == number
+        return Recording(self.track, self.rows[steps], self.clock[steps])

@@ -1,0 +1,44 @@
+"""Who is ahead: what a race is ranked by, and places from that. Pure functions of lap times in seconds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from racecraft.errors import ConfigError, did_you_mean
+
+RANKINGS: Final = ("total", "best", "average")
+"""Sum of all laps; fastest lap; or mean of the fastest run of consecutive laps. Less is better."""
+
+
+def ranking_score(lap_times: Sequence[float], *, ranking: str = "total", minimum_laps: int = 1) -> float:
+    """What a race is ranked by, s; infinite when too few laps were completed.
+
+    Args:
+        lap_times: s of the completed laps, penalties included, in the order they were driven.
+        ranking: ``total`` of all laps, ``best`` lap, or ``average`` of the best `minimum_laps` laps in a row.
+        minimum_laps: Completed laps that a race must have to be ranked.
+
+    Raises:
+        ConfigError: No such ranking, or fewer than one lap demanded.
+    """
+    if ranking not in RANKINGS:
+        allowed = ", ".join(RANKINGS)
+        raise ConfigError(f"ranking is {ranking!r}; allowed are {allowed}.", hint=did_you_mean(ranking, RANKINGS))
+    if minimum_laps < 1:
+        raise ConfigError(f"minimum_laps is {minimum_laps!r}; allowed is 1 or more.")
+    if len(lap_times) < minimum_laps:
+        return math.inf
+    if ranking == "best":
+        return min(lap_times)
+    if ranking == "total":
+        return math.fsum(lap_times)
+    windows = (lap_times[i : i + minimum_laps] for i in range(len(lap_times) - minimum_laps + 1))
+    return min(math.fsum(window) / minimum_laps for window in windows)
+
+
+def places(scores: Sequence[float]) -> list[int]:
+    """The place of each score, from 1: less is better, equals share a place and the next one is left out."""
+    ordered = sorted(scores)
+    return [ordered.index(score) + 1 for score in scores]
