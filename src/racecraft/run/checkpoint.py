@@ -179,9 +179,11 @@ class CheckpointStore:
         raise CheckpointError(" ".join(damage), hint="No other checkpoint of this run is whole.")
 
     def entries(self) -> list[Entry]:
-        """All checkpoints in the order they were saved; those found in the folder if the manifest is damaged."""
+        """All checkpoints in the order they were saved; without a whole manifest those in the folder."""
         try:
             return self._read_manifest()
+        except CheckpointError:
+            raise
         except FileNotFoundError:
             reason = "is missing"
         except (OSError, ValueError, TypeError, KeyError) as error:

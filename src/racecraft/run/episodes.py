@@ -1,7 +1,7 @@
-"""From the rows of many cars at once to a sequence of whole episodes, as AWS's single car would have driven them.
+"""From the rows of many cars at once to a sequence of whole episodes, as a single car would have driven them.
 
-AWS's logs and metrics number episodes one after the other on one simulated clock. Here cars drive side by side, so an
-episode gets its number and its place on the clock when it ends.
+AWS's logs and metrics number episodes one after the other on one simulated clock. Here cars drive side by
+side, so an episode gets its number and its place on the clock when it ends.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class EpisodeCounter:
     def __init__(self, num_envs: int, *, number: int = 0, clock: float = 0.0) -> None:
         self.number = number
         self.clock = clock
-        self._rewards = np.zeros(num_envs)
+        self.rewards = np.zeros(num_envs)  # of the episodes under way
 
     def update(self, rows: NDArray[np.float64], rewards: ArrayLike, done: NDArray[np.bool_]) -> list[Episode]:
         """Count one step of every car and return the episodes it ended.
@@ -68,8 +68,12 @@ class EpisodeCounter:
             rewards: Their rewards   (N,).
             done: Which episodes end with this step, terminated or truncated   (N,).
         """
-        self._rewards += rewards
+        self.rewards += np.asarray(rewards, dtype=np.float64)
         return [self._end(int(env), rows[env]) for env in np.flatnonzero(done)]
+
+    def abandon(self, mask: NDArray[np.bool_]) -> None:
+        """Forget the episodes that the cars of the mask (N,) have under way; they get no number."""
+        self.rewards[mask] = 0.0
 
     def place(self, duration: float) -> float:
         """Put something of this duration, an evaluation episode say, on the clock; returns when it starts."""
@@ -83,12 +87,12 @@ class EpisodeCounter:
             number=self.number,
             env=env,
             steps=int(row[_STEPS]),
-            reward=float(self._rewards[env]),
+            reward=float(self.rewards[env]),
             progress=float(row[_PROGRESS]),
             status=STATUS_NAMES[int(row[_STATUS])],
             start_time=self.place(duration),
             duration=duration,
         )
         self.number += 1
-        self._rewards[env] = 0.0
+        self.rewards[env] = 0.0
         return episode

@@ -67,7 +67,7 @@ class RunFolder:
 
         Args:
             root: Folder of all runs, made when missing.
-            name: 1 to 64 letters, digits, dots, hyphens and underscores; made from prefix and time when not given.
+            name: 1 to 64 letters, digits, dots, hyphens and underscores; made from prefix and time if None.
             prefix: Anything; a track's name, say.
 
         Raises:
@@ -79,10 +79,13 @@ class RunFolder:
         else:
             stem = f"{sanitize_name(prefix)[:40]}-{time.strftime('%Y%m%d-%H%M%S')}"
             names = [stem, *(f"{stem}-{count}" for count in range(2, 1000))]
+        try:
+            root.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RunError(f"{root} cannot be made: {error.strerror or error}.") from error
         for candidate in names:
             path = root / candidate
             try:
-                root.mkdir(parents=True, exist_ok=True)
                 path.mkdir()
             except FileExistsError:
                 continue

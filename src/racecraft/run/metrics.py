@@ -1,4 +1,4 @@
-"""AWS's metrics files: ``TrainingMetrics.json`` with every episode, ``EvaluationMetrics-*.json`` with every trial."""
+"""AWS's metrics files: ``TrainingMetrics.json`` of all episodes, ``EvaluationMetrics-*.json`` of trials."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class TrainingMetrics:
         path: The file; an old one is continued up to ``episodes``.
         best_model_metric: What makes a checkpoint the best: progress, reward or laptime.
         episodes_per_iteration: After how many episodes AWS's trial counter begins again.
-        episodes: Keep this many training episodes of an old file, and the evaluations among them; a resumed run
-            gives the number its checkpoint has. 0 starts anew.
+        episodes: Keep this many training episodes of an old file, and the evaluations among them, as a
+            resumed run does from its checkpoint on. 0 starts anew.
         interval_s: Seconds between two writings, at least.
     """
 
@@ -64,7 +64,7 @@ class TrainingMetrics:
         self._next_write = 0.0
 
     def add(self, episode: Episode, *, phase: Phase = "training") -> None:
-        """Note an episode; one of an evaluation carries the number of the training episode before it, as at AWS."""
+        """Note an episode; an evaluation has the number of the training episode before it, as at AWS."""
         if phase == "training":
             self._episodes = episode.number + 1
         line = {

@@ -1,7 +1,7 @@
 """The sim-trace: every step of every episode, in the CSV files that DeepRacer's log tools read.
 
-Cars drive side by side, but the files hold one whole episode after the other, as AWS's single car wrote them, so a
-car's steps wait in memory until its episode ends. Numbers have full precision, angles are in degrees.
+Cars drive side by side, but the files hold one whole episode after the other, as AWS's single car wrote them,
+so a car's steps wait in memory until its episode ends. Numbers have full precision, angles are in degrees.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ class SimTraceWriter:
         tracks: The simulation's tracks, in its order; they tell which waypoint is the closest.
         action_space: What the actions mean.
         iteration: Number of the first file.
-        max_bytes: Of all files together. When they grow past it, every other iteration is removed and not written
-            any more, so that what remains still covers the whole run.
+        max_bytes: Of all files together. When they grow past it, every other iteration is removed and not
+            written any more, so that what remains still covers the whole run.
     """
 
     def __init__(
@@ -135,6 +135,12 @@ class SimTraceWriter:
         if len(self._steps) >= _COMPACT_EVERY:
             self._compact()
 
+    def abandon(self, mask: NDArray[np.bool_]) -> None:
+        """Drop what the cars of the mask (N,) have driven since their last whole episode."""
+        for env in np.flatnonzero(mask).tolist():
+            self._first[env] = len(self._steps)
+            self._packed[env] = []
+
     def next_iteration(self) -> None:
         """Begin the next file; episodes go to the file of the iteration in which they end."""
         self.close()
@@ -171,63 +177,58 @@ class SimTraceWriter:
 
     def _lines(self, table: NDArray[np.float64], episode: Episode) -> str:
         """An episode's rows as text, with AWS's ``prepare`` row before the first."""
-        (
-            steps,
-            x,
-            y,
-            heading,
-            steer,
-            speed,
-            progress,
-            previous,
-            following,
-            on_track,
-            status,
-            time_,
-            track,
-            length,
-        ) = table[:, : len(_KEPT)].T
-        waypoints = self._waypoints[int(track[0])]
-        behind, ahead = waypoints[previous.astype(int)], waypoints[following.astype(int)]
-        nearer_ahead = np.hypot(ahead[:, 0] - x, ahead[:, 1] - y) < np.hypot(
-            behind[:, 0] - x, behind[:, 1] - y
-        )
-        closest = np.where(nearer_ahead, following, previous).astype(int) % (len(waypoints) - 1)
+        column = dict(zip(_KEPT, table.T, strict=False))
         if isinstance(self._action_space, DiscreteActionSpace):
             indices = table[:, -2].astype(int)
             names = [str(index) for index in indices]
-            degrees, throttle = np.array(self._action_space.to_degrees())[indices].T.tolist()
+            steer, throttle = np.array(self._action_space.to_degrees())[indices].T.tolist()
         else:
-            degrees, throttle = np.degrees(steer).tolist(), speed.tolist()
-            names = [f"[{angle!r} {value!r}]" for angle, value in zip(degrees, throttle, strict=True)]
-        yaw = np.degrees(np.arctan2(np.sin(heading), np.cos(heading)))
-        columns: list[Iterable[object]] = [
-            steps.tolist(),
-            x.tolist(),
-            y.tolist(),
-            yaw.tolist(),
-            degrees,
-            throttle,
+            steer, throttle = np.degrees(column["steering_angle"]).tolist(), column["speed"].tolist()
+            names = [f"[{angle!r} {speed!r}]" for angle, speed in zip(steer, throttle, strict=True)]
+        heading = column["heading"]
+        texts = (
+            map(repr, column["steps"].tolist()),
+            map(repr, column["x"].tolist()),
+            map(repr, column["y"].tolist()),
+            map(repr, np.degrees(np.arctan2(np.sin(heading), np.cos(heading))).tolist()),
+            map(repr, steer),
+            map(repr, throttle),
             names,
-            table[:, -1].tolist(),
-            [False] * (len(table) - 1) + [True],
-            (on_track > 0).tolist(),
-            [100 if share >= 1 else 100 * share for share in progress.tolist()],
-            closest.tolist(),
-            length.tolist(),
-            np.round(episode.start_time + time_, 3).tolist(),
-            [STATUS_NAMES[code] for code in status.astype(int)],
-        ]
-        rows = list(zip(*columns, strict=True))
-        prepare = list(rows[0])
-        prepare[0] = 1.0
-        prepare[7], prepare[8], prepare[14] = 0.0, False, "prepare"
-        prepare[13] = round(episode.start_time + float(time_[0]) - STEP_SECONDS, 3)
-        number = episode.number
-        return "".join(
-            f"{number},{a!r},{b!r},{c!r},{d!r},{e!r},{f!r},{g},{h!r},{i},{j},{k!r},{m},{n!r},{o!r},{p},0.0,0\n"
-            for a, b, c, d, e, f, g, h, i, j, k, m, n, o, p in (prepare, *rows)
+            map(repr, table[:, -1].tolist()),
+            ["False"] * (len(table) - 1) + ["True"],
+            map(repr, (column["all_wheels_on_track"] > 0).tolist()),
+            ["100" if share >= 1 else repr(100 * share) for share in column["progress"].tolist()],
+            map(repr, self._closest(column).tolist()),
+            map(repr, column["track_length"].tolist()),
+            map(repr, np.round(episode.start_time + column["time"], 3).tolist()),
+            [STATUS_NAMES[code] for code in column["status"].astype(int)],
         )
+        rows = list(zip(*texts, strict=True))
+        _, *pose_and_action, _, _, wheels, progress, closest, length, _, _ = rows[0]
+        before = repr(round(episode.start_time + float(column["time"][0]) - STEP_SECONDS, 3))
+        prepare = (
+            "1.0",
+            *pose_and_action,
+            "0.0",
+            "False",
+            wheels,
+            progress,
+            closest,
+            length,
+            before,
+            "prepare",
+        )
+        return "".join(f"{episode.number},{','.join(row)},0.0,0\n" for row in (prepare, *rows))
+
+    def _closest(self, column: dict[str, NDArray[np.float64]]) -> NDArray[np.int64]:
+        """Index of the closest waypoint: the nearer of the one behind and the one ahead   (T,)."""
+        waypoints = self._waypoints[int(column["track_index"][0])]
+        behind, ahead = column["closest_prev"].astype(np.int64), column["closest_next"].astype(np.int64)
+        car = np.column_stack([column["x"], column["y"]])
+        is_ahead = np.linalg.norm(waypoints[ahead] - car, axis=1) < np.linalg.norm(
+            waypoints[behind] - car, axis=1
+        )
+        return np.where(is_ahead, ahead, behind)
 
     def _write(self, text: str) -> None:
         try:
@@ -258,7 +259,7 @@ def read_simtrace(path: str | Path, *, max_rows: int = MAX_READ_ROWS) -> dict[st
     """The columns of a sim-trace file of any era, by name.
 
     Args:
-        path: A CSV file with 15, 17, 18 or 19 columns; the header may be missing, unknown columns are left out.
+        path: A CSV file with 15, 17, 18 or 19 columns; the header may be missing.
         max_rows: Longer files are refused.
 
     Returns:
@@ -308,8 +309,12 @@ def _parse(name: str, texts: tuple[str, ...]) -> NDArray[Any]:
             raise ValueError(f"{name} is {min(wrong)[:40]!r}, allowed: True or False")
         return np.array([text in ("True", "1") for text in texts], dtype=np.bool_)
     if name == "action" and any(text.startswith("[") for text in texts):
-        return np.array([text.strip("[]").split() for text in texts], dtype=np.float64).reshape(-1, 2)
+        return np.array(
+            [text.strip("[]").replace(",", " ").split() for text in texts], dtype=np.float64
+        ).reshape(-1, 2)
     values = np.array(texts, dtype=np.float64)
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} is not a finite number in every row")
     if name in ("episode", "steps", "action", "closest_waypoint", "obstacle_crash_counter"):
         whole = values.astype(np.int64)
         if not np.array_equal(whole, values):

@@ -15,6 +15,7 @@ from racecraft.errors import ConfigError
 from racecraft.run.atomic import write_file
 
 MAX_BYTES = 1 << 18
+MAX_DEPTH = 20  # of nested YAML
 RaceType = Literal["TIME_TRIAL", "OBJECT_AVOIDANCE", "HEAD_TO_BOT", "HEAD_TO_MODEL", "F1"]
 _YES_NO = "true or false"
 
@@ -72,12 +73,18 @@ class TrainingParams:
         import yaml
 
         try:
-            if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text, Loader=yaml.SafeLoader)):
-                raise ConfigError(f"{name} has a YAML alias (*...), which is not allowed.")
+            depth = 0
+            for token in yaml.scan(text, Loader=yaml.SafeLoader):
+                kind = type(token).__name__
+                depth += kind.endswith("StartToken") - kind.endswith("EndToken")
+                if depth > MAX_DEPTH:  # before the parser, which takes quadratic time in the depth
+                    raise ConfigError(f"{name} is nested too deeply.")
+                if kind == "AliasToken":
+                    raise ConfigError(f"{name} has a YAML alias (*...), which is not allowed.")
             document = yaml.safe_load(text)
-        except (yaml.YAMLError, RecursionError, ValueError) as error:
-            if isinstance(error, ConfigError):
-                raise
+        except ConfigError:
+            raise
+        except (yaml.YAMLError, ValueError) as error:
             mark = getattr(error, "problem_mark", None)
             where = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
             raise ConfigError(f"{name} is not valid YAML{where}.") from error

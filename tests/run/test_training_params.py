@@ -1,0 +1,75 @@
+import pytest
+
+from racecraft.errors import ConfigError
+from racecraft.run.training_params import TrainingParams
+
+AWS = """\
+JOB_TYPE: "TRAINING"
+WORLD_NAME: "2022_april_open"
+RACE_TYPE: ["TIME_TRIAL"]
+REVERSE_DIR: "True"
+CHANGE_START_POSITION: "false"
+ROUND_ROBIN_ADVANCE_DIST: "0.1"
+MIN_EVAL_TRIALS: "7"
+MODEL_METADATA_FILE_S3_KEY: ["model/model_metadata.json"]
+"""
+
+
+def test_aws_file_with_strings_and_lists():
+    params = TrainingParams.from_yaml(AWS)
+    assert (params.world_name, params.race_type, params.min_eval_trials) == (
+        "2022_april_open",
+        "TIME_TRIAL",
+        7,
+    )
+    assert (params.reverse_dir, params.change_start_position, params.round_robin_advance_dist) == (
+        True,
+        False,
+        0.1,
+    )
+    assert params.extra == {
+        "JOB_TYPE": "TRAINING",
+        "MODEL_METADATA_FILE_S3_KEY": ["model/model_metadata.json"],
+    }
+    assert TrainingParams.from_yaml(params.to_yaml()) == params
+
+
+def test_defaults(tmp_path):
+    assert TrainingParams.from_yaml("") == TrainingParams()
+    TrainingParams().save(tmp_path / "p.yaml")
+    assert TrainingParams.load(tmp_path / "p.yaml") == TrainingParams()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("- 1", "is not a list of settings"),
+        ("just text", "is not a list of settings"),
+        ("A: [", "not valid YAML at line"),
+        ("A: !!python/object/apply:os.system ['true']", "not valid YAML"),
+        ("a: &x [1, 1]\nb: *x", "YAML alias"),
+        ("RACE_TYPE: DRAG", "RACE_TYPE is 'DRAG', allowed: TIME_TRIAL"),
+        ("WORLD_NAME: 3", "WORLD_NAME is 3, allowed: a track's name"),
+        ("REVERSE_DIR: maybe", "REVERSE_DIR is 'maybe', allowed: true or false"),
+        ("ROUND_ROBIN_ADVANCE_DIST: 1.5", "ROUND_ROBIN_ADVANCE_DIST is 1.5, allowed: 0 to 1"),
+        ("START_POSITION_OFFSET: .nan", "START_POSITION_OFFSET is nan"),
+        ("MIN_EVAL_TRIALS: 0", "MIN_EVAL_TRIALS is 0, allowed: 1 to 1000"),
+        ("BEST_MODEL_METRIC: speed", "BEST_MODEL_METRIC is 'speed', allowed: 'progress'"),
+        ("[" * 200_000, "nested too deeply"),
+        ("- " * 100_000, "nested too deeply"),
+    ],
+)
+def test_bad_files(text, words):
+    with pytest.raises(ConfigError) as error:
+        TrainingParams.from_yaml(text, name="t.yaml")
+    assert words in str(error.value)
+    assert str(error.value).startswith("t.yaml")
+
+
+def test_unreadable_files(tmp_path):
+    for data, words in ((b"\xff", "UTF-8"), (b" " * (1 << 19), "larger than")):
+        (tmp_path / "p.yaml").write_bytes(data)
+        with pytest.raises(ConfigError, match=words):
+            TrainingParams.load(tmp_path / "p.yaml")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        TrainingParams.load(tmp_path)
