@@ -1,56 +1,21 @@
-"""What PPO drives: simulation, reward worker and action space behind the learner's small `Environment` protocol.
+"""What PPO drives: simulation, reward worker and action space behind the learner's `Environment` protocol.
 
-    actions -> *action space* -> commands -> *simulation* -> rows -> *reward worker* -> rewards
-                                                  └-> frames, state -> policy
+actions -> *action space* -> commands -> *simulation* -> rows -> *reward worker* -> rewards
+                                              └-> frames, state -> policy
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.action_space import ActionSpace
 from racecraft.reward.worker import RewardWorker
-from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.run import Episode, EpisodeCounter, SimTraceWriter
 from racecraft.sim.simulation import Simulation
-
-_STEPS, _PROGRESS, _STATUS, _EPISODE, _TIME = (
-    ROW_COLUMNS.index(name) for name in ("steps", "progress", "status", "episode", "time")
-)
-
-
-@dataclass(frozen=True, slots=True)
-class EpisodeRecord:
-    """A finished training episode of one car."""
-
-    car: int
-    """Which car of the batch."""
-    episode: int
-    """Number of the car's episode, from 0."""
-    total_reward: float
-    """Sum of the rewards."""
-    progress: float
-    """Fraction of a lap driven, 0 to 1."""
-    status: int
-    """How it ended, index into STATUS_NAMES."""
-    duration: float
-    """Simulated seconds."""
-
-
-class Trace(Protocol):
-    """Where judged steps are logged."""
-
-    def add(
-        self,
-        rows: NDArray[np.float64],
-        actions: NDArray[Any],
-        rewards: NDArray[np.float64],
-        done: NDArray[np.bool_],
-    ) -> None:
-        """Log one step of the traced cars, arrays (N, ...)."""
 
 
 class TrainingEnvironment:
@@ -60,8 +25,8 @@ class TrainingEnvironment:
         simulation: The cars.
         worker: Pays them.
         action_space: Turns the policy's actions into commands.
-        trace: Logs the steps of the first `traced_cars` cars; None for no log.
-        traced_cars: How many cars of the batch are logged.
+        counter: Numbers the episodes.
+        trace: Logs every step; None for no log.
     """
 
     def __init__(
@@ -70,17 +35,17 @@ class TrainingEnvironment:
         worker: RewardWorker,
         action_space: ActionSpace,
         *,
-        trace: Trace | None = None,
-        traced_cars: int = 0,
+        counter: EpisodeCounter,
+        trace: SimTraceWriter | None = None,
     ) -> None:
         self.simulation = simulation
         self.worker = worker
         self.action_space = action_space
+        self.counter = counter
         self.trace = trace
-        self.traced_cars = traced_cars
-        self.finished: list[EpisodeRecord] = []
         self.reward_seconds = 0.0
-        self._totals = np.zeros(simulation.num_envs)
+        self.trace_seconds = 0.0
+        self._finished: list[Episode] = []
 
     @property
     def num_envs(self) -> int:
@@ -99,43 +64,26 @@ class TrainingEnvironment:
         """
         simulation = self.simulation
         simulation.step(self.action_space.to_commands(actions))
+        moved = time.perf_counter()
         rewards = self.worker(simulation.rows)
+        paid = time.perf_counter()
         terminated, truncated = simulation.terminated.copy(), simulation.truncated.copy()
-        done = terminated | truncated
-        self._totals += rewards
+        ended = self.counter.update(simulation.rows, rewards, terminated | truncated)
+        self._finished += ended
         if self.trace is not None:
-            cars = slice(self.traced_cars)
-            self.trace.add(simulation.rows[cars], actions[cars], rewards[cars], done[cars])
-        for car in np.flatnonzero(done).tolist():
-            row = simulation.rows[car]
-            self.finished.append(
-                EpisodeRecord(
-                    car=car,
-                    episode=int(row[_EPISODE]),
-                    total_reward=float(self._totals[car]),
-                    progress=float(min(max(row[_PROGRESS], 0.0), 1.0)),
-                    status=int(row[_STATUS]),
-                    duration=float(row[_TIME]),
-                )
-            )
-            self._totals[car] = 0.0
+            self.trace.write(simulation.rows, actions=actions, rewards=rewards, ended=ended)
+        self.reward_seconds += paid - moved
+        self.trace_seconds += time.perf_counter() - paid
         return rewards, terminated, truncated
 
     def reset(self, mask: NDArray[np.bool_]) -> None:
-        """Put the cars of the mask (N,) at their next start."""
-        self._totals[mask] = 0.0
+        """Put the cars of the mask (N,) at their next start; what they were driving does not count."""
+        self.counter.abandon(mask)
+        if self.trace is not None:
+            self.trace.abandon(mask)
         self.simulation.reset(mask)
 
-    def take_finished(self) -> list[EpisodeRecord]:
+    def take_finished(self) -> list[Episode]:
         """The episodes that ended since the last call."""
-        finished, self.finished = self.finished, []
+        finished, self._finished = self._finished, []
         return finished
-
-    def save(self) -> dict[str, NDArray[Any]]:
-        """Everything the next step depends on, for `load`; globals of the user's reward function excepted."""
-        return {"simulation": self.simulation.save(), "totals": self._totals.copy()}
-
-    def load(self, saved: dict[str, NDArray[Any]]) -> None:
-        """Continue from what `save` gave."""
-        self.simulation.load(saved["simulation"])
-        self._totals[:] = saved["totals"]

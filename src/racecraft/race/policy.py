@@ -1,0 +1,68 @@
+"""A driver: what turns camera frames into commands, and how one is loaded from a run."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.agent.action_space import ActionSpace
+from racecraft.errors import CheckpointError
+from racecraft.learn import Learner, NetworkSpec, distributions, make_learner
+from racecraft.run.folder import RunFolder
+
+WEIGHTS = "weights/"
+"""Prefix of the network's weights among a checkpoint's arrays."""
+
+
+class Policy(Protocol):
+    """Drives N cars by what their cameras see."""
+
+    def __call__(self, frames: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Commands (N, 2), steering angle in rad and speed in m/s, for frames (N, H, W)."""
+
+
+class NetworkPolicy:
+    """A network's best action for every frame, as in evaluation; it draws no random numbers.
+
+    Args:
+        learner: Holds the network; it may go on learning.
+        action_space: Turns its actions into commands.
+    """
+
+    def __init__(self, learner: Learner, action_space: ActionSpace) -> None:
+        self.learner = learner
+        self.action_space = action_space
+
+    def __call__(self, frames: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Commands (N, 2), steering angle in rad and speed in m/s, for frames (N, H, W)."""
+        spec = self.learner.spec
+        outputs = self.learner.policy(self.learner.encode(frames))
+        actions = distributions.most_likely(outputs, is_discrete=spec.is_discrete)
+        return self.action_space.to_commands(actions if spec.is_discrete else actions.clip(-1.0, 1.0))
+
+
+def load_policy(run: RunFolder, *, checkpoint: str | int = "best") -> NetworkPolicy:
+    """The policy of a run's checkpoint.
+
+    Args:
+        run: The run folder.
+        checkpoint: ``best``, ``last`` or a number of steps.
+
+    Raises:
+        CheckpointError: There is no such checkpoint, it is damaged, or does not fit its description.
+        ConfigError: The run's action space is not valid.
+    """
+    saved = run.checkpoints.load(checkpoint)
+    try:
+        spec = NetworkSpec(
+            **{**saved.metadata["network"], "frame_shape": tuple(saved.metadata["network"]["frame_shape"])}
+        )
+    except (KeyError, TypeError) as error:
+        raise CheckpointError(f"{saved.path} does not describe its network: {error}.") from error
+    learner = make_learner(spec)
+    learner.load_weights(
+        {name.removeprefix(WEIGHTS): array for name, array in saved.arrays.items() if name.startswith(WEIGHTS)}
+    )
+    return NetworkPolicy(learner, run.read_model_metadata().action_space)

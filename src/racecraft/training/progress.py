@@ -1,0 +1,120 @@
+"""What a training run reports while it goes, and to whom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from racecraft.learn import IterationStats
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationReport:
+    """One deterministic evaluation during training."""
+
+    step: int
+    """Camera steps of training behind it."""
+    seconds: float
+    """Wall clock since the start."""
+    completions: tuple[float, ...]
+    """Fraction of the lap each trial drove, 0 to 1."""
+    lap_times: tuple[float, ...]
+    """s, of the trials that completed the lap."""
+    is_best: bool
+    """Better than every checkpoint before: more completion, then a faster lap."""
+
+    @property
+    def completion(self) -> float:
+        """Mean fraction of the lap."""
+        return sum(self.completions) / len(self.completions)
+
+    @property
+    def laps_completed(self) -> int:
+        """Trials that drove the whole lap."""
+        return len(self.lap_times)
+
+    @property
+    def best_lap(self) -> float | None:
+        """s, the fastest lap; None when none was completed."""
+        return min(self.lap_times, default=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class IterationReport:
+    """One iteration of training."""
+
+    stats: IterationStats
+    seconds: float
+    """Wall clock since the start."""
+    steps_per_second: float
+    """Camera steps per second of training lately, everything included."""
+    episodes: int
+    """Training episodes finished in the run."""
+    mean_reward: float
+    """Of the last 100 training episodes; NaN before the first."""
+    completion: float
+    """Mean fraction of a lap in the last 100 training episodes; NaN before the first."""
+    remaining: float | None
+    """Estimated seconds until a limit of steps or seconds; None when only laps count."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainResult:
+    """How a training ended."""
+
+    run: Path
+    """The run folder."""
+    reason: str
+    """``laps``, ``seconds``, ``steps``, ``episodes``, ``score`` or ``interrupted``."""
+    wall_seconds: float
+    """From the start of the process (or call) to the end."""
+    steps: int
+    """Camera steps of the run."""
+    laps_completed: int
+    """Trials of the last evaluation that drove the whole lap."""
+    evaluation_trials: int
+    """Trials of that evaluation."""
+    best_lap_seconds: float | None
+    """Fastest lap of all evaluations."""
+    parts: dict[str, float]
+    """Seconds by part: start, simulator, reward, log, policy, learner, evaluation, checkpoint."""
+
+    def to_dict(self) -> dict[str, object]:
+        """As JSON."""
+        return {
+            "run": str(self.run),
+            "reason": self.reason,
+            "wall_seconds": round(self.wall_seconds, 3),
+            "steps": self.steps,
+            "laps_completed": self.laps_completed,
+            "evaluation_trials": self.evaluation_trials,
+            "best_lap_seconds": self.best_lap_seconds,
+            "parts": {name: round(seconds, 3) for name, seconds in self.parts.items()},
+        }
+
+
+class Reporter(Protocol):
+    """Shows a training to somebody. Calls come from the training's own thread, so they must be quick."""
+
+    def note(self, text: str) -> None:
+        """Something worth a line."""
+
+    def iteration(self, report: IterationReport) -> None:
+        """An iteration ended."""
+
+    def evaluation(self, report: EvaluationReport) -> None:
+        """An evaluation ended."""
+
+
+class SilentReporter:
+    """Shows nothing."""
+
+    def note(self, text: str) -> None:
+        """Nothing."""
+
+    def iteration(self, report: IterationReport) -> None:
+        """Nothing."""
+
+    def evaluation(self, report: EvaluationReport) -> None:
+        """Nothing."""

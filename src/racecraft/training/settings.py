@@ -1,0 +1,138 @@
+"""Everything that decides how a run trains, as one frozen value that run.json repeats."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Final
+
+from racecraft.agent import Hyperparameters, ModelMetadata
+from racecraft.errors import ConfigError, RunError
+from racecraft.learn import NetworkSpec, PPOConfig, network_names
+from racecraft.sim import Start, Vehicle, load_vehicle
+from racecraft.sim.columns import STATE_COLUMNS
+from racecraft.sim.simulation import DIRECTIONS
+from racecraft.training.stop import Until
+
+DEFAULT_TRACK: Final = "reinvent_2018"
+DEFAULT_REWARD: Final = "racing"
+VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
+CRITICS: Final = ("privileged", "camera")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainSettings:
+    """Settings of a training run, apart from its files (reward function, model metadata, hyperparameters)."""
+
+    track: str = DEFAULT_TRACK
+    """Name of a track, or path of a track file."""
+    until: Until = field(default_factory=lambda: Until(laps=5))
+    """When to stop."""
+    seed: int = 0
+    """Key of every random number."""
+    network: str = "RACECRAFT_SMALL"
+    """Architecture, one of `racecraft.learn.network_names()`."""
+    critic: str = "privileged"
+    """What the critic sees while training: ``privileged`` state, or the ``camera`` alone, as AWS's."""
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    """The car."""
+    start: Start = field(default_factory=lambda: Start(spread=True))
+    """Where training episodes start."""
+    direction: str = "forward"
+    """``forward``, ``reverse`` or ``alternate`` with every episode."""
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    """How the policy improves."""
+    evaluate_every: int = 4096
+    """Camera steps between two evaluations, each followed by a checkpoint."""
+    evaluation_trials: int = 5
+    """Cars that drive one lap in each evaluation."""
+    num_threads: int = 0
+    """Threads of simulator and learner; 0 takes one per core. Results repeat for the same number."""
+
+    def __post_init__(self) -> None:
+        if self.network not in network_names():
+            raise ConfigError(f"network is {self.network!r}; allowed are {', '.join(network_names())}.")
+        if self.critic not in CRITICS:
+            raise ConfigError(f"critic is {self.critic!r}; allowed are {', '.join(CRITICS)}.")
+        if self.direction not in DIRECTIONS:
+            raise ConfigError(f"direction is {self.direction!r}; allowed are {', '.join(DIRECTIONS)}.")
+        for name, value, low, high in (
+            ("seed", self.seed, 0, 2**32 - 1),
+            ("evaluate_every", self.evaluate_every, 1, 10**9),
+            ("evaluation_trials", self.evaluation_trials, 1, 100),
+            ("num_threads", self.num_threads, 0, 1024),
+        ):
+            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+                raise ConfigError(f"{name} is {value!r}; allowed is a whole number from {low} to {high}.")
+        if self.until.laps > self.evaluation_trials:
+            object.__setattr__(self, "evaluation_trials", self.until.laps)
+
+    def network_spec(self, metadata: ModelMetadata) -> NetworkSpec:
+        """The network for a model's action space."""
+        space = metadata.action_space
+        is_discrete = space.kind == "discrete"
+        return NetworkSpec(
+            name=self.network,
+            num_actions=space.size if is_discrete else 2,
+            is_discrete=is_discrete,
+            state_size=len(STATE_COLUMNS) if self.critic == "privileged" else 0,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON, for run.json."""
+        return {**asdict(self), "until": str(self.until)}
+
+    @classmethod
+    def from_dict(cls, document: dict[str, Any]) -> TrainSettings:
+        """From what `to_dict` gave.
+
+        Raises:
+            RunError: A field is missing or unknown.
+            ConfigError: A value is outside its range.
+        """
+        try:
+            values = dict(document)
+            values["until"] = Until.parse(values["until"])
+            values["vehicle"] = Vehicle(**values["vehicle"])
+            values["start"] = Start(**values["start"])
+            values["ppo"] = PPOConfig(**values["ppo"])
+            return cls(**values)
+        except (KeyError, TypeError) as error:
+            raise RunError(
+                f"The settings in run.json do not fit this version of Racecraft: {error}."
+            ) from error
+
+
+def make_settings(
+    *,
+    metadata: ModelMetadata,
+    hyperparameters: Hyperparameters | None,
+    network: str = "",
+    vehicle: Vehicle | str = "",
+    num_envs: int = 0,
+    **settings: Any,
+) -> TrainSettings:
+    """Settings from AWS's files and what the user says beyond them.
+
+    Without hyperparameters the defaults are Racecraft's own, tuned for speed. With them training follows AWS:
+    whole episodes per iteration, its batch size, epochs, losses and exploration.
+
+    Args:
+        metadata: Its network and version are used where `network` and `vehicle` are not given.
+        hyperparameters: AWS's, or None.
+        network: Overrides the metadata's.
+        vehicle: Preset, file or parameters; by default the preset of the metadata's version.
+        num_envs: Cars driven at once; 0 decides by itself.
+        settings: Other fields of `TrainSettings`.
+    """
+    if not isinstance(vehicle, Vehicle):
+        vehicle = load_vehicle(vehicle or VEHICLE_OF_VERSION[metadata.version])
+    if hyperparameters is None:
+        ppo = PPOConfig()
+        if num_envs:
+            num_steps = max(1, round(ppo.num_envs * ppo.num_steps / num_envs))
+            minibatch_size = min(ppo.minibatch_size, num_envs * num_steps)
+            ppo = replace(ppo, num_envs=num_envs, num_steps=num_steps, minibatch_size=minibatch_size)
+    else:
+        fields: dict[str, Any] = dict(hyperparameters.to_ppo())
+        ppo = PPOConfig(**fields, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
+    return TrainSettings(vehicle=vehicle, network=network or metadata.neural_network, ppo=ppo, **settings)
