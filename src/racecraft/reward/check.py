@@ -46,7 +46,9 @@ class Problem:
 def check_reward(source: str) -> list[Problem]:
     """All problems that can be seen in the source, in the order of its lines."""
     try:
-        problems = list(_problems(source))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's own are caught where the source is parsed
+            problems = list(_problems(source))
     except (RecursionError, MemoryError):
         problems = [Problem(1, 1, "The source is nested too deeply to be read.")]
     return sorted(set(problems), key=lambda problem: (problem.line, problem.column, problem.severity))
@@ -66,14 +68,10 @@ def validate_reward(source: str) -> None:
 
 def _problems(source: str) -> Iterator[Problem]:
     if not source.strip():
-        yield Problem(
-            1, 1, "The source is empty.", "Write 'def reward_function(params):' and return a number."
-        )
+        yield Problem(1, 1, "The source is empty.", "Write 'def reward_function(params):' and return a number.")
         return
     if len(source) > MAX_CHARACTERS:
-        yield Problem(
-            1, 1, f"The source has {len(source):,} characters; AWS accepts up to {MAX_CHARACTERS:,}."
-        )
+        yield Problem(1, 1, f"The source has {len(source):,} characters; AWS accepts up to {MAX_CHARACTERS:,}.")
         return
     tree, findings = _parse(source)
     yield from findings
@@ -93,9 +91,7 @@ def _parse(source: str) -> tuple[ast.Module | None, list[Problem]]:
         warnings.simplefilter("always")
         try:
             tree = ast.parse(source, FILENAME)
-            compile(
-                tree, FILENAME, "exec"
-            )  # finds more: a 'return' outside of a function, a 'nonlocal' without one
+            compile(tree, FILENAME, "exec")  # finds more: a 'return' outside of a function, a 'nonlocal' without one
         except SyntaxError as error:
             tree = None
             message = f"{type(error).__name__}: {error.msg}."
@@ -121,9 +117,7 @@ def _check_reward_function(tree: ast.Module) -> Iterator[Problem]:
         yield Problem(*where, "There is no function 'reward_function' at the top level.", hint)
         return
     for function in found[1:]:
-        yield _at(
-            function, f"'reward_function' is defined again; the first one is in line {found[0].lineno}."
-        )
+        yield _at(function, f"'reward_function' is defined again; the first one is in line {found[0].lineno}.")
     function = found[-1]
     if isinstance(function, ast.AsyncFunctionDef):
         yield _at(function, "'reward_function' is 'async', expected a plain function.", "Remove 'async'.")
@@ -149,9 +143,7 @@ def _check_returns(function: Function) -> Iterator[Problem]:
     nodes = list(_own_nodes(function))
     generator = next((node for node in nodes if isinstance(node, (ast.Yield, ast.YieldFrom))), None)
     if generator is not None:
-        yield _at(
-            generator, "'reward_function' has a 'yield', so it returns a generator instead of a number."
-        )
+        yield _at(generator, "'reward_function' has a 'yield', so it returns a generator instead of a number.")
         return
     returns = [node for node in nodes if isinstance(node, ast.Return)]
     empty = [node for node in returns if node.value is None or _is_constant(node.value, None)]
@@ -186,20 +178,12 @@ def _check_keys(tree: ast.Module, function: Function) -> Iterator[Problem]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and node.id == name and not isinstance(node.ctx, ast.Load):
             return
-        if (
-            isinstance(node, ast.Subscript)
-            and _is_name(node.value, name)
-            and (key := _text(node.slice)) is not None
-        ):
+        if isinstance(node, ast.Subscript) and _is_name(node.value, name) and (key := _text(node.slice)) is not None:
             if isinstance(node.ctx, ast.Load):
                 reads.append((node.slice, key, True))
             else:
                 written.add(key)
-        elif (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Attribute)
-            and _is_name(node.func.value, name)
-        ):
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and _is_name(node.func.value, name):
             if node.func.attr in ("get", "pop") and node.args and (key := _text(node.args[0])) is not None:
                 reads.append((node.args[0], key, False))
             elif node.func.attr in ("update", "setdefault"):
@@ -235,9 +219,7 @@ def _can_pass(statement: ast.stmt) -> bool:
             return passes and _completes(statement.finalbody)
         case ast.Match():
             last = statement.cases[-1]
-            is_total = (
-                last.guard is None and isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None
-            )
+            is_total = last.guard is None and isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None
             return not is_total or any(_completes(case.body) for case in statement.cases)
         case _:
             return True

@@ -198,11 +198,7 @@ def keeps_state(source: str) -> bool:
             target: ast.expr | None = None
             if isinstance(node, (ast.Attribute, ast.Subscript)) and not isinstance(node.ctx, ast.Load):
                 target = node.value
-            elif (
-                isinstance(node, ast.Call)
-                and isinstance(node.func, ast.Attribute)
-                and node.func.attr in changers
-            ):
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in changers:
                 target = node.func.value
             while isinstance(target, (ast.Attribute, ast.Subscript)):
                 target = target.value

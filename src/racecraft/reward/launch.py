@@ -72,9 +72,7 @@ def create_shared_memory(size: int) -> int:
         descriptor = os.memfd_create("racecraft-reward", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
         os.ftruncate(descriptor, size)
         # A process that shrank the memory could crash the trainer at its next access.
-        fcntl.fcntl(
-            descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
-        )
+        fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
         return descriptor
     with tempfile.TemporaryFile() as file:
         os.ftruncate(file.fileno(), size)

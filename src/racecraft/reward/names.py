@@ -42,9 +42,7 @@ def undefined_names(source: str, tree: ast.Module) -> Iterator[tuple[ast.Name, s
         return
     scopes = list(_scopes(symtable.symtable(source, "reward_function.py", "exec")))
     module, *inner = scopes
-    known = {
-        symbol.get_name() for symbol in module.get_symbols() if symbol.is_assigned() or symbol.is_imported()
-    }
+    known = {symbol.get_name() for symbol in module.get_symbols() if symbol.is_assigned() or symbol.is_imported()}
     known |= {
         symbol.get_name()
         for scope in inner

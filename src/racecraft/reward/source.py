@@ -66,9 +66,7 @@ def load_reward(name_or_path: str | Path) -> str:
         if len(data) > 4 * MAX_CHARACTERS:
             raise RewardError(_too_long(path)) from error
         line = data[: error.start].count(b"\n") + 1
-        raise RewardError(
-            f"Reward function '{path}' is not UTF-8 text: see line {line}.", line=line
-        ) from error
+        raise RewardError(f"Reward function '{path}' is not UTF-8 text: see line {line}.", line=line) from error
     if len(source) > MAX_CHARACTERS:
         raise RewardError(_too_long(path))
     return source

@@ -81,7 +81,7 @@ class RewardWorker:
         self._source_lines = source.splitlines()
         self._waypoints = waypoints_of(tracks if isinstance(tracks, Sequence) else (tracks,))
         self._timeout_s = timeout_s
-        self._failure: RewardError | None = None
+        self._failure = ""  # why the process has ended: text, as a kept error would keep this object alive
         self._num_read = 0  # bytes of the log
 
         rewards_offset = MAX_BATCH * len(ROW_COLUMNS) * 8
@@ -94,7 +94,7 @@ class RewardWorker:
             self._process = launch.start_process(descriptor)
         finally:
             os.close(descriptor)
-        self._finalizer = weakref.finalize(self, _end, self._process)
+        self._finalizer = weakref.finalize(self, _kill, self._process)
         self._rows = np.frombuffer(memory, np.float64, MAX_BATCH * len(ROW_COLUMNS)).reshape(MAX_BATCH, -1)
         self._rewards = np.frombuffer(memory, np.float64, MAX_BATCH, rewards_offset)
         self._text = memoryview(memory)[text_offset:log_offset]
@@ -148,11 +148,11 @@ class RewardWorker:
         Raises:
             RewardError: The function raised, returned no number, hung or crashed; the worker has ended.
         """
-        if self._failure is not None:
+        if self._failure:
             raise RewardError(
                 f"The reward worker ended after an error and cannot be called again: {self._failure}",
                 hint="Correct the reward function and make a new RewardWorker.",
-            ) from self._failure
+            )
         rows = np.asarray(rows, np.float64)
         if rows.ndim != 2 or rows.shape[1] != len(ROW_COLUMNS):
             raise ShapeError(
@@ -162,9 +162,7 @@ class RewardWorker:
             raise ShapeError("rows holds NaN or infinity; every value of a judged step is finite.")
         track_index = rows[:, _TRACK_COLUMN]
         if len(rows) and (track_index.min() < 0 or track_index.max() >= len(self._waypoints)):
-            raise ShapeError(
-                f"rows holds a track_index outside 0 to {len(self._waypoints) - 1}, the worker's tracks."
-            )
+            raise ShapeError(f"rows holds a track_index outside 0 to {len(self._waypoints) - 1}, the worker's tracks.")
         rewards = np.empty(len(rows))
         for first in range(0, len(rows), MAX_BATCH):
             part = rows[first : first + MAX_BATCH]
@@ -186,17 +184,11 @@ class RewardWorker:
                     raise self._stalled(rows, self._timeout_s, first=first)
             self._read_reply(rows, first)
         except BaseException as error:
-            self._failure = (
-                error if isinstance(error, RewardError) else RewardError("a batch was interrupted")
-            )
-            self._finalizer()
+            self._end(str(error) if isinstance(error, RewardError) else "a batch was interrupted.")
             raise
-        if not (
-            np.abs(rewards) <= protocol.REWARD_LIMIT
-        ).all():  # NaN included: never trust the process's own check
-            self._failure = RewardError("The reward worker answered without all rewards.")
-            self._finalizer()
-            raise self._failure
+        if not (np.abs(rewards) <= protocol.REWARD_LIMIT).all():  # NaN included: never trust the process's own check
+            self._end("The reward worker answered without all rewards: user code wrote into its memory.")
+            raise RewardError(self._failure)
         return rewards
 
     def _read_reply(self, rows: Rows | None, first: int) -> None:
@@ -208,9 +200,7 @@ class RewardWorker:
         if status == (protocol.READY if rows is None else protocol.REWARDS):
             return
         if status != protocol.FAILED or size > TEXT_BYTES or (rows is not None and row >= len(rows)):
-            raise RewardError(
-                "The reward worker sent a reply that makes no sense: user code wrote into its pipe."
-            )
+            raise RewardError("The reward worker sent a reply that makes no sense: user code wrote into its pipe.")
         text = bytes(self._text[:size]).decode("utf-8", "replace")
         raise self._error(text, line, rows, row, first=first)
 
@@ -219,9 +209,7 @@ class RewardWorker:
         self._process.send_signal(signal.SIGUSR1)
         line = _line_in(self._read_stderr(timeout_s=1.0))
         text = f"did not return within {timeout_s:g} s"
-        return self._error(
-            text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first
-        )
+        return self._error(text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first)
 
     def _crashed(self, rows: Rows | None, first: int) -> RewardError:
         """The error of a process that ended without a reply."""
@@ -243,9 +231,7 @@ class RewardWorker:
             text = f"ended the worker process with exit status {status}"
         if rows is None and line < 0 and stack:
             text += f": {stack.strip().splitlines()[-1]}"
-        return self._error(
-            text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first
-        )
+        return self._error(text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first)
 
     def _error(self, text: str, line: int, rows: Rows | None, row: int, *, first: int) -> RewardError:
         """One sentence, the line at fault, and the params that the function was called with."""
@@ -301,8 +287,10 @@ class RewardWorker:
 
     def close(self) -> None:
         """End the process; calling again does nothing."""
-        if self._failure is None:
-            self._failure = RewardError("it was closed")
+        self._end("it was closed.")
+
+    def _end(self, reason: str) -> None:
+        self._failure = self._failure or reason
         self._finalizer()
 
     def __enter__(self) -> RewardWorker:
@@ -330,7 +318,7 @@ def _line_in(stack: str) -> int:
     return int(match.group(1)) if match else -1
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _kill(process: subprocess.Popen[bytes]) -> None:
     """Kill the process and all that it may have started, and close its pipes."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, signal.SIGKILL)

@@ -1,0 +1,230 @@
+"""The static check finds mistakes with line and column, and does not cry wolf."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from racecraft.errors import RewardError
+from racecraft.reward.check import check_reward, validate_reward
+from racecraft.reward.imports import keeps_state
+from racecraft.reward.source import MAX_CHARACTERS, load_preset, preset_names
+
+
+def body(*lines: str, top: str = "") -> str:
+    return top + "def reward_function(params):\n" + "".join(f"    {line}\n" for line in lines)
+
+
+RETURN = "return 1.0"
+
+# source, line, column, part of the message
+ERRORS = [
+    ("", 1, 1, "empty"),
+    (" \n\n", 1, 1, "empty"),
+    ("x" * (MAX_CHARACTERS + 1), 1, 1, "140,001 characters"),
+    ("def reward_function(params:\n    return 1", 1, 20, "SyntaxError"),
+    ("def reward_function(params):\nreturn 1", 2, 1, "IndentationError"),
+    ("return 1", 1, 1, "SyntaxError"),
+    ("x = '\0'", 1, 1, "null bytes"),
+    ("x = '\ud800'", 1, 1, "not text that Python reads"),
+    ("x = " + "(" * 5000, 1, None, ""),
+    ("x = " + "-" * 100_000 + "1", 1, None, ""),
+    ("x = 1", 1, 1, "no function 'reward_function'"),
+    ("x = 1\ndef reward_fuction(params):\n    return 1.0", 2, 1, "Did you mean 'reward_fuction'?"),
+    ("if True:\n    def reward_function(params):\n        return 1.0", 1, 1, "top level"),
+    ("class A:\n    def reward_function(self, params):\n        return 1.0", 1, 1, "top level"),
+    (body(RETURN) + body(RETURN), 3, 1, "defined again"),
+    ("async " + body(RETURN), 1, 1, "async"),
+    ("def reward_function():\n    return 1.0", 1, 1, "has 0 parameters"),
+    ("def reward_function(self, params):\n    return 1.0", 1, 1, "has 2 parameters"),
+    ("def reward_function(params, speed=1):\n    return 1.0", 1, 1, "has 2 parameters"),
+    ("def reward_function(*params):\n    return 1.0", 1, 1, "expected exactly one"),
+    ("def reward_function(*, params):\n    return 1.0", 1, 1, "expected exactly one"),
+    ("def reward_function(**params):\n    return 1.0", 1, 1, "expected exactly one"),
+    (body("x = 1"), 1, 1, "never returns"),
+    (body("pass"), 1, 1, "never returns"),
+    (body("return"), 1, 1, "never returns"),
+    (body("def inner():", "    return 1", "inner()"), 1, 1, "never returns"),
+    (body("yield 1.0"), 2, 5, "yield"),
+    (body("return 'fast'"), 2, 5, "type str"),
+    (body("import os", RETURN), 2, 5, "'import os'"),
+    ("import os\n" + body(RETURN), 1, 1, "'import os'"),
+    ("import math, subprocess as s\n" + body(RETURN), 1, 1, "'import subprocess'"),
+    ("import os.path\n" + body(RETURN), 1, 1, "'import os.path'"),
+    ("from os import path\n" + body(RETURN), 1, 1, "'import os'"),
+    ("from . import mine\n" + body(RETURN), 1, 1, "relative"),
+    ("import nunpy as np\n" + body(RETURN), 1, 1, "Did you mean 'numpy'?"),
+    ("import torch\n" + body(RETURN), 1, 1, "Allowed are math"),
+    ("import scipy.io\n" + body(RETURN), 1, 1, "reads or writes files"),
+    ("from scipy import io\n" + body(RETURN), 1, 1, "'scipy.io'"),
+    ("from numpy import load\n" + body(RETURN), 1, 1, "'numpy.load'"),
+    ("import numpy as np\nx = np.load('x')\n" + body(RETURN), 2, 5, "'numpy.load' reads or writes files"),
+    ("import numpy\nx = numpy.lib.npyio.load\n" + body(RETURN), 2, 5, "not allowed"),
+    (body("import numpy as np", "np.savetxt('x', [1])", RETURN), 3, 5, "numpy.savetxt"),
+    ("import numpy as np\nnp.zeros(3).tofile('x')\n" + body(RETURN), 2, 1, "tofile"),
+    ("import random\nrandom._os.system('x')\n" + body(RETURN), 2, 1, "'random._os'"),
+    ("from random import _os\n" + body(RETURN), 1, 1, "'random._os'"),
+    (body("open('x')", RETURN), 2, 5, "'open'"),
+    (body("eval('1')", RETURN), 2, 5, "'eval'"),
+    (body("f = exec", RETURN), 2, 9, "'exec'"),
+    (body("compile('1', '', 'exec')", RETURN), 2, 5, "'compile'"),
+    (body("input()", RETURN), 2, 5, "'input'"),
+    (body("__import__('os')", RETURN), 2, 5, "'__import__'"),
+    (body("x = __builtins__", RETURN), 2, 9, "'__builtins__'"),
+    (body("x = ().__class__.__bases__", RETURN), 2, 9, "'.__bases__'"),
+    (body("x = getattr(params, '__globals__')", RETURN), 2, 9, "'.__globals__'"),
+    (body("exit()", RETURN), 2, 5, "'exit'"),
+    (body("return params['speeed']"), 2, 19, "Did you mean 'speed'?"),
+    (body("return params['Speed'] + params['on_track']"), 2, 19, "no key 'Speed'"),
+    (body("return params['zzz']"), 2, 19, "The keys are all_wheels_on_track"),
+    (
+        "def help_me(params):\n    return params['progres']\n" + body("return help_me(params)"),
+        2,
+        19,
+        "'progress'",
+    ),
+    (body("reward = 1.0", "return rewrad"), 3, 12, "'rewrad' is not defined. Did you mean 'reward'?"),
+    (body("return math.pi"), 2, 12, "'math' is not defined"),
+    (body("return [y for x in range(3)][0]"), 2, 13, "'y' is not defined"),
+    ("x = undefined_thing\n" + body(RETURN), 1, 5, "'undefined_thing' is not defined"),
+]
+
+
+@pytest.mark.parametrize(("source", "line", "column", "text"), ERRORS, ids=range(len(ERRORS)))
+def test_errors_have_a_place(source, line, column, text):
+    errors = [problem for problem in check_reward(source) if problem.severity == "error"]
+    assert errors
+    first = errors[0]
+    assert text in str(first)
+    assert first.line == line
+    assert first.column == column or column is None
+    with pytest.raises(RewardError) as caught:
+        validate_reward(source)
+    assert (caught.value.line, caught.value.column) == (first.line, first.column)
+    assert f"line {line}" in str(caught.value)
+
+
+WARNINGS = [
+    (body("if params['speed'] > 1:", "    return 1.0"), 1, "can reach its end without"),
+    (body("if params['speed'] > 1:", "    return None", RETURN), 3, "returns None"),
+    (body("for x in [1]:", "    return 1.0"), 1, "can reach its end"),
+    (body("try:", "    return 1.0", "except KeyError:", "    pass"), 1, "can reach its end"),
+    (body("while True:", "    if params['x']: break", "    return 1.0"), 1, "can reach its end"),
+    (body("match params['x']:", "    case 1: return 1.0"), 1, "can reach its end"),
+    (body("return params.get('speeed', 1.0)"), 2, "Did you mean 'speed'?"),
+    (body("try:", "    return params['speeed']", "except KeyError:", "    return 1.0"), 3, "no key 'speeed'"),
+    (body("import time", "return time.time()"), 3, "clock on the wall"),
+    ("import numpy as np\nrng = np.random.default_rng()\n" + body(RETURN), 2, "without a seed"),
+    (body("return 1.0 if params['x'] is 1 else 2.0"), 2, '"is" with'),
+    (body(r"x = '\d'", RETURN), 2, "invalid escape sequence"),
+]
+
+
+@pytest.mark.parametrize(("source", "line", "text"), WARNINGS, ids=range(len(WARNINGS)))
+def test_warnings_pass_validation(source, line, text):
+    problems = check_reward(source)
+    assert [problem.severity for problem in problems] == ["warning"]
+    assert problems[0].line == line
+    assert text in str(problems[0])
+    validate_reward(source)
+
+
+FINE = [
+    body(RETURN),
+    body("return int(params['speed'] > 1)"),
+    body("payload = 3.0", "saved_speed = payload", "return saved_speed"),
+    body("load = {'x': 1.0}", "save = load", "return save['x']"),
+    body("return TABLE.load", top="class TABLE:\n    load = 1.0\n"),
+    body("return TABLE.tofile()", top="class Table:\n    def tofile(self): return 1.0\nTABLE = Table()\n"),
+    body("import math", "import numpy as np", "from scipy.spatial import distance", "return math.pi"),
+    body("return float(np.linalg.norm([1]))", top="import numpy as np\n"),
+    body("return next(itertools.count())", top="import itertools, collections, functools, statistics, bisect\n"),
+    body("return json.loads('1')", top="import json\n"),
+    body("def open(x): return x", "return open(1.0)"),
+    body("input = 3.0", "return input"),
+    body("return re.compile('1').pattern == '1'", top="import re\n"),
+    body("pattern = params['x']", "return pattern.eval if False else 1.0"),
+    body("return sqrt(2)", top="from math import *\n"),
+    body("raise ValueError('not written yet')"),
+    body("if params['x']:", "    return 1.0", "else:", "    return 2.0"),
+    body("while True:", "    return 1.0"),
+    body("with A() as a:", "    return a", top="class A:\n    __enter__ = __exit__ = None\n"),
+    body("try:", "    return 1.0", "except KeyError:", "    return 2.0"),
+    body("try:", "    x = 1", "finally:", "    return 2.0"),
+    body("match params['x']:", "    case 1: return 1.0", "    case _: return 2.0"),
+    body("params['mine'] = 1.0", "return params['mine']"),
+    body("params = dict(params)", "return params['anything']"),
+    body("params.update(a=1)", "return params['a']"),
+    body("return params['sim_time'] if 'on_track' not in params else params['on_track']"),
+    body("return params.get('speed')"),
+    "def reward_function(p, /):\n    return p['speed']",
+    body("global last", "last = 1.0", "return last"),
+    body("return (lambda a, *b, **c: a)(1.0)"),
+    body("return sum(x for x in range(3) if x)"),
+    body("if __name__ == '__main__': return 1.0", "return 2.0"),
+    body("try:", "    return 1 / 0", "except ZeroDivisionError as error:", "    print(error)", "    return 0.0"),
+    body("if (n := len(params)) > 1: return n", RETURN),
+    body(
+        "return A().b",
+        top="class A:\n    def __init__(self):\n        super().__init__()\n        self.b = 1.0\n",
+    ),
+    body("return float(type(params).__name__ == params.__class__.__name__)"),
+    body("del params['x']", RETURN),
+    "from __future__ import annotations\n" + body(RETURN),
+    "# -*- coding: utf-8 -*-\n'''Grüße'''\n" + body(RETURN) + "print(reward_function({}))\n",
+    body(RETURN).replace("\n", "\r\n"),
+    body(RETURN).replace("    ", "\t"),
+]
+
+
+@pytest.mark.parametrize("source", FINE, ids=range(len(FINE)))
+def test_no_false_alarms(source):
+    assert check_reward(source) == []
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_presets_are_clean(name):
+    assert check_reward(load_preset(name)) == []
+
+
+def test_all_errors_are_counted():
+    with pytest.raises(RewardError, match=r"\(2 more\)"):
+        validate_reward("import os\nimport sys\n" + body("return params['speeed']"))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.text(max_size=200))
+def test_any_text_gives_problems_and_never_an_exception(text):
+    for problem in check_reward(text):
+        assert problem.line >= 1
+        assert problem.column >= 1
+
+
+STATEFUL = [
+    body("global last", "last = 1.0", "return last"),
+    body("memory['x'] = 1.0", RETURN, top="memory = {}\n"),
+    body("memory.append(1.0)", RETURN, top="memory = []\n"),
+    body("Memory.last = 1.0", RETURN, top="class Memory:\n    last = 0.0\n"),
+    body(
+        "return reward.step()",
+        top="class R:\n    def step(self):\n        self.n = 1\n        return 1.0\nreward = R()\n",
+    ),
+]
+STATELESS = [
+    body("x = []", "x.append(1)", "params['x'] = 2", RETURN),
+    body("return A(1).x", top="class A:\n    def __init__(self, x):\n        self.x = x\n"),
+    body("memory = {}", "memory['x'] = 1", RETURN),
+    body("return LINE[0]", top="LINE = []\nLINE.append(1.0)\n"),
+    *(load_preset(name) for name in preset_names()),
+]
+
+
+@pytest.mark.parametrize("source", STATEFUL, ids=range(len(STATEFUL)))
+def test_state_is_seen(source):
+    assert keeps_state(source)
+
+
+@pytest.mark.parametrize("source", STATELESS, ids=range(len(STATELESS)))
+def test_no_state_is_seen_where_there_is_none(source):
+    assert not keeps_state(source)
