@@ -1,241 +1,394 @@
 #include "camera_kernel.hpp"
 
-#if defined(__AVX2__)
-#include <immintrin.h>
-#endif
-
-#if defined(__GNUC__) && !defined(__clang__)
-// GCC 12's own AVX-512 header leaves pass-through operands undefined on purpose and then warns of it.
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
+#include "lanes.hpp"
 
 namespace racecraft::RC_ISA {
 namespace {
 
-constexpr int kBlock = 64;  // sample rows that are set up together
+constexpr int kBlock = 64;             // sample rows that are set up together
+constexpr float kFixedOne = 65536.0f;  // a texel in 16.16 fixed point
 
 // The walks of a block of sample rows: everything that needs floating point, done for all rows at once.
 struct Block {
-    float x[kBlock], y[kBlock], step_x[kBlock], step_y[kBlock];  // m
-    int32_t begin[kBlock], end[kBlock];                          // pixels inside the room
+    int32_t begin[kBlock], end[kBlock];  // pixels inside the room
+    int32_t level[kBlock];
+    float scale[kBlock];                                   // texels per metre of the level
+    int32_t u[kBlock], v[kBlock], du[kBlock], dv[kBlock];  // GroundWalk
 };
 
+// plane_scale stretches the walks of the ground to another horizontal plane.
 void set_up(const CameraView& camera, const GroundView& ground, const LensPose& lens, int first, int count,
             float plane_scale, Block& block) {
+    for (int i = 0; i < count; ++i) {
+        block.level[i] = clamp(camera.exponent[first + i] - ground.exponent, 0, ground.num_levels - 1);
+        block.scale[i] = ground.levels[block.level[i]].texels_per_metre * kFixedOne;
+    }
     const float right_x = lens.sine;
     const float right_y = -lens.cosine;
+    constexpr float limit = 2.0e9f;
+#pragma GCC ivdep
     for (int i = 0; i < count; ++i) {
         const float ahead = camera.distance[first + i] * plane_scale;
         const float start = camera.start[first + i] * plane_scale;
         const float step = camera.step[first + i] * plane_scale;
-        block.x[i] = lens.x + ahead * lens.cosine + start * right_x;
-        block.y[i] = lens.y + ahead * lens.sine + start * right_y;
-        block.step_x[i] = step * right_x;
-        block.step_y[i] = step * right_y;
-        const PixelSpan span =
-            clip_walk(ground, block.x[i], block.y[i], block.step_x[i], block.step_y[i], camera.spec.width);
+        const float x = lens.x + ahead * lens.cosine + start * right_x;
+        const float y = lens.y + ahead * lens.sine + start * right_y;
+        const PixelSpan span = clip_walk(ground, x, y, step * right_x, step * right_y, camera.spec.width);
+        // The ring of one texel is where a level's texels begin.
+        const float u = (x - ground.min_x) * block.scale[i] + kFixedOne;
+        const float v = (y - ground.min_y) * block.scale[i] + kFixedOne;
+        const int32_t is_usable =
+            static_cast<int32_t>(abs_of(u) < limit) & static_cast<int32_t>(abs_of(v) < limit);
         block.begin[i] = span.begin;
-        block.end[i] = span.end;
+        block.end[i] = is_usable != 0 ? span.end : span.begin;
+        block.u[i] = static_cast<int32_t>(clamp(u, -limit, limit));
+        block.v[i] = static_cast<int32_t>(clamp(v, -limit, limit));
+        block.du[i] = static_cast<int32_t>(clamp(step * right_x * block.scale[i], -limit, limit));
+        block.dv[i] = static_cast<int32_t>(clamp(step * right_y * block.scale[i], -limit, limit));
     }
 }
 
-struct LevelWalk {
-    const uint32_t* texels;
-    int32_t tiles_per_row;
-    GroundWalk walk;
-};
-
-void add_constant(int32_t* sums, int begin, int end, int32_t value) {
-    for (int i = begin; i < end; ++i) sums[i] += value;
+// Half of a signed step of a walk.
+uint32_t half(uint32_t step) {
+    return static_cast<uint32_t>(static_cast<int32_t>(step) >> 1);
 }
 
-// Adds a ground sample to the sums of pixels [begin, end). Each instruction set computes exactly shade_edge()
-// or shade_coverage() of ground.hpp; the portable code *is* these functions.
-#if defined(__AVX512VNNI__)
+// Distance of a border from a position, brightness after it, for every pixel of a walk. The lanes compute
+// exactly what the scalar code says with the functions of ground.hpp.
+//
+// add_ground() adds a sample to the sums of the pixels of a span, one row of `stride` sums per channel.
+// store_ground() writes a whole row of one sample and one channel. There, close to the lens, pixels are much
+// smaller than texels: two neighbours share the texel under their common edge, which halves the fetches.
+#if defined(RC_HAS_LANES)
 
-struct Lanes {
-    __m512i u, v;
+struct WalkLanes {
+    Lanes u, v, du, dv;
 };
 
-inline __m512i fetch(const GroundLevel& level, const uint32_t* texels, __m512i u, __m512i v, __mmask16 mask) {
-    const __m512i column = _mm512_srli_epi32(u, 16);
-    const __m512i row = _mm512_srli_epi32(v, 16);
-    const __m512i tile = _mm512_add_epi32(
-        _mm512_mullo_epi32(_mm512_srli_epi32(row, 2), _mm512_set1_epi32(level.tiles_per_row)),
-        _mm512_srli_epi32(column, 2));
-    const __m512i three = _mm512_set1_epi32(3);
-    __m512i index = _mm512_slli_epi32(tile, 4);
-    index = _mm512_or_si512(index, _mm512_slli_epi32(_mm512_and_si512(row, three), 2));
-    index = _mm512_or_si512(index, _mm512_and_si512(column, three));
-    return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), mask, index, texels + level.offset, 4);
+RC_HD WalkLanes start_walk(uint32_t u, uint32_t v, uint32_t du, uint32_t dv) {
+    const Lanes lane = lane_numbers();
+    return {splat(static_cast<int32_t>(u)) + lane * splat(static_cast<int32_t>(du)),
+            splat(static_cast<int32_t>(v)) + lane * splat(static_cast<int32_t>(dv)),
+            splat(static_cast<int32_t>(du * Lanes::kCount)), splat(static_cast<int32_t>(dv * Lanes::kCount))};
 }
 
-static void add_ground(const GroundView& ground, int level_index, const GroundWalk& walk, int32_t sharpness,
-                       const ShadeTable* tables, int num_channels, int begin, int end, int32_t* sums,
-                       int stride) {
-    const GroundLevel& level = ground.levels[level_index];
-    const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    const __m512i first = _mm512_add_epi32(_mm512_set1_epi32(begin), lane);
-    __m512i u = _mm512_add_epi32(_mm512_set1_epi32(static_cast<int>(walk.u)),
-                                 _mm512_mullo_epi32(first, _mm512_set1_epi32(static_cast<int>(walk.du))));
-    __m512i v = _mm512_add_epi32(_mm512_set1_epi32(static_cast<int>(walk.v)),
-                                 _mm512_mullo_epi32(first, _mm512_set1_epi32(static_cast<int>(walk.dv))));
-    const __m512i du = _mm512_set1_epi32(static_cast<int>(walk.du << 4));
-    const __m512i dv = _mm512_set1_epi32(static_cast<int>(walk.dv << 4));
-    for (int i = begin; i < end; i += 16) {
-        const int left = end - i;
-        const __mmask16 mask = static_cast<__mmask16>(left >= 16 ? 0xffff : (1 << left) - 1);
-        const __m512i texel = fetch(level, ground.texels, u, v, mask);
-        if (level_index == 0) {
-            const __m512i byte = _mm512_set1_epi32(255);
-            __m512i position = _mm512_and_si512(_mm512_srli_epi32(u, 8), byte);
-            position = _mm512_or_si512(position, _mm512_and_si512(v, _mm512_set1_epi32(0xff00)));
-            position = _mm512_or_si512(position, _mm512_set1_epi32(kEdgeOffsetScale << 16));
-            const __m512i distance = _mm512_dpbusd_epi32(_mm512_setzero_si512(), position, texel);
-            __m512i ramp = _mm512_srai_epi32(_mm512_mullo_epi32(distance, _mm512_set1_epi32(sharpness)), 16);
-            ramp = _mm512_add_epi32(ramp, _mm512_set1_epi32(kCoverageUnit / 2));
-            ramp = _mm512_min_epi32(_mm512_max_epi32(ramp, _mm512_setzero_si512()),
-                                    _mm512_set1_epi32(kCoverageUnit));
-            const __m512i mix =
-                _mm512_or_si512(_mm512_slli_epi32(ramp, 16), _mm512_set1_epi32(kCoverageUnit));
-            const __m512i pair = _mm512_srli_epi32(texel, 24);
-            for (int c = 0; c < num_channels; ++c) {
-                const __m512i blend = _mm512_broadcast_i64x4(
-                    _mm256_loadu_si256(reinterpret_cast<const __m256i*>(tables[c].blend)));
-                const __m512i value = _mm512_madd_epi16(_mm512_permutexvar_epi32(pair, blend), mix);
-                int32_t* target = sums + c * stride + i;
-                _mm512_mask_storeu_epi32(target, mask,
-                                         _mm512_add_epi32(_mm512_maskz_loadu_epi32(mask, target), value));
+// texel_index() less the level's offset: tile row, tile column, then row and column in the tile.
+RC_HD Lanes index_lanes(Lanes u, Lanes v, Lanes tile_row) {
+    const Lanes in_tile_row = (shift_right(u, 14) & splat(~15)) | (shift_right(v, 14) & splat(12)) |
+                              (shift_right(u, 16) & splat(3));
+    return shift_right(v, 18) * tile_row + in_tile_row;
+}
+
+RC_HD Lanes distance_lanes(Lanes texel, Lanes u, Lanes v) {
+    const Lanes position =
+        (shift_right(u, 8) & splat(255)) | (v & splat(255 << 8)) | splat(kEdgeOffsetScale << 16);
+    return dot_bytes(position, texel);
+}
+
+// The second factor of shade_edge()'s blend: coverage above the border and the unit.
+RC_HD Lanes coverage_lanes(Lanes distance, Lanes sharpness) {
+    const Lanes ramp = shift_right_signed(distance * sharpness, 16) + splat(kCoverageUnit / 2);
+    return shift_left(clamp_lanes(ramp, splat(0), splat(kCoverageUnit)), 16) | splat(kCoverageUnit);
+}
+
+template <int kChannels, bool kIsEdge>
+void add_ground(const GroundView& ground, const GroundLevel& level, const GroundWalk& walk, int32_t sharpness,
+                const ShadeTable* tables, PixelSpan span, int32_t* sums, int stride) {
+    const uint32_t begin = static_cast<uint32_t>(span.begin);
+    WalkLanes at = start_walk(walk.u + begin * walk.du, walk.v + begin * walk.dv, walk.du, walk.dv);
+    const Lanes tile_row = splat(level.tiles_per_row * 16);
+    const Lanes sharp = splat(sharpness);
+    for (int i = span.begin; i < span.end; i += Lanes::kCount) {
+        const LaneMask mask = first_lanes(span.end - i);
+        const Lanes texel = gather(ground.texels + level.offset, index_lanes(at.u, at.v, tile_row), mask);
+        if constexpr (kIsEdge) {
+            const Lanes mix = coverage_lanes(distance_lanes(texel, at.u, at.v), sharp);
+            const Lanes pair = shift_right(texel, 24);
+            for (int c = 0; c < kChannels; ++c) {
+                add_to(sums + c * stride + i, dot_halves(look_up(tables[c].blend, pair), mix), mask);
             }
         } else {
-            for (int c = 0; c < num_channels; ++c) {
-                int32_t* target = sums + c * stride + i;
-                const __m512i value =
-                    _mm512_dpbusd_epi32(_mm512_maskz_loadu_epi32(mask, target),
-                                        _mm512_set1_epi32(static_cast<int>(tables[c].weights)), texel);
-                _mm512_mask_storeu_epi32(target, mask, value);
+            for (int c = 0; c < kChannels; ++c) {
+                add_to(sums + c * stride + i,
+                       dot_bytes(splat(static_cast<int32_t>(tables[c].weights)), texel), mask);
             }
         }
-        u = _mm512_add_epi32(u, du);
-        v = _mm512_add_epi32(v, dv);
+        at.u = at.u + at.du;
+        at.v = at.v + at.dv;
     }
+}
+
+void store_ground(const GroundView& ground, const GroundWalk& walk, int32_t sharpness,
+                  const ShadeTable& table, int width, uint8_t* line) {
+    const GroundLevel& level = ground.levels[0];
+    // Positions midway between the pixels of a pair, and half a pixel in 1/256 texel.
+    WalkLanes at = start_walk(walk.u + half(walk.du), walk.v + half(walk.dv), 2 * walk.du, 2 * walk.dv);
+    const int32_t half_x = static_cast<int32_t>(walk.du) >> 9;
+    const int32_t half_y = static_cast<int32_t>(walk.dv) >> 9;
+    // Bytes of dot_bytes() are unsigned on this side: shift the step by 128 and take the same off again.
+    const Lanes step = splat(((half_y + 128) << 8) | (half_x + 128));
+    const Lanes origin = splat((128 << 8) | 128);
+    const Lanes tile_row = splat(level.tiles_per_row * 16);
+    const Lanes sharp = splat(sharpness);
+    for (int i = 0; i < width; i += 2 * Lanes::kCount) {
+        const Lanes texel = gather_all(ground.texels + level.offset, index_lanes(at.u, at.v, tile_row));
+        const Lanes distance = distance_lanes(texel, at.u, at.v);
+        const Lanes growth = dot_bytes(step, texel) - dot_bytes(origin, texel);
+        const Lanes blend = look_up(table.blend, shift_right(texel, 24));
+        const Lanes left =
+            dot_halves(blend, coverage_lanes(distance - growth, sharp)) + splat(kCoverageUnit / 2);
+        const Lanes right =
+            dot_halves(blend, coverage_lanes(distance + growth, sharp)) + splat(kCoverageUnit / 2);
+        store_halves(line + i, shift_right(left, 6) | shift_left(shift_right(right, 6), 8));
+        at.u = at.u + at.du;
+        at.v = at.v + at.dv;
+    }
+}
+
+// Adds values[i] * factor to the sums of a span.
+void add_values(int32_t* sums, const int32_t* values, int32_t factor, int begin, int end) {
+    for (int i = begin; i < end; i += Lanes::kCount) {
+        add_to(sums + i, load(values + i) * splat(factor), first_lanes(end - i));
+    }
+}
+
+void add_constant(int32_t* sums, int32_t value, int begin, int end) {
+    for (int i = begin; i < end; i += Lanes::kCount) add_to(sums + i, splat(value), first_lanes(end - i));
 }
 
 #else
 
-static void add_ground(const GroundView& ground, int level_index, const GroundWalk& walk, int32_t sharpness,
-                       const ShadeTable* tables, int num_channels, int begin, int end, int32_t* sums,
-                       int stride) {
-    const GroundLevel& level = ground.levels[level_index];
-    uint32_t u = walk.u + static_cast<uint32_t>(begin) * walk.du;
-    uint32_t v = walk.v + static_cast<uint32_t>(begin) * walk.dv;
-    for (int i = begin; i < end; ++i) {
+template <int kChannels, bool kIsEdge>
+void add_ground(const GroundView& ground, const GroundLevel& level, const GroundWalk& walk, int32_t sharpness,
+                const ShadeTable* tables, PixelSpan span, int32_t* sums, int stride) {
+    uint32_t u = walk.u + static_cast<uint32_t>(span.begin) * walk.du;
+    uint32_t v = walk.v + static_cast<uint32_t>(span.begin) * walk.dv;
+    for (int i = span.begin; i < span.end; ++i) {
         const uint32_t texel = ground.texels[texel_index(level, u, v)];
-        for (int c = 0; c < num_channels; ++c) {
-            sums[c * stride + i] += level_index == 0 ? shade_edge(texel, u, v, sharpness, tables[c].blend)
-                                                     : shade_coverage(texel, tables[c].weights);
+        for (int c = 0; c < kChannels; ++c) {
+            sums[c * stride + i] +=
+                kIsEdge ? shade_edge(texel, edge_distance(texel, u, v), sharpness, tables[c].blend)
+                        : shade_coverage(texel, tables[c].weights);
         }
         u += walk.du;
         v += walk.dv;
     }
 }
 
-#endif
-
-// Walls over [begin, end) less [hole_begin, hole_end), each in its own shade.
-void add_walls(const CameraView& camera, int sample, const WallSpan* walls, int num_walls,
-               const ShadeTable& table, PixelSpan range, PixelSpan hole, int32_t* sums) {
-    for (int w = 0; w < num_walls; ++w) {
-        const float middle = camera.corner_start[sample];
-        const float scale = camera.corner_scale[sample];
-        const int left = max_of(pixel_of_slope(middle, scale, walls[w].left, camera.spec.width), range.begin);
-        const int right = min_of(pixel_of_slope(middle, scale, walls[w].right, camera.spec.width), range.end);
-        add_constant(sums, left, min_of(right, hole.begin), table.wall[walls[w].wall]);
-        add_constant(sums, max_of(left, hole.end), right, table.wall[walls[w].wall]);
+void store_ground(const GroundView& ground, const GroundWalk& walk, int32_t sharpness,
+                  const ShadeTable& table, int width, uint8_t* line) {
+    uint32_t u = walk.u + half(walk.du);
+    uint32_t v = walk.v + half(walk.dv);
+    const int32_t half_x = static_cast<int32_t>(walk.du) >> 9;
+    const int32_t half_y = static_cast<int32_t>(walk.dv) >> 9;
+    for (int i = 0; i < width; i += 2) {
+        const uint32_t texel = ground.texels[texel_index(ground.levels[0], u, v)];
+        const int32_t distance = edge_distance(texel, u, v);
+        const int32_t growth = edge_growth(texel, half_x, half_y);
+        const int32_t left = shade_edge(texel, distance - growth, sharpness, table.blend);
+        const int32_t right = shade_edge(texel, distance + growth, sharpness, table.blend);
+        line[i] = static_cast<uint8_t>((left + kCoverageUnit / 2) >> 6);
+        line[i + 1] = static_cast<uint8_t>((right + kCoverageUnit / 2) >> 6);
+        u += 2 * walk.du;
+        v += 2 * walk.dv;
     }
 }
 
-int32_t fixed_point(float texels) {
-    return static_cast<int32_t>(floor_of(texels * 65536.0f + 0.5f));
+void add_values(int32_t* sums, const int32_t* values, int32_t factor, int begin, int end) {
+    for (int i = begin; i < end; ++i) sums[i] += values[i] * factor;
+}
+
+void add_constant(int32_t* sums, int32_t value, int begin, int end) {
+    for (int i = begin; i < end; ++i) sums[i] += value;
+}
+
+#endif
+
+void fill(int32_t* values, int32_t value, int begin, int end) {
+    for (int i = begin; i < end; ++i) values[i] = value;
+}
+
+// Draws one view, row by row. Sums of brightness times 64 gather a row's samples.
+template <int kChannels>
+class Painter {
+  public:
+    Painter(const CameraView& camera, const GroundView& ground, const ShadeTable* tables,
+            const LensPose& lens)
+        : camera_(camera),
+          ground_(ground),
+          tables_(tables),
+          width_(camera.spec.width),
+          stride_((camera.spec.width + 15) / 16 * 16),
+          is_above_walls_(camera.spec.above >= kWallHeight),
+          num_walls_(walls_in_view(ground, lens, walls_)) {}
+
+    // begin is the row's first sample; its walks start at index i of block (and of upper, their counterparts
+    // in the plane of the walls' upper edge, used only from above it).
+    void draw_row(int row, int begin, int samples, const Block& block, const Block& upper, int i,
+                  uint8_t* line) {
+        if (samples == 1 && kChannels == 1 && can_store(begin, block, i)) {
+            store_ground(ground_, walk_of(block, i), sharpness_of(begin), tables_[0], width_, line);
+            return;
+        }
+        for (int k = 0; k < kChannels * stride_; ++k) sums_[k] = 0;
+        bool has_walls = false;
+        int bare = 0;  // samples that show nothing but walls
+        for (int k = 0; k < samples; ++k) {
+            const PixelSpan inside = {block.begin[i + k], block.end[i + k]};
+            const uint8_t kind = camera_.kind[begin + k];
+            if (kind == kSampleGround && inside.begin < inside.end) add_walk(begin + k, block, i + k, inside);
+            if (kind != kSampleWall && inside.begin == 0 && inside.end == width_) {
+                if (kind == kSampleSky) add_all(0, width_, &ShadeTable::sky);
+                continue;
+            }
+            if (is_above_walls_ && kind != kSampleGround) {
+                add_all(0, width_, &ShadeTable::sky);
+                continue;
+            }
+            if (!has_walls) find_walls(row);
+            has_walls = true;
+            if (is_above_walls_) {
+                add_from_above(inside, {upper.begin[i + k], upper.end[i + k]});
+            } else if (kind == kSampleWall || inside.begin >= inside.end) {
+                ++bare;
+            } else {
+                if (kind == kSampleSky) add_all(inside.begin, inside.end, &ShadeTable::sky);
+                add_walls(0, inside.begin);
+                add_walls(inside.end, width_);
+            }
+        }
+        for (int c = 0; bare > 0 && c < kChannels; ++c) {
+            add_values(sums_ + c * stride_, wall_row_ + c * stride_, bare, 0, width_);
+        }
+        store_row(samples, line);
+    }
+
+  private:
+    static GroundWalk walk_of(const Block& block, int i) {
+        return {static_cast<uint32_t>(block.u[i]), static_cast<uint32_t>(block.v[i]),
+                static_cast<uint32_t>(block.du[i]), static_cast<uint32_t>(block.dv[i])};
+    }
+
+    int32_t sharpness_of(int sample) const {
+        return static_cast<int32_t>(min_of(camera_.sharpness[sample] * ground_.texel, 32767.0f));
+    }
+
+    // Whether store_ground() may draw the row: all ground, and pixels small against an edge texel.
+    bool can_store(int sample, const Block& block, int i) const {
+        constexpr float largest_step = 0.35f;  // texels
+        return camera_.kind[sample] == kSampleGround && block.begin[i] == 0 && block.end[i] == width_ &&
+               block.level[i] == 0 && width_ % 32 == 0 && camera_.step[sample] < largest_step * ground_.texel;
+    }
+
+    void add_walk(int sample, const Block& block, int i, PixelSpan inside) {
+        const GroundLevel& level = ground_.levels[block.level[i]];
+        if (block.level[i] == 0) {
+            add_ground<kChannels, true>(ground_, level, walk_of(block, i), sharpness_of(sample), tables_,
+                                        inside, sums_, stride_);
+        } else {
+            add_ground<kChannels, false>(ground_, level, walk_of(block, i), 0, tables_, inside, sums_,
+                                         stride_);
+        }
+    }
+
+    // Around the ground: walls within the opening between their upper edges, the world outside beyond it.
+    void add_from_above(PixelSpan inside, PixelSpan opening) {
+        if (inside.begin < inside.end) {
+            opening = {min_of(opening.begin, inside.begin), max_of(opening.end, inside.end)};
+        } else {
+            inside = {opening.end, opening.end};
+        }
+        add_all(0, opening.begin, &ShadeTable::outside);
+        add_walls(opening.begin, inside.begin);
+        add_walls(inside.end, opening.end);
+        add_all(opening.end, width_, &ShadeTable::outside);
+    }
+
+    void add_all(int begin, int end, int32_t ShadeTable::* shade) {
+        for (int c = 0; c < kChannels; ++c) add_constant(sums_ + c * stride_, tables_[c].*shade, begin, end);
+    }
+
+    void add_walls(int begin, int end) {
+        for (int c = 0; c < kChannels; ++c)
+            add_values(sums_ + c * stride_, wall_row_ + c * stride_, 1, begin, end);
+    }
+
+    // What the row would show if there were only walls; a corner's pixel is a mixture of both walls.
+    void find_walls(int row) {
+        const float middle = 0.5f * static_cast<float>(width_);
+        const float scale = camera_.corner_scale[row];
+        for (int c = 0; c < kChannels; ++c) {
+            int32_t* values = wall_row_ + c * stride_;
+            int x = 0;
+            for (int w = 0; w < num_walls_; ++w) {
+                const int32_t shade = tables_[c].wall[walls_[w].wall];
+                if (w + 1 == num_walls_) {
+                    fill(values, shade, x, width_);
+                    break;
+                }
+                const float edge = clamp(middle + scale * walls_[w].right, 0.0f, static_cast<float>(width_));
+                const int pixel = static_cast<int>(edge);
+                const int32_t share = static_cast<int32_t>((edge - static_cast<float>(pixel)) * 64.0f);
+                const int32_t next = tables_[c].wall[walls_[w + 1].wall];
+                fill(values, shade, x, pixel);
+                values[pixel] = (shade * share + next * (64 - share)) >> 6;
+                x = max_of(x, pixel + 1);
+            }
+        }
+    }
+
+    void store_row(int samples, uint8_t* line) const {
+        const int shift = samples == 1 ? 6 : samples == 2 ? 7 : samples == 4 ? 8 : 9;
+        const int32_t rounding = 1 << (shift - 1);
+        for (int c = 0; c < kChannels; ++c) {
+            for (int x = 0; x < width_; ++x) {
+                line[x * kChannels + c] = static_cast<uint8_t>((sums_[c * stride_ + x] + rounding) >> shift);
+            }
+        }
+    }
+
+    const CameraView& camera_;
+    const GroundView& ground_;
+    const ShadeTable* tables_;
+    int width_;
+    int stride_;  // of a channel in the arrays below
+    bool is_above_walls_;
+    WallSpan walls_[kNumWalls];
+    int num_walls_;
+    alignas(64) int32_t sums_[kChannels * (kMaxImageWidth + 16)];
+    alignas(64) int32_t wall_row_[kChannels * (kMaxImageWidth + 16)];
+};
+
+template <int kChannels>
+void render(const CameraView& camera, const GroundView& ground, const ShadeTable* tables,
+            const LensPose& lens, uint8_t* out) {
+    Painter<kChannels> painter(camera, ground, tables, lens);
+    const bool is_above_walls = camera.spec.above >= kWallHeight;
+    alignas(64) Block block;
+    alignas(64) Block upper;
+    for (int row = 0; row < camera.spec.height;) {
+        const int first = camera.row_begin[row];
+        int end = row + 1;
+        while (end < camera.spec.height && camera.row_begin[end + 1] - first <= kBlock) ++end;
+        const int count = camera.row_begin[end] - first;
+        set_up(camera, ground, lens, first, count, 1.0f, block);
+        if (is_above_walls) set_up(camera, ground, lens, first, count, camera.upper_scale, upper);
+        for (; row < end; ++row) {
+            const int begin = camera.row_begin[row];
+            painter.draw_row(row, begin, camera.row_begin[row + 1] - begin, block, upper, begin - first,
+                             out + static_cast<size_t>(row) * camera.spec.width * kChannels);
+        }
+    }
 }
 
 }  // namespace
 
 void render_room(const CameraView& camera, const GroundView& ground, const ShadeTable* tables,
                  int num_channels, const LensPose& lens, uint8_t* out) {
-    constexpr int kMaxChannels = 3;
-    alignas(64) int32_t sums[kMaxChannels * (kMaxImageWidth + 16)];
-    const int width = camera.spec.width;
-    const int stride = (width + 15) / 16 * 16;
-    const bool is_above_walls = camera.spec.above >= kWallHeight;
-    const PixelSpan all = {0, width};
-    WallSpan walls[kNumWalls];
-    const int num_walls = walls_in_view(ground, lens, walls);
-
-    alignas(64) Block block;
-    alignas(64) Block upper;  // in the plane of the walls' upper edge; used only from above it
-    int row = 0;
-    for (int first = 0; first < camera.num_samples; first += kBlock) {
-        const int count = min_of(kBlock, camera.num_samples - first);
-        set_up(camera, ground, lens, first, count, 1.0f, block);
-        if (is_above_walls) set_up(camera, ground, lens, first, count, camera.sky_scale, upper);
-        for (int i = 0; i < count; ++i) {
-            const int sample = first + i;
-            if (sample == camera.row_begin[row]) {
-                for (int k = 0; k < num_channels * stride; ++k) sums[k] = 0;
-            }
-            PixelSpan inside = {block.begin[i], block.end[i]};
-            if (camera.kind[sample] == kSampleWall) inside = {0, 0};
-            if (camera.kind[sample] == kSampleGround && inside.begin < inside.end) {
-                const int level = clamp(camera.exponent[sample] - ground.exponent, 0, ground.num_levels - 1);
-                const float scale = ground.levels[level].texels_per_metre;
-                const GroundWalk walk = {
-                    static_cast<uint32_t>(fixed_point((block.x[i] - ground.min_x) * scale + 1.0f)),
-                    static_cast<uint32_t>(fixed_point((block.y[i] - ground.min_y) * scale + 1.0f)),
-                    static_cast<uint32_t>(fixed_point(block.step_x[i] * scale)),
-                    static_cast<uint32_t>(fixed_point(block.step_y[i] * scale))};
-                const int32_t sharpness =
-                    static_cast<int32_t>(min_of(camera.sharpness[sample] * ground.texel, 32767.0f));
-                add_ground(ground, level, walk, sharpness, tables, num_channels, inside.begin, inside.end,
-                           sums, stride);
-            }
-            if (inside.begin > 0 || inside.end < width) {
-                for (int c = 0; c < num_channels; ++c) {
-                    int32_t* target = sums + c * stride;
-                    if (!is_above_walls) {
-                        add_walls(camera, sample, walls, num_walls, tables[c], all, inside, target);
-                        if (camera.kind[sample] == kSampleSky) {
-                            add_constant(target, inside.begin, inside.end, tables[c].sky);
-                        }
-                    } else if (camera.kind[sample] == kSampleGround) {
-                        PixelSpan opening = {min_of(upper.begin[i], inside.begin),
-                                             max_of(upper.end[i], inside.end)};
-                        if (inside.begin >= inside.end) opening = {upper.begin[i], upper.end[i]};
-                        add_walls(camera, sample, walls, num_walls, tables[c], opening, inside, target);
-                        add_constant(target, 0, opening.begin, tables[c].outside);
-                        add_constant(target, opening.end, width, tables[c].outside);
-                    } else {
-                        add_constant(target, 0, width, tables[c].sky);
-                    }
-                }
-            } else if (camera.kind[sample] == kSampleSky) {
-                for (int c = 0; c < num_channels; ++c)
-                    add_constant(sums + c * stride, 0, width, tables[c].sky);
-            }
-
-            if (sample + 1 == camera.row_begin[row + 1]) {
-                const int samples = camera.row_begin[row + 1] - camera.row_begin[row];
-                const int shift = samples == 1 ? 6 : samples == 2 ? 7 : samples == 4 ? 8 : 9;
-                uint8_t* line = out + static_cast<size_t>(row) * width * num_channels;
-                for (int c = 0; c < num_channels; ++c) {
-                    for (int x = 0; x < width; ++x) {
-                        line[x * num_channels + c] =
-                            static_cast<uint8_t>((sums[c * stride + x] + (1 << (shift - 1))) >> shift);
-                    }
-                }
-                ++row;
-            }
-        }
+    if (num_channels == 1) {
+        render<1>(camera, ground, tables, lens, out);
+    } else {
+        render<3>(camera, ground, tables, lens, out);
     }
 }
 

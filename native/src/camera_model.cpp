@@ -66,6 +66,7 @@ CameraModel::CameraModel(const CameraSpec& spec) {
     for (int32_t row = 0; row < spec.height; ++row) {
         const Ray middle = ray(static_cast<float>(row) + 0.5f);
         row_begin_.push_back(static_cast<int32_t>(kind_.size()));
+        corner_scale_.push_back(focal * max_of(middle.ahead, 0.01f));
         // How many samples: enough that none is much longer on the ground than wide.
         int32_t samples = kSkySamples;
         if (ray(static_cast<float>(row)).down > farthest_slope) {
@@ -104,8 +105,6 @@ CameraModel::CameraModel(const CameraSpec& spec) {
             start_.push_back(-middle_pixel * step);
             step_.push_back(step);
             sharpness_.push_back(filter > 0.0f ? 256.0f / filter : 0.0f);
-            corner_scale_.push_back(focal * r.ahead);
-            corner_start_.push_back(middle_pixel);
         }
     }
     row_begin_.push_back(static_cast<int32_t>(kind_.size()));
@@ -119,7 +118,6 @@ CameraModel::CameraModel(const CameraSpec& spec) {
              step_.data(),
              sharpness_.data(),
              corner_scale_.data(),
-             corner_start_.data(),
              (spec.above - kWallHeight) / spec.above};
 }
 

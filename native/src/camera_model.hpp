@@ -23,7 +23,7 @@ class CameraModel {
     std::vector<int32_t> row_begin_;
     std::vector<uint8_t> kind_;
     std::vector<int8_t> exponent_;
-    std::vector<float> distance_, start_, step_, sharpness_, corner_scale_, corner_start_;
+    std::vector<float> distance_, start_, step_, sharpness_, corner_scale_;
     CameraView view_{};
 };
 

@@ -127,6 +127,14 @@ double depth_in(const Dash& dash, Point p, Point& gradient) {
     return -outside;
 }
 
+bool has_corner(const Dash& dash, Point p, double reach) {
+    const double dx = p.x - dash.center.x;
+    const double dy = p.y - dash.center.y;
+    const double over_end = std::fabs(dx * dash.along.x + dy * dash.along.y) - dash.half_length;
+    const double over_side = std::fabs(dy * dash.along.x - dx * dash.along.y) - 0.5 * kDashWidth;
+    return std::fabs(over_end) < reach && std::fabs(over_side) < reach;
+}
+
 uint32_t pack(int x, int y, int offset, int pair) {
     return static_cast<uint32_t>(x & 255) | static_cast<uint32_t>(y & 255) << 8 |
            static_cast<uint32_t>(offset & 255) << 16 | static_cast<uint32_t>(pair) << 24;
@@ -164,14 +172,9 @@ uint32_t edge_texel(const Border& border, double texel) {
     return pack(x, y, std::clamp(offset, -127, 127), border.pair);
 }
 
-// Share of the unit square above the border of an edge texel (area of a square cut by a straight line).
-double share_above(uint32_t texel) {
-    const double x = static_cast<int8_t>(texel & 255);
-    const double y = static_cast<int8_t>(texel >> 8 & 255);
-    const double offset = static_cast<int8_t>(texel >> 16 & 255);
-    const double high = std::max(std::fabs(x), std::fabs(y)) * 256.0;
-    const double low = std::min(std::fabs(x), std::fabs(y)) * 256.0;
-    const double center = 127.5 * (x + y) + kEdgeOffsetScale * offset;
+// Share of the unit square above a straight line whose signed distance from the square's centre is `center`;
+// high and low are the larger and the smaller absolute component of its normal, in the same unit.
+double share_above(double center, double high, double low) {
     const double depth = std::fabs(center);
     const double reach = 0.5 * (high + low);
     double share = 1.0;
@@ -181,6 +184,44 @@ double share_above(uint32_t texel) {
         share = 1.0 - (reach - depth) * (reach - depth) / (2.0 * high * low);
     }
     return center < 0.0 ? 1.0 - share : share;
+}
+
+double share_above(uint32_t texel) {
+    const double x = static_cast<int8_t>(texel & 255);
+    const double y = static_cast<int8_t>(texel >> 8 & 255);
+    const double offset = static_cast<int8_t>(texel >> 16 & 255);
+    const double high = std::max(std::fabs(x), std::fabs(y)) * 256.0;
+    const double low = std::min(std::fabs(x), std::fabs(y)) * 256.0;
+    return share_above(127.5 * (x + y) + kEdgeOffsetScale * offset, high, low);
+}
+
+// The straight line that halves a texel around p as a corner of the dash does: same area, same direction.
+Border fit_corner(const Dash& dash, Point p, double texel) {
+    constexpr int kSide = 8;
+    double inside = 0.0;
+    Point sum{};
+    for (int i = 0; i < kSide * kSide; ++i) {
+        const double x = (i % kSide + 0.5) / kSide - 0.5;
+        const double y = (i / kSide + 0.5) / kSide - 0.5;
+        Point gradient;
+        if (depth_in(dash, {p.x + x * texel, p.y + y * texel}, gradient) > 0.0) {
+            inside += 1.0;
+            sum = {sum.x + x, sum.y + y};
+        }
+    }
+    const double size = std::sqrt(sum.x * sum.x + sum.y * sum.y);
+    const double share = inside / (kSide * kSide);
+    if (size < 1e-9) return {(share > 0.5 ? 1.0 : -1.0) * texel, {1.0, 0.0}, kPairOfDash};
+    const Point normal = {sum.x / size, sum.y / size};
+    const double high = std::max(std::fabs(normal.x), std::fabs(normal.y));
+    const double low = std::min(std::fabs(normal.x), std::fabs(normal.y));
+    double below = -0.71;
+    double above = 0.71;
+    for (int i = 0; i < 24; ++i) {
+        const double middle = 0.5 * (below + above);
+        (share_above(middle, high, low) < share ? below : above) = middle;
+    }
+    return {0.5 * (below + above) * texel, normal, kPairOfDash};
 }
 
 // Exact coverage while the pyramid is built, in 1/65536 of a texel; sums to 65536.
@@ -377,8 +418,10 @@ class Painter {
             for (const uint32_t i : dashes) {
                 Point gradient;
                 const double depth = depth_in(dashes_[i], p, gradient);
-                if (depth > 0.0 || std::fabs(depth) < std::fabs(best.distance))
-                    best = {depth, gradient, kPairOfDash};
+                if (depth > 0.0 || std::fabs(depth) < std::fabs(best.distance)) {
+                    best = has_corner(dashes_[i], p, 0.75 * texel_) ? fit_corner(dashes_[i], p, texel_)
+                                                                    : Border{depth, gradient, kPairOfDash};
+                }
             }
         }
         return edge_texel(best, texel_);

@@ -51,9 +51,8 @@ struct CameraView {
     const float* start;         // m to the right of the middle, of pixel 0                 (M,)
     const float* step;          // m to the right per pixel                                 (M,)
     const float* sharpness;     // 256 / filter width, 1/m                                  (M,)
-    const float* corner_scale;  // pixels to the right of the middle per unit of right/ahead      (M,)
-    const float* corner_start;  // pixel of the image's middle                              (M,)
-    float sky_scale;  // (above - wall height) / above: ground walk to walk in the plane of the walls' edge
+    const float* corner_scale;  // pixels to the right of the middle per unit of right/ahead   (height,)
+    float upper_scale;          // what stretches a walk on the ground to the plane of the walls' upper edge
 };
 
 // Where the lens is and looks.
@@ -107,7 +106,7 @@ struct WallSpan {
     int32_t wall;  // index into a palette's walls
 };
 
-// The walls in view, at most four; returns their number.
+// The walls in view, at most four, from left to right; returns their number.
 RC_HD int32_t walls_in_view(const GroundView& ground, const LensPose& lens, WallSpan* spans) {
     // Corners clockwise as seen from above, which is left to right as seen from inside; wall i begins at
     // corner i.
@@ -130,13 +129,14 @@ RC_HD int32_t walls_in_view(const GroundView& ground, const LensPose& lens, Wall
         spans[count].wall = walls[i];
         ++count;
     }
+    for (int32_t i = 1; i < count; ++i) {
+        for (int32_t k = i; k > 0 && spans[k].left < spans[k - 1].left; --k) {
+            const WallSpan span = spans[k];
+            spans[k] = spans[k - 1];
+            spans[k - 1] = span;
+        }
+    }
     return count;
-}
-
-// The first pixel whose centre lies to the right of direction slope (right / ahead).
-RC_HD int32_t pixel_of_slope(float middle, float scale, float slope, int32_t width) {
-    const float pixel = clamp(middle + scale * slope, 0.0f, static_cast<float>(width));
-    return -static_cast<int32_t>(floor_of(-pixel));
 }
 
 }  // namespace racecraft

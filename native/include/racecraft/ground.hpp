@@ -79,10 +79,15 @@ RC_HD int32_t edge_distance(uint32_t texel, uint32_t u, uint32_t v) {
     return along_x * normal_x + along_y * normal_y + kEdgeOffsetScale * offset;
 }
 
+// How much the distance grows over the step (x, y) in 1/256 texel.
+RC_HD int32_t edge_growth(uint32_t texel, int32_t x, int32_t y) {
+    return x * static_cast<int8_t>(texel & 255) + y * static_cast<int8_t>((texel >> 8) & 255);
+}
+
 // Brightness times 64 of an edge texel. sharpness is 256 over the filter width in texels; blend holds, per
 // pair, the brightness below in the low half and the difference to the brightness above in the high half.
-RC_HD int32_t shade_edge(uint32_t texel, uint32_t u, uint32_t v, int32_t sharpness, const int32_t* blend) {
-    const int32_t ramp = ((edge_distance(texel, u, v) * sharpness) >> 16) + kCoverageUnit / 2;
+RC_HD int32_t shade_edge(uint32_t texel, int32_t distance, int32_t sharpness, const int32_t* blend) {
+    const int32_t ramp = ((distance * sharpness) >> 16) + kCoverageUnit / 2;
     const int32_t coverage = clamp(ramp, 0, kCoverageUnit);
     const int32_t entry = blend[texel >> 24];
     return kCoverageUnit * static_cast<int16_t>(entry & 0xffff) + coverage * (entry >> 16);

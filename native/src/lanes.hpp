@@ -1,0 +1,173 @@
+// Vectors of 32-bit integers for kernels, one definition per instruction set: 16 lanes with AVX-512, 8 with
+// AVX2. Include only from *_kernel.cpp. Without RC_HAS_LANES a kernel runs its scalar code, which gives the
+// same bits.
+#pragma once
+
+#include "racecraft/platform.hpp"
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+#define RC_HAS_LANES 1
+#endif
+
+#if defined(__GNUC__) && !defined(__clang__)
+// GCC 12's own AVX-512 header leaves pass-through operands undefined on purpose and then warns of it.
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
+
+namespace racecraft::RC_ISA {
+namespace {
+
+#if defined(__AVX512VNNI__)
+
+struct Lanes {
+    static constexpr int kCount = 16;
+    __m512i v;
+};
+using LaneMask = __mmask16;
+
+RC_HD Lanes splat(int32_t value) {
+    return {_mm512_set1_epi32(value)};
+}
+RC_HD Lanes lane_numbers() {
+    return {_mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)};
+}
+RC_HD LaneMask first_lanes(int count) {
+    return static_cast<__mmask16>(count >= 16 ? 0xffff : (1 << count) - 1);
+}
+RC_HD Lanes operator+(Lanes a, Lanes b) {
+    return {_mm512_add_epi32(a.v, b.v)};
+}
+RC_HD Lanes operator-(Lanes a, Lanes b) {
+    return {_mm512_sub_epi32(a.v, b.v)};
+}
+RC_HD Lanes operator*(Lanes a, Lanes b) {
+    return {_mm512_mullo_epi32(a.v, b.v)};
+}
+RC_HD Lanes operator&(Lanes a, Lanes b) {
+    return {_mm512_and_si512(a.v, b.v)};
+}
+RC_HD Lanes operator|(Lanes a, Lanes b) {
+    return {_mm512_or_si512(a.v, b.v)};
+}
+RC_HD Lanes shift_left(Lanes a, int bits) {
+    return {_mm512_slli_epi32(a.v, static_cast<unsigned>(bits))};
+}
+RC_HD Lanes shift_right(Lanes a, int bits) {
+    return {_mm512_srli_epi32(a.v, static_cast<unsigned>(bits))};
+}
+RC_HD Lanes shift_right_signed(Lanes a, int bits) {
+    return {_mm512_srai_epi32(a.v, static_cast<unsigned>(bits))};
+}
+RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
+    return {_mm512_min_epi32(_mm512_max_epi32(a.v, low.v), high.v)};
+}
+// Dot product of the four bytes of each lane, a unsigned and b signed; pairs of products must fit 16 bits.
+RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
+    return {_mm512_dpbusd_epi32(_mm512_setzero_si512(), a.v, b.v)};
+}
+// Dot product of the two signed 16-bit halves of each lane.
+RC_HD Lanes dot_halves(Lanes a, Lanes b) {
+    return {_mm512_madd_epi16(a.v, b.v)};
+}
+// Entry index[lane] of a table of eight.
+RC_HD Lanes look_up(const int32_t* table, Lanes index) {
+    const __m256i entries = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(table));
+    return {_mm512_permutexvar_epi32(index.v, _mm512_broadcast_i64x4(entries))};
+}
+RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
+    return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), mask, index.v, base, 4)};
+}
+RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
+    return {_mm512_i32gather_epi32(index.v, base, 4)};
+}
+RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
+    _mm512_mask_storeu_epi32(sums, mask, _mm512_add_epi32(_mm512_loadu_si512(sums), value.v));
+}
+RC_HD Lanes load(const int32_t* values) {
+    return {_mm512_loadu_si512(values)};
+}
+// The low 16 bits of each lane.
+RC_HD void store_halves(uint8_t* out, Lanes a) {
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm512_cvtepi32_epi16(a.v));
+}
+
+#elif defined(__AVX2__)
+
+struct Lanes {
+    static constexpr int kCount = 8;
+    __m256i v;
+};
+using LaneMask = __m256i;
+
+RC_HD Lanes splat(int32_t value) {
+    return {_mm256_set1_epi32(value)};
+}
+RC_HD Lanes lane_numbers() {
+    return {_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)};
+}
+RC_HD LaneMask first_lanes(int count) {
+    return _mm256_cmpgt_epi32(_mm256_set1_epi32(count), lane_numbers().v);
+}
+RC_HD Lanes operator+(Lanes a, Lanes b) {
+    return {_mm256_add_epi32(a.v, b.v)};
+}
+RC_HD Lanes operator-(Lanes a, Lanes b) {
+    return {_mm256_sub_epi32(a.v, b.v)};
+}
+RC_HD Lanes operator*(Lanes a, Lanes b) {
+    return {_mm256_mullo_epi32(a.v, b.v)};
+}
+RC_HD Lanes operator&(Lanes a, Lanes b) {
+    return {_mm256_and_si256(a.v, b.v)};
+}
+RC_HD Lanes operator|(Lanes a, Lanes b) {
+    return {_mm256_or_si256(a.v, b.v)};
+}
+RC_HD Lanes shift_left(Lanes a, int bits) {
+    return {_mm256_slli_epi32(a.v, bits)};
+}
+RC_HD Lanes shift_right(Lanes a, int bits) {
+    return {_mm256_srli_epi32(a.v, bits)};
+}
+RC_HD Lanes shift_right_signed(Lanes a, int bits) {
+    return {_mm256_srai_epi32(a.v, bits)};
+}
+RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
+    return {_mm256_min_epi32(_mm256_max_epi32(a.v, low.v), high.v)};
+}
+RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
+    return {_mm256_madd_epi16(_mm256_maddubs_epi16(a.v, b.v), _mm256_set1_epi16(1))};
+}
+RC_HD Lanes dot_halves(Lanes a, Lanes b) {
+    return {_mm256_madd_epi16(a.v, b.v)};
+}
+RC_HD Lanes look_up(const int32_t* table, Lanes index) {
+    return {
+        _mm256_permutevar8x32_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(table)), index.v)};
+}
+RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
+    const int* words = reinterpret_cast<const int*>(base);
+    return {_mm256_mask_i32gather_epi32(_mm256_setzero_si256(), words, index.v, mask, 4)};
+}
+RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
+    return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), index.v, 4)};
+}
+RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
+    const __m256i old = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(sums));
+    const __m256i added = _mm256_add_epi32(old, _mm256_and_si256(value.v, mask));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums), added);
+}
+RC_HD Lanes load(const int32_t* values) {
+    return {_mm256_loadu_si256(reinterpret_cast<const __m256i*>(values))};
+}
+RC_HD void store_halves(uint8_t* out, Lanes a) {
+    const __m256i packed = _mm256_packus_epi32(a.v, a.v);
+    const __m256i ordered = _mm256_permute4x64_epi64(packed, 0x08);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm256_castsi256_si128(ordered));
+}
+
+#endif
+
+}  // namespace
+}  // namespace racecraft::RC_ISA
