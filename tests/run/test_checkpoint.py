@@ -38,9 +38,7 @@ def assert_good(checkpoint):
 
 @pytest.fixture
 def store(tmp_path):
-    return CheckpointStore(
-        tmp_path / "checkpoints", aws_index=tmp_path / "model" / "deepracer_checkpoints.json"
-    )
+    return CheckpointStore(tmp_path / "checkpoints", aws_index=tmp_path / "model" / "deepracer_checkpoints.json")
 
 
 def test_every_kind_of_array_comes_back_bit_for_bit(store):
@@ -65,9 +63,7 @@ def test_every_kind_of_array_comes_back_bit_for_bit(store):
 
 def test_metadata_keeps_large_integers_and_numpy_scalars(store):
     state = np.random.default_rng(7).bit_generator.state
-    store.save(
-        1, {}, metadata={"generator": state, "share": np.float64(0.5)}, metrics={"loss": np.nan, "reward": 2}
-    )
+    store.save(1, {}, metadata={"generator": state, "share": np.float64(0.5)}, metrics={"loss": np.nan, "reward": 2})
     checkpoint = store.load()
     assert checkpoint.metadata == {"generator": state, "share": 0.5}
     assert checkpoint.metrics == {"loss": None, "reward": 2.0}
@@ -140,7 +136,7 @@ def test_what_cannot_be_saved_is_refused_and_leaves_the_old(store, arguments, wo
     assert_good(store.load())
 
 
-def damage_nothing(path):
+def remove(path):
     path.unlink()
 
 
@@ -162,7 +158,7 @@ def grow(path):
     path.write_bytes(path.read_bytes() + b"\0")
 
 
-@pytest.mark.parametrize("damage", [damage_nothing, truncate, flip, empty, grow])
+@pytest.mark.parametrize("damage", [remove, truncate, flip, empty, grow])
 def test_damaged_last_falls_back_with_a_warning(store, damage):
     save(store, 100, 200, 300)
     damage(store.folder / store.last.file)
@@ -183,7 +179,7 @@ def test_all_damaged_is_an_error(store, damage):
         store.load()
 
 
-@pytest.mark.parametrize("damage", [damage_nothing, truncate, empty, lambda path: path.write_text("[1]")])
+@pytest.mark.parametrize("damage", [remove, truncate, empty, lambda path: path.write_text("[1]")])
 def test_without_the_manifest_whole_files_are_found_again(store, damage):
     save(store, 100, score=(2.0,))
     save(store, 200, 300, score=(1.0,))
@@ -231,6 +227,28 @@ def test_manifest_of_a_later_version_is_left_alone(store):
         with pytest.raises(CheckpointError, match="has format 2, this version reads 1"):
             call()
     assert sorted(store.folder.iterdir()) == before
+
+
+def test_unreadable_folder_is_not_taken_for_an_empty_one(store, monkeypatch):
+    save(store, 100, 200)
+    before = sorted(store.folder.iterdir())
+
+    def fail(*arguments, **more):
+        raise OSError(errno.EIO, "Input/output error")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", fail)
+        for call in (store.entries, store.load, lambda: save(store, 300)):
+            with pytest.raises(CheckpointError, match="Input/output error"):
+                call()
+    assert sorted(store.folder.iterdir()) == before
+
+
+def test_numpy_steps(store):
+    store.save(np.int64(100), {}, metrics={"reward": np.float32(1)}, score=np.array([1.0]))
+    assert store.load(np.int64(100)).step == store.best.step == 100
+    with pytest.raises(CheckpointError, match="step is -1"):
+        store.save(-1, {})
 
 
 CALLS = ("open", "write", "fsync", "replace", "close")

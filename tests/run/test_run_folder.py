@@ -79,9 +79,7 @@ def test_open_says_what_is_missing_and_guesses(tmp_path):
         RunFolder.open(tmp_path / "empty")
 
 
-@pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"format": 1}', '{"format": 2}', '{"format": 1, "seed": 1, "x": 2}']
-)
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 1}', '{"format": 2}', '{"format": 1, "seed": 1, "x": 2}'])
 def test_damaged_run_json(tmp_path, text):
     (tmp_path / "run.json").write_text(text)
     with pytest.raises(RunError):
@@ -104,9 +102,7 @@ def test_damaged_inputs(tmp_path):
 
 def test_info_that_is_not_json_is_refused(tmp_path):
     with pytest.raises(RunError, match="cannot be written"):
-        RunFolder(tmp_path).write_info(
-            RunInfo(seed=1, track="", track_digest="", settings={"x": float("nan")})
-        )
+        RunFolder(tmp_path).write_info(RunInfo(seed=1, track="", track_digest="", settings={"x": float("nan")}))
     assert list(tmp_path.iterdir()) == []
 
 

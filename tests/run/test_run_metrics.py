@@ -80,6 +80,22 @@ def test_resumed_run_continues_the_file_from_its_checkpoint(tmp_path):
     assert lines[-1]["episode_status"] == "Crashed"
 
 
+def test_very_long_runs_are_thinned_evenly(tmp_path, monkeypatch):
+    monkeypatch.setattr("racecraft.run.metrics.MAX_EPISODES", 100)
+    metrics = TrainingMetrics(tmp_path / "m.json", interval_s=1e9)
+    for number in range(1000):
+        metrics.add(episode(number))
+        if number % 100 == 99:
+            metrics.add(episode(0), phase="evaluation")
+    metrics.write()
+    lines = read_metrics(metrics.path)["metrics"]
+    training = [line["episode"] for line in lines if line["phase"] == "training"]
+    assert 40 < len(training) <= 100
+    assert training == list(range(1, training[-1] + 1, training[1] - training[0]))
+    assert training[-1] > 950
+    assert len(lines) - len(training) == 10
+
+
 def test_writing_is_rare(tmp_path):
     metrics = TrainingMetrics(tmp_path / "m.json", interval_s=1000)
     metrics.add(episode(0))

@@ -37,9 +37,7 @@ def drive(writer, counter, lengths, rng, steps=60, step=None):
     step, ended = np.full(len(lengths), 2) if step is None else step, []
     for _ in range(steps):
         done = step == lengths
-        rows = make_rows(
-            len(lengths), steps=step, time=step / 15, progress=step / 100, x=rng.normal(size=len(lengths))
-        )
+        rows = make_rows(len(lengths), steps=step, time=step / 15, progress=step / 100, x=rng.normal(size=len(lengths)))
         rows[done, ROW_COLUMNS.index("status")] = STATUS_NAMES.index("off_track")
         rewards = rng.normal(size=len(lengths))
         now = counter.update(rows, rewards, done)
@@ -59,9 +57,7 @@ def test_real_episodes_come_out_as_aws_wrote_them(tmp_path):
     for line in lines:
         episodes.setdefault(int(line[0]), []).append(dict(zip(header, line, strict=True)))
     space = ModelMetadata.load(DRFC / "model_metadata.json").action_space
-    writer = SimTraceWriter(
-        tmp_path, num_envs=len(episodes), tracks=[track], action_space=space, iteration=20
-    )
+    writer = SimTraceWriter(tmp_path, num_envs=len(episodes), tracks=[track], action_space=space, iteration=20)
     longest = max(map(len, episodes.values()))
     for step in range(1, longest):  # all cars side by side, each one episode
         rows, actions, rewards, ended = make_rows(len(episodes)), np.zeros(len(episodes), int), [], []
@@ -95,9 +91,7 @@ def test_real_episodes_come_out_as_aws_wrote_them(tmp_path):
     assert ours[0] == ",".join(WRITTEN) == ",".join([*header, "obstacle_crash_counter"])
     written = {}
     for line in ours[1:]:
-        written.setdefault(int(line.split(",")[0]), []).append(
-            dict(zip(WRITTEN, line.split(","), strict=True))
-        )
+        written.setdefault(int(line.split(",")[0]), []).append(dict(zip(WRITTEN, line.split(","), strict=True)))
     assert written.keys() == episodes.keys()
     rounded = {"yaw": 1e-9, "progress": 1e-9, "tstamp": 6e-4}
     for number, steps in episodes.items():
@@ -114,9 +108,7 @@ def test_real_episodes_come_out_as_aws_wrote_them(tmp_path):
 
 FLOAT = re.compile(r"-?\d+\.\d+(e[-+]\d+)?|-?\d(\.\d+)?e[-+]\d+")
 FORMATS = {
-    **dict.fromkeys(
-        ("steps", "X", "Y", "yaw", "steer", "throttle", "reward", "track_len", "pause_duration"), FLOAT
-    ),
+    **dict.fromkeys(("steps", "X", "Y", "yaw", "steer", "throttle", "reward", "track_len", "pause_duration"), FLOAT),
     **dict.fromkeys(("episode", "action", "closest_waypoint", "obstacle_crash_counter"), re.compile(r"\d+")),
     **dict.fromkeys(("done", "all_wheels_on_track"), re.compile("True|False")),
     "progress": re.compile(f"{FLOAT.pattern}|100"),
@@ -145,9 +137,7 @@ def test_number_formats_are_those_of_real_files(tmp_path, ring):
 
 def test_episodes_are_whole_in_sequence_and_agree_with_the_counter(tmp_path, ring):
     counter, rng = EpisodeCounter(4, number=40, clock=100.0), np.random.default_rng(1)
-    writer = SimTraceWriter(
-        tmp_path, num_envs=4, tracks=[ring], action_space=action_space("default"), iteration=2
-    )
+    writer = SimTraceWriter(tmp_path, num_envs=4, tracks=[ring], action_space=action_space("default"), iteration=2)
     lengths, step = np.array([7, 11, 13, 50]), np.full(4, 2)
     ended = drive(writer, counter, lengths, rng, steps=70, step=step)
     writer.next_iteration()

@@ -108,7 +108,9 @@ class CheckpointStore:
         Raises:
             CheckpointError: It could not be saved; the earlier ones are as good as before.
         """
-        time_stamp = time.time()
+        step, time_stamp = int(step), time.time()
+        if step < 0:
+            raise CheckpointError(f"step is {step}, allowed: 0 or more.")
         shown = {name: float(v) if math.isfinite(v) else None for name, v in (metrics or {}).items()}
         ranked = None if score is None else tuple(map(float, score))
         if ranked is not None and not all(map(math.isfinite, ranked)):
@@ -122,9 +124,7 @@ class CheckpointStore:
         }
         data = _encode(arrays, header)
         digest = hashlib.sha256(data).hexdigest()
-        entry = Entry(
-            step, f"{step:09d}-{digest[:8]}.safetensors", len(data), digest, time_stamp, ranked, shown
-        )
+        entry = Entry(step, f"{step:09d}-{digest[:8]}.safetensors", len(data), digest, time_stamp, ranked, shown)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             kept = self._kept([*(e for e in self.entries() if e.file != entry.file), entry])
@@ -158,11 +158,11 @@ class CheckpointStore:
         elif which == "best":
             ranked = sorted((_rank(entry), place) for place, entry in enumerate(entries))
             candidates = [entries[place] for _, place in reversed(ranked)]
-        elif isinstance(which, int):
-            candidates = [entry for entry in reversed(entries) if entry.step == which][:1]
-        else:
+        elif isinstance(which, str):
             hint = did_you_mean(which, ("last", "best"))
             raise CheckpointError(f"checkpoint is {which!r}, allowed: 'last', 'best' or a step.", hint=hint)
+        else:
+            candidates = [entry for entry in reversed(entries) if entry.step == which][:1]
         if not candidates:
             steps = ", ".join(str(entry.step) for entry in entries)
             raise CheckpointError(f"{self.folder} has no checkpoint of step {which}, allowed: {steps}.")
@@ -179,16 +179,23 @@ class CheckpointStore:
         raise CheckpointError(" ".join(damage), hint="No other checkpoint of this run is whole.")
 
     def entries(self) -> list[Entry]:
-        """All checkpoints in the order they were saved; without a whole manifest those in the folder."""
+        """All checkpoints in the order they were saved; without a whole manifest those in the folder.
+
+        Raises:
+            CheckpointError: The folder cannot be read, or was written by a later version.
+        """
         try:
-            return self._read_manifest()
-        except CheckpointError:
-            raise
-        except FileNotFoundError:
-            reason = "is missing"
-        except (OSError, ValueError, TypeError, KeyError) as error:
-            reason = f"is damaged ({error})"
-        entries = self._scan()
+            try:
+                return self._read_manifest()
+            except CheckpointError:
+                raise
+            except FileNotFoundError:
+                reason = "is missing"
+            except (ValueError, TypeError, KeyError) as error:
+                reason = f"is damaged ({error})"
+            entries = self._scan()
+        except OSError as error:
+            raise CheckpointError(f"{self.folder} cannot be read: {error.strerror or error}.") from error
         if entries:
             warnings.warn(
                 f"{self.folder / MANIFEST} {reason}; {len(entries)} whole checkpoints were found beside it.",
@@ -241,7 +248,7 @@ class CheckpointStore:
         entries = []
         for path in self.folder.glob("*.safetensors"):
             name = _NAME.fullmatch(path.name)
-            with suppress(OSError, ValueError, KeyError, TypeError):
+            with suppress(ValueError, KeyError, TypeError):
                 data = _read_capped(path)
                 digest = hashlib.sha256(data).hexdigest()
                 if name is None or digest[:8] != name[2]:
@@ -320,9 +327,7 @@ def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> by
     for name, values in arrays.items():
         array = np.asarray(values)
         if array.dtype.kind not in "biuf":
-            raise CheckpointError(
-                f"array {name!r} has type {array.dtype}, allowed: booleans, integers, floats."
-            )
+            raise CheckpointError(f"array {name!r} has type {array.dtype}, allowed: booleans, integers, floats.")
         plain[name] = np.asarray(array, dtype=array.dtype.newbyteorder("="), order="C")
     try:
         text = json.dumps(header, allow_nan=False, default=_plain)

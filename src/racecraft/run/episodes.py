@@ -14,9 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 
 STEP_SECONDS = 1 / 15
-_STEPS, _PROGRESS, _STATUS, _TIME = (
-    ROW_COLUMNS.index(name) for name in ("steps", "progress", "status", "time")
-)
+_STEPS, _PROGRESS, _STATUS, _TIME = (ROW_COLUMNS.index(name) for name in ("steps", "progress", "status", "time"))
 
 
 @dataclass(frozen=True)

@@ -48,9 +48,7 @@ class EventWriter:
     def add_scalars(self, scalars: Mapping[str, float], *, step: int) -> None:
         """Write numbers by tag, such as ``train/reward``, at a training step."""
         now = time.time()
-        values = b"".join(
-            _bytes(1, _bytes(1, tag.encode()) + _float(2, value)) for tag, value in scalars.items()
-        )
+        values = b"".join(_bytes(1, _bytes(1, tag.encode()) + _float(2, value)) for tag, value in scalars.items())
         self._write(_double(1, now) + _varint(2 << 3) + _varint(step) + _bytes(5, values))
         if now - self._flushed >= FLUSH_SECONDS:
             self.flush()

@@ -92,9 +92,7 @@ class RunFolder:
             except OSError as error:
                 raise RunError(f"{path} cannot be made: {error.strerror or error}.") from error
             return cls(path)
-        raise RunError(
-            f"{root / names[0]} exists.", hint="Choose another name, or continue it with --resume."
-        )
+        raise RunError(f"{root / names[0]} exists.", hint="Choose another name, or continue it with --resume.")
 
     @classmethod
     def open(cls, path: str | Path) -> RunFolder:
@@ -159,9 +157,7 @@ class RunFolder:
     @property
     def checkpoints(self) -> CheckpointStore:
         """Weights, with AWS's index of them in ``model/``."""
-        return CheckpointStore(
-            self.path / "checkpoints", aws_index=self.path / "model" / "deepracer_checkpoints.json"
-        )
+        return CheckpointStore(self.path / "checkpoints", aws_index=self.path / "model" / "deepracer_checkpoints.json")
 
     def evaluation(self, stamp: str) -> Path:
         """Folder of the evaluation begun at ``stamp`` (YYYYmmddHHMMSS)."""
@@ -191,9 +187,7 @@ class RunFolder:
         try:
             document = read_json_object(path)
             if document.pop("format") != FORMAT:
-                raise RunError(
-                    f"{path} was written by another version of Racecraft.", hint="Update Racecraft."
-                )
+                raise RunError(f"{path} was written by another version of Racecraft.", hint="Update Racecraft.")
             return RunInfo(**document)
         except (ConfigError, KeyError, TypeError) as error:
             raise RunError(f"{self.path} cannot be opened: {error}") from error
@@ -257,9 +251,7 @@ class RunFolder:
             else:
                 write_json(path, content)
         except (OSError, ValueError, TypeError) as error:
-            raise RunError(
-                f"{path} cannot be written: {getattr(error, 'strerror', None) or error}."
-            ) from error
+            raise RunError(f"{path} cannot be written: {getattr(error, 'strerror', None) or error}.") from error
 
 
 def list_runs(root: str | Path) -> list[RunFolder]:

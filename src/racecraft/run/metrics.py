@@ -27,6 +27,7 @@ STATUS_LABELS = {
     "pause": "Pause",
     "park": "Park",
 }
+MAX_EPISODES = 100_000  # 20 MB; beyond it every other training episode is left out
 WRITE_SHARE = 0.01  # at most this share of the time goes into writing the file again
 
 Phase = Literal["training", "evaluation"]
@@ -58,7 +59,10 @@ class TrainingMetrics:
         self.episodes_per_iteration = episodes_per_iteration
         self.interval_s = interval_s
         kept = read_metrics(path)["metrics"] if episodes and path.exists() else []
-        self._lines = [json.dumps(line) for line in kept if line["episode"] <= episodes]
+        self._lines = [
+            (line["episode"], line["phase"], json.dumps(line)) for line in kept if line["episode"] <= episodes
+        ]
+        self._stride = 1
         self._episodes = episodes
         self._dirty = True
         self._next_write = 0.0
@@ -78,8 +82,11 @@ class TrainingMetrics:
             "completion_percentage": _percent(episode.progress),
             "episode_status": STATUS_LABELS[episode.status],
         }
-        self._lines.append(json.dumps(line))
-        self._dirty = True
+        if phase == "evaluation" or episode.number % self._stride == 0:
+            self._lines.append((line["episode"], phase, json.dumps(line)))
+            self._dirty = True
+        if len(self._lines) > MAX_EPISODES:
+            self._thin()
         if time.monotonic() >= self._next_write:
             self.write()
 
@@ -93,10 +100,18 @@ class TrainingMetrics:
             return
         begin = time.monotonic()
         end = f'"version": {VERSION}, "best_model_metric": {json.dumps(self.best_model_metric)}'
-        _write(self.path, f'{{"metrics": [{", ".join(self._lines)}], {end}}}')
+        lines = ", ".join(text for _, _, text in self._lines)
+        _write(self.path, f'{{"metrics": [{lines}], {end}}}')
         now = time.monotonic()
         self._next_write = now + max(self.interval_s, (now - begin) / WRITE_SHARE)
         self._dirty = False
+
+    def _thin(self) -> None:
+        """Halve the training episodes, evenly over the run, so that the file stays one that tools can read."""
+        count = len(self._lines)
+        while len(self._lines) > 0.75 * count and self._stride < self._episodes:
+            self._stride *= 2
+            self._lines = [line for line in self._lines if line[1] == "evaluation" or (line[0] - 1) % self._stride == 0]
 
 
 @dataclass(frozen=True)

@@ -102,9 +102,7 @@ class SimTraceWriter:
         self._file: TextIO | None = None
         self._steps: list[NDArray[np.float64]] = []  # (N, _WIDTH) each
         self._first = [0] * num_envs  # index into _steps where a car's episode begins
-        self._packed: list[list[NDArray[np.float64]]] = [
-            [] for _ in range(num_envs)
-        ]  # its steps before _steps
+        self._packed: list[list[NDArray[np.float64]]] = [[] for _ in range(num_envs)]  # its steps before _steps
 
     def write(
         self,
@@ -225,9 +223,7 @@ class SimTraceWriter:
         waypoints = self._waypoints[int(column["track_index"][0])]
         behind, ahead = column["closest_prev"].astype(np.int64), column["closest_next"].astype(np.int64)
         car = np.column_stack([column["x"], column["y"]])
-        is_ahead = np.linalg.norm(waypoints[ahead] - car, axis=1) < np.linalg.norm(
-            waypoints[behind] - car, axis=1
-        )
+        is_ahead = np.linalg.norm(waypoints[ahead] - car, axis=1) < np.linalg.norm(waypoints[behind] - car, axis=1)
         return np.where(is_ahead, ahead, behind)
 
     def _write(self, text: str) -> None:
@@ -309,9 +305,7 @@ def _parse(name: str, texts: tuple[str, ...]) -> NDArray[Any]:
             raise ValueError(f"{name} is {min(wrong)[:40]!r}, allowed: True or False")
         return np.array([text in ("True", "1") for text in texts], dtype=np.bool_)
     if name == "action" and any(text.startswith("[") for text in texts):
-        return np.array(
-            [text.strip("[]").replace(",", " ").split() for text in texts], dtype=np.float64
-        ).reshape(-1, 2)
+        return np.array([text.strip("[]").replace(",", " ").split() for text in texts], dtype=np.float64).reshape(-1, 2)
     values = np.array(texts, dtype=np.float64)
     if not np.isfinite(values).all():
         raise ValueError(f"{name} is not a finite number in every row")

@@ -24,13 +24,9 @@ _YES_NO = "true or false"
 class TrainingParams:
     """The settings of a training job; each field is the AWS key of the same name in capitals."""
 
-    world_name: Annotated[str, Field(min_length=1, max_length=200, description="a track's name")] = (
-        "reinvent_base"
-    )
+    world_name: Annotated[str, Field(min_length=1, max_length=200, description="a track's name")] = "reinvent_base"
     """Track."""
-    race_type: Annotated[RaceType, Field(description="TIME_TRIAL, OBJECT_AVOIDANCE, HEAD_TO_BOT, ...")] = (
-        "TIME_TRIAL"
-    )
+    race_type: Annotated[RaceType, Field(description="TIME_TRIAL, OBJECT_AVOIDANCE, HEAD_TO_BOT, ...")] = "TIME_TRIAL"
     """What else is on the track."""
     reverse_dir: Annotated[bool, Field(description=_YES_NO)] = False
     """Drive against the track's direction."""
@@ -38,13 +34,9 @@ class TrainingParams:
     """Change direction with every training episode."""
     change_start_position: Annotated[bool, Field(description=_YES_NO)] = True
     """Start every training episode a little further on."""
-    round_robin_advance_dist: Annotated[
-        Number, Field(ge=0, le=1, description="0 to 1, a share of the lap")
-    ] = 0.05
+    round_robin_advance_dist: Annotated[Number, Field(ge=0, le=1, description="0 to 1, a share of the lap")] = 0.05
     """How much further."""
-    start_position_offset: Annotated[Number, Field(ge=0, le=1, description="0 to 1, a share of the lap")] = (
-        0.0
-    )
+    start_position_offset: Annotated[Number, Field(ge=0, le=1, description="0 to 1, a share of the lap")] = 0.0
     """Where the first episode starts."""
     enable_domain_randomization: Annotated[bool, Field(description=_YES_NO)] = False
     """Change light and colours with every episode."""
