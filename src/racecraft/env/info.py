@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 
+INFO_NAMES: Final = tuple("episode_number" if name == "episode" else name for name in ROW_COLUMNS)
+"""Keys of an info; ``episode`` belongs to the wrappers that record statistics."""
+
 WHOLE_COLUMNS: Final = ("episode", "steps", "closest_prev", "closest_next", "track_index", "lap")
 TRUTH_COLUMNS: Final = ("all_wheels_on_track", "is_offtrack", "is_crashed", "is_reversed")
 
@@ -22,7 +25,7 @@ _PYTHON_TYPES: Final[list[type]] = [
 def single_info(row: NDArray[np.float64]) -> dict[str, Any]:
     """Every column of a row by its name, as int, bool or float; ``status`` as its name."""
     info: dict[str, Any] = {
-        name: kind(value) for name, kind, value in zip(ROW_COLUMNS, _PYTHON_TYPES, row.tolist(), strict=True)
+        name: kind(value) for name, kind, value in zip(INFO_NAMES, _PYTHON_TYPES, row.tolist(), strict=True)
     }
     info["status"] = STATUS_NAMES[int(info["status"])]
     return info
@@ -39,7 +42,7 @@ def vector_info(rows: NDArray[np.float64], mask: NDArray[np.bool_] | None = None
     shown = np.ones(len(rows), dtype=np.bool_) if mask is None else mask
     codes = rows[:, _STATUS].astype(np.intp)
     info: dict[str, Any] = {}
-    for index, (name, kind) in enumerate(zip(ROW_COLUMNS, _PYTHON_TYPES, strict=True)):
+    for index, (name, kind) in enumerate(zip(INFO_NAMES, _PYTHON_TYPES, strict=True)):
         values: NDArray[Any] = _NAMES[codes] if index == _STATUS else rows[:, index].astype(kind)
         if not has_all:
             values[~shown] = None if index == _STATUS else 0

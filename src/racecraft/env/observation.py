@@ -39,9 +39,7 @@ def check_kind(kind: str) -> None:
         ConfigError: It is none of `KINDS`.
     """
     if kind not in KINDS:
-        raise ConfigError(
-            f"observation is {kind!r}, allowed: {', '.join(KINDS)}.", hint=did_you_mean(str(kind), KINDS)
-        )
+        raise ConfigError(f"observation is {kind!r}, allowed: {', '.join(KINDS)}.", hint=did_you_mean(str(kind), KINDS))
 
 
 class Observer:

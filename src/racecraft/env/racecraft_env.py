@@ -93,7 +93,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
 
     Every column of the judged row by its name in `racecraft.sim.ROW_COLUMNS`, in SI units and radians:
     `progress` (a fraction of the lap), `lap`, `time`, `offset`, `is_offtrack` and so on; `status` as a
-    word. A step that completes a lap adds `lap_time` in seconds.
+    word, and `episode` as `episode_number`. A step that completes a lap adds `lap_time` in seconds.
 
     ## Starting State
 
@@ -125,7 +125,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | `observation`       | `camera`        | `camera`, `state` (many times faster) or `both`                |
     | `camera`            | `CameraSpec()`  | size, lens and place of the driver's camera                    |
     | `vehicle`           | `v5`            | preset, file, or `Vehicle`                                     |
-    | `start`             | `random`        | `random`, `advance`, `fixed`, or a `Start` with its jitter      |
+    | `start`             | `random`        | `random`, `advance`, `fixed`, or a `Start` with jitter         |
     | `direction`         | `forward`       | `forward`, `reverse`, or `alternate` with every episode        |
     | `laps`              | `1`             | laps to an episode, driven without a stop                      |
     | `max_episode_steps` | `3000`          | steps that truncate an episode, 200 s                          |
@@ -154,9 +154,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
             )
         check_render_mode(render_mode)
         self.render_mode = render_mode
-        self._task = DrivingTask(
-            track, num_envs=1, num_threads=1, has_pictures=render_mode is not None, **settings
-        )
+        self._task = DrivingTask(track, num_envs=1, num_threads=1, has_pictures=render_mode is not None, **settings)
         self._renderer = Renderer(self._task.simulation) if render_mode else None
         self.observation_space = self._task.observer.space
         self.action_space = self._task.action_space.space

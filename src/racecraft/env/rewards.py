@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,12 +19,12 @@ from racecraft.reward import (
     validate_reward,
 )
 from racecraft.reward.worker import waypoints_of
+from racecraft.reward.worker_process import REWARD_LIMIT, BadRewardError, to_float
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.track import Track
 
 RewardFunction = Callable[[dict[str, Any]], float]
 
-REWARD_LIMIT = 1e5  # largest magnitude that AWS accepts
 _STEPS = ROW_COLUMNS.index("steps")
 
 
@@ -45,9 +44,7 @@ class RewardSource(Protocol):
         ...
 
 
-def open_reward(
-    reward: str | Path | RewardFunction, *, tracks: Sequence[Track], num_envs: int
-) -> RewardSource:
+def open_reward(reward: str | Path | RewardFunction, *, tracks: Sequence[Track], num_envs: int) -> RewardSource:
     """The reward that a user named.
 
     Args:
@@ -66,9 +63,7 @@ def open_reward(
     elif isinstance(reward, str | Path):
         source = load_reward(reward)
     else:
-        raise RewardError(
-            f"reward is {reward!r}; allowed are a preset's name, a path, source text or a callable."
-        )
+        raise RewardError(f"reward is {reward!r}; allowed are a preset's name, a path, source text or a callable.")
     validate_reward(source)
     return IsolatedReward(source, tracks=tracks, num_envs=num_envs)
 
@@ -126,17 +121,15 @@ class CallableReward:
             params = make_params(row, self._waypoints)
             value = self._function(params)
             try:
-                reward = float(value)
-            except (TypeError, ValueError):
-                reward = math.nan
-            if not abs(reward) <= REWARD_LIMIT:
+                rewards[car] = reward = to_float(value)
+                if not abs(reward) <= REWARD_LIMIT:
+                    raise BadRewardError(f"returned {reward!r}; a reward is a finite number within ±100000")
+            except BadRewardError as error:
                 raise RewardError(
-                    f"The reward callable returned {value!r}; a reward is a finite number within ±100000.\n"
-                    f"It was called with params = {format_params(params)}",
+                    f"The reward callable {error}.\nIt was called with params = {format_params(params)}",
                     row_index=car,
                     params=params,
-                )
-            rewards[car] = reward
+                ) from None
         return rewards
 
     def restart(self, seed: int) -> None:

@@ -179,9 +179,7 @@ class RacecraftVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
             return np.ones(self.num_envs, dtype=np.bool_)
         mask = options["reset_mask"]
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ShapeError(
-                f"options['reset_mask'] is {mask!r}, expected a bool array of shape ({self.num_envs},)."
-            )
+            raise ShapeError(f"options['reset_mask'] is {mask!r}, expected a bool array of shape ({self.num_envs},).")
         if not mask.any():
             raise ShapeError("options['reset_mask'] is False everywhere; there is no car to reset.")
         return mask
@@ -223,9 +221,7 @@ def _within(
     return laps[0] & mask, np.where(mask, laps[1], 0.0)
 
 
-def _with_laps(
-    infos: dict[str, Any], laps: tuple[NDArray[np.bool_], NDArray[np.float64]] | None
-) -> dict[str, Any]:
+def _with_laps(infos: dict[str, Any], laps: tuple[NDArray[np.bool_], NDArray[np.float64]] | None) -> dict[str, Any]:
     if laps is not None:
         infos["_lap_time"], infos["lap_time"] = laps
     return infos
