@@ -1,3 +1,77 @@
-"""Racecraft: autonomous racing with reinforcement learning, on your own machine."""
+"""Racecraft: autonomous racing with reinforcement learning, on your own machine.
+
+    from racecraft import train, evaluate
+
+    result = train("reinvent_2018", reward="racing", until="5 laps", seed=1)
+    evaluation = evaluate(result.run, laps=3)
+
+Everything public is here; the packages below are the rooms it lives in (see ARCHITECTURE.md).
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+_HOME = {
+    "CameraSpec": "sim",
+    "Hyperparameters": "agent",
+    "ModelMetadata": "agent",
+    "RaceRules": "race",
+    "RacecraftEnv": "env",
+    "RacecraftError": "errors",
+    "RacecraftVectorEnv": "env",
+    "RewardWorker": "reward",
+    "Simulation": "sim",
+    "Start": "sim",
+    "Track": "track",
+    "Vehicle": "sim",
+    "action_space": "agent",
+    "check_reward": "reward",
+    "draw_track": "track",
+    "evaluate": "race.run_evaluation",
+    "generate_track": "track",
+    "load_reward": "reward",
+    "load_track": "track",
+    "resume": "training",
+    "track_names": "track",
+    "train": "training",
+}
+"""Where each public name lives, below ``racecraft``."""
+
+if TYPE_CHECKING:
+    from racecraft.agent import Hyperparameters as Hyperparameters
+    from racecraft.agent import ModelMetadata as ModelMetadata
+    from racecraft.agent import action_space as action_space
+    from racecraft.env import RacecraftEnv as RacecraftEnv
+    from racecraft.env import RacecraftVectorEnv as RacecraftVectorEnv
+    from racecraft.errors import RacecraftError as RacecraftError
+    from racecraft.race import RaceRules as RaceRules
+    from racecraft.race.run_evaluation import evaluate as evaluate
+    from racecraft.reward import RewardWorker as RewardWorker
+    from racecraft.reward import check_reward as check_reward
+    from racecraft.reward import load_reward as load_reward
+    from racecraft.sim import CameraSpec as CameraSpec
+    from racecraft.sim import Simulation as Simulation
+    from racecraft.sim import Start as Start
+    from racecraft.sim import Vehicle as Vehicle
+    from racecraft.track import Track as Track
+    from racecraft.track import draw_track as draw_track
+    from racecraft.track import generate_track as generate_track
+    from racecraft.track import load_track as load_track
+    from racecraft.track import track_names as track_names
+    from racecraft.training import resume as resume
+    from racecraft.training import train as train
+
+
+def __getattr__(name: str) -> Any:
+    """Import on first use, so that ``import racecraft`` costs nothing."""
+    if name in _HOME:
+        return getattr(import_module(f"racecraft.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'racecraft' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*sorted(_HOME), "__version__"]

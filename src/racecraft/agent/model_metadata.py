@@ -34,7 +34,10 @@ from racecraft.agent.sensors import LIDAR_RAYS, LidarConfig, check_sensors
 from racecraft.errors import ConfigError
 
 NeuralNetwork = Literal[
-    "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW", "DEEP_CONVOLUTIONAL_NETWORK", "DEEP_CONVOLUTIONAL_NETWORK_DEEP"
+    "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW",
+    "DEEP_CONVOLUTIONAL_NETWORK",
+    "DEEP_CONVOLUTIONAL_NETWORK_DEEP",
+    "RACECRAFT_SMALL",  # ours, much faster to train
 ]
 NEURAL_NETWORKS: tuple[NeuralNetwork, ...] = get_args(NeuralNetwork)
 VERSIONS = ("1", "2", "3", "4", "5", "6")

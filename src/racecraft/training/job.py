@@ -107,9 +107,7 @@ def start_run(
     document = settings.to_dict()
     document.pop("seed")
     document.pop("track")
-    folder.write_info(
-        RunInfo(seed=settings.seed, track=settings.track, track_digest=track.digest, settings=document)
-    )
+    folder.write_info(RunInfo(seed=settings.seed, track=settings.track, track_digest=track.digest, settings=document))
     return folder
 
 
@@ -199,9 +197,7 @@ class Training:
             RewardWorker(source, [track], seed=settings.seed, num_cars=copies) as worker,
             EventWriter(folder.events) as events,
         ):
-            counter = EpisodeCounter(
-                settings.ppo.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0))
-            )
+            counter = EpisodeCounter(settings.ppo.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0)))
             trace = SimTraceWriter(
                 folder.training_simtrace,
                 num_envs=settings.ppo.num_envs,
@@ -214,9 +210,7 @@ class Training:
                 episodes_per_iteration=settings.ppo.episodes_per_iteration or 20,
                 episodes=episodes,
             )
-            environment = TrainingEnvironment(
-                simulation, worker, metadata.action_space, counter=counter, trace=trace
-            )
+            environment = TrainingEnvironment(simulation, worker, metadata.action_space, counter=counter, trace=trace)
             ppo = PPO(settings.ppo, learner, environment, seed=settings.seed)
             self._patience = track.length / SLOWEST_EVALUATED
             self._rules = replace(
@@ -238,9 +232,7 @@ class Training:
             reason = self._limit_reached(ppo, counter, hyperparameters)
             while not reason:
                 stats = ppo.iterate()
-                self._account(
-                    stats.environment_seconds, stats.policy_seconds, stats.update_seconds, environment
-                )
+                self._account(stats.environment_seconds, stats.policy_seconds, stats.update_seconds, environment)
                 for episode in environment.take_finished():
                     self._recent.append(episode)
                     metrics.add(episode)
@@ -282,9 +274,7 @@ class Training:
             num_threads=settings.num_threads,
         )
 
-    def _limit_reached(
-        self, ppo: PPO, counter: EpisodeCounter, hyperparameters: Hyperparameters | None
-    ) -> str:
+    def _limit_reached(self, ppo: PPO, counter: EpisodeCounter, hyperparameters: Hyperparameters | None) -> str:
         """Why training is to end now, or an empty string."""
         until = self.until
         if self._stop.is_set():
@@ -411,9 +401,7 @@ class Training:
         except (KeyError, TypeError, ValueError) as error:
             if isinstance(error, RacecraftError):
                 raise
-            raise CheckpointError(
-                f"The checkpoint of {self.folder.path} cannot be resumed: {error}."
-            ) from error
+            raise CheckpointError(f"The checkpoint of {self.folder.path} cannot be resumed: {error}.") from error
         self.reporter.note(f"Resumed at step {ppo.total_steps:,}.")
 
     # ---- tell
@@ -450,9 +438,7 @@ class Training:
             steps_per_second=speed,
             episodes=counter.number,
             mean_reward=float(np.mean([e.reward for e in recent])) if recent else float("nan"),
-            completion=float(np.mean([min(max(e.progress, 0.0), 1.0) for e in recent]))
-            if recent
-            else float("nan"),
+            completion=float(np.mean([min(max(e.progress, 0.0), 1.0) for e in recent])) if recent else float("nan"),
             remaining=max(0.0, min(remaining)) if remaining else None,
         )
 
@@ -479,9 +465,7 @@ class Training:
             if self._stop.is_set() and number == signal.SIGINT:
                 raise KeyboardInterrupt
             self._stop.set()
-            self.reporter.note(
-                "Stopping after this iteration; a checkpoint is saved. Ctrl-C again stops at once."
-            )
+            self.reporter.note("Stopping after this iteration; a checkpoint is saved. Ctrl-C again stops at once.")
 
         before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
         try:
@@ -513,6 +497,4 @@ def _write_iteration(events: EventWriter, report: IterationReport) -> None:
         "losses/clip_fraction": stats.losses.clip_fraction,
         "losses/explained_variance": stats.explained_variance,
     }
-    events.add_scalars(
-        {tag: value for tag, value in scalars.items() if np.isfinite(value)}, step=stats.total_steps
-    )
+    events.add_scalars({tag: value for tag, value in scalars.items() if np.isfinite(value)}, step=stats.total_steps)

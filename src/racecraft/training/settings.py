@@ -97,9 +97,7 @@ class TrainSettings:
             values["ppo"] = PPOConfig(**values["ppo"])
             return cls(**values)
         except (KeyError, TypeError) as error:
-            raise RunError(
-                f"The settings in run.json do not fit this version of Racecraft: {error}."
-            ) from error
+            raise RunError(f"The settings in run.json do not fit this version of Racecraft: {error}.") from error
 
 
 def make_settings(
