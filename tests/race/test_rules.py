@@ -1,0 +1,71 @@
+import dataclasses
+import json
+
+import pytest
+
+from racecraft.errors import ConfigError
+from racecraft.race.rules import RULE_SETS, RaceRules
+
+
+def test_defaults_are_those_of_deepracer_for_cloud():
+    rules = RaceRules()
+    assert (rules.laps, rules.is_continuous, rules.max_resets) == (3, True, 100)
+    assert (rules.offtrack_penalty, rules.collision_penalty) == (5.0, 5.0)
+    assert rules == RULE_SETS["drfc"]
+
+
+def test_defaults_of_the_simulation_worker():
+    rules = RULE_SETS["worker"]
+    assert (rules.laps, rules.is_continuous, rules.max_resets) == (10, False, 0)
+    assert (rules.offtrack_penalty, rules.collision_penalty) == (2.0, 5.0)
+
+
+def test_each_mistake_has_its_penalty():
+    rules = RaceRules(offtrack_penalty=2.0, collision_penalty=3.0, immobilized_penalty=0.5)
+    assert rules.penalty("off_track") == rules.penalty("reversed") == 2.0
+    assert rules.penalty("crashed") == 3.0
+    assert rules.penalty("immobilized") == 0.5
+
+
+@pytest.mark.parametrize(("seconds", "steps"), [(0.0, 0), (2.0, 30), (5.0, 75), (0.03, 0), (0.04, 1), (1.0, 15)])
+def test_penalties_are_whole_steps(seconds, steps):
+    assert RaceRules(offtrack_penalty=seconds).penalty_steps("off_track") == steps
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("laps", 0),
+        ("laps", 1001),
+        ("laps", 1.5),
+        ("laps", True),
+        ("laps", "3"),
+        ("is_continuous", 1),
+        ("max_resets", -1),
+        ("max_resets", 2.0),
+        ("offtrack_penalty", -0.1),
+        ("offtrack_penalty", float("nan")),
+        ("collision_penalty", float("inf")),
+        ("collision_penalty", None),
+        ("immobilized_penalty", 1e9),
+        ("time_limit", -1),
+        ("start_offset", 1.0),
+        ("start_offset", -0.1),
+        ("lateral_jitter", 2.0),
+        ("heading_jitter", 4.0),
+        ("direction", "alternate"),
+        ("direction", None),
+    ],
+)
+def test_a_wrong_rule_names_itself_and_its_value(field, value):
+    with pytest.raises(ConfigError, match=field) as error:
+        RaceRules(**{field: value})
+    assert repr(value) in str(error.value)
+    assert "allowed" in str(error.value)
+
+
+def test_rules_are_frozen_and_plain():
+    rules = RaceRules(laps=2)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        rules.laps = 3
+    assert RaceRules(**json.loads(json.dumps(rules.to_dict()))) == rules
