@@ -14,7 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from racecraft.errors import RewardError, ShapeError
+from racecraft.errors import ConfigError, RewardError, ShapeError
+from racecraft.reward import worker_process
 from racecraft.reward.source import load_preset
 from racecraft.reward.worker import LOG_BYTES, MAX_BATCH, RewardWorker
 from racecraft.sim.columns import ROW_COLUMNS
@@ -102,6 +103,14 @@ def test_waypoints_of_several_tracks_and_directions(track, make_row):
         rewards = worker(rows)
     line = track.centerline
     assert rewards.tolist() == [2500 + line[1, 0], 409.0, 2500 + line[-2, 0], 400.0]
+
+
+def test_the_prepare_step_has_no_reward_and_no_call(track, make_row):
+    assert ROW_COLUMNS[worker_process.STEPS] == "steps"
+    rows = np.stack([make_row(steps=1.0, status=0.0), make_row(), make_row(steps=1.0, status=0.0), make_row()])
+    source = function("global calls", "calls += 1", "return calls", top="calls = 0\n")
+    with running(source, track) as worker:
+        assert worker(rows).tolist() == [0.0, 1.0, 0.0, 2.0]
 
 
 def test_changes_to_params_do_not_reach_the_next_call(track, rows):
@@ -412,6 +421,14 @@ def test_rows_that_are_not_finite(shared_worker, rows, value):
     bad[4, 5] = value
     with pytest.raises(ShapeError, match="NaN or infinity"):
         shared_worker(bad)
+
+
+@pytest.mark.parametrize(
+    "options", [{"timeout_s": 0}, {"timeout_s": float("nan")}, {"num_cars": 0}, {"memory_limit_mb": 1}]
+)
+def test_options_out_of_range(track, options):
+    with pytest.raises(ConfigError, match=next(iter(options))):
+        RewardWorker(load_preset("racing"), track, **options)
 
 
 @pytest.mark.parametrize("index", [-1.0, 2.0, 1e9])

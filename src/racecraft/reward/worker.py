@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from racecraft.errors import RewardError, ShapeError
+from racecraft.errors import ConfigError, RewardError, ShapeError
 from racecraft.reward import launch
 from racecraft.reward import worker_process as protocol
 from racecraft.reward.params import format_params, make_params
@@ -78,6 +78,11 @@ class RewardWorker:
         memory_limit_mb: int = 2048,
         num_cars: int = 1,
     ) -> None:
+        for name, value in (("timeout_s", timeout_s), ("start_timeout_s", start_timeout_s), ("num_cars", num_cars)):
+            if not value > 0:
+                raise ConfigError(f"{name} is {value}; it must be greater than 0.")
+        if not memory_limit_mb >= 64:
+            raise ConfigError(f"memory_limit_mb is {memory_limit_mb}; a process needs 64 at least.")
         self._source_lines = source.splitlines()
         self._waypoints = waypoints_of(tracks if isinstance(tracks, Sequence) else (tracks,))
         self._timeout_s = timeout_s
@@ -94,7 +99,7 @@ class RewardWorker:
             self._process = launch.start_process(descriptor)
         finally:
             os.close(descriptor)
-        self._finalizer = weakref.finalize(self, _kill, self._process)
+        self._finalizer = weakref.finalize(self, _kill, self._process, os.getpid())
         self._rows = np.frombuffer(memory, np.float64, MAX_BATCH * len(ROW_COLUMNS)).reshape(MAX_BATCH, -1)
         self._rewards = np.frombuffer(memory, np.float64, MAX_BATCH, rewards_offset)
         self._text = memoryview(memory)[text_offset:log_offset]
@@ -208,7 +213,7 @@ class RewardWorker:
         """The error of a process that makes no progress; asks it for its stack first."""
         self._process.send_signal(signal.SIGUSR1)
         line = _line_in(self._read_stderr(timeout_s=1.0))
-        text = f"did not return within {timeout_s:g} s"
+        text = f"did not {'load' if rows is None else 'return'} within {timeout_s:g} s"
         return self._error(text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first)
 
     def _crashed(self, rows: Rows | None, first: int) -> RewardError:
@@ -236,7 +241,7 @@ class RewardWorker:
     def _error(self, text: str, line: int, rows: Rows | None, row: int, *, first: int) -> RewardError:
         """One sentence, the line at fault, and the params that the function was called with."""
         message = f"{protocol.FILENAME}, line {line}: " if line > 0 else f"{protocol.FILENAME}: "
-        message += text if "Error:" in text else f"the reward function {text}"
+        message += f"the {'file' if rows is None else 'reward function'} {text}"
         message += "" if message.endswith(".") else "."
         if 0 < line <= len(self._source_lines):
             message += f"\n    {self._source_lines[line - 1].strip()}"
@@ -318,8 +323,10 @@ def _line_in(stack: str) -> int:
     return int(match.group(1)) if match else -1
 
 
-def _kill(process: subprocess.Popen[bytes]) -> None:
+def _kill(process: subprocess.Popen[bytes], owner: int) -> None:
     """Kill the process and all that it may have started, and close its pipes."""
+    if os.getpid() != owner:  # a forked copy of the trainer: the worker is not its child
+        return
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()

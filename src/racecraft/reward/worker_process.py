@@ -297,9 +297,9 @@ def describe(error: BaseException) -> bytes:
     elif isinstance(error, SystemExit):
         message = f"called sys.exit({text})"
     elif isinstance(error, MemoryError) and not text:
-        message = "MemoryError: the reward function used up its memory limit"
+        message = "raised MemoryError: the memory limit is used up"
     else:
-        message = f"{kind}: {text}" if text else kind
+        message = f"raised {kind}: {text}" if text else f"raised {kind}"
     return message.encode("utf-8", "replace")
 
 
