@@ -216,7 +216,9 @@ class SimTraceWriter:
             before,
             "prepare",
         )
-        return "".join(f"{episode.number},{','.join(row)},0.0,0\n" for row in (prepare, *rows))
+        if column["steps"][0] == 2.0:  # a flying lap has nothing to prepare
+            rows.insert(0, prepare)
+        return "".join(f"{episode.number},{','.join(row)},0.0,0\n" for row in rows)
 
     def _closest(self, column: dict[str, NDArray[np.float64]]) -> NDArray[np.int64]:
         """Index of the closest waypoint: the nearer of the one behind and the one ahead   (T,)."""
