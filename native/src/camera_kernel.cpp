@@ -37,10 +37,9 @@ void set_up(const CameraView& camera, const GroundView& ground, const LensPose& 
         // The ring of one texel is where a level's texels begin.
         const float u = (x - ground.min_x) * block.scale[i] + kFixedOne;
         const float v = (y - ground.min_y) * block.scale[i] + kFixedOne;
-        const int32_t is_usable =
-            static_cast<int32_t>(abs_of(u) < limit) & static_cast<int32_t>(abs_of(v) < limit);
+        const float farthest = max_of(abs_of(u), abs_of(v));
         block.begin[i] = span.begin;
-        block.end[i] = is_usable != 0 ? span.end : span.begin;
+        block.end[i] = farthest < limit ? span.end : span.begin;
         block.u[i] = static_cast<int32_t>(clamp(u, -limit, limit));
         block.v[i] = static_cast<int32_t>(clamp(v, -limit, limit));
         block.du[i] = static_cast<int32_t>(clamp(step * right_x * block.scale[i], -limit, limit));
@@ -340,9 +339,12 @@ class Painter {
     void store_row(int samples, uint8_t* line) const {
         const int shift = samples == 1 ? 6 : samples == 2 ? 7 : samples == 4 ? 8 : 9;
         const int32_t rounding = 1 << (shift - 1);
+        const int width = width_;  // a local, since bytes may alias anything
         for (int c = 0; c < kChannels; ++c) {
-            for (int x = 0; x < width_; ++x) {
-                line[x * kChannels + c] = static_cast<uint8_t>((sums_[c * stride_ + x] + rounding) >> shift);
+            const int32_t* values = sums_ + c * stride_;
+#pragma GCC ivdep
+            for (int x = 0; x < width; ++x) {
+                line[x * kChannels + c] = static_cast<uint8_t>((values[x] + rounding) >> shift);
             }
         }
     }

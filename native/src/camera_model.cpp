@@ -11,6 +11,7 @@ namespace {
 constexpr float kFarthest = 60.0f;  // m; rows that look farther along the ground show only wall
 constexpr float kStretch = 2.5f;  // length over width of a sample's footprint on the ground, at most, before
 constexpr int32_t kMaxRowSamples = 4;  // the row is split into twice as many, up to this many
+constexpr float kSteep = 1.0f;         // rad; cameras that look down more steeply see no walls, as on a map
 constexpr int32_t kSkySamples = 4;     // of rows above the horizon: they only smooth the walls' upper edge
 
 // Sideways shifts of the samples of a row, in pixels, so that upright borders are smoothed as well.
@@ -118,7 +119,7 @@ CameraModel::CameraModel(const CameraSpec& spec) {
              step_.data(),
              sharpness_.data(),
              corner_scale_.data(),
-             (spec.above - kWallHeight) / spec.above};
+             spec.pitch > kSteep ? 1.0f : (spec.above - kWallHeight) / spec.above};
 }
 
 void render_grey(const CameraModel& camera, const GroundMap& ground, const GreyPalette& palette, float x,

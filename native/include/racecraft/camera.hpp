@@ -94,9 +94,10 @@ RC_HD PixelSpan clip_walk(const GroundView& ground, float x, float y, float step
     const float y1 = (ground.max_y - y) * inverse_y;
     const float limit = static_cast<float>(width);
     const float first = clamp(max_of(min_of(x0, x1), min_of(y0, y1)), 0.0f, limit);
-    const float last = clamp(min_of(max_of(x0, x1), max_of(y0, y1)), -1.0f, limit - 1.0f);
-    const int32_t begin = -static_cast<int32_t>(floor_of(-first));
-    const int32_t end = static_cast<int32_t>(floor_of(last)) + 1;
+    const float last = clamp(min_of(max_of(x0, x1), max_of(y0, y1)) + 1.0f, 0.0f, limit);
+    const int32_t whole = static_cast<int32_t>(first);
+    const int32_t begin = whole + static_cast<int32_t>(static_cast<float>(whole) < first);
+    const int32_t end = static_cast<int32_t>(last);
     return {begin, max_of(begin, end)};
 }
 

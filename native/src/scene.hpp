@@ -1,0 +1,33 @@
+// Pictures for people: the room in colour and the cars in it, from the driver's, the chase or the top-down
+// camera.
+#pragma once
+
+#include "camera_model.hpp"
+
+namespace racecraft {
+
+struct CarPicture {
+    float x, y;         // m, the car's origin
+    float heading;      // rad
+    float steering;     // rad, of the front wheels, left positive
+    uint8_t colour[3];  // of the body, RGB
+    float alpha;        // 1 is solid; a car that waits for its reset blinks between 0.3 and 1
+};
+
+// 1.5 m behind the car, 1 m up, looking 18 degrees down.
+CameraSpec chase_camera(int width, int height);
+
+// A camera straight above the track that shows it whole, with a quarter more around it.
+struct FixedCamera {
+    CameraSpec spec;
+    float x, y, heading;  // m, rad
+};
+FixedCamera top_down_camera(const GroundMap& ground, int width, int height);
+
+// What the camera of a car at (x, y, heading) sees, into out (height, width, 3). Cars closer to the lens than
+// 2 cm are left out, and so is whatever the caller leaves out of `cars`: a driver does not see the own car.
+// Safe from any thread; allocates only while its buffers grow to the largest car seen so far.
+void render_rgb(const CameraModel& camera, const GroundMap& ground, const RgbPalette& palette, float x,
+                float y, float heading, const CarPicture* cars, int num_cars, uint8_t* out);
+
+}  // namespace racecraft
