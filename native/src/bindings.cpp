@@ -187,6 +187,7 @@ void bind_engine(nb::module_& m) {
         .def(
             "load", [](Engine& self, Bytes bytes) { self.load(bytes.data(), bytes.shape(0)); }, "state"_a)
         .def_prop_ro("num_threads", &Engine::num_threads)
+        .def_prop_ro("num_bytes", &Engine::num_bytes)
         .def_prop_ro("rows",
                      [](nb::handle_t<Engine> self) {
                          Engine& e = nb::cast<Engine&>(self);

@@ -240,6 +240,13 @@ void Engine::visit_saved(Visitor&& visit) {
     visit(flags_.get(), 2 * num_envs() * sizeof(bool));
 }
 
+size_t Engine::num_bytes() const {
+    size_t bytes = frames_.size() + is_moving_.size() * sizeof(float) + steering_command_.size() * sizeof(float) +
+                   speed_command_.size() * sizeof(float);
+    const_cast<Engine*>(this)->visit_saved([&](const void*, size_t size) { bytes += size; });
+    return bytes;
+}
+
 std::vector<uint8_t> Engine::save() const {
     std::vector<uint8_t> bytes;
     const_cast<Engine*>(this)->visit_saved([&](const void* data, size_t size) {

@@ -59,6 +59,7 @@ class Engine {
     size_t num_envs() const { return config_.num_envs; }
     size_t num_tracks() const { return tracks_.size() / 2; }
     int num_threads() const { return pool_.num_threads(); }
+    size_t num_bytes() const;  // of the batch's own buffers, frames included
     const CameraModel* camera() const { return camera_.get(); }
     double* rows() { return rows_.data(); }                  // (N, kNumRowColumns)
     float* state() { return state_.data(); }                 // (N, kNumStateColumns)

@@ -31,7 +31,7 @@ _HOME = {
     "action_space": "agent",
     "check_reward": "reward",
     "draw_track": "track",
-    "evaluate": "race.run_evaluation",
+    "evaluate": "race.run_evaluation:evaluate_run",
     "generate_track": "track",
     "load_reward": "reward",
     "load_track": "track",
@@ -39,7 +39,7 @@ _HOME = {
     "track_names": "track",
     "train": "training",
 }
-"""Where each public name lives, below ``racecraft``."""
+"""Where each public name lives below ``racecraft``, and after a colon what it is called there."""
 
 if TYPE_CHECKING:
     from racecraft.agent import Hyperparameters as Hyperparameters
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from racecraft.env import RacecraftVectorEnv as RacecraftVectorEnv
     from racecraft.errors import RacecraftError as RacecraftError
     from racecraft.race import RaceRules as RaceRules
-    from racecraft.race.run_evaluation import evaluate as evaluate
+    from racecraft.race.run_evaluation import evaluate_run
     from racecraft.reward import RewardWorker as RewardWorker
     from racecraft.reward import check_reward as check_reward
     from racecraft.reward import load_reward as load_reward
@@ -65,11 +65,14 @@ if TYPE_CHECKING:
     from racecraft.training import resume as resume
     from racecraft.training import train as train
 
+    evaluate = evaluate_run
+
 
 def __getattr__(name: str) -> Any:
     """Import on first use, so that ``import racecraft`` costs nothing."""
     if name in _HOME:
-        return getattr(import_module(f"racecraft.{_HOME[name]}"), name)
+        home, _, inside = _HOME[name].partition(":")
+        return getattr(import_module(f"racecraft.{home}"), inside or name)
     raise AttributeError(f"module 'racecraft' has no attribute {name!r}")
 
 

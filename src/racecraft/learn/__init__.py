@@ -4,7 +4,7 @@ Nothing here imports torch until ``make_learner`` is called.
 """
 
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats
-from racecraft.learn.networks import initial_weights, network_names, parameter_count
+from racecraft.learn.networks import forward_operations, initial_weights, network_names, parameter_count
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
 
@@ -33,6 +33,7 @@ __all__ = [
     "Objective",
     "PPOConfig",
     "UpdateStats",
+    "forward_operations",
     "initial_weights",
     "make_learner",
     "network_names",

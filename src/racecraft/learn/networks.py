@@ -187,6 +187,23 @@ def parameter_count(spec: NetworkSpec, *, tower: str = "") -> int:
     return sum(int(np.prod(shape)) for name, shape in weight_shapes(spec).items() if name.startswith(tower))
 
 
+def forward_operations(spec: NetworkSpec) -> int:
+    """Floating-point operations of one forward pass for one car, both towers; biases and activations not counted."""
+    arch = architecture(spec.name)
+    total = 0
+    for name, shape in weight_shapes(spec).items():
+        if not name.endswith(".weight"):
+            continue
+        places = 1
+        if ".conv" in name:
+            height, width = (side // arch.pool for side in spec.frame_shape)
+            for conv in arch.convs[: int(name.split(".conv")[1].split(".")[0])]:
+                height, width = (height - conv.kernel) // conv.stride + 1, (width - conv.kernel) // conv.stride + 1
+            places = height * width
+        total += 2 * places * int(np.prod(shape))
+    return total
+
+
 def _orthogonal(rng: np.random.Generator, rows: int, columns: int) -> NDArray[np.float64]:
     """A random matrix with orthonormal rows, or columns where there are fewer  (rows, columns)."""
     tall = rng.standard_normal((max(rows, columns), min(rows, columns)))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,13 +12,6 @@ from racecraft.run.folder import RunFolder
 
 WEIGHTS = "weights/"
 """Prefix of the network's weights among a checkpoint's arrays."""
-
-
-class Policy(Protocol):
-    """Drives N cars by what their cameras see."""
-
-    def __call__(self, frames: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Commands (N, 2), steering angle in rad and speed in m/s, for frames (N, H, W)."""
 
 
 class NetworkPolicy:
@@ -43,12 +34,13 @@ class NetworkPolicy:
         return self.action_space.to_commands(actions if spec.is_discrete else actions.clip(-1.0, 1.0))
 
 
-def load_policy(run: RunFolder, *, checkpoint: str | int = "best") -> NetworkPolicy:
-    """The policy of a run's checkpoint.
+def load_policy(run: RunFolder, *, checkpoint: str | int = "best", num_threads: int = 0) -> tuple[int, NetworkPolicy]:
+    """The policy of a run's checkpoint, and the camera steps of training behind it.
 
     Args:
         run: The run folder.
         checkpoint: ``best``, ``last`` or a number of steps.
+        num_threads: 0 takes one per core.
 
     Raises:
         CheckpointError: There is no such checkpoint, it is damaged, or does not fit its description.
@@ -61,8 +53,8 @@ def load_policy(run: RunFolder, *, checkpoint: str | int = "best") -> NetworkPol
         )
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"{saved.path} does not describe its network: {error}.") from error
-    learner = make_learner(spec)
+    learner = make_learner(spec, num_threads=num_threads)
     learner.load_weights(
         {name.removeprefix(WEIGHTS): array for name, array in saved.arrays.items() if name.startswith(WEIGHTS)}
     )
-    return NetworkPolicy(learner, run.read_model_metadata().action_space)
+    return saved.step, NetworkPolicy(learner, run.read_model_metadata().action_space)

@@ -2,7 +2,7 @@
 
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import ROW_COLUMNS, STATE_COLUMNS, STATUS_NAMES
-from racecraft.sim.simulation import CONTROL_DT, MAX_STEERING, Simulation, Start
+from racecraft.sim.simulation import CONTROL_DT, MAX_STEERING, Simulation, Start, instruction_set
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 
 __all__ = [
@@ -15,5 +15,6 @@ __all__ = [
     "Simulation",
     "Start",
     "Vehicle",
+    "instruction_set",
     "load_vehicle",
 ]

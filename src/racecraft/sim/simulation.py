@@ -8,6 +8,7 @@ Every array is a view of the core's own memory: it changes with the next step, s
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -112,8 +113,8 @@ class Simulation:
         num_envs: int = 1,
         seed: int = 0,
         vehicle: Vehicle | str = "v5",
-        camera: CameraSpec | None = CameraSpec(),  # noqa: B008 (frozen)
-        start: Start = Start(),  # noqa: B008 (frozen)
+        camera: CameraSpec | None = CameraSpec(),
+        start: Start = Start(),
         direction: str = "forward",
         laps: int = 1,
         time_limit: float = 0.0,
@@ -177,6 +178,11 @@ class Simulation:
     def num_threads(self) -> int:
         """Threads that step the batch, the caller's included."""
         return int(self._engine.num_threads)
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory of the batch, frames included; tracks and threads not."""
+        return int(self._engine.num_bytes)
 
     def column(self, name: str) -> NDArray[np.float64]:
         """One column of `rows` by name, a view (N,)."""
@@ -289,6 +295,12 @@ class Simulation:
             raise ShapeError(str(error)) from error
 
 
+def instruction_set() -> str:
+    """What the core's kernels run on: ``avx512``, ``avx2`` or ``portable``; results are the same."""
+    return str(_native.isa())
+
+
+@functools.lru_cache(maxsize=8)
 def ground_map(track: Track, *, texel: float = 0.01) -> _native.GroundMap:
     """The ground of a track as the cameras see it, with texels of about `texel` metres."""
     return _native.GroundMap(track.centerline, track.inner, track.outer, track.is_closed, texel)

@@ -1,4 +1,4 @@
-"""The car's parameters: named presets and files, handed to the native vehicle model (native/include/racecraft/vehicle.hpp)."""
+"""The car's parameters, presets and files, for the native model (native/include/racecraft/vehicle.hpp)."""
 
 from __future__ import annotations
 
@@ -119,7 +119,8 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     path = Path(name_or_path)
     if not path.is_file():
         raise ConfigError(
-            f"Vehicle {name!r} is neither a preset ({', '.join(PRESETS)}) nor a file. {did_you_mean(name, PRESETS)}".strip()
+            f"Vehicle {name!r} is neither a preset ({', '.join(PRESETS)}) nor a file.",
+            hint=did_you_mean(name, PRESETS),
         )
     if path.stat().st_size > MAX_FILE_BYTES:
         raise ConfigError(f"Vehicle file {name!r} has more than {MAX_FILE_BYTES} bytes; it should hold a few numbers.")

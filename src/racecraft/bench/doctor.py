@@ -1,0 +1,109 @@
+"""`racecraft doctor`: every part tried for a moment, with what to do where one fails."""
+
+from __future__ import annotations
+
+import platform
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from racecraft import __version__
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """The outcome of one check."""
+
+    name: str
+    """What was looked at."""
+    ok: bool
+    """Whether it works."""
+    text: str
+    """What was found."""
+    hint: str = ""
+    """What to do about it."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        return asdict(self)
+
+
+def examine() -> list[Finding]:
+    """Try every part; a failure never stops the checks that follow."""
+    return [_try(name, check, hint) for name, check, hint in CHECKS]
+
+
+def _try(name: str, check: Callable[[], str], hint: str) -> Finding:
+    try:
+        return Finding(name=name, ok=True, text=check())
+    except Exception as error:  # whatever is broken here is what the user wants to know
+        return Finding(name=name, ok=False, text=f"{type(error).__name__}: {error}", hint=hint)
+
+
+def _python() -> str:
+    return f"Python {platform.python_version()}, Racecraft {__version__}, {platform.system()} {platform.machine()}"
+
+
+def _core() -> str:
+    from racecraft.sim import instruction_set
+
+    return f"native core loaded, instruction set {instruction_set()}"
+
+
+def _simulator() -> str:
+    import numpy as np
+
+    from racecraft.sim import Simulation
+    from racecraft.track import load_track
+
+    simulation = Simulation(load_track("oval"), num_envs=4)
+    for _ in range(10):
+        simulation.step(np.tile(np.float32([0.0, 1.0]), (4, 1)))
+    contrast = int(simulation.frames.max()) - int(simulation.frames.min())
+    if contrast < 20:
+        raise RuntimeError(f"the camera's picture is blank (contrast {contrast})")
+    return f"10 steps driven on {simulation.num_threads} threads, camera sees"
+
+
+def _reward() -> str:
+    from racecraft.reward import dry_run, load_preset
+    from racecraft.track import load_track
+
+    outcomes = dry_run(load_preset("centerline"), load_track("oval"))
+    for outcome in outcomes:
+        if outcome.error is not None:
+            raise outcome.error
+    return f"worker process started, {len(outcomes)} rewards paid"
+
+
+def _learner() -> str:
+    from racecraft.learn import NetworkSpec, make_learner
+
+    learner = make_learner(NetworkSpec(num_actions=10), num_threads=1)
+    return f"{type(learner).__name__} ready"
+
+
+def _video() -> str:
+    import av
+
+    codec = av.codec.Codec("libx264", "w")
+    return f"H.264 encoder: {codec.long_name}"
+
+
+def _disk() -> str:
+    with tempfile.NamedTemporaryFile(dir=Path.cwd()) as file:
+        file.write(b"racecraft")
+    return "the current folder can be written to, for runs/"
+
+
+CHECKS: list[tuple[str, Callable[[], str], str]] = [
+    ("python", _python, "Install Python 3.11 or newer."),
+    ("native core", _core, "Build it again: make clean setup."),
+    ("simulator", _simulator, "Build it again: make clean setup."),
+    ("reward worker", _reward, "Racecraft must be allowed to start processes."),
+    ("learner", _learner, "Install the learner: make setup, or pip install 'racecraft[torch]'."),
+    ("video", _video, "Install PyAV with H.264: pip install av."),
+    ("folder", _disk, "Change into a folder that you may write to."),
+]

@@ -1,0 +1,74 @@
+"""What this machine is and what it can do at most: the yardstick for every figure."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from racecraft import __version__
+from racecraft.sim import instruction_set
+
+COPY_BYTES = 1 << 27  # far beyond every cache
+
+
+def describe_machine() -> dict[str, Any]:
+    """Processor, cores, memory, versions; no names of hosts or people."""
+    return {
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "memory_gib": round(_memory_bytes() / 2**30, 1),
+        "instruction_set": instruction_set(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "racecraft": __version__,
+    }
+
+
+def copy_bandwidth() -> float:
+    """Bytes per second that one thread writes when it copies memory; median of 5."""
+    source = np.ones(COPY_BYTES, np.uint8)
+    target = np.empty_like(source)
+    np.copyto(target, source)
+    seconds = []
+    for _ in range(5):
+        begun = time.perf_counter()
+        np.copyto(target, source)
+        seconds.append(time.perf_counter() - begun)
+    return COPY_BYTES / median(seconds)
+
+
+def matrix_flops() -> float:
+    """Floating-point operations per second of a large float32 matrix product on all cores; median of 5."""
+    side = 1536
+    left, right = np.ones((side, side), np.float32), np.ones((side, side), np.float32)
+    product = left @ right
+    seconds = []
+    for _ in range(5):
+        begun = time.perf_counter()
+        np.matmul(left, right, out=product)
+        seconds.append(time.perf_counter() - begun)
+    return 2.0 * side**3 / median(seconds)
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def _memory_bytes() -> float:
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):
+        return float("nan")
