@@ -42,7 +42,7 @@ class Autopilot:
     """m/s² it allows itself in bends."""
     lookahead: float = 0.3
     """m to the point it steers for when standing, beyond the car's nose."""
-    lookahead_time: float = 0.15
+    lookahead_time: float = 0.25
     """s of driving added to that."""
 
     def __post_init__(self) -> None:
@@ -50,7 +50,7 @@ class Autopilot:
             "speed": (0.1, 4.0),
             "lateral_acceleration": (0.1, 20.0),
             "lookahead": (0.1, 2.0),
-            "lookahead_time": (0.0, 0.3),
+            "lookahead_time": (0.0, 0.5),
         }
         for name, (low, high) in limits.items():
             if not low <= getattr(self, name) <= high:

@@ -46,7 +46,7 @@ def evaluate(
     num_trials: int = 5,
     seed: int = 0,
     vehicle: Vehicle | str = "v5",
-    camera: CameraSpec = CameraSpec(),  # noqa: B008 (frozen)
+    camera: CameraSpec = CameraSpec(),
     sees: str = "frames",
     num_threads: int = 0,
 ) -> Evaluation:
@@ -96,7 +96,7 @@ def trial_simulation(
     num_trials: int = 5,
     seed: int = 0,
     vehicle: Vehicle | str = "v5",
-    camera: CameraSpec | None = CameraSpec(),  # noqa: B008 (frozen)
+    camera: CameraSpec | None = CameraSpec(),
     num_threads: int = 0,
 ) -> Simulation:
     """A simulation by the rules, a car for each trial: what `evaluate` makes and `completion` reuses."""
