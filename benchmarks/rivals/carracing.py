@@ -7,6 +7,7 @@ It is the camera racing environment that most people know: 96 x 96 RGB, one car,
 
 from __future__ import annotations
 
+import argparse
 import json
 import statistics
 import time
@@ -50,4 +51,6 @@ def measure(seconds: float = 5.0) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(measure()))
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=5.0, help="how long to measure")
+    print(json.dumps(measure(parser.parse_args().seconds)))

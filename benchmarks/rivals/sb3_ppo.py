@@ -9,6 +9,7 @@ per step does not depend on it, since every step is learned from ten times.
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import time
@@ -85,4 +86,6 @@ def measure(seconds: float = 30.0, *, num_threads: int | None = None) -> dict[st
 
 
 if __name__ == "__main__":
-    print(json.dumps(measure()))
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=30.0, help="how long to measure")
+    print(json.dumps(measure(parser.parse_args().seconds)))

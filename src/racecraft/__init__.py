@@ -10,6 +10,7 @@ Everything public is here; the packages below are the rooms it lives in (see ARC
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -78,3 +79,7 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return [*sorted(_HOME), "__version__"]
+
+
+if "gymnasium" in sys.modules:  # it may be the importer: gymnasium.make("racecraft:Racecraft-v0")
+    import_module("racecraft.env")

@@ -1,4 +1,4 @@
-"""The rivals can be measured, as modules and as scripts."""
+"""The rivals can be measured; each script prints one JSON object."""
 
 from __future__ import annotations
 
@@ -13,19 +13,11 @@ import pytest
 RIVALS = Path(__file__).resolve().parents[2] / "benchmarks" / "rivals"
 KEYS = {"name", "version", "steps_per_second", "steps", "observation", "num_envs"}
 
-MEASURE = """
-import importlib.util, json, sys
-spec = importlib.util.spec_from_file_location("rival", sys.argv[1])
-rival = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(rival)
-print(json.dumps(rival.measure(float(sys.argv[2]))))
-"""
-
 
 def measure(name, seconds):
     """A rival's figures, from a process of its own: other projects' warnings are none of ours."""
     process = subprocess.run(
-        [sys.executable, "-c", MEASURE, RIVALS / f"{name}.py", str(seconds)],
+        [sys.executable, RIVALS / f"{name}.py", "--seconds", str(seconds)],
         capture_output=True,
         text=True,
         timeout=240,

@@ -62,9 +62,10 @@ def test_registering_again_does_nothing():
     assert gymnasium.spec(ENV_ID).to_json()
 
 
-def test_an_id_can_name_the_module_to_import():
+@pytest.mark.parametrize("module", ["racecraft", "racecraft.env"])
+def test_an_id_can_name_the_module_to_import(module):
     code = (
-        "import gymnasium; env = gymnasium.make('racecraft.env:Racecraft-v0', track='oval', observation='state');"
+        f"import gymnasium; env = gymnasium.make('{module}:Racecraft-v0', track='oval', observation='state');"
         "env.reset(seed=0); env.close()"
     )
     subprocess.run([sys.executable, "-W", "error", "-c", code], check=True, timeout=60)

@@ -12,8 +12,9 @@ ENV_ID: Final = "Racecraft-v0"
 def register_environments() -> None:
     """Make ``gymnasium.make`` and ``gymnasium.make_vec`` know Racecraft; calling again does nothing.
 
-    Importing `racecraft.env` does this. Gymnasium has no plug-in mechanism since 1.0, so either that import
-    comes first or the id names it: ``gymnasium.make("racecraft.env:Racecraft-v0")``.
+    Importing `racecraft.env` does this, and so does importing `racecraft` after Gymnasium. There is no plug-in
+    mechanism since Gymnasium 1.0, so one of these comes first, or the id names what to import:
+    ``gymnasium.make("racecraft.env:Racecraft-v0")``.
     """
     if ENV_ID not in gymnasium.registry:
         gymnasium.register(
