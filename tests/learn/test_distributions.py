@@ -40,9 +40,7 @@ def test_gaussian_log_prob_integrates_to_one():
 
 def test_gaussian_samples_have_the_policys_moments():
     outputs = np.tile(np.array([[0.2, -0.4, -1.0, 0.5]], np.float32), (40_000, 1))
-    noise = distributions.noise_for(
-        len(outputs), num_actions=2, is_discrete=False, rng=np.random.default_rng(0)
-    )
+    noise = distributions.noise_for(len(outputs), num_actions=2, is_discrete=False, rng=np.random.default_rng(0))
     actions = distributions.sample(outputs, noise, is_discrete=False)
     np.testing.assert_allclose(actions.mean(0), [0.2, -0.4], atol=0.03)
     np.testing.assert_allclose(actions.std(0), np.exp([-1.0, 0.5]), rtol=0.03)

@@ -23,9 +23,7 @@ def assert_same_weights(a: PPO, b: PPO) -> None:
 
 @pytest.mark.parametrize("is_discrete", [True, False])
 def test_learns_to_centre_the_stripe(is_discrete):
-    config = PPOConfig(
-        num_envs=32, num_steps=16, minibatch_size=128, update_epochs=4, learning_rate=1e-3, ent_coef=0.0
-    )
+    config = PPOConfig(num_envs=32, num_steps=16, minibatch_size=128, update_epochs=4, learning_rate=1e-3, ent_coef=0.0)
     spec = NetworkSpec(num_actions=3 if is_discrete else 1, is_discrete=is_discrete, state_size=2)
     ppo = ppo_for(config, spec=spec)
     rewards = []
@@ -205,9 +203,7 @@ def test_e_greedy_falls_from_all_random_to_its_end(config):
         ppo.iterate()
         outputs = ppo.learner.policy(ppo._rollout.observations.reshape(-1, *ppo.learner.observation_shape))
         shares.append((ppo._rollout.actions.ravel() == outputs.argmax(1)).mean())
-    assert shares[0] == pytest.approx(
-        1 / 3 + 0.1 * 2 / 3, abs=0.12
-    )  # epsilon about 0.9 in the first iteration
+    assert shares[0] == pytest.approx(1 / 3 + 0.1 * 2 / 3, abs=0.12)  # epsilon about 0.9 in the first iteration
     assert shares[-1] == pytest.approx(0.9 + 0.1 / 3, abs=0.04)
 
 

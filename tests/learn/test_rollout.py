@@ -12,9 +12,7 @@ def column(*values, dtype=np.float32):
     return np.array(values, dtype)[:, None]
 
 
-def advantages_of(
-    *, terminated=(0, 0, 0, 0), truncated=(0, 0, 0, 0), next_values=(0, 0, 0, 0), gae_lambda=0.5
-):
+def advantages_of(*, terminated=(0, 0, 0, 0), truncated=(0, 0, 0, 0), next_values=(0, 0, 0, 0), gae_lambda=0.5):
     return generalized_advantages(
         rewards=column(1, 2, 3, 4),
         values=column(10, 20, 30, 40),
@@ -50,9 +48,7 @@ def test_lambda_one_without_ends_is_the_discounted_return():
 @given(st.integers(0, 2**32 - 1), st.floats(0, 1), st.floats(0, 1))
 def test_cars_do_not_touch_each_other(seed, gamma, gae_lambda):
     rng = np.random.default_rng(seed)
-    arrays = {
-        name: rng.normal(size=(9, 3)).astype(np.float32) for name in ("rewards", "values", "next_values")
-    }
+    arrays = {name: rng.normal(size=(9, 3)).astype(np.float32) for name in ("rewards", "values", "next_values")}
     ends = {name: rng.random((9, 3)) < 0.2 for name in ("terminated", "truncated")}
     together = generalized_advantages(**arrays, **ends, gamma=gamma, gae_lambda=gae_lambda)[0]
     alone = generalized_advantages(
@@ -76,9 +72,7 @@ def test_a_car_that_is_terminated_and_truncated_is_terminated():
     assert advantages.tolist() == [[1.0, 5.0]]
 
 
-@pytest.mark.parametrize(
-    ("action_size", "dtype", "shape"), [(0, np.int64, (4, 3)), (2, np.float32, (4, 3, 2))]
-)
+@pytest.mark.parametrize(("action_size", "dtype", "shape"), [(0, np.int64, (4, 3)), (2, np.float32, (4, 3, 2))])
 def test_actions_are_indices_or_vectors(action_size, dtype, shape):
     rollout = Rollout(4, num_envs=3, observation_shape=(15, 20, 16), state_size=0, action_size=action_size)
     assert rollout.actions.dtype == dtype

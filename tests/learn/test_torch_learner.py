@@ -56,9 +56,7 @@ def reference_tower(spec: NetworkSpec, weights, frames, tower: str) -> np.ndarra
 def test_forward_agrees_with_numpy(name):
     spec = NetworkSpec(name=name, num_actions=6)
     learner = TorchLearner(spec, seed=2, precision="float32")
-    weights = {
-        key: array * (50 if key == "policy.head.weight" else 1) for key, array in learner.weights().items()
-    }
+    weights = {key: array * (50 if key == "policy.head.weight" else 1) for key, array in learner.weights().items()}
     learner.load_weights(weights)
     frames = np.random.default_rng(0).integers(0, 256, (2, 120, 160), dtype=np.uint8)
     observations = learner.encode(frames)
@@ -197,6 +195,4 @@ def test_torch_is_imported_only_by_the_torch_learner():
     code = "import sys, racecraft.learn; assert 'torch' not in sys.modules; "
     code += "racecraft.learn.make_learner(racecraft.learn.NetworkSpec(num_actions=2)); "
     code += "assert 'torch' in sys.modules and 'torch._dynamo' not in sys.modules"
-    subprocess.run(
-        [sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)}, timeout=60
-    )
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)}, timeout=60)

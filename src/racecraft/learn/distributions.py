@@ -23,9 +23,7 @@ def log_softmax(logits: NDArray[np.float32]) -> NDArray[np.float64]:
     return np.asarray(shifted - np.log(np.exp(shifted).sum(axis=1, keepdims=True)))
 
 
-def noise_for(
-    num_cars: int, *, num_actions: int, is_discrete: bool, rng: np.random.Generator
-) -> NDArray[np.float64]:
+def noise_for(num_cars: int, *, num_actions: int, is_discrete: bool, rng: np.random.Generator) -> NDArray[np.float64]:
     """The random numbers one step of acting uses: uniforms (N,), or standard normals (N, A)."""
     return rng.random(num_cars) if is_discrete else rng.standard_normal((num_cars, num_actions))
 
@@ -56,9 +54,7 @@ def most_likely(outputs: NDArray[np.float32], *, is_discrete: bool) -> NDArray[A
     return np.asarray(outputs[:, : outputs.shape[1] // 2].clip(-1.0, 1.0), dtype=np.float32)
 
 
-def log_prob(
-    outputs: NDArray[np.float32], actions: NDArray[Any], *, is_discrete: bool
-) -> NDArray[np.float32]:
+def log_prob(outputs: NDArray[np.float32], actions: NDArray[Any], *, is_discrete: bool) -> NDArray[np.float32]:
     """Log-probability, or log-density, of actions  (N,)."""
     if is_discrete:
         return np.take_along_axis(log_softmax(outputs), actions[:, None], axis=1)[:, 0].astype(np.float32)

@@ -43,9 +43,7 @@ class Architecture:
 
 ARCHITECTURES: dict[str, Architecture] = {
     "RACECRAFT_SMALL": Architecture((Conv(16, 8, 4), Conv(32, 4, 2), Conv(32, 3, 2)), (128,), pool=2),
-    "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW": Architecture(
-        (Conv(32, 8, 4), Conv(64, 4, 2), Conv(64, 3, 1)), (512,)
-    ),
+    "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW": Architecture((Conv(32, 8, 4), Conv(64, 4, 2), Conv(64, 3, 1)), (512,)),
     "DEEP_CONVOLUTIONAL_NETWORK": Architecture(
         (Conv(32, 5, 2), Conv(32, 3, 1), Conv(64, 3, 2), Conv(64, 3, 1)), (64, 512)
     ),
@@ -176,9 +174,7 @@ def initial_weights(spec: NetworkSpec, *, seed: int) -> Weights:
             weights[name] = np.zeros(shape, np.float32)
             continue
         gain = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}.get(name, 2.0**0.5)
-        weights[name] = (
-            (gain * _orthogonal(rng, shape[0], int(np.prod(shape[1:])))).reshape(shape).astype(np.float32)
-        )
+        weights[name] = (gain * _orthogonal(rng, shape[0], int(np.prod(shape[1:])))).reshape(shape).astype(np.float32)
     return weights
 
 

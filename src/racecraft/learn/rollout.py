@@ -46,9 +46,7 @@ class Rollout:
         self.truncated = np.zeros(shape, bool)
         self.is_valid = np.zeros(shape, bool)  # False where a car only waited for the others
         self.values = np.zeros(shape, np.float32)
-        self.next_values = np.zeros(
-            shape, np.float32
-        )  # value of the pose after the step, where `bootstrap` put one
+        self.next_values = np.zeros(shape, np.float32)  # value of the pose after the step, where `bootstrap` put one
         self.num_steps = 0  # rows filled so far
 
     def clear(self) -> None:
@@ -82,9 +80,7 @@ class Rollout:
         t = self.num_steps - 1
         self.rewards[t], self.terminated[t], self.truncated[t] = rewards, terminated, truncated & ~terminated
 
-    def advantages(
-        self, *, gamma: float, gae_lambda: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def advantages(self, *, gamma: float, gae_lambda: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Generalised advantage estimates and returns of the filled rows, each (T, N).
 
         ``values`` must be filled, ``next_values`` wherever a step was truncated and in each car's last row.
@@ -129,9 +125,7 @@ def generalized_advantages(
     advantages = np.zeros_like(rewards)
     carried = np.zeros(rewards.shape[1:], np.float32)
     for t in reversed(range(num_steps)):
-        following = (
-            next_values[t] if t == num_steps - 1 else np.where(truncated[t], next_values[t], values[t + 1])
-        )
+        following = next_values[t] if t == num_steps - 1 else np.where(truncated[t], next_values[t], values[t + 1])
         delta = rewards[t] + gamma * np.where(terminated[t], 0.0, following) - values[t]
         carried = delta + gamma * gae_lambda * np.where(terminated[t] | truncated[t], 0.0, carried)
         advantages[t] = carried

@@ -1,7 +1,7 @@
 """The learner on torch: the reference backend, built for few CPU cores, where training spends its time.
 
 Parameters, gradients and Adam's moments are flat vectors, and the tensors of the network are views into them,
-so a step of the optimiser is six passes over one array. Each minibatch is cut into shards of fixed size whose
+so a step of the optimiser is six passes over one array. Each minibatch is cut into two shards or more, whose
 gradients are added in fixed order; with two threads two shards run at once, each on a core of its own. That
 scales better than torch's own threads, which meet after every operation, and the result is the same bits for
 any number of threads.
@@ -26,7 +26,7 @@ from racecraft.learn.distributions import LOG_STD_MAX, LOG_STD_MIN
 from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights
 
 _BETA1, _BETA2 = 0.9, 0.999
-_SHARD_SIZE = 128  # samples; activations of the small network then stay in a 1 MB L2 cache
+_SHARD_SIZES = (64, 256)  # samples; a smaller shard is mostly overhead, a larger one leaves the L2 cache
 _CHUNK_SIZE = 256  # samples of one forward pass without gradient
 _HALF_LOG_TWO_PI = 0.9189385332046727
 _ENTROPY_OF_UNIT_GAUSSIAN = 1.4189385332046727
@@ -43,9 +43,7 @@ class TorchLearner:
             Weights, loss and optimiser are float32 in any case.
     """
 
-    def __init__(
-        self, spec: NetworkSpec, *, seed: int = 0, num_threads: int = 0, precision: str = "auto"
-    ) -> None:
+    def __init__(self, spec: NetworkSpec, *, seed: int = 0, num_threads: int = 0, precision: str = "auto") -> None:
         self.spec = spec
         self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
         self._dtype = _dtype(precision)
@@ -54,12 +52,8 @@ class TorchLearner:
         self._flat = torch.zeros(size)
         self._moment1, self._moment2 = torch.zeros(size), torch.zeros(size)
         self._num_updates = 0
-        self._num_threads = (
-            num_threads or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-        )
-        self._pool = ThreadPoolExecutor(
-            self._num_threads, "learner", initializer=torch.set_num_threads, initargs=(1,)
-        )
+        self._num_threads = num_threads or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+        self._pool = ThreadPoolExecutor(num_threads or _num_cores(), "learner", initializer=_prepare_thread)
         self._shards: list[tuple[Tensor, torch_networks.Parameters]] = []
         self._parameters = self._views(self._flat)
         self.load_weights(networks.initial_weights(spec, seed=seed))
@@ -89,7 +83,8 @@ class TorchLearner:
     def update(self, minibatch: Minibatch, objective: Objective) -> UpdateStats:
         """Take one gradient step; leave everything as it is when loss or gradient is not finite."""
         size = len(minibatch.advantages)
-        starts = range(0, size, _SHARD_SIZE)
+        shard_size = min(max(-(-size // 2), _SHARD_SIZES[0]), _SHARD_SIZES[1])
+        starts = range(0, size, shard_size)
         while len(self._shards) < len(starts):
             gradient = torch.zeros_like(self._flat)
             parameters = self._views(self._flat)
@@ -100,7 +95,7 @@ class TorchLearner:
         def run(shard: int) -> Tensor:
             gradient, parameters = self._shards[shard]
             gradient.zero_()
-            rows = slice(starts[shard], starts[shard] + _SHARD_SIZE)
+            rows = slice(starts[shard], starts[shard] + shard_size)
             loss, terms = self._loss(parameters, minibatch, rows, objective)
             (loss / size).backward()  # type: ignore[no-untyped-call]
             return terms
@@ -122,7 +117,7 @@ class TorchLearner:
         if stats.is_finite:
             if 0 < objective.max_grad_norm < norm:
                 gradient.mul_(objective.max_grad_norm / norm)
-            self._adam(gradient, objective)
+            self._pool.submit(self._adam, gradient, objective).result()
         return stats
 
     def weights(self) -> Weights:
@@ -206,9 +201,7 @@ class TorchLearner:
         """The network's tensors as views into a flat vector."""
         sizes = [int(np.prod(shape)) for shape in self._shapes.values()]
         parts = torch.split(flat.detach(), sizes)
-        return {
-            name: part.view(shape) for (name, shape), part in zip(self._shapes.items(), parts, strict=True)
-        }
+        return {name: part.view(shape) for (name, shape), part in zip(self._shapes.items(), parts, strict=True)}
 
     def _load(self, flat: Tensor, arrays: Weights) -> None:
         shapes = {name: tuple(array.shape) for name, array in arrays.items()}
@@ -230,9 +223,17 @@ def _log_probs_and_entropy(outputs: Tensor, actions: Tensor, *, is_discrete: boo
     mean, log_std = outputs.chunk(2, dim=1)
     log_std = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
     z = (actions - mean) * (-log_std).exp()
-    return (-0.5 * z.square() - log_std - _HALF_LOG_TWO_PI).sum(1), (
-        log_std + _ENTROPY_OF_UNIT_GAUSSIAN
-    ).sum()
+    return (-0.5 * z.square() - log_std - _HALF_LOG_TWO_PI).sum(1), (log_std + _ENTROPY_OF_UNIT_GAUSSIAN).sum()
+
+
+def _num_cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _prepare_thread() -> None:
+    """One core per thread, and no subnormal numbers: moments of dead units decay into them, at 100 times the cost."""
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)
 
 
 def _dtype(precision: str) -> torch.dtype:

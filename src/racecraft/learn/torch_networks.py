@@ -80,11 +80,7 @@ def _fold(weight: Tensor, block: int) -> Tensor:
     """A kernel over the blocks that ``networks.encode`` makes: (F, 1, K, K) -> (F, b², K/b, K/b)."""
     filters, _, kernel, _ = weight.shape
     steps = kernel // block
-    return (
-        weight.view(filters, steps, block, steps, block)
-        .permute(0, 2, 4, 1, 3)
-        .reshape(filters, -1, steps, steps)
-    )
+    return weight.view(filters, steps, block, steps, block).permute(0, 2, 4, 1, 3).reshape(filters, -1, steps, steps)
 
 
 def _linear(parameters: Parameters, x: Tensor, layer: str) -> Tensor:
