@@ -28,9 +28,7 @@ class Canvas:
         background: Colour of the sheet.
     """
 
-    def __init__(
-        self, size: tuple[int, int], *, scale: float, origin: tuple[float, float], background: Color
-    ) -> None:
+    def __init__(self, size: tuple[int, int], *, scale: float, origin: tuple[float, float], background: Color) -> None:
         from PIL import Image, ImageDraw
 
         self.size = size
@@ -85,21 +83,15 @@ class Canvas:
         ((x, y),), radius = self._fine(as_points(center)[None]), radius_px * OVERSAMPLING
         self._draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=color)
 
-    def shade(
-        self, polygons: list[Floats], color: Color, *, blur_px: float, strength: float, shift_px: float
-    ) -> None:
+    def shade(self, polygons: list[Floats], color: Color, *, blur_px: float, strength: float, shift_px: float) -> None:
         """Lays the soft shadow of polygons in metres on the sheet, shifted downwards."""
         from PIL import Image, ImageDraw, ImageFilter
 
         mask = Image.new("L", self.size, 0)
         draw = ImageDraw.Draw(mask)
         for polygon in polygons:
-            draw.polygon(
-                [(x, y + shift_px) for x, y in self.to_pixels(polygon).tolist()], fill=round(255 * strength)
-            )
-        mask = mask.filter(ImageFilter.GaussianBlur(blur_px)).resize(
-            self._image.size, Image.Resampling.BILINEAR
-        )
+            draw.polygon([(x, y + shift_px) for x, y in self.to_pixels(polygon).tolist()], fill=round(255 * strength))
+        mask = mask.filter(ImageFilter.GaussianBlur(blur_px)).resize(self._image.size, Image.Resampling.BILINEAR)
         self._image.paste(color, (0, 0), mask)
 
     # --- in pixels of the finished picture
@@ -126,15 +118,11 @@ class Canvas:
         width = text_width(words, size=size, spacing=spacing)
         x, y = place[0] * OVERSAMPLING, place[1] * OVERSAMPLING
         if not spacing:
-            self._draw.text(
-                (x, y), words, fill=color, font=font, anchor=anchor, stroke_width=stroke, stroke_fill=color
-            )
+            self._draw.text((x, y), words, fill=color, font=font, anchor=anchor, stroke_width=stroke, stroke_fill=color)
             return width
         x -= {"l": 0.0, "m": 0.5, "r": 1.0}[anchor[0]] * width * OVERSAMPLING
         for letter in words:
-            self._draw.text(
-                (x, y), letter, fill=color, font=font, anchor="l" + anchor[1], stroke_width=stroke
-            )
+            self._draw.text((x, y), letter, fill=color, font=font, anchor="l" + anchor[1], stroke_width=stroke)
             x += font.getlength(letter) + spacing * size * OVERSAMPLING
         return width
 
@@ -160,16 +148,12 @@ def text_width(words: str, *, size: float, spacing: float = 0.0) -> float:
     font = _font(size)
     if not spacing:
         return font.getlength(words) / OVERSAMPLING
-    return sum(font.getlength(letter) for letter in words) / OVERSAMPLING + spacing * size * max(
-        0, len(words) - 1
-    )
+    return sum(font.getlength(letter) for letter in words) / OVERSAMPLING + spacing * size * max(0, len(words) - 1)
 
 
 def _font(size: float) -> ImageFont.FreeTypeFont:
     from PIL import ImageFont
 
     font = ImageFont.load_default(size=size * OVERSAMPLING)
-    assert isinstance(
-        font, ImageFont.FreeTypeFont
-    )  # Pillow gives a bitmap font only when built without FreeType
+    assert isinstance(font, ImageFont.FreeTypeFont)  # Pillow gives a bitmap font only when built without FreeType
     return font

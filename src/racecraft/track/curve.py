@@ -29,8 +29,9 @@ def trace_corners(corners: Sequence[Corner], *, is_closed: bool = True, ease: fl
     """The smooth line through a table of corners, finely sampled.
 
     Args:
-        corners: (x, y, radius) in metres, in driving direction. A closed line starts halfway between the
-            last corner and the first; an open one runs from the first to the last, whose radii do not matter.
+        corners: (x, y, radius) in metres, in driving direction. A closed line starts in the middle of the
+            straight from the last corner to the first; an open one runs from the first to the last, whose
+            radii do not matter.
         is_closed: Whether the last corner leads back to the first.
         ease: Length of the sliding mean, metres.
 
@@ -41,23 +42,22 @@ def trace_corners(corners: Sequence[Corner], *, is_closed: bool = True, ease: fl
         TrackError: Two neighbouring corners leave no room for their arcs.
     """
     points = np.array([(x, y) for x, y, _ in corners], dtype=np.float64)
+    radii = [radius for _, _, radius in corners]
     if is_closed:
-        points = np.concatenate(([(points[-1] + points[0]) / 2], points, [(points[-1] + points[0]) / 2]))
-        radii = [0.0, *(radius for _, _, radius in corners), 0.0]
-    else:
-        radii = [0.0, *(radius for _, _, radius in corners[1:-1]), 0.0]
-    pieces, free = [points[:1]], np.hypot(*np.diff(points, axis=0).T)
+        points, radii = np.concatenate((points[-1:], points, points[:1])), [0.0, *radii, 0.0]
+    arcs, room = [], np.hypot(*np.diff(points, axis=0).T)
     for index in range(1, len(points) - 1):
         arc, tangent = _corner_arc(points[index - 1], points[index], points[index + 1], radii[index])
-        free[index - 1 : index + 1] -= tangent
-        pieces.append(arc)
-    # the straight over the start is one straight, cut in two
-    room = np.append(free[1:-1], free[0] + free[-1]) if is_closed else free
+        room[index - 1 : index + 1] -= tangent
+        arcs.append(arc)
+    if is_closed:  # the first straight and the last are the same one
+        room = np.append(room[1:-1], room[0] + room[-1] - np.hypot(*(points[1] - points[0])))
     if room.min() < -1e-9:
         raise TrackError(
-            f"Corner {int(room.argmin()) + 1} leaves {room.min():.2f} m to the next; use smaller radii."
+            f"Corner {int(room.argmin()) + 1} overlaps the next by {-room.min():.2f} m; use smaller radii."
         )
-    rough = np.concatenate([*pieces, points[-1:]])
+    start = (arcs[-1][-1:] + arcs[0][:1]) / 2 if is_closed else points[:1]
+    rough = np.concatenate([start, *arcs, start if is_closed else points[-1:]])
     rough = rough[np.concatenate(([True], np.hypot(*np.diff(rough, axis=0).T) > 1e-9))]
     fine = resample(rough, max(8, round(arc_length(rough)[-1] / _FINE)) + 1)
     return _slide(_slide(fine, is_closed, ease), is_closed, ease)

@@ -60,8 +60,7 @@ def generate_track(
     lap = lap if length is None else float(length)
     if lap < SHORTEST_LAP * road_width:
         raise TrackError(
-            f"length is {lap:g} m at a width of {road_width:g} m; "
-            f"a lap is at least {SHORTEST_LAP:g} times the width."
+            f"length is {lap:g} m at a width of {road_width:g} m; a lap is at least {SHORTEST_LAP:g} times the width."
         )
     given = "".join(f",{key}={_plain(value)}" for key, value in options.items() if value is not None)
     name = f"generated:{int(seed)}{given}"
@@ -72,11 +71,7 @@ def generate_track(
         # a draft that fails too often was too ambitious: become simpler
         ambition = difficulty * (1.0 - draft / _DRAFTS)
         corners = (_street if is_street else _country)(rng, lap, road_width, ambition)
-        line = (
-            None
-            if corners is None
-            else _fit(corners, lap, road_width, rng, roundness * (1.0 - 0.8 * ambition))
-        )
+        line = None if corners is None else _fit(corners, lap, road_width, rng, roundness * (1.0 - 0.8 * ambition))
         if line is not None and _is_clear(line, road_width):
             break
     else:
@@ -102,9 +97,7 @@ def parse_generated(name: str) -> Track:
         except ValueError:
             values[key] = math.nan
         if key not in {"length", "width", "difficulty"} or math.isnan(values[key]):
-            raise TrackError(
-                f"{option!r} in {name[:80]!r} is no option; allowed are length=, width= and difficulty=."
-            )
+            raise TrackError(f"{option!r} in {name[:80]!r} is no option; allowed are length=, width= and difficulty=.")
     if not (seed.isascii() and seed.isdigit() and len(seed) < 20):
         raise TrackError(f"{name[:80]!r} has no seed; write an integer after the colon, as in 'generated:7'.")
     return generate_track(int(seed), **values)
@@ -197,7 +190,7 @@ def _is_clear(line: Floats, width: float) -> bool:
     step = length / len(coarse)
     before, after = np.roll(coarse, 1, axis=0), np.roll(coarse, -1, axis=0)
     turn = np.abs(wrap_angle(_heading(after - coarse) - _heading(coarse - before)))
-    if turn.max() > step / TIGHTEST_RADIUS:
+    if turn.max() > step / max(TIGHTEST_RADIUS, width / 2 + VERGE / 2):
         return False
     distance = np.hypot(*(coarse[:, None] - coarse[None]).transpose(2, 0, 1))
     apart = np.abs(np.arange(len(coarse))[:, None] - np.arange(len(coarse)))

@@ -1,6 +1,6 @@
 """Our own tracks, each a short table of corners: (x, y, radius) in metres, in driving direction.
 
-A closed track starts halfway between its last corner and its first, so those two lie on the main straight.
+A closed track starts in the middle of the straight from its last corner to its first.
 """
 
 from __future__ import annotations
@@ -151,12 +151,12 @@ _LIST = (
         difficulty=2,
         width=0.8,
         corners=(
+            (0.1, -0.5, 0.95),
             (4.0, 1.3, 1.5),
             (7.9, -0.5, 0.95),
             (7.9, 4.7, 0.95),
             (4.0, 2.9, 1.5),
             (0.1, 4.7, 0.95),
-            (0.1, -0.5, 0.95),
         ),
     ),
     Course(

@@ -53,14 +53,10 @@ class TrackPicture:
 
     def __init__(self, track: Track, *, width_px: int = 1600, has_numbers: bool = True) -> None:
         if not MIN_WIDTH_PX <= width_px <= MAX_WIDTH_PX:
-            raise TrackError(
-                f"width_px is {width_px!r}; allowed are {MIN_WIDTH_PX} to {MAX_WIDTH_PX} pixels."
-            )
+            raise TrackError(f"width_px is {width_px!r}; allowed are {MIN_WIDTH_PX} to {MAX_WIDTH_PX} pixels.")
         self.track = track
         self.corners = find_corners(track)
-        self._unit = unit = (
-            width_px / 100.0
-        )  # everything that is not road is measured in hundredths of the width
+        self._unit = unit = width_px / 100.0  # everything that is not road is measured in hundredths of the width
         head, foot, side = 15.5 * unit, 14.0 * unit, 8.5 * unit
         size_x, size_y = _extent(track)
         scale = min((width_px - 2 * side) / size_x, 72.0 * unit / size_y, 12.0 * unit / track.mean_width)
@@ -150,9 +146,7 @@ class TrackPicture:
             for slide in (0.0, 0.12, -0.12, 0.24, -0.24, 0.36, -0.36, 0.48, -0.48):
                 s = corner.apex + slide * (corner.end - corner.start)
                 place = self._ribbon.beside(s, side, out * reach + (KERB_WIDTH if side != outside else 0.0))
-                if self._is_free(place, reach) and all(
-                    np.hypot(*(place - other)) > 1.7 * reach for other in taken
-                ):
+                if self._is_free(place, reach) and all(np.hypot(*(place - other)) > 1.7 * reach for other in taken):
                     return place
         return None
 
@@ -184,17 +178,13 @@ class TrackPicture:
 
     def _scale_bar(self, right: float, top: float) -> None:
         canvas, unit = self.canvas, self._unit
-        metres = max(
-            (step for step in SCALE_BARS if step * canvas.scale <= 14.0 * unit), default=SCALE_BARS[0]
-        )
+        metres = max((step for step in SCALE_BARS if step * canvas.scale <= 14.0 * unit), default=SCALE_BARS[0])
         quarter, thick = metres * canvas.scale / 4, max(1.0, 0.4 * unit)
         for index in range(4):
             start = right - (4 - index) * quarter
             color = INK if index % 2 else SOFT_INK
             canvas.box((start, top + 2.3 * unit, start + quarter, top + 2.3 * unit + thick), color)
-        canvas.text(
-            (right, top + 0.7 * unit), f"{metres:g} m", INK, size=1.2 * unit, weight=0.01, anchor="rs"
-        )
+        canvas.text((right, top + 0.7 * unit), f"{metres:g} m", INK, size=1.2 * unit, weight=0.01, anchor="rs")
 
 
 def draw_track(track: Track, path: str | Path, *, width_px: int = 1600) -> Path:
@@ -288,9 +278,7 @@ def _extent(track: Track) -> tuple[float, float]:
     return max(x_max - x_min, 1e-3), max(y_max - y_min, 1e-3)
 
 
-def _canvas_for(
-    track: Track, size: tuple[int, int], area: tuple[float, float, float, float], scale: float
-) -> Canvas:
+def _canvas_for(track: Track, size: tuple[int, int], area: tuple[float, float, float, float], scale: float) -> Canvas:
     """A canvas with the track in the middle of an area, pixels."""
     x_min, y_min, x_max, y_max = track.bounds
     origin = (
@@ -305,9 +293,10 @@ def _fitted(
     size: float, room: float, weight: float = 0.0, is_soft: bool = False,
 ) -> None:  # fmt: skip
     """Writes words no wider than `room`: smaller if need be, and cut if they would get too small to read."""
-    smallest = 0.6 * size
-    while len(words) > 1 and text_width(words, size=smallest) > room:
-        words = words[:-2].rstrip() + "..."
+    shortest, kept = 0.6 * size, len(words)
+    while kept > 1 and text_width(words, size=shortest) > room:
+        kept = kept * 9 // 10
+        words = words[:kept].rstrip() + "..."
     size = min(size, size * room / max(text_width(words, size=size), 1e-9))
     canvas.text(place, words, SOFT_INK if is_soft else INK, size=size, weight=weight)
 
@@ -315,7 +304,5 @@ def _fitted(
 def _image_path(path: str | Path) -> Path:
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
-        raise TrackError(
-            f"Cannot write a picture to {path.name!r}; the name must end in one of {', '.join(SUFFIXES)}."
-        )
+        raise TrackError(f"Cannot write a picture to {path.name!r}; the name must end in one of {', '.join(SUFFIXES)}.")
     return path

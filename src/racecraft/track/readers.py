@@ -22,6 +22,7 @@ from racecraft.track.track import CLOSED_GAP, Track
 from racecraft.track.validate import MAX_WAYPOINTS, MIN_WAYPOINTS, check_rows, validate
 
 MAX_FILE_BYTES = 2_000_000  # AWS's largest route has 19 kB; 10,000 waypoints of text fit in well
+MAX_FOLD_ROWS = 64  # longest loop of a border that is cut off, waypoints
 MAX_HEADER_BYTES = 1_000  # of an .npy file; numpy writes 118
 ROUTE_COLUMNS = ("centerline", "inner", "outer")
 CSV_COLUMNS = ("x_m", "y_m", "w_tr_right_m", "w_tr_left_m")
@@ -59,14 +60,12 @@ def read_centerline_csv(path: str | Path) -> Track:
     if (bad := np.flatnonzero(~((rows[:, 2:] >= 0.0) & np.isfinite(rows[:, 2:])).all(axis=1))).size:
         right, left = rows[bad[0], 2:]
         raise TrackError(
-            f"{path.name}: the road is {right:g} m wide to the right and {left:g} m to the left at waypoint {bad[0]}; "
+            f"{path.name}: waypoint {bad[0]} has {right:g} m of road to the right, {left:g} m to the left; "
             "widths are finite and not negative."
         )
     rows = rows[np.concatenate(([True], np.hypot(*np.diff(rows[:, :2], axis=0).T) > CLOSED_GAP))]
     if len(rows) < MIN_WAYPOINTS:
-        raise TrackError(
-            f"{path.name} has {len(rows)} different waypoints; at least {MIN_WAYPOINTS} are needed."
-        )
+        raise TrackError(f"{path.name} has {len(rows)} different waypoints; at least {MIN_WAYPOINTS} are needed.")
     steps = np.hypot(*np.diff(rows[:, :2], axis=0).T)
     gap = float(np.hypot(*(rows[0, :2] - rows[-1, :2])))
     is_closed = gap <= 3.0 * float(steps.max()) and gap < 0.5 * float(steps.sum())
@@ -74,10 +73,8 @@ def read_centerline_csv(path: str | Path) -> Track:
         rows = np.concatenate((rows if gap > CLOSED_GAP else rows[:-1], rows[:1]))
     centre, right_width, left_width = rows[:, :2], rows[:, 2:3], rows[:, 3:4]
     normal = _left_normals(centre, is_closed=is_closed)
-    left, right = (
-        _unfold(centre + normal * left_width, centre),
-        _unfold(centre - normal * right_width, centre),
-    )
+    left = _unfold(centre + normal * left_width, is_closed=is_closed)
+    right = _unfold(centre - normal * right_width, is_closed=is_closed)
     inner_is_left = not is_closed or signed_area(centre) >= 0.0
     inner, outer = (left, right) if inner_is_left else (right, left)
     return _checked(path.stem, {"centerline": centre, "inner": inner, "outer": outer})
@@ -112,9 +109,7 @@ def save_route(track: Track, path: str | Path) -> Path:
     if path.suffix.lower() != ".npy":
         raise TrackError(f"A route is an .npy file; {path.name!r} does not end in .npy.")
     with path.open("wb") as file:
-        np.save(
-            file, np.concatenate((track.centerline, track.inner, track.outer), axis=1), allow_pickle=False
-        )
+        np.save(file, np.concatenate((track.centerline, track.inner, track.outer), axis=1), allow_pickle=False)
     return path
 
 
@@ -128,6 +123,8 @@ def _checked(name: str, lines: dict[str, Floats]) -> Track:
 def _read_bytes(path: Path) -> bytes:
     """The content of a regular file of a sane size. Never waits on a pipe, never reads a large file."""
     try:
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            raise TrackError(f"{str(path)!r} is not a regular file.")
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (FileNotFoundError, NotADirectoryError):
         raise TrackNotFound(f"There is no track file {str(path)!r}.") from None
@@ -137,8 +134,6 @@ def _read_bytes(path: Path) -> bytes:
         ) from None
     with open(handle, "rb") as file:
         status = os.fstat(handle)
-        if not stat.S_ISREG(status.st_mode):
-            raise TrackError(f"{str(path)!r} is not a regular file.")
         content = file.read(MAX_FILE_BYTES + 1) if status.st_size <= MAX_FILE_BYTES else b""
     if status.st_size > MAX_FILE_BYTES or len(content) > MAX_FILE_BYTES:
         raise TrackError(
@@ -155,15 +150,11 @@ def _parse_npy(content: bytes, path: Path) -> Floats:
             warnings.simplefilter("error")
             version = np.lib.format.read_magic(file)
             read_header = (
-                np.lib.format.read_array_header_1_0
-                if version == (1, 0)
-                else np.lib.format.read_array_header_2_0
+                np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
             )
             shape, is_fortran, dtype = read_header(file, max_header_size=MAX_HEADER_BYTES)
     except Exception as error:  # numpy raises whatever its literal parser does on a hostile header
-        raise TrackError(
-            f"{path.name} is not a readable .npy file: {str(error).splitlines()[0][:120]}."
-        ) from None
+        raise TrackError(f"{path.name} is not a readable .npy file: {str(error).splitlines()[0][:120]}.") from None
     if dtype.hasobject or dtype.kind != "f" or dtype.itemsize not in (4, 8):
         raise TrackError(f"{path.name} holds {str(dtype)[:60]!r} values; a route is float64 or float32.")
     if len(shape) != 2 or shape[1] != 2 * len(ROUTE_COLUMNS):
@@ -176,9 +167,7 @@ def _parse_npy(content: bytes, path: Path) -> Floats:
     size = shape[0] * shape[1] * dtype.itemsize
     data = file.read()
     if len(data) != size:
-        raise TrackError(
-            f"{path.name} is damaged: {len(data):,} bytes of data, {size:,} expected from its header."
-        )
+        raise TrackError(f"{path.name} is damaged: {len(data):,} bytes of data, {size:,} expected from its header.")
     rows = np.frombuffer(data, dtype=dtype).reshape(shape, order="F" if is_fortran else "C")
     with np.errstate(invalid="ignore"):
         return np.ascontiguousarray(rows, dtype=np.float64)
@@ -204,8 +193,7 @@ def _parse_csv(content: bytes, path: Path) -> Floats:
             raise TrackError(f"{path.name} has more than {MAX_WAYPOINTS:,} waypoints.", hint="Resample it.")
         if len(fields) <= max(columns) or (columns == (0, 1, 2, 3) and len(fields) != 4):
             raise TrackError(
-                f"{path.name}, line {number} has {len(fields)} columns; "
-                f"a centre line has {', '.join(CSV_COLUMNS)}.",
+                f"{path.name}, line {number} has {len(fields)} columns; a centre line has {', '.join(CSV_COLUMNS)}.",
                 hint="Other columns are allowed when the first line names them.",
             )
         try:
@@ -246,27 +234,29 @@ def _left_normals(centre: Floats, *, is_closed: bool) -> Floats:
     return np.asarray(np.stack([-chord[:, 1], chord[:, 0]], axis=1) / length[:, None])
 
 
-def _unfold(border: Floats, centre: Floats) -> Floats:
-    """Pulls straight where a border runs backwards, as it does inside bends tighter than the half width.
+def _unfold(border: Floats, *, is_closed: bool) -> Floats:
+    """Cuts off the small loops a border makes inside bends tighter than the half width.
 
-    A folded piece makes both its ends give way to the points around them, until none is left or it is
-    clearly hopeless; what stays folded is refused by `validate` later.
+    Where two pieces a few rows apart cross, all points between them move to the crossing, so that rows still pair up.
     """
-    border = border.copy()
-    is_closed = bool((centre[0] == centre[-1]).all())
-    forward = np.diff(centre, axis=0)
-    for _ in range(60):
-        folded = np.einsum("wi,wi->w", np.diff(border, axis=0), forward) <= 0.0
-        if not folded.any():
-            break
-        moved = np.concatenate((folded, [False])) | np.concatenate(([False], folded))
-        before, after = np.roll(border, 1, axis=0), np.roll(border, -1, axis=0)
-        if is_closed:
-            before[0], after[-1] = border[-2], border[1]
-            moved[0] = moved[-1] = moved[0] or moved[-1]
-        else:
-            moved[0] = moved[-1] = False
-        border[moved] = ((before + border + after) / 3.0)[moved]
-        if is_closed:
-            border[-1] = border[0]
-    return border
+    body = border[:-1].copy() if is_closed else border.copy()
+    num_points = len(body)
+    for rows_apart in range(min(MAX_FOLD_ROWS, num_points // 3), 1, -1):
+        start, step = body, np.roll(body, -1, axis=0) - body
+        other_start, other_step = np.roll(start, -rows_apart, axis=0), np.roll(step, -rows_apart, axis=0)
+        between = other_start - start
+        denominator = _cross(step, other_step)
+        parallel = np.abs(denominator) < 1e-12
+        denominator = np.where(parallel, 1.0, denominator)
+        along, other_along = _cross(between, other_step) / denominator, _cross(between, step) / denominator
+        meets = ~parallel & (along >= 0.0) & (along <= 1.0) & (other_along >= 0.0) & (other_along <= 1.0)
+        if not is_closed:
+            meets[num_points - 1 - rows_apart :] = False
+        crossing = start + along[:, None] * step
+        for row in np.flatnonzero(meets):
+            body[(row + 1 + np.arange(rows_apart)) % num_points] = crossing[row]
+    return np.concatenate((body, body[:1])) if is_closed else body
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

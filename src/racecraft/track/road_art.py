@@ -38,9 +38,7 @@ class Ribbon:
     """
 
     def __init__(self, track: Track) -> None:
-        smooth = _smooth(
-            np.concatenate((track.left, track.centerline, track.right), axis=1), is_closed=track.is_closed
-        )
+        smooth = _smooth(np.concatenate((track.left, track.centerline, track.right), axis=1), is_closed=track.is_closed)
         self.length = track.length
         self.is_closed = track.is_closed
         self.left, self.centre, self.right = smooth[:, :2], smooth[:, 2:4], smooth[:, 4:]
@@ -102,14 +100,10 @@ class Ribbon:
 def paint_infield(canvas: Canvas, ribbon: Ribbon) -> None:
     """A tint inside a closed track."""
     if ribbon.is_closed:
-        canvas.polygon(
-            min(ribbon.left, ribbon.right, key=lambda border: float(np.ptp(border, axis=0).sum())), INFIELD
-        )
+        canvas.polygon(min(ribbon.left, ribbon.right, key=lambda border: float(np.ptp(border, axis=0).sum())), INFIELD)
 
 
-def paint_road(
-    canvas: Canvas, track: Track, ribbon: Ribbon, corners: list[TrackCorner], *, shadow_px: float
-) -> None:
+def paint_road(canvas: Canvas, track: Track, ribbon: Ribbon, corners: list[TrackCorner], *, shadow_px: float) -> None:
     """The road with everything painted on it, over a soft shadow."""
     outline = ribbon.outline()
     canvas.shade([outline], SHADOW, blur_px=shadow_px, strength=0.55, shift_px=0.6 * shadow_px)
@@ -161,8 +155,7 @@ def _paint_start(canvas: Canvas, track: Track, ribbon: Ribbon) -> float:
             near, far = (right + size * (column + end) for end in (0, 1))
             begin, end = (first + size * (row + step) for step in (0, 1))
             outline = [
-                origin + a * ahead + b * leftwards
-                for a, b in ((begin, near), (end, near), (end, far), (begin, far))
+                origin + a * ahead + b * leftwards for a, b in ((begin, near), (end, near), (end, far), (begin, far))
             ]
             canvas.polygon(np.array(outline), EDGE if (row + column) % 2 else INK)
     depth, half, tip = 0.2, 0.19 * (left - right), 0.0

@@ -58,27 +58,20 @@ class Track:
     """Border on the outside of the circuit, metres, (W, 2), row by row beside the centre line."""
 
     def __post_init__(self) -> None:
-        lines = {
-            name: np.array(getattr(self, name), dtype=np.float64) for name in ("centerline", "inner", "outer")
-        }
+        lines = {name: np.array(getattr(self, name), dtype=np.float64) for name in ("centerline", "inner", "outer")}
         shape = lines["centerline"].shape
         for name, line in lines.items():
             if line.shape != shape or line.ndim != 2 or line.shape[1] != 2:
                 raise ShapeError(
-                    f"{name} of track {self.name!r} has shape {line.shape}, "
-                    "expected (W, 2) for all three lines."
+                    f"{name} of track {self.name!r} has shape {line.shape}, expected (W, 2) for all three lines."
                 )
             if not np.isfinite(line).all():
                 row = int(np.flatnonzero(~np.isfinite(line).all(axis=1))[0])
-                raise TrackError(
-                    f"{name}[{row}] of track {self.name!r} is {_xy(line[row])}; it must be finite."
-                )
+                raise TrackError(f"{name}[{row}] of track {self.name!r} is {_xy(line[row])}; it must be finite.")
         steps = np.hypot(*np.diff(lines["centerline"], axis=0).T)
         keep = np.concatenate(([True], steps > SAME_POINT))[: shape[0]]
         if keep.sum() < 2:
-            raise TrackError(
-                f"Track {self.name!r} has {keep.sum()} different waypoints; it needs at least two."
-            )
+            raise TrackError(f"Track {self.name!r} has {keep.sum()} different waypoints; it needs at least two.")
         is_closed = np.hypot(*(lines["centerline"][0] - lines["centerline"][-1])) <= CLOSED_GAP
         for name, line in lines.items():
             line = line[keep] + 0.0  # adding zero turns -0.0 into 0.0, so that equal geometry has equal bytes

@@ -82,13 +82,9 @@ def _check_centerline(track: Track) -> None:
     name = track.name
     num_different = len(track.centerline) - track.is_closed
     if num_different < MIN_WAYPOINTS:
-        raise TrackError(
-            f"Track {name!r} has {num_different} different waypoints; it needs {MIN_WAYPOINTS} or more."
-        )
+        raise TrackError(f"Track {name!r} has {num_different} different waypoints; it needs {MIN_WAYPOINTS} or more.")
     if track.length < MIN_LENGTH:
-        raise TrackError(
-            f"Track {name!r} is {track.length:.3g} m long; at least {MIN_LENGTH:g} m are needed."
-        )
+        raise TrackError(f"Track {name!r} is {track.length:.3g} m long; at least {MIN_LENGTH:g} m are needed.")
     steps = np.diff(track.centerline, axis=0)
     gap = float(np.hypot(*(track.centerline[-1] - track.centerline[0])))
     longest = float(np.hypot(*steps.T).max())
@@ -115,13 +111,12 @@ def _check_centerline(track: Track) -> None:
 
 def _check_widths(track: Track) -> None:
     name, widths = track.name, track.widths
-    for row, limit in ((int(widths.argmin()), "at least"), (int(widths.argmax()), "at most")):
-        if not MIN_WIDTH <= widths[row] <= MAX_WIDTH:
-            allowed = MIN_WIDTH if limit == "at least" else MAX_WIDTH
-            raise TrackError(
-                f"Track {name!r} is {widths[row]:.3g} m wide at waypoint {row}; "
-                f"{limit} {allowed:g} m is allowed."
-            )
+    for row, is_bad, limit in (
+        (int(widths.argmin()), widths.min() < MIN_WIDTH, f"at least {MIN_WIDTH:g}"),
+        (int(widths.argmax()), widths.max() > MAX_WIDTH, f"at most {MAX_WIDTH:g}"),
+    ):
+        if is_bad:
+            raise TrackError(f"Track {name!r} is {widths[row]:.3g} m wide at waypoint {row}; {limit} m is allowed.")
     detour = np.hypot(*(track.centerline - track.inner).T) + np.hypot(*(track.centerline - track.outer).T)
     row = int((detour / widths).argmax())
     if detour[row] > MAX_DETOUR * widths[row]:
@@ -151,8 +146,7 @@ def _check_crossings(track: Track) -> None:
         centre = lines["centre line"]
         if not outside.contains(inside) or not outside.contains(centre) or inside.contains(centre):
             raise TrackError(
-                f"Track {name!r}: its inner border does not lie inside its outer one, "
-                "with the centre line between.",
+                f"Track {name!r}: its inner border does not lie inside its outer one, with the centre line between.",
                 hint="Columns 3 and 4 are the inner border, 5 and 6 the outer one.",
             )
         if (signed_area(track.inner) > 0) != (signed_area(track.outer) > 0):

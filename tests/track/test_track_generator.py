@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from racecraft.errors import TrackError
+from racecraft.track import Track, find_corners, generate_track, load_track, validate
+
+
+def check(track: Track) -> None:
+    validate(track)
+    assert track.is_closed
+    assert track.min_radius > 0.68
+    assert track.min_radius > track.mean_width / 2 + 0.1
+    assert np.ptp(track.widths) < 1e-4
+
+
+def test_three_hundred_seeds_are_valid_and_all_different() -> None:
+    digests = set()
+    for seed in range(300):
+        track = generate_track(seed, difficulty=seed % 5 / 4)
+        check(track)
+        digests.add(track.digest)
+    assert len(digests) == 300
+
+
+@given(
+    seed=st.integers(0, 2**63 - 1),
+    width=st.floats(0.5, 2.0),
+    laps=st.floats(0.0, 1.0),
+    difficulty=st.floats(0.0, 1.0),
+)
+@settings(max_examples=60, deadline=None)
+def test_any_wish_is_met(seed: int, width: float, laps: float, difficulty: float) -> None:
+    shortest = max(12.0, 14.0 * width)
+    length = min(200.0, shortest * (1 + 1e-9) + laps * 60)
+    track = generate_track(seed, length=length, width=width, difficulty=difficulty)
+    check(track)
+    assert track.length == pytest.approx(length, rel=0.01)
+    assert track.mean_width == pytest.approx(width, rel=1e-3)
+    assert load_track(track.name).digest == track.digest
+
+
+def test_the_same_seed_is_the_same_track_for_ever() -> None:
+    assert generate_track(7).digest == generate_track(7).digest == load_track("generated:7").digest
+    assert generate_track(7).name == "generated:7"
+    assert generate_track(7, length=40).name == "generated:7,length=40"
+    assert round(generate_track(7).length, 3) == pytest.approx(24.268, abs=0.02)
+
+
+def test_difficulty_means_more_and_tighter_corners() -> None:
+    seeds = range(40)
+    easy = [generate_track(seed, length=40, difficulty=0.0) for seed in seeds]
+    hard = [generate_track(seed, length=40, difficulty=1.0) for seed in seeds]
+    assert np.mean([len(find_corners(t)) for t in hard]) > 1.5 * np.mean([len(find_corners(t)) for t in easy])
+    assert np.median([t.min_radius for t in hard]) < np.median([t.min_radius for t in easy])
+
+
+def test_both_directions_come_up() -> None:
+    clockwise = sum(generate_track(seed).direction == "clockwise" for seed in range(60))
+    assert 15 < clockwise < 45
+
+
+@pytest.mark.parametrize(
+    ("seed", "options", "words"),
+    [
+        (-1, {}, "seed is -1"),
+        (1.5, {}, "seed is 1.5"),
+        (True, {}, "seed is True"),
+        ("7", {}, "seed"),
+        (2**63, {}, "seed"),
+        (1, {"length": 5}, "length is 5"),
+        (1, {"length": float("nan")}, "length is nan"),
+        (1, {"length": 20, "width": 2}, "14 times"),
+        (1, {"width": 0}, "width is 0"),
+        (1, {"difficulty": 1.1}, "difficulty is 1.1"),
+    ],
+)
+def test_what_cannot_be_is_refused(seed, options, words) -> None:
+    with pytest.raises(TrackError, match=words):
+        generate_track(seed, **options)
+
+
+@pytest.mark.parametrize(
+    "name", ["generated:", "generated:x", "generated:-1", "generated:1,size=3", "generated:1,length=", "generated:1,",
+             "generated:" + "9" * 500, "generated:1,length=nan", "generated:²"]
+)  # fmt: skip
+def test_names_that_say_nothing_are_refused(name: str) -> None:
+    with pytest.raises(TrackError):
+        load_track(name)

@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from racecraft.errors import TrackError
+from racecraft.track import TrackPicture, draw_contact_sheet, draw_track, generate_track, load_track, track_names
+from racecraft.track.road_art import ROAD
+
+
+def test_a_picture_is_written(tmp_path: Path) -> None:
+    path = draw_track(load_track("reinvent_2018"), tmp_path / "track.png", width_px=640)
+    with Image.open(path) as image:
+        assert image.size[0] == 640
+        assert image.mode == "RGB"
+
+
+@pytest.mark.parametrize("name", ["reinvent_2018", "harbor", "alpine_pass", "straight"])
+def test_the_road_lies_where_the_transform_says(name: str) -> None:
+    track = load_track(name)
+    picture = TrackPicture(track, width_px=600)
+    pixels = np.asarray(picture.image())
+    assert pixels.shape == (picture.size[1], picture.size[0], 3)
+    # a quarter of the way to the border there is bare asphalt, but for the start line and its arrows
+    s = np.linspace(2.5, track.length - 0.5, 60)
+    heading = track.heading_at(s)
+    side = track.width_at(s)[:, None] / 4 * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    x, y = picture.canvas.to_pixels(track.point_at(s) + side).T
+    assert (np.abs(pixels[y.astype(int), x.astype(int)].astype(int) - ROAD).max(axis=1) < 25).mean() > 0.9
+
+
+@pytest.mark.parametrize("name", track_names())
+def test_words_never_touch_the_road(name: str) -> None:
+    track = load_track(name)
+    plain = TrackPicture(track, width_px=400, has_numbers=False)
+    numbered = TrackPicture(track, width_px=400)
+    numbered.caption()
+    before, after = (np.asarray(picture.image()).astype(int) for picture in (plain, numbered))
+    y, x = np.nonzero(np.abs(before - after).max(axis=2) > 8)
+    canvas = plain.canvas
+    places = np.stack([x + 0.5 - canvas.origin[0], canvas.origin[1] - y - 0.5], axis=1) / canvas.scale
+    s, offset = track.project(places)
+    ends = (s <= 0.0) | (s >= track.length) if not track.is_closed else np.zeros(len(s), dtype=bool)
+    assert (np.abs(offset)[~ends] > track.width_at(s)[~ends] / 2).all()
+
+
+def test_lines_can_be_laid_over_the_road() -> None:
+    track = load_track("oval")
+    picture = TrackPicture(track, width_px=500)
+    points = track.point_at(np.linspace(0, 3, 20))
+    picture.canvas.line(points, (255, 0, 0), width_px=4)
+    picture.canvas.line(points + 1.0, (0, 0, 0), width_px=4, colors=[(0, 0, 255)] * 19)
+    pixels = np.asarray(picture.image())
+    x, y = picture.canvas.to_pixels(points[10]).astype(int)
+    assert tuple(pixels[y, x]) == (255, 0, 0)
+
+
+def test_contact_sheet(tmp_path: Path) -> None:
+    tracks = [load_track("oval"), generate_track(3), load_track("straight")]
+    path = draw_contact_sheet(tracks, tmp_path / "sheet.png", columns=2, width_px=500, title="A title")
+    with Image.open(path) as image:
+        assert image.size[0] == 500
+
+
+def test_a_long_title_is_cut_to_fit(tmp_path: Path) -> None:
+    picture = TrackPicture(load_track("oval"), width_px=400)
+    picture.caption(title="A very long title " * 40, subtitle="", figures=[("ONE", "1")])
+    picture.save(tmp_path / "long.png")
+
+
+@pytest.mark.parametrize("name", ["track.txt", "track", "track.svg"])
+def test_wrong_endings(tmp_path: Path, name: str) -> None:
+    with pytest.raises(TrackError, match="must end in"):
+        draw_track(load_track("oval"), tmp_path / name)
+
+
+@pytest.mark.parametrize("width_px", [0, -5, 100, 10**9])
+def test_wrong_sizes(tmp_path: Path, width_px: int) -> None:
+    with pytest.raises(TrackError, match="allowed are 320 to 6000"):
+        draw_track(load_track("oval"), tmp_path / "track.png", width_px=width_px)
+    with pytest.raises(TrackError, match="allowed are"):
+        draw_contact_sheet([load_track("oval")], tmp_path / "track.png", width_px=width_px)
+    with pytest.raises(TrackError, match="at least one"):
+        draw_contact_sheet([], tmp_path / "track.png")
