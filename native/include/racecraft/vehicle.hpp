@@ -1,12 +1,10 @@
 // The car: a dynamic single-track model with saturating tyres, a friction circle, limited drive and brake
 // forces and a lagging steering actuator.
 //
-//        front axle            One tyre per axle. Each tyre's lateral force follows its slip (sideways over
-//        forward
-//      \  lf   | lr            speed) linearly at first and saturates at what friction leaves beside the
-//      drive force:
-//       \------o------|   --> x
-//      steer  origin  rear     F = -capacity * s / sqrt(1 + s^2),  s = stiffness * load * slip / capacity
+//        front axle               One tyre per axle. Its lateral force follows its slip (sideways over
+//      \  lf   | lr               forward speed) linearly at first and saturates at its capacity, what
+//       \------o------|   --> x   friction leaves beside the drive force:
+//      steer  origin  rear         F = -capacity * s / sqrt(1 + s^2),  s = stiffness * load * slip / capacity
 //
 // Below `slip_speed` the slip's denominator is held constant, which turns the tyre into a viscous one: no
 // division by zero, no singularity at standstill, and a standing car with turned wheels feels no force.
@@ -23,6 +21,8 @@ constexpr float kGravity = 9.8f;              // m/s^2, as in the original's phy
 constexpr float kMaxSteering = 0.523598776f;  // rad, 30 degrees: hard clip of the steering command
 constexpr float kMinSpeedCommand = 0.1f;      // m/s; a command of exactly 0 (stop) is allowed below it
 constexpr float kMaxSpeedCommand = 4.0f;      // m/s
+// Of the friction circle, for drive and brakes: a tyre always keeps some grip across.
+constexpr float kMaxDriveShare = 0.9f;
 
 // One value per car, so that every parameter can be randomised. Column order of Engine's parameter block.
 #define RC_VEHICLE_PARAMETERS(X)                                                        \
@@ -109,8 +109,8 @@ RC_HD VehicleConstants vehicle_constants(const VehicleParameters& p) {
     c.friction = p.friction;
     c.inverse_friction_limit = 1.0f / limit;
     c.slip_speed = p.slip_speed;
-    c.drive_limit = min_of(p.drive_acceleration, limit);
-    c.brake_limit = min_of(p.brake_acceleration, limit);
+    c.drive_limit = min_of(p.drive_acceleration, kMaxDriveShare * limit);
+    c.brake_limit = min_of(p.brake_acceleration, kMaxDriveShare * limit);
     c.inverse_speed_time = 1.0f / p.speed_time_constant;
     c.speed_gain = p.speed_gain;
     c.inverse_steering_time = 1.0f / p.steering_time_constant;
@@ -136,30 +136,35 @@ RC_HD VehicleRates vehicle_rates(const VehicleConstants& c, const VehicleState& 
     sincos_of(state.heading, sin_heading, cos_heading);
     sincos_of(state.steering, sin_steering, cos_steering);
 
-    // What the motors give, shared by both axles according to their load.
-    const float drive = clamp((speed_command * c.speed_gain - state.speed) * c.inverse_speed_time,
-                              -c.brake_limit, c.drive_limit);
-    const float share = drive * c.inverse_friction_limit;
-    // The friction circle, never quite empty so that the tyre law stays finite.
-    const float grip = c.friction * sqrt_of(max_of(1.0f - share * share, 0.01f));
-
     const float front_sideways_body = state.lateral_speed + c.front_axle * state.yaw_rate;
     const float front_forward = state.speed * cos_steering + front_sideways_body * sin_steering;
     const float front_sideways = front_sideways_body * cos_steering - state.speed * sin_steering;
     const float rear_sideways = state.lateral_speed - c.rear_axle * state.yaw_rate;
-    const float front_lateral =
-        tyre_acceleration(c.front_stiffness, c.front_load, grip, front_sideways, front_forward, c.slip_speed);
-    const float rear_lateral =
-        tyre_acceleration(c.rear_stiffness, c.rear_load, grip, rear_sideways, state.speed, c.slip_speed);
-    const float front_drive = c.front_load * drive;
-    const float rear_drive = c.rear_load * drive;
 
-    const float front_x = front_drive * cos_steering - front_lateral * sin_steering;
-    const float front_y = front_drive * sin_steering + front_lateral * cos_steering;
+    // Each axle's wheels are driven towards the commanded speed by how fast they roll, as the original's four
+    // motors do. Control of the car's forward speed alone would feed a sliding car energy without end.
+    const float target = speed_command * c.speed_gain;
+    const float front_drive =
+        clamp((target - front_forward) * c.inverse_speed_time, -c.brake_limit, c.drive_limit);
+    const float rear_drive =
+        clamp((target - state.speed) * c.inverse_speed_time, -c.brake_limit, c.drive_limit);
+    const float front_share = front_drive * c.inverse_friction_limit;
+    const float rear_share = rear_drive * c.inverse_friction_limit;
+    const float front_grip = c.friction * sqrt_of(1.0f - front_share * front_share);
+    const float rear_grip = c.friction * sqrt_of(1.0f - rear_share * rear_share);
+    const float front_lateral = tyre_acceleration(c.front_stiffness, c.front_load, front_grip, front_sideways,
+                                                  front_forward, c.slip_speed);
+    const float rear_lateral =
+        tyre_acceleration(c.rear_stiffness, c.rear_load, rear_grip, rear_sideways, state.speed, c.slip_speed);
+    const float front_along = c.front_load * front_drive;
+    const float rear_along = c.rear_load * rear_drive;
+
+    const float front_x = front_along * cos_steering - front_lateral * sin_steering;
+    const float front_y = front_along * sin_steering + front_lateral * cos_steering;
     rates.x = state.speed * cos_heading - state.lateral_speed * sin_heading;
     rates.y = state.speed * sin_heading + state.lateral_speed * cos_heading;
     rates.heading = state.yaw_rate;
-    rates.speed = front_x + rear_drive + state.yaw_rate * state.lateral_speed;
+    rates.speed = front_x + rear_along + state.yaw_rate * state.lateral_speed;
     rates.lateral_speed = front_y + rear_lateral - state.yaw_rate * state.speed;
     rates.yaw_rate = (c.front_axle * front_y - c.rear_axle * rear_lateral) * c.mass_over_inertia;
     rates.steering = clamp((steering_command + c.steering_bias - state.steering) * c.inverse_steering_time,

@@ -55,9 +55,7 @@ class Start:
     def __post_init__(self) -> None:
         if self.mode not in START_MODES:
             hint = did_you_mean(self.mode, START_MODES)
-            raise ConfigError(
-                f"Start mode is {self.mode!r}; allowed are {', '.join(START_MODES)}. {hint}".strip()
-            )
+            raise ConfigError(f"Start mode is {self.mode!r}; allowed are {', '.join(START_MODES)}. {hint}".strip())
         limits = {
             "offset": (-1.0, 1.0),
             "advance": (-1.0, 1.0),
@@ -131,7 +129,7 @@ class Simulation:
         _check_range("seed", seed, 0, 2**64 - 1)
         _check_range("laps", laps, 1, 1_000_000)
         _check_range("max_steps", max_steps, 2, 2**31 - 1)
-        _check_range("substeps", substeps, 1, 128)
+        _check_range("substeps", substeps, 4, 128)
         _check_range("num_threads", num_threads, 0, 1024)
         if not 0.0 <= time_limit < 1e9:
             raise ConfigError(f"time_limit is {time_limit!r}; allowed is 0 (none) to 1e9 seconds.")
@@ -188,9 +186,7 @@ class Simulation:
         """One column of `rows` by name, a view (N,)."""
         return self.rows[:, ROW_COLUMNS.index(name)]
 
-    def reset(
-        self, mask: NDArray[np.bool_] | None = None, *, seeds: NDArray[np.uint64] | None = None
-    ) -> None:
+    def reset(self, mask: NDArray[np.bool_] | None = None, *, seeds: NDArray[np.uint64] | None = None) -> None:
         """Put the masked cars (all without a mask) at the start of their next episode.
 
         Args:
@@ -213,13 +209,10 @@ class Simulation:
             seeds = np.ascontiguousarray(seeds)
             if seeds.shape != (self.num_envs,) or seeds.dtype != np.uint64:
                 raise ShapeError(
-                    f"seeds are {seeds.dtype} of shape {seeds.shape}, "
-                    f"expected uint64 of shape ({self.num_envs},)."
+                    f"seeds are {seeds.dtype} of shape {seeds.shape}, expected uint64 of shape ({self.num_envs},)."
                 )
         if self.track_choice.min() < 0 or self.track_choice.max() >= len(self.tracks):
-            raise ConfigError(
-                f"track_choice must be 0 to {len(self.tracks) - 1}, got {self.track_choice.tolist()}."
-            )
+            raise ConfigError(f"track_choice must be 0 to {len(self.tracks) - 1}, got {self.track_choice.tolist()}.")
         self._engine.reset(mask, seeds)
 
     def step(self, actions: ArrayLike) -> None:
@@ -243,9 +236,7 @@ class Simulation:
         if not finite.all():
             car = int(np.flatnonzero(~finite.all(axis=1))[0])
             steering, speed = commands[car]
-            raise NonFiniteAction(
-                f"action[{car}] = ({steering}, {speed}); steering_angle and speed must be finite."
-            )
+            raise NonFiniteAction(f"action[{car}] = ({steering}, {speed}); steering_angle and speed must be finite.")
         self._engine.step(commands)
 
     def set_pose(self, env: int, x: float, y: float, heading: float, *, speed: float = 0.0) -> None:

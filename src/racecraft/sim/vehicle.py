@@ -57,6 +57,12 @@ class Vehicle:
             low, high = LIMITS[field.name]
             if not isinstance(value, int | float) or isinstance(value, bool) or not low <= value <= high:
                 raise ConfigError(f"Vehicle parameter {field.name} is {value!r}; allowed is {low} to {high}.")
+        least = MIN_INERTIA_RATIO * self.mass * self.front_axle * self.rear_axle
+        if self.yaw_inertia < least:
+            raise ConfigError(
+                f"Vehicle parameter yaw_inertia is {self.yaw_inertia!r}; a car of {self.mass:g} kg with these axles "
+                f"needs at least {least:.3g} kg m²."
+            )
 
     def values(self) -> list[float]:
         """The parameters in the native core's order."""
@@ -69,22 +75,25 @@ class Vehicle:
 
 LIMITS: Final[dict[str, tuple[float, float]]] = {
     "mass": (0.1, 1000.0),
-    "yaw_inertia": (0.001, 1000.0),
-    "front_axle": (0.02, 5.0),
-    "rear_axle": (0.02, 5.0),
-    "friction": (0.05, 5.0),
-    "front_stiffness": (0.1, 20.0),
-    "rear_stiffness": (0.1, 20.0),
+    "yaw_inertia": (0.0001, 10000.0),
+    "front_axle": (0.05, 2.0),
+    "rear_axle": (0.05, 2.0),
+    "friction": (0.05, 3.0),
+    "front_stiffness": (0.5, 20.0),
+    "rear_stiffness": (0.5, 20.0),
     "slip_speed": (0.3, 5.0),
-    "drive_acceleration": (0.1, 50.0),
-    "brake_acceleration": (0.1, 50.0),
-    "speed_time_constant": (0.02, 10.0),
+    "drive_acceleration": (0.1, 30.0),
+    "brake_acceleration": (0.1, 30.0),
+    "speed_time_constant": (0.03, 10.0),
     "steering_time_constant": (0.02, 10.0),
     "steering_rate": (0.1, 100.0),
     "steering_bias": (-0.3, 0.3),
-    "speed_gain": (0.1, 2.0),
+    "speed_gain": (0.1, 1.5),
 }
-"""Allowed range of every parameter; inside it the integration is stable."""
+"""Allowed range of every parameter; native/tests/vehicle_test.cpp drives a car at every corner of it."""
+
+MIN_INERTIA_RATIO: Final = 0.25
+"""Least yaw_inertia over mass x front_axle x rear_axle: below it the car turns faster than the substeps can follow."""
 
 PRESETS: Final[dict[str, Vehicle]] = {
     "v4": Vehicle(

@@ -1,0 +1,345 @@
+// The car: what physics forbids, what symmetry demands, and every corner of the parameters' allowed range.
+#include "racecraft/vehicle.hpp"
+
+#include <iterator>
+#include <random>
+
+#include "../src/vehicle_kernel.hpp"
+#include "check.hpp"
+
+namespace racecraft {
+namespace {
+
+constexpr int kSubsteps = 8;
+constexpr float kSimDt = kControlDt / kSubsteps;
+
+// The default car of racecraft.sim.vehicle.
+VehicleParameters default_car() {
+    return {.mass = 7.5f,
+            .yaw_inertia = 0.1f,
+            .front_axle = 0.125f,
+            .rear_axle = 0.125f,
+            .friction = 0.75f,
+            .front_stiffness = 3.2f,
+            .rear_stiffness = 10.0f,
+            .slip_speed = 0.4f,
+            .drive_acceleration = 3.2f,
+            .brake_acceleration = 6.5f,
+            .speed_time_constant = 0.2f,
+            .steering_time_constant = 0.15f,
+            .steering_rate = 10.0f,
+            .steering_bias = 0.0f,
+            .speed_gain = 1.0f};
+}
+
+VehicleState drive(const VehicleParameters& parameters, VehicleState state, float steering, float speed,
+                   int substeps, float sim_dt = kSimDt) {
+    const VehicleConstants constants = vehicle_constants(parameters);
+    for (int i = 0; i < substeps; ++i) state = vehicle_substep(constants, state, steering, speed, sim_dt);
+    return state;
+}
+
+// Any state that a car of up to 4 m/s may be in, and worse.
+VehicleState random_state(std::mt19937& random) {
+    std::uniform_real_distribution<float> u(-1.0f, 1.0f);
+    return {.x = 10.0f * u(random),
+            .y = 10.0f * u(random),
+            .heading = 3.1f * u(random),
+            .speed = 2.0f + 2.0f * u(random),
+            .lateral_speed = 2.0f * u(random),
+            .yaw_rate = 6.0f * u(random),
+            .steering = kMaxSteering * u(random)};
+}
+
+// Energy of movement over mass, m^2/s^2.
+double energy(const VehicleParameters& p, const VehicleState& s) {
+    const double gyration = static_cast<double>(p.yaw_inertia) / static_cast<double>(p.mass);
+    const double u = s.speed, v = s.lateral_speed, r = s.yaw_rate;
+    return 0.5 * (u * u + v * v + gyration * r * r);
+}
+
+}  // namespace
+
+TEST(a_standing_car_stays_where_it_is) {
+    for (const float steering : {-kMaxSteering, 0.0f, kMaxSteering}) {
+        const VehicleState start{.x = 1.25f,
+                                 .y = -3.5f,
+                                 .heading = 2.0f,
+                                 .speed = 0.0f,
+                                 .lateral_speed = 0.0f,
+                                 .yaw_rate = 0.0f,
+                                 .steering = 0.0f};
+        const VehicleState end = drive(default_car(), start, steering, 0.0f, 1000);
+        CHECK_EQUAL(end.x, start.x);
+        CHECK_EQUAL(end.y, start.y);
+        CHECK_EQUAL(end.heading, start.heading);
+        CHECK_EQUAL(end.speed, 0.0f);
+        CHECK_EQUAL(end.yaw_rate, 0.0f);
+        CHECK_NEAR(end.steering, steering, 1e-5);
+    }
+}
+
+TEST(a_coasting_car_never_gains_energy) {
+    std::mt19937 random(1);
+    for (int car = 0; car < 2000; ++car) {
+        VehicleState state = random_state(random);
+        const float steering = state.steering;
+        for (int i = 0; i < 100; ++i) {
+            const double before = energy(default_car(), state);
+            state = drive(default_car(), state, steering, 0.0f, 1);
+            CHECK(energy(default_car(), state) <= before * (1.0 + 1e-5) + 1e-9);
+        }
+    }
+}
+
+TEST(a_braked_car_comes_to_rest) {
+    std::mt19937 random(2);
+    for (int car = 0; car < 200; ++car) {
+        const VehicleState end = drive(default_car(), random_state(random), 0.1f, 0.0f, 4 * 15 * kSubsteps);
+        CHECK(end.speed >= 0.0f && end.speed < 1e-3f);
+        CHECK_NEAR(end.lateral_speed, 0.0, 1e-3);
+        CHECK_NEAR(end.yaw_rate, 0.0, 1e-3);
+    }
+}
+
+TEST(on_a_straight_the_car_reaches_its_speed_and_no_more) {
+    for (const float target : {0.1f, 1.0f, 2.5f, 4.0f}) {
+        VehicleState state{};
+        for (int i = 0; i < 8 * 15 * kSubsteps; ++i) {
+            state = drive(default_car(), state, 0.0f, target, 1);
+            CHECK(state.speed <= target * 1.00001f);
+        }
+        CHECK_NEAR(state.speed, target, 1e-4);
+        CHECK_EQUAL(state.y, 0.0f);
+        CHECK_EQUAL(state.heading, 0.0f);
+    }
+}
+
+TEST(from_rest_the_drive_limit_is_the_acceleration) {
+    const VehicleState state = drive(default_car(), VehicleState{}, 0.0f, 4.0f, 5 * kSubsteps);
+    CHECK_NEAR(state.speed, 3.2 * 5.0 / 15.0, 1e-4);
+    CHECK_NEAR(state.x, 0.5 * 3.2 * (5.0 / 15.0) * (5.0 / 15.0), 1e-4);
+}
+
+TEST(steering_follows_its_command_with_the_time_constant_and_the_rate) {
+    VehicleParameters car = default_car();
+    for (int step = 1; step <= 10; ++step) {
+        const VehicleState state = drive(car, VehicleState{}, 0.5f, 0.0f, step * kSubsteps);
+        CHECK_NEAR(state.steering, 0.5 * (1.0 - std::exp(-step / 15.0 / 0.15)), 1e-6);
+    }
+    car.steering_rate = 1.0f;
+    CHECK_NEAR(drive(car, VehicleState{}, 0.5f, 0.0f, 3 * kSubsteps).steering, 3.0 / 15.0, 1e-6);
+    car.steering_bias = 0.1f;
+    CHECK_NEAR(drive(car, VehicleState{}, 0.2f, 0.0f, 600).steering, 0.3, 1e-5);
+}
+
+TEST(tyres_never_give_more_than_friction) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<float> u(0.0f, 1.0f);
+    const VehicleParameters car = default_car();
+    const VehicleConstants constants = vehicle_constants(car);
+    double most = 0.0;
+    for (int i = 0; i < 200000; ++i) {
+        const VehicleState state = random_state(random);
+        const VehicleRates rates =
+            vehicle_rates(constants, state, kMaxSteering * (2.0f * u(random) - 1.0f), 4.0f * u(random));
+        const double along =
+            static_cast<double>(rates.speed) - static_cast<double>(state.yaw_rate * state.lateral_speed);
+        const double across =
+            static_cast<double>(rates.lateral_speed) + static_cast<double>(state.yaw_rate * state.speed);
+        most = std::max(most, std::hypot(along, across));
+    }
+    const double limit = static_cast<double>(car.friction * kGravity);
+    CHECK(most <= limit * 1.00001);
+    CHECK(most > 0.95 * limit);
+}
+
+TEST(a_mirrored_car_is_the_mirror_image_to_the_bit) {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> u(-1.0f, 1.0f);
+    VehicleParameters car = default_car();
+    VehicleParameters twin = car;
+    car.steering_bias = 0.05f;
+    twin.steering_bias = -0.05f;
+    for (int trial = 0; trial < 200; ++trial) {
+        VehicleState state = random_state(random);
+        state.heading *= 3.0f;
+        VehicleState image{state.x,         -state.y,       -state.heading, state.speed, -state.lateral_speed,
+                           -state.yaw_rate, -state.steering};
+        for (int step = 0; step < 60; ++step) {
+            const float steering = kMaxSteering * u(random);
+            const float speed = 2.0f + 2.0f * u(random);
+            state = drive(car, state, steering, speed, kSubsteps);
+            image = drive(twin, image, -steering, speed, kSubsteps);
+            CHECK_EQUAL(image.x, state.x);
+            CHECK_EQUAL(image.y, -state.y);
+            CHECK_EQUAL(image.heading, -state.heading);
+            CHECK_EQUAL(image.speed, state.speed);
+            CHECK_EQUAL(image.lateral_speed, -state.lateral_speed);
+            CHECK_EQUAL(image.yaw_rate, -state.yaw_rate);
+            CHECK_EQUAL(image.steering, -state.steering);
+        }
+    }
+}
+
+TEST(halving_the_substeps_converges_at_fourth_order) {
+    // A smooth manoeuvre, no limit touched; few steps, so that single precision does not hide the order.
+    VehicleParameters car = default_car();
+    car.speed_time_constant = 1.0f;
+    car.steering_time_constant = 0.4f;
+    car.front_stiffness = 1.0f;
+    car.rear_stiffness = 1.5f;
+    car.slip_speed = 1.0f;
+    const VehicleState start{.x = 0.0f,
+                             .y = 0.0f,
+                             .heading = 0.0f,
+                             .speed = 2.0f,
+                             .lateral_speed = 0.0f,
+                             .yaw_rate = 0.0f,
+                             .steering = 0.0f};
+    const auto at_end = [&](int steps) {
+        return drive(car, start, 0.3f, 2.2f, steps, 1.0f / static_cast<float>(steps));
+    };
+    const auto error = [](const VehicleState& a, const VehicleState& b) {
+        return std::hypot(a.x - b.x, a.y - b.y, a.heading - b.heading) + std::abs(a.yaw_rate - b.yaw_rate);
+    };
+    const VehicleState exact = at_end(64);
+    const double coarse = static_cast<double>(error(at_end(10), exact));
+    const double fine = static_cast<double>(error(at_end(20), exact));
+    const double order = std::log2(coarse / fine);
+    std::printf("       errors %.3g and %.3g, order %.2f\n", coarse, fine, order);
+    CHECK(order > 3.7 && order < 4.3);
+}
+
+TEST(the_default_substeps_are_fine_enough) {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> u(-1.0f, 1.0f);
+    for (int trial = 0; trial < 100; ++trial) {
+        VehicleState coarse{};
+        coarse.speed = 2.0f;
+        VehicleState fine = coarse;
+        for (int step = 0; step < 15; ++step) {
+            const float steering = 0.35f * u(random);
+            coarse = drive(default_car(), coarse, steering, 2.0f, kSubsteps);
+            fine = drive(default_car(), fine, steering, 2.0f, 8 * kSubsteps, kSimDt / 8.0f);
+        }
+        CHECK_NEAR(coarse.x, fine.x, 1e-4);
+        CHECK_NEAR(coarse.y, fine.y, 1e-4);
+        CHECK_NEAR(coarse.heading, fine.heading, 2e-4);
+    }
+}
+
+TEST(mass_matters_only_beside_the_inertia) {
+    VehicleParameters heavy = default_car();
+    heavy.mass *= 16.0f;
+    heavy.yaw_inertia *= 16.0f;
+    const VehicleState a = drive(default_car(), VehicleState{}, 0.3f, 3.0f, 200);
+    const VehicleState b = drive(heavy, VehicleState{}, 0.3f, 3.0f, 200);
+    CHECK(test::same_bits(a, b));
+}
+
+// LIMITS and MIN_INERTIA_RATIO of racecraft.sim.vehicle; tests/sim/test_vehicle.py holds them equal.
+struct Range {
+    const char* name;
+    float low, high;
+};
+constexpr Range kLimits[] = {
+    {"mass", 0.1f, 1000.0f},
+    {"yaw_inertia", 0.0001f, 10000.0f},
+    {"front_axle", 0.05f, 2.0f},
+    {"rear_axle", 0.05f, 2.0f},
+    {"friction", 0.05f, 3.0f},
+    {"front_stiffness", 0.5f, 20.0f},
+    {"rear_stiffness", 0.5f, 20.0f},
+    {"slip_speed", 0.3f, 5.0f},
+    {"drive_acceleration", 0.1f, 30.0f},
+    {"brake_acceleration", 0.1f, 30.0f},
+    {"speed_time_constant", 0.03f, 10.0f},
+    {"steering_time_constant", 0.02f, 10.0f},
+    {"steering_rate", 0.1f, 100.0f},
+    {"steering_bias", -0.3f, 0.3f},
+    {"speed_gain", 0.1f, 1.5f},
+};
+constexpr float kMinInertiaRatio = 0.25f;
+static_assert(std::size(kLimits) == kNumVehicleParameters);
+
+// Cars at corners of the allowed range, number `corner` being a bit per parameter, drive at full lock, 4 m/s,
+// with the lock reversed and the brakes on now and then. Returns the highest speed of any.
+double drive_corners(const std::vector<uint32_t>& corners, int steps, int substeps) {
+    const size_t n = corners.size();
+    std::vector<float> fields(7 * n, 0.0f), parameters(kNumVehicleParameters * n);
+    std::vector<float> steering(n, kMaxSteering), speed(n, kMaxSpeedCommand), is_moving(n, 1.0f);
+    for (size_t car = 0; car < n; ++car) {
+        for (size_t k = 0; k < kNumVehicleParameters; ++k) {
+            parameters[k * n + car] = (corners[car] >> k) & 1u ? kLimits[k].high : kLimits[k].low;
+        }
+        const auto value = [&](size_t k) -> float& { return parameters[k * n + car]; };
+        value(kVehicle_yaw_inertia) =
+            max_of(value(kVehicle_yaw_inertia), kMinInertiaRatio * value(kVehicle_mass) *
+                                                    value(kVehicle_front_axle) * value(kVehicle_rear_axle));
+        fields[3 * n + car] = kMaxSpeedCommand;
+    }
+    float* f = fields.data();
+    const VehicleArrays arrays{
+        f,         f + n,           f + 2 * n,    f + 3 * n,        f + 4 * n,         f + 5 * n,
+        f + 6 * n, steering.data(), speed.data(), is_moving.data(), parameters.data(), n};
+    double fastest = 0.0;
+    for (int step = 0; step < steps; ++step) {
+        if (step % 40 == 25) {
+            for (float& command : steering) command = -command;
+        }
+        if (step % 150 == 90) speed.assign(n, step % 300 == 90 ? 0.0f : kMaxSpeedCommand);
+        for (size_t begin = 0; begin < n; begin += kLanes) {
+            const int count = static_cast<int>(std::min(n - begin, size_t{kLanes}));
+            RC_DISPATCH(advance_vehicles, arrays, begin, count, substeps);
+        }
+        for (size_t car = 0; car < n; ++car) {
+            const double total =
+                std::hypot(static_cast<double>(f[3 * n + car]), static_cast<double>(f[4 * n + car]));
+            // A NaN must not get lost in max().
+            fastest = total <= fastest ? fastest : total;
+        }
+    }
+    for (const float value : fields) CHECK(std::isfinite(value));
+    return fastest;
+}
+
+TEST(every_corner_of_the_parameters_stays_finite) {
+    std::vector<uint32_t> all(1u << kNumVehicleParameters);
+    for (uint32_t corner = 0; corner < all.size(); ++corner) all[corner] = corner;
+    for (const int substeps : {4, kSubsteps}) {
+        const double fastest = drive_corners(all, 60, substeps);
+        std::printf("       fastest of all corners with %d substeps: %.1f m/s\n", substeps, fastest);
+        CHECK(fastest < 20.0);
+    }
+}
+
+TEST(some_corners_stay_finite_for_2000_steps) {
+    std::mt19937 random(6);
+    std::vector<uint32_t> some(1000);
+    for (uint32_t& corner : some) corner = random() & ((1u << kNumVehicleParameters) - 1u);
+    CHECK(drive_corners(some, 2000, kSubsteps) < 20.0);
+}
+
+TEST(a_car_randomised_by_a_fifth_stays_near_its_speed) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<float> u(-1.0f, 1.0f);
+    for (int trial = 0; trial < 300; ++trial) {
+        VehicleParameters car = default_car();
+        float values[kNumVehicleParameters];
+        std::memcpy(values, &car, sizeof(car));
+        for (float& value : values) value *= 1.0f + 0.2f * u(random);
+        std::memcpy(&car, values, sizeof(car));
+        VehicleState state{};
+        float steering = 0.0f;
+        float speed = kMaxSpeedCommand;
+        for (int step = 0; step < 150; ++step) {
+            if (u(random) > 0.6f) steering = u(random) > 0.0f ? kMaxSteering : -kMaxSteering;
+            if (u(random) > 0.8f) speed = u(random) > -0.5f ? kMaxSpeedCommand : 0.0f;
+            state = drive(car, state, steering, speed, kSubsteps);
+            CHECK(std::hypot(state.speed, state.lateral_speed) < 1.3f * 1.2f * kMaxSpeedCommand);
+        }
+    }
+}
+
+}  // namespace racecraft
