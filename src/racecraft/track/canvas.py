@@ -52,6 +52,11 @@ class Canvas:
         """Fills a polygon of places in metres, (P, 2)."""
         self._draw.polygon(self._fine(points), fill=color)
 
+    def polygons(self, shapes: Floats, color: Color) -> None:
+        """Fills many polygons of equally many places in metres, (K, P, 2)."""
+        for shape in (self.to_pixels(shapes) * OVERSAMPLING).reshape(len(shapes), -1).tolist():
+            self._draw.polygon(shape, fill=color)
+
     def line(
         self,
         points: ArrayLike,
@@ -140,7 +145,7 @@ class Canvas:
                 self.box((x - radius_px, y - radius_px, x + radius_px, y + radius_px), color)
 
     def _fine(self, points: ArrayLike) -> list[tuple[float, float]]:
-        return [(x, y) for x, y in (self.to_pixels(points) * OVERSAMPLING).tolist()]
+        return list(map(tuple, (self.to_pixels(points) * OVERSAMPLING).tolist()))
 
 
 def text_width(words: str, *, size: float, spacing: float = 0.0) -> float:

@@ -254,7 +254,8 @@ def describe(track: Track) -> tuple[str, str]:
         seed, *options = track.name.removeprefix("generated:").split(",")
         return f"Seed {seed}", ", ".join(["Drawn by the generator", *options]).replace("=", " ")
     kind = "Closed circuit" if track.is_closed else "Open road"
-    return track.name.replace("_", " ").strip() or "Track", f"{kind} of {len(track.centerline)} waypoints"
+    title = track.name.replace("_", " ").strip() or "Track"
+    return title[0].upper() + title[1:], f"{kind} of {len(track.centerline)} waypoints"
 
 
 def _cell(track: Track, size: tuple[int, int]) -> Image.Image:

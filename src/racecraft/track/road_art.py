@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,9 +60,9 @@ class Ribbon:
         return np.asarray(self._at(s, arc, border) + out * self._at(s, arc, normal))
 
     def strip(self, s: Floats, side: float, out: tuple[float, float]) -> Floats:
-        """Outline of a strip between two distances outside a border, metres: (2 P, 2) for `s` (P,)."""
+        """Outlines of strips between two distances outside a border, metres: (..., 2 P, 2) for `s` (..., P)."""
         near, far = (self.beside(s, side, distance) for distance in out)
-        return np.concatenate((near, far[::-1]))
+        return np.concatenate((near, far[..., ::-1, :]), axis=-2)
 
     def edge_line(self, side: float, out: tuple[float, float]) -> Floats:
         """Quadrilaterals of a strip along a whole border, metres, (P - 1, 4, 2)."""
@@ -91,10 +90,11 @@ class Ribbon:
 
     def _at(self, s: ArrayLike, arc: Floats, line: Floats) -> Floats:
         s = np.asarray(s, dtype=np.float64)
-        period = self.length if self.is_closed else None
-        if self.is_closed:
-            arc, line = arc[:-1], line[:-1]
-        return np.stack([np.interp(s, arc, line[:, axis], period=period) for axis in (0, 1)], axis=-1)
+        if self.is_closed:  # a lap before and after, so that nothing happens at the start line
+            s = s % self.length
+            arc = np.maximum.accumulate((np.array([[-1.0], [0.0], [1.0]]) * self.length + arc[:-1]).ravel())
+            line = np.concatenate((line[:-1],) * 3)
+        return np.stack([np.interp(s, arc, line[:, axis]) for axis in (0, 1)], axis=-1)
 
 
 def paint_infield(canvas: Canvas, ribbon: Ribbon) -> None:
@@ -112,14 +112,13 @@ def paint_road(canvas: Canvas, track: Track, ribbon: Ribbon, corners: list[Track
             _paint_kerb(canvas, ribbon, corner)
     canvas.polygon(outline, ROAD)
     for side in (-1.0, 1.0):
-        for piece in ribbon.edge_line(side, (-EDGE_LINE[0], -EDGE_LINE[1])):
-            canvas.polygon(piece, EDGE)
+        canvas.polygons(ribbon.edge_line(side, (-EDGE_LINE[0], -EDGE_LINE[1])), EDGE)
     arrows_end = _paint_start(canvas, track, ribbon)
     num_dashes = max(1, round(track.length / DASH_PERIOD))
-    for start in (np.arange(num_dashes) * track.length / num_dashes).tolist():
-        if arrows_end < start and start + DASH < track.length - 0.1:
-            points = ribbon.place(np.linspace(start, start + DASH, 4))
-            canvas.line(points, CENTRE, width_px=DASH_WIDTH * canvas.scale, is_round=False)
+    starts = np.arange(num_dashes) * track.length / num_dashes
+    starts = starts[(starts > arrows_end) & (starts + DASH < track.length - 0.1)]
+    for dash in ribbon.place(np.linspace(starts, starts + DASH, 4, axis=-1)):
+        canvas.line(dash, CENTRE, width_px=DASH_WIDTH * canvas.scale, is_round=False)
 
 
 def _paint_kerb(canvas: Canvas, ribbon: Ribbon, corner: TrackCorner) -> None:
@@ -132,9 +131,9 @@ def _paint_kerb(canvas: Canvas, ribbon: Ribbon, corner: TrackCorner) -> None:
     along = arc_length(ribbon.beside(fine, side, 0.0))  # stripes of one length on the border itself
     num_stripes = 2 * max(1, round(along[-1] / KERB_STRIPE / 2)) + 1
     marks = np.interp(np.linspace(0.0, along[-1], num_stripes + 1), along, fine)
-    for index, (begin, stop) in enumerate(pairwise(marks)):
-        outline = ribbon.strip(np.linspace(begin, stop, 4), side, (-EDGE_LINE[0] / 2, KERB_WIDTH))
-        canvas.polygon(outline, KERB[index % 2])
+    stripes = ribbon.strip(np.linspace(marks[:-1], marks[1:], 4, axis=-1), side, (-EDGE_LINE[0] / 2, KERB_WIDTH))
+    for first, color in enumerate(KERB):
+        canvas.polygons(stripes[first::2], color)
 
 
 def _paint_start(canvas: Canvas, track: Track, ribbon: Ribbon) -> float:
