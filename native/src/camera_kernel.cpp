@@ -5,6 +5,7 @@
 namespace racecraft::RC_ISA {
 namespace {
 
+constexpr int kMaxSamples = 8;         // of a row
 constexpr int kBlock = 64;             // sample rows that are set up together
 constexpr float kFixedOne = 65536.0f;  // a texel in 16.16 fixed point
 
@@ -52,12 +53,25 @@ uint32_t half(uint32_t step) {
     return static_cast<uint32_t>(static_cast<int32_t>(step) >> 1);
 }
 
+// Sums of a row's samples are brightness times 64 times samples; this divides them.
+int row_shift(int samples) {
+    return samples == 1 ? 6 : samples == 2 ? 7 : samples == 4 ? 8 : 9;
+}
+
+// A row near the lens, see store_ground().
+struct SharedRow {
+    int samples;
+    GroundWalk walk[kMaxSamples];
+    int32_t sharpness[kMaxSamples];
+    int32_t half_x[kMaxSamples], half_y[kMaxSamples];  // half a pixel's step in 1/256 texel
+};
+
 // Distance of a border from a position, brightness after it, for every pixel of a walk. The lanes compute
 // exactly what the scalar code says with the functions of ground.hpp.
 //
 // add_ground() adds a sample to the sums of the pixels of a span, one row of `stride` sums per channel.
-// store_ground() writes a whole row of one sample and one channel. There, close to the lens, pixels are much
-// smaller than texels: two neighbours share the texel under their common edge, which halves the fetches.
+// store_ground() writes a whole row of one channel. There, close to the lens, pixels are smaller than texels:
+// two neighbours share the texel under their common edge, which halves the fetches.
 #if defined(RC_HAS_LANES)
 
 struct WalkLanes {
@@ -117,30 +131,36 @@ void add_ground(const GroundView& ground, const GroundLevel& level, const Ground
     }
 }
 
-void store_ground(const GroundView& ground, const GroundWalk& walk, int32_t sharpness,
-                  const ShadeTable& table, int width, uint8_t* line) {
+void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTable& table, int width,
+                  uint8_t* line) {
     const GroundLevel& level = ground.levels[0];
-    // Positions midway between the pixels of a pair, and half a pixel in 1/256 texel.
-    WalkLanes at = start_walk(walk.u + half(walk.du), walk.v + half(walk.dv), 2 * walk.du, 2 * walk.dv);
-    const int32_t half_x = static_cast<int32_t>(walk.du) >> 9;
-    const int32_t half_y = static_cast<int32_t>(walk.dv) >> 9;
-    // Bytes of dot_bytes() are unsigned on this side: shift the step by 128 and take the same off again.
-    const Lanes step = splat(((half_y + 128) << 8) | (half_x + 128));
-    const Lanes origin = splat((128 << 8) | 128);
+    const uint32_t* texels = ground.texels + level.offset;
     const Lanes tile_row = splat(level.tiles_per_row * 16);
-    const Lanes sharp = splat(sharpness);
+    // Bytes of dot_bytes() are unsigned on this side: shift the step by 128 and take the same off again.
+    const Lanes origin = splat((128 << 8) | 128);
+    const Lanes rounding = splat(kCoverageUnit / 2 * row.samples);
+    const int shift = row_shift(row.samples);
+    WalkLanes at[kMaxSamples];
+    for (int k = 0; k < row.samples; ++k) {
+        const GroundWalk& walk = row.walk[k];
+        at[k] = start_walk(walk.u + half(walk.du), walk.v + half(walk.dv), 2 * walk.du, 2 * walk.dv);
+    }
     for (int i = 0; i < width; i += 2 * Lanes::kCount) {
-        const Lanes texel = gather_all(ground.texels + level.offset, index_lanes(at.u, at.v, tile_row));
-        const Lanes distance = distance_lanes(texel, at.u, at.v);
-        const Lanes growth = dot_bytes(step, texel) - dot_bytes(origin, texel);
-        const Lanes blend = look_up(table.blend, shift_right(texel, 24));
-        const Lanes left =
-            dot_halves(blend, coverage_lanes(distance - growth, sharp)) + splat(kCoverageUnit / 2);
-        const Lanes right =
-            dot_halves(blend, coverage_lanes(distance + growth, sharp)) + splat(kCoverageUnit / 2);
-        store_halves(line + i, shift_right(left, 6) | shift_left(shift_right(right, 6), 8));
-        at.u = at.u + at.du;
-        at.v = at.v + at.dv;
+        Lanes left = rounding;
+        Lanes right = rounding;
+        for (int k = 0; k < row.samples; ++k) {
+            const Lanes step = splat(((row.half_y[k] + 128) << 8) | (row.half_x[k] + 128));
+            const Lanes sharp = splat(row.sharpness[k]);
+            const Lanes texel = gather_all(texels, index_lanes(at[k].u, at[k].v, tile_row));
+            const Lanes distance = distance_lanes(texel, at[k].u, at[k].v);
+            const Lanes growth = dot_bytes(step, texel) - dot_bytes(origin, texel);
+            const Lanes blend = look_up(table.blend, shift_right(texel, 24));
+            left = left + dot_halves(blend, coverage_lanes(distance - growth, sharp));
+            right = right + dot_halves(blend, coverage_lanes(distance + growth, sharp));
+            at[k].u = at[k].u + at[k].du;
+            at[k].v = at[k].v + at[k].dv;
+        }
+        store_halves(line + i, shift_right(left, shift) | shift_left(shift_right(right, shift), 8));
     }
 }
 
@@ -174,22 +194,24 @@ void add_ground(const GroundView& ground, const GroundLevel& level, const Ground
     }
 }
 
-void store_ground(const GroundView& ground, const GroundWalk& walk, int32_t sharpness,
-                  const ShadeTable& table, int width, uint8_t* line) {
-    uint32_t u = walk.u + half(walk.du);
-    uint32_t v = walk.v + half(walk.dv);
-    const int32_t half_x = static_cast<int32_t>(walk.du) >> 9;
-    const int32_t half_y = static_cast<int32_t>(walk.dv) >> 9;
+void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTable& table, int width,
+                  uint8_t* line) {
+    const int shift = row_shift(row.samples);
     for (int i = 0; i < width; i += 2) {
-        const uint32_t texel = ground.texels[texel_index(ground.levels[0], u, v)];
-        const int32_t distance = edge_distance(texel, u, v);
-        const int32_t growth = edge_growth(texel, half_x, half_y);
-        const int32_t left = shade_edge(texel, distance - growth, sharpness, table.blend);
-        const int32_t right = shade_edge(texel, distance + growth, sharpness, table.blend);
-        line[i] = static_cast<uint8_t>((left + kCoverageUnit / 2) >> 6);
-        line[i + 1] = static_cast<uint8_t>((right + kCoverageUnit / 2) >> 6);
-        u += 2 * walk.du;
-        v += 2 * walk.dv;
+        int32_t left = kCoverageUnit / 2 * row.samples;
+        int32_t right = left;
+        for (int k = 0; k < row.samples; ++k) {
+            const GroundWalk& walk = row.walk[k];
+            const uint32_t u = walk.u + half(walk.du) + static_cast<uint32_t>(i) * walk.du;
+            const uint32_t v = walk.v + half(walk.dv) + static_cast<uint32_t>(i) * walk.dv;
+            const uint32_t texel = ground.texels[texel_index(ground.levels[0], u, v)];
+            const int32_t distance = edge_distance(texel, u, v);
+            const int32_t growth = edge_growth(texel, row.half_x[k], row.half_y[k]);
+            left += shade_edge(texel, distance - growth, row.sharpness[k], table.blend);
+            right += shade_edge(texel, distance + growth, row.sharpness[k], table.blend);
+        }
+        line[i] = static_cast<uint8_t>(left >> shift);
+        line[i + 1] = static_cast<uint8_t>(right >> shift);
     }
 }
 
@@ -225,8 +247,16 @@ class Painter {
     // in the plane of the walls' upper edge, used only from above it).
     void draw_row(int row, int begin, int samples, const Block& block, const Block& upper, int i,
                   uint8_t* line) {
-        if (samples == 1 && kChannels == 1 && can_store(begin, block, i)) {
-            store_ground(ground_, walk_of(block, i), sharpness_of(begin), tables_[0], width_, line);
+        if (kChannels == 1 && can_share(begin, samples, block, i)) {
+            SharedRow shared;
+            shared.samples = samples;
+            for (int k = 0; k < samples; ++k) {
+                shared.walk[k] = walk_of(block, i + k);
+                shared.sharpness[k] = sharpness_of(begin + k);
+                shared.half_x[k] = block.du[i + k] >> 9;
+                shared.half_y[k] = block.dv[i + k] >> 9;
+            }
+            store_ground(ground_, shared, tables_[0], width_, line);
             return;
         }
         for (int k = 0; k < kChannels * stride_; ++k) sums_[k] = 0;
@@ -272,11 +302,16 @@ class Painter {
         return static_cast<int32_t>(min_of(camera_.sharpness[sample] * ground_.texel, 32767.0f));
     }
 
-    // Whether store_ground() may draw the row: all ground, and pixels small against an edge texel.
-    bool can_store(int sample, const Block& block, int i) const {
-        constexpr float largest_step = 0.35f;  // texels
-        return camera_.kind[sample] == kSampleGround && block.begin[i] == 0 && block.end[i] == width_ &&
-               block.level[i] == 0 && width_ % 32 == 0 && camera_.step[sample] < largest_step * ground_.texel;
+    // Whether store_ground() may draw the row: all of it ground, and pixels small against an edge texel.
+    bool can_share(int sample, int samples, const Block& block, int i) const {
+        constexpr float largest_step = 0.95f;  // texels
+        bool can = width_ % 32 == 0;
+        for (int k = 0; k < samples; ++k) {
+            can = can && camera_.kind[sample + k] == kSampleGround && block.begin[i + k] == 0 &&
+                  block.end[i + k] == width_ && block.level[i + k] == 0 &&
+                  camera_.step[sample + k] < largest_step * ground_.texel;
+        }
+        return can;
     }
 
     void add_walk(int sample, const Block& block, int i, PixelSpan inside) {
@@ -337,7 +372,7 @@ class Painter {
     }
 
     void store_row(int samples, uint8_t* line) const {
-        const int shift = samples == 1 ? 6 : samples == 2 ? 7 : samples == 4 ? 8 : 9;
+        const int shift = row_shift(samples);
         const int32_t rounding = 1 << (shift - 1);
         const int width = width_;  // a local, since bytes may alias anything
         for (int c = 0; c < kChannels; ++c) {

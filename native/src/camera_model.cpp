@@ -9,8 +9,8 @@ namespace racecraft {
 namespace {
 
 constexpr float kFarthest = 60.0f;  // m; rows that look farther along the ground show only wall
-constexpr float kStretch = 2.5f;  // length over width of a sample's footprint on the ground, at most, before
-constexpr int32_t kMaxRowSamples = 4;  // the row is split into twice as many, up to this many
+constexpr float kStretch = 3.5f;  // length over width of a sample's footprint on the ground, at most, before
+constexpr int32_t kMaxRowSamples = 8;  // the row is split into twice as many, up to this many
 constexpr float kSteep = 1.0f;         // rad; cameras that look down more steeply see no walls, as on a map
 constexpr int32_t kSkySamples = 4;     // of rows above the horizon: they only smooth the walls' upper edge
 
@@ -29,6 +29,9 @@ void check(const CameraSpec& spec) {
     if (spec.width < 1 || spec.width > kMaxImageWidth || spec.height < 1 || spec.height > kMaxImageWidth) {
         fail("size " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " must be 1 to " +
              std::to_string(kMaxImageWidth) + " pixels in each direction.");
+    }
+    if (spec.min_samples != 1 && spec.min_samples != 2 && spec.min_samples != 4 && spec.min_samples != 8) {
+        fail("min_samples = " + std::to_string(spec.min_samples) + " must be 1, 2, 4 or 8.");
     }
     if (!(spec.hfov > 0.01f && spec.hfov < 3.0f)) {
         fail("hfov = " + std::to_string(spec.hfov) +
@@ -62,6 +65,8 @@ CameraModel::CameraModel(const CameraSpec& spec) {
         return Ray{sine + b * cosine, cosine - b * sine};
     };
     const auto ground_distance = [&](const Ray& r) { return spec.above * r.ahead / r.down; };
+    // Samples that lie beside each other as well may each be sharper.
+    const float narrowing = spec.min_samples >= 4 ? 0.65f : 0.9f;
     const float farthest_slope = spec.above / kFarthest;
 
     for (int32_t row = 0; row < spec.height; ++row) {
@@ -74,7 +79,7 @@ CameraModel::CameraModel(const CameraSpec& spec) {
             const float wide = spec.above / (middle.down * focal);
             const float length = abs_of(ground_distance(ray(static_cast<float>(row))) -
                                         ground_distance(ray(static_cast<float>(row + 1))));
-            samples = 1;
+            samples = spec.min_samples;
             while (samples < kMaxRowSamples && length > kStretch * wide * static_cast<float>(samples))
                 samples *= 2;
         }
@@ -95,7 +100,7 @@ CameraModel::CameraModel(const CameraSpec& spec) {
                 const float length = first.down > farthest_slope
                                          ? abs_of(ground_distance(first) - ground_distance(ray(upper + part)))
                                          : kFarthest;
-                filter = length > step ? sqrt_of(step * length) : step;
+                filter = narrowing * (length > step ? sqrt_of(step * length) : step);
             }
             int8_t exponent = -8;
             for (float texel = 0.01f / 256.0f; texel * 1.41421356f < filter && exponent < 8; texel *= 2.0f)

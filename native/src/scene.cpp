@@ -293,6 +293,7 @@ CameraSpec chase_camera(int width, int height) {
     spec.pitch = 0.31416f;
     spec.forward = -1.5f;
     spec.above = 1.0f;
+    spec.min_samples = 4;
     return spec;
 }
 
@@ -305,6 +306,7 @@ FixedCamera top_down_camera(const GroundMap& ground, int width, int height) {
     camera.spec.height = height;
     camera.spec.pitch = 0.5f * kPi;
     camera.spec.forward = 0.0f;
+    camera.spec.min_samples = 4;
     camera.x = 0.5f * (view.min_x + view.max_x);
     camera.y = 0.5f * (view.min_y + view.max_y);
     float sine, cosine;
@@ -331,7 +333,7 @@ void render_rgb(const CameraModel& camera, const GroundMap& ground, const RgbPal
     // Far cars first, so that near ones cover them.
     thread_local std::vector<int> order;
     thread_local std::vector<Sample> samples;
-    order.resize(static_cast<size_t>(num_cars));
+    order.resize(static_cast<size_t>(max_of(num_cars, 0)));
     std::iota(order.begin(), order.end(), 0);
     const auto distance = [&](int i) {
         const float dx = cars[i].x - lens.x;

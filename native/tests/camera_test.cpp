@@ -1,0 +1,209 @@
+// The driver's camera against its reference, across instruction sets, and at poses that no car should reach.
+#include <limits>
+#include <stdexcept>
+
+#include "../src/camera_model.hpp"
+#include "../src/dispatch.hpp"
+#include "check.hpp"
+#include "ray_cast.hpp"
+#include "tracks.hpp"
+
+namespace racecraft {
+namespace {
+
+using test::Outline;
+
+const GreyPalette kGrey = grey_palette(kPalette2018);
+
+// A circuit of literal numbers only, so that a hash over its frames depends on nothing but the renderer.
+Outline octagon() {
+    constexpr double corners[9][2] = {{3, 0},     {2, 1.5}, {0, 2},    {-2, 1.5}, {-3, 0},
+                                      {-2, -1.5}, {0, -2},  {2, -1.5}, {3, 0}};
+    Outline road{{}, {}, {}, true};
+    for (const auto& p : corners) {
+        road.center.insert(road.center.end(), {p[0], p[1]});
+        road.inner.insert(road.inner.end(), {0.8125 * p[0], 0.8125 * p[1]});
+        road.outer.insert(road.outer.end(), {1.1875 * p[0], 1.1875 * p[1]});
+    }
+    return road;
+}
+
+std::vector<uint8_t> frame(const CameraModel& camera, const GroundMap& ground, float x, float y,
+                           float heading) {
+    std::vector<uint8_t> pixels(size_t(camera.spec().width) * camera.spec().height);
+    render_grey(camera, ground, kGrey, x, y, heading, pixels.data());
+    return pixels;
+}
+
+struct Pose {
+    float x, y, heading;
+};
+constexpr Pose kPoses[] = {{2.5f, 0.8f, 2.0f},  {0.0f, 2.0f, 3.3f},   {-3.0f, 0.0f, -1.5f},
+                           {1.0f, -1.7f, 0.3f}, {2.9f, -0.3f, 1.2f},  {0.5f, 0.5f, 0.0f},
+                           {-3.9f, 2.0f, 2.5f}, {2.0f, 1.5f, 100.0f}, {1.5f, 1.6f, -2.75f},
+                           {-2.0f, -1.4f, 0.0f}};
+
+uint64_t hash_of_frames() {
+    const Outline road = octagon();
+    const GroundMap ground(road.view());
+    const CameraModel camera(CameraSpec{});
+    CameraSpec odd;
+    odd.width = 83;
+    odd.height = 61;
+    const CameraModel small(odd);
+    uint64_t hash = 14695981039346656037u;  // FNV-1a
+    for (const Pose& p : kPoses) {
+        for (const CameraModel* model : {&camera, &small}) {
+            for (const uint8_t byte : frame(*model, ground, p.x, p.y, p.heading))
+                hash = (hash ^ byte) * 1099511628211u;
+        }
+    }
+    return hash;
+}
+
+double mean_difference(const std::vector<uint8_t>& a, const std::vector<double>& b) {
+    double sum = 0.0;
+    for (size_t i = 0; i < a.size(); ++i) sum += std::abs(a[i] - b[i]);
+    return sum / static_cast<double>(a.size());
+}
+
+// Equal for every compiler, optimisation level and CPU. A change here changes what every policy sees.
+constexpr uint64_t kGoldenHash = 13496028275728262795u;
+
+TEST(golden_hash_for_every_instruction_set) {
+    for (const Isa isa : available_isas()) {
+        set_isa(isa_name(isa));
+        CHECK_EQUAL(hash_of_frames(), kGoldenHash);
+    }
+}
+
+TEST(frames_agree_with_ray_casting) {
+    const CameraModel camera(CameraSpec{});
+    for (const Outline& road : {octagon(), test::circuit(), test::open_bend()}) {
+        const GroundMap ground(road.view());
+        const test::RayCaster reference(road.view(), kGrey);
+        for (size_t k = 1; k < road.num_waypoints() - 1; k += road.num_waypoints() / 2) {
+            const double x = road.center[2 * k] + 0.07;
+            const double y = road.center[2 * k + 1] - 0.05;
+            const double heading = std::atan2(road.center[2 * k + 3] - y, road.center[2 * k + 2] - x) + 0.2;
+            const auto pixels = frame(camera, ground, static_cast<float>(x), static_cast<float>(y),
+                                      static_cast<float>(heading));
+            CHECK_NEAR(mean_difference(pixels, reference.frame(camera.spec(), x, y, heading, 3)), 0.0, 1.0);
+        }
+    }
+}
+
+// A finer map only sharpens the corners of the dashes.
+TEST(texel_size_hardly_matters) {
+    const Outline road = octagon();
+    const CameraModel camera(CameraSpec{});
+    const GroundMap coarse(road.view());
+    const GroundMap fine(road.view(), {.texel = 0.005f});
+    for (const Pose& p : kPoses) {
+        const auto a = frame(camera, coarse, p.x, p.y, p.heading);
+        const auto b = frame(camera, fine, p.x, p.y, p.heading);
+        CHECK_NEAR(mean_difference(a, {b.begin(), b.end()}), 0.0, 0.6);
+    }
+}
+
+TEST(mirrored_track_gives_mirrored_frames) {
+    const Outline road = octagon();
+    Outline mirrored = road;
+    for (auto* line : {&mirrored.center, &mirrored.inner, &mirrored.outer}) {
+        for (size_t i = 1; i < line->size(); i += 2) (*line)[i] = -(*line)[i];
+    }
+    const GroundMap ground(road.view());
+    const GroundMap mirror(mirrored.view());
+    const CameraModel camera(CameraSpec{});
+    // Opposite walls differ in shade, so the walls to the left and right get one.
+    GreyPalette palette = kGrey;
+    palette.wall[3] = palette.wall[1];
+    const int width = camera.spec().width;
+    std::vector<uint8_t> a(size_t(width) * camera.spec().height), b = a;
+    for (const Pose& p : kPoses) {
+        render_grey(camera, ground, palette, p.x, p.y, p.heading, a.data());
+        render_grey(camera, mirror, palette, p.x, -p.y, -p.heading, b.data());
+        double sum = 0.0;
+        for (int i = 0; i < width * camera.spec().height; ++i) {
+            sum += std::abs(a[i] - b[i / width * width + width - 1 - i % width]);
+        }
+        CHECK_NEAR(sum / static_cast<double>(a.size()), 0.0, 0.5);
+    }
+}
+
+// What is far away must not flicker: a step of 1 mm to the side changes no far pixel by much more than its
+// share.
+TEST(small_steps_change_little) {
+    const Outline road = test::circuit();
+    const GroundMap ground(road.view());
+    const CameraModel camera(CameraSpec{});
+    const float x = static_cast<float>(road.center[20]);
+    const float y = static_cast<float>(road.center[21]);
+    auto before = frame(camera, ground, x, y, 1.9f);
+    for (int step = 1; step <= 10; ++step) {
+        const auto after = frame(camera, ground, x, y + 0.001f * static_cast<float>(step), 1.9f);
+        CHECK_NEAR(mean_difference(after, {before.begin(), before.end()}), 0.0, 0.7);
+        before = after;
+    }
+}
+
+TEST(palette_reaches_every_part_of_a_frame) {
+    const Outline road = octagon();
+    const GroundMap ground(road.view());
+    CameraSpec level;
+    level.pitch = 0.0f;
+    const CameraModel camera(level);
+    GreyPalette palette{};
+    for (uint8_t* shades : {palette.ground, palette.wall}) {
+        for (int i = 0; i < 4; ++i) shades[i] = 255;
+    }
+    palette.sky = 255;
+    std::vector<uint8_t> pixels(size_t(level.width) * level.height);
+    for (const Pose& p : kPoses) {
+        render_grey(camera, ground, palette, p.x, p.y, p.heading, pixels.data());
+        for (const uint8_t pixel : pixels) CHECK_EQUAL(int(pixel), 255);
+    }
+}
+
+// The sanitizers watch this one.
+TEST(any_pose_is_safe) {
+    const Outline road = octagon();
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+    for (const float texel : {0.0025f, 0.01f, 0.08f}) {
+        const GroundMap ground(road.view(), {.texel = texel});
+        for (const float pitch : {-0.5f, 0.0f, 0.2618f, 1.2f, 1.5707f}) {
+            for (const float above : {0.01f, 0.127f, 1.0f, 5.0f}) {
+                CameraSpec spec;
+                spec.width = 67;
+                spec.height = 41;
+                spec.pitch = pitch;
+                spec.above = above;
+                const CameraModel camera(spec);
+                for (const float x : {-100.0f, -4.5f, 0.0f, 3.0f, 4.47f, 1e30f, infinity, nan}) {
+                    for (const float heading : {0.0f, 0.785398f, 1.5707963f, 3.14159f, -2.0f, 1e20f, nan}) {
+                        frame(camera, ground, x, 0.3f * x, heading);
+                    }
+                }
+            }
+        }
+    }
+}
+
+TEST(impossible_cameras_are_refused) {
+    const auto with = [](auto change) {
+        CameraSpec spec;
+        change(spec);
+        return spec;
+    };
+    CHECK_THROWS(CameraModel(with([](CameraSpec& s) { s.width = 0; })), std::invalid_argument);
+    CHECK_THROWS(CameraModel(with([](CameraSpec& s) { s.height = 5000; })), std::invalid_argument);
+    CHECK_THROWS(CameraModel(with([](CameraSpec& s) { s.hfov = 3.2f; })), std::invalid_argument);
+    CHECK_THROWS(CameraModel(with([](CameraSpec& s) { s.pitch = std::nanf(""); })), std::invalid_argument);
+    CHECK_THROWS(CameraModel(with([](CameraSpec& s) { s.above = 0.0f; })), std::invalid_argument);
+    CHECK_THROWS(CameraModel(with([](CameraSpec& s) { s.forward = std::nanf(""); })), std::invalid_argument);
+    CHECK_THROWS(CameraModel(with([](CameraSpec& s) { s.min_samples = 3; })), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace racecraft
