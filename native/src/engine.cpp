@@ -109,8 +109,7 @@ void Engine::begin_episode(size_t env) {
     const TrackGeometry& track = track_of(env);
     episode.steps = 1;
     episode.status = Status::prepare;
-    episode.progress =
-        lap_difference(track, episode.projection.arc_length * track.inverse_length, episode.start);
+    episode.progress = lap_difference(track, episode.projection.arc_length / track.length, episode.start);
     episode.last_x = episode.reference_x;
     episode.last_y = episode.reference_y;
     write_row(track, episode, state, 0.0f, 0.0f, wheels_on_road(track, state, episode), is_reversed(env),
@@ -169,9 +168,8 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
                   is_reversed(env), episodes_[env], &rows_[env * kNumRowColumns]);
         terminated()[env] = verdict.terminated;
         truncated()[env] = verdict.truncated;
-        const bool moving = !verdict.terminated && episodes_[env].status != Status::pause;
-        is_moving_[env] = moving ? 1.0f : 0.0f;
-        any_moving |= moving;
+        is_moving_[env] = verdict.moves ? 1.0f : 0.0f;
+        any_moving |= verdict.moves;
     }
     if (!any_moving) return;
 
@@ -241,8 +239,8 @@ void Engine::visit_saved(Visitor&& visit) {
 }
 
 size_t Engine::num_bytes() const {
-    size_t bytes = frames_.size() + is_moving_.size() * sizeof(float) + steering_command_.size() * sizeof(float) +
-                   speed_command_.size() * sizeof(float);
+    size_t bytes = frames_.size() + is_moving_.size() * sizeof(float) +
+                   steering_command_.size() * sizeof(float) + speed_command_.size() * sizeof(float);
     const_cast<Engine*>(this)->visit_saved([&](const void*, size_t size) { bytes += size; });
     return bytes;
 }

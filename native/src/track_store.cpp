@@ -87,7 +87,6 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
     g.num_segments = static_cast<int32_t>(segments_.size());
     g.is_closed = outline.is_closed ? 1 : 0;
     g.length = arc_length;
-    g.inverse_length = 1.0 / arc_length;
     g.segments = segments_.data();
     g.grid_x = x_min - kMargin;
     g.grid_y = y_min - kMargin;

@@ -67,9 +67,14 @@ inline Outline open_bend(size_t pieces = 60) {
     return road_along([](double t) { return Point{8.0 * t, 1.5 * std::sin(4.0 * t)}; }, pieces, 0.5, false);
 }
 
-// Constant tables are enough where width and curvature are not the subject.
+// Constant tables, one sample a metre, are enough where width and curvature are not the subject.
 inline TrackStore store_of(const Outline& road, float width = 0.8f) {
-    return TrackStore(road.view(), {width, width}, {0.0f, 0.0f}, 1.0);
+    double length = 0.0;
+    for (size_t i = 2; i < road.center.size(); i += 2) {
+        length += std::hypot(road.center[i] - road.center[i - 2], road.center[i + 1] - road.center[i - 1]);
+    }
+    const size_t count = static_cast<size_t>(std::ceil(length)) + 1;
+    return TrackStore(road.view(), std::vector<float>(count, width), std::vector<float>(count, 0.0f), 1.0);
 }
 
 }  // namespace racecraft::test

@@ -125,6 +125,7 @@ struct RuleLimits {
 struct Verdict {
     bool terminated;
     bool truncated;
+    bool moves;  // the action acts: neither terminated nor frozen
 };
 
 // How many of the four wheel centres are on the road.
@@ -185,14 +186,16 @@ RC_HD Verdict judge(const TrackGeometry& track, const RuleLimits& limits, const 
     const int32_t wheels = wheels_on_road(track, state, episode);
     episode.steps += 1;
 
-    Verdict verdict{false, false};
-    if (episode.frozen_steps > 0) {
+    const bool is_frozen = episode.frozen_steps > 0;
+    Verdict verdict{false, false, false};
+    if (is_frozen) {
         episode.frozen_steps -= 1;
         episode.status = Status::pause;
         write_row(track, episode, state, steering_command, speed_command, wheels, is_reversed, row);
     } else {
+        // Divided, not multiplied by an inverse: at the end of an open road the quotient is 1 exactly.
         const double here =
-            lap_difference(track, episode.projection.arc_length * track.inverse_length, episode.start);
+            lap_difference(track, episode.projection.arc_length / track.length, episode.start);
         const double before = episode.progress;
         episode.progress = before + lap_difference(track, here, before);
         episode.falling_steps = episode.progress < before ? episode.falling_steps + 1 : 0;
@@ -221,6 +224,7 @@ RC_HD Verdict judge(const TrackGeometry& track, const RuleLimits& limits, const 
         row[kRow_status] = static_cast<int32_t>(Status::time_up);
     }
     verdict.truncated = !verdict.terminated && (time_up || episode.steps >= limits.max_steps);
+    verdict.moves = !verdict.terminated && !is_frozen;
     episode.last_x = episode.reference_x;
     episode.last_y = episode.reference_y;
     return verdict;

@@ -29,7 +29,6 @@ struct TrackGeometry {
     int32_t num_segments;     // W - 1
     int32_t is_closed;        // 1 or 0
     double length;            // m, of the centre line
-    double inverse_length;    // 1/m
     const Segment* segments;  //                                       (W - 1,)
 
     double grid_x, grid_y;  // m, lower left corner of the grid
