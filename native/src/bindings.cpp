@@ -12,6 +12,7 @@
 
 #include "dispatch.hpp"
 #include "engine.hpp"
+#include "scene.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -81,6 +82,12 @@ nb::tuple names_of(const char* const (&names)[Count]) {
     return nb::tuple(list);
 }
 
+const RgbPalette& rgb_palette(const std::string& name) {
+    if (name == "2018") return kPalette2018;
+    if (name == "2020") return kPalette2020;
+    throw std::invalid_argument("Palette '" + name + "' does not exist; choose '2018' or '2020'.");
+}
+
 void bind_camera(nb::module_& m) {
     nb::class_<CameraSpec>(m, "CameraSpec",
                            "Where a camera sits on the car and what it covers; SI units and radians.")
@@ -90,14 +97,7 @@ void bind_camera(nb::module_& m) {
                float pitch) { new (self) CameraSpec{width, height, hfov, pitch, forward, left, above}; },
             "width"_a, "height"_a, "hfov"_a, "forward"_a, "left"_a, "above"_a, "pitch"_a);
     nb::class_<GreyPalette>(m, "GreyPalette", "Brightness of everything a driver's camera can see.");
-    m.def(
-        "grey_palette",
-        [](const std::string& name) {
-            if (name == "2018") return grey_palette(kPalette2018);
-            if (name == "2020") return grey_palette(kPalette2020);
-            throw std::invalid_argument("Palette '" + name + "' does not exist; choose '2018' or '2020'.");
-        },
-        "name"_a);
+    m.def("grey_palette", [](const std::string& name) { return grey_palette(rgb_palette(name)); }, "name"_a);
     nb::class_<GroundMap>(m, "GroundMap", "The ground of a track as cameras see it.")
         .def(
             "__init__",
@@ -109,6 +109,47 @@ void bind_camera(nb::module_& m) {
             },
             "centerline"_a, "inner"_a, "outer"_a, "is_closed"_a, "texel"_a)
         .def_prop_ro("num_bytes", &GroundMap::num_bytes);
+}
+
+void bind_views(nb::module_& m) {
+    constexpr int kNumCarFields = 8;  // x, y, heading, steering, red, green, blue, alpha
+    using Cars = nb::ndarray<const float, nb::shape<-1, kNumCarFields>, nb::c_contig, nb::device::cpu>;
+    using Picture = nb::ndarray<uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+
+    nb::class_<CameraModel>(m, "CameraModel", "A camera that is ready to draw pictures for people.")
+        .def(nb::init<const CameraSpec&>(), "spec"_a);
+    m.def("chase_camera", &chase_camera, "width"_a, "height"_a);
+    m.def(
+        "top_down_camera",
+        [](const GroundMap& ground, int width, int height) {
+            const FixedCamera camera = top_down_camera(ground, width, height);
+            return std::make_tuple(camera.spec, camera.x, camera.y, camera.heading);
+        },
+        "ground"_a, "width"_a, "height"_a);
+    m.def(
+        "render_rgb",
+        [](const CameraModel& camera, const GroundMap& ground, const std::string& palette, float x, float y,
+           float heading, Cars cars, Picture out) {
+            const CameraSpec& spec = camera.spec();
+            if (out.shape(0) != static_cast<size_t>(spec.height) ||
+                out.shape(1) != static_cast<size_t>(spec.width)) {
+                throw std::invalid_argument("The picture does not have the camera's size.");
+            }
+            std::vector<CarPicture> pictures;
+            for (size_t i = 0; i < cars.shape(0); ++i) {
+                const float* car = cars.data() + i * kNumCarFields;
+                const auto byte = [&](int field) {
+                    return static_cast<uint8_t>(clamp(car[field], 0.0f, 255.0f));
+                };
+                pictures.push_back({car[0], car[1], car[2], car[3], {byte(4), byte(5), byte(6)}, car[7]});
+            }
+            const RgbPalette& colours = rgb_palette(palette);
+            uint8_t* pixels = out.data();
+            nb::gil_scoped_release release;
+            render_rgb(camera, ground, colours, x, y, heading, pictures.data(),
+                       static_cast<int>(pictures.size()), pixels);
+        },
+        "camera"_a, "ground"_a, "palette"_a, "x"_a, "y"_a, "heading"_a, "cars"_a, "out"_a);
 }
 
 void bind_engine(nb::module_& m) {
@@ -250,5 +291,6 @@ NB_MODULE(_native, m) {
     });
     m.def("set_isa", &racecraft::set_isa, "name"_a);
     racecraft::bind_camera(m);
+    racecraft::bind_views(m);
     racecraft::bind_engine(m);
 }

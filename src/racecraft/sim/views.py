@@ -1,0 +1,107 @@
+"""Pictures for people: the track and its cars in colour, from the driver's, the chase or the top-down camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft import _native
+from racecraft.errors import ConfigError
+from racecraft.sim.camera import CameraSpec
+from racecraft.sim.simulation import ground_map, native_camera
+from racecraft.track.track import Track
+
+CHASE_DISTANCE: Final = 1.5
+"""m that the chase camera is behind the car, 1 m above the ground."""
+
+
+class CarView(NamedTuple):
+    """A car in a picture."""
+
+    x: float
+    """m, of the car's origin."""
+    y: float
+    """m"""
+    heading: float
+    """rad"""
+    steering: float = 0.0
+    """rad, of the front wheels, left positive."""
+    color: tuple[int, int, int] = (196, 32, 38)
+    """Of the body, RGB."""
+    alpha: float = 1.0
+    """1 is solid; a car that stands as a penalty blinks between 0.3 and 1."""
+
+
+class Scene:
+    """A track with its surroundings, ready to be looked at.
+
+    Args:
+        track: What is shown.
+        palette: Colours of the world: ``2018`` or ``2020``.
+    """
+
+    def __init__(self, track: Track, *, palette: str = "2018") -> None:
+        if palette not in ("2018", "2020"):
+            raise ConfigError(f"Palette is {palette!r}; allowed are '2018' and '2020'.")
+        self.palette = palette
+        self._ground = ground_map(track)
+
+    def chase_view(self, *, width: int = 640, height: int = 480) -> View:
+        """The camera that follows a car from behind and above."""
+        return View(self, _native.chase_camera(width, height), width, height)
+
+    def driver_view(self, camera: CameraSpec = CameraSpec()) -> View:
+        """The driver's camera in colour; leave the own car out of its pictures."""
+        return View(self, native_camera(camera), camera.width, camera.height)
+
+    def top_view(self, *, width: int = 640, height: int = 480) -> View:
+        """The whole track from above; its camera stands still, so the pose it is given does not matter."""
+        spec, x, y, heading = _native.top_down_camera(self._ground, width, height)
+        return View(self, spec, width, height, fixed=(x, y, heading))
+
+
+class View:
+    """One camera in a scene; made by a `Scene`."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        spec: _native.CameraSpec,
+        width: int,
+        height: int,
+        *,
+        fixed: tuple[float, float, float] | None = None,
+    ) -> None:
+        self.width = width
+        self.height = height
+        self._scene = scene
+        self._camera = _native.CameraModel(spec)
+        self._fixed = fixed
+
+    def draw(
+        self,
+        x: float = 0.0,
+        y: float = 0.0,
+        heading: float = 0.0,
+        *,
+        cars: Sequence[CarView] = (),
+        out: NDArray[np.uint8] | None = None,
+    ) -> NDArray[np.uint8]:
+        """A picture, RGB uint8 (height, width, 3).
+
+        Args:
+            x: Origin of the car that carries the camera, m.
+            y: The same.
+            heading: Of that car, rad.
+            cars: What is seen besides the track.
+            out: Where to draw; a new array by default.
+        """
+        if out is None:
+            out = np.empty((self.height, self.width, 3), dtype=np.uint8)
+        table = np.array([(*car[:4], *car.color, car.alpha) for car in cars], dtype=np.float32).reshape(-1, 8)
+        x, y, heading = self._fixed or (x, y, heading)
+        _native.render_rgb(self._camera, self._scene._ground, self._scene.palette, x, y, heading, table, out)
+        return out
