@@ -9,7 +9,7 @@ namespace racecraft {
 namespace {
 
 constexpr float kFarthest = 60.0f;  // m; rows that look farther along the ground show only wall
-constexpr float kStretch = 3.5f;  // length over width of a sample's footprint on the ground, at most, before
+constexpr float kStretch = 4.25f;  // length over width of a sample's footprint on the ground, at most, before
 constexpr int32_t kMaxRowSamples = 8;  // the row is split into twice as many, up to this many
 constexpr float kSteep = 1.0f;         // rad; cameras that look down more steeply see no walls, as on a map
 constexpr int32_t kSkySamples = 4;     // of rows above the horizon: they only smooth the walls' upper edge
