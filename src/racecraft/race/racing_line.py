@@ -138,12 +138,7 @@ def _smooth(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _figures(recording: Recording) -> list[tuple[str, str]]:
-    numbers = recording.lap_numbers
-    times = [
-        float(recording.clock[numbers == number].max() - began)
-        for number, began in _lap_starts(recording)
-        if "lap_complete" in np.array(recording.statuses)[numbers == number]
-    ]
+    times = list(recording.lap_times.values())
     speeds = recording.column("actual_speed")
     figures = []
     if len(times) == 1:
@@ -160,13 +155,6 @@ def _figures(recording: Recording) -> list[tuple[str, str]]:
     if mistakes:
         figures.append(("RESETS", str(mistakes)))
     return figures
-
-
-def _lap_starts(recording: Recording) -> list[tuple[int, float]]:
-    """Number of every lap and when it began on the clock, s: a step before its first one."""
-    numbers = recording.lap_numbers
-    step = 1.0 / 15.0
-    return [(int(number), float(recording.clock[numbers == number].min()) - step) for number in np.unique(numbers)]
 
 
 def _color_bar(canvas: Canvas, unit: float, low: float, high: float) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim.simulation import CONTROL_DT
 from racecraft.track.track import Track
 
 REFERENCE_AHEAD = 0.14
@@ -51,6 +52,16 @@ class Recording:
         completed = self.column("lap").astype(np.int64)
         is_last = self.column("status") == STATUS_NAMES.index("lap_complete")
         return np.asarray(completed + 1 - is_last)
+
+    @cached_property
+    def lap_times(self) -> dict[int, float]:
+        """Times of the laps completed in this recording by their number, s."""
+        times = {}
+        for number in np.unique(self.lap_numbers).tolist():
+            steps = np.flatnonzero(self.lap_numbers == number)
+            if self.statuses[steps[-1]] == "lap_complete":
+                times[number] = float(self.clock[steps[-1]] - self.clock[steps[0]]) + CONTROL_DT
+        return times
 
     def lap(self, number: int) -> Recording:
         """The steps of one lap, numbered from 1."""

@@ -1,0 +1,138 @@
+"""`film`: the video of a trial, seen from behind the car, with the driver's view and the race's figures.
+
+640 x 480 at 15 frames a second, one frame for every step: H.264, yuv420p, playable while it loads.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import ConfigError, RunError
+from racecraft.race.overlay import HEIGHT, INSET, WIDTH, Overlay
+from racecraft.race.recording import Recording
+from racecraft.race.rules import RESET_STATUSES
+from racecraft.sim.camera import CameraSpec
+from racecraft.sim.simulation import CONTROL_DT
+from racecraft.sim.views import CarView, Scene
+from racecraft.track.canvas import Color
+
+FRAME_RATE: Final = 15
+END_SECONDS: Final = 2.0
+"""How long the last frame stays, with the result."""
+CAMERA_LAG: Final = 0.25
+"""s by which the chase camera's heading lags behind the car's."""
+BLINK_PERIOD: Final = 0.5
+"""s in which a car that stands as a penalty fades and returns once."""
+BLINK_ALPHA: Final = 0.3
+"""How solid it is when faded most."""
+QUALITY: Final = "22"
+"""x264's constant rate factor: 18 is near lossless, 28 is poor."""
+
+
+def film(
+    recording: Recording,
+    path: str | Path,
+    *,
+    name: str = "",
+    laps: int = 0,
+    color: Color = (214, 60, 44),
+    palette: str = "2018",
+) -> Path:
+    """Write the video of a trial.
+
+    Args:
+        recording: Of the trial, or of one of its laps.
+        path: Where to, ending in ``.mp4``.
+        name: The racer's, or the run's.
+        laps: Laps that the race has; 0 if that is not known.
+        color: Of the car.
+        palette: Colours of the world: ``2018`` or ``2020``.
+
+    Raises:
+        ConfigError: Nothing was recorded, the palette is unknown, or the path does not end in .mp4.
+        RunError: The file cannot be written.
+    """
+    import av
+
+    path = Path(path)
+    if path.suffix.lower() != ".mp4":
+        raise ConfigError(f"Cannot write a video to {path.name!r}; the name must end in .mp4.")
+    unfinished = path.with_name(f".{path.stem}.part.mp4")
+    try:
+        with av.open(str(unfinished), "w", options={"movflags": "faststart"}) as container:
+            stream = container.add_stream("h264", rate=FRAME_RATE, options={"preset": "veryfast", "crf": QUALITY})
+            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+            for pixels in frames(recording, name=name, laps=laps, color=color, palette=palette):
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
+            container.mux(stream.encode())
+        os.replace(unfinished, path)
+    except OSError as error:
+        raise RunError(f"{path} cannot be written: {error.strerror or error}.") from error
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path
+
+
+def frames(
+    recording: Recording, *, name: str = "", laps: int = 0, color: Color = (214, 60, 44), palette: str = "2018"
+) -> Iterator[NDArray[np.uint8]]:
+    """The frames of `film`, RGB (480, 640, 3), each in the same array: copy what must last.
+
+    Raises:
+        ConfigError: Nothing was recorded, or the palette is unknown.
+    """
+    if not len(recording):
+        raise ConfigError("Nothing was recorded, so there is nothing to film.")
+    left, top, width, height = INSET
+    scene = Scene(recording.track, palette=palette)
+    chase = scene.chase_view(width=WIDTH, height=HEIGHT)
+    driver = scene.driver_view(CameraSpec(width=width, height=height))
+    overlay = Overlay(recording, name=name, laps=laps)
+    places, headings = recording.origins, recording.column("heading")
+    steering = recording.column("actual_steering_angle")
+    directions, alphas = follow(recording), blink(recording)
+    frame = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
+    inset = np.empty((height, width, 3), dtype=np.uint8)
+    step = 0
+    for step in range(len(recording)):
+        (x, y), heading = places[step].tolist(), float(headings[step])
+        car = CarView(x, y, heading, float(steering[step]), color, float(alphas[step]))
+        chase.draw(x, y, float(directions[step]), cars=[car], out=frame)
+        frame[top : top + height, left : left + width] = driver.draw(x, y, heading, out=inset)
+        if step == len(recording) - 1:
+            break
+        overlay.draw(frame, step)
+        yield frame
+    overlay.draw(frame, step, is_over=True)
+    for _ in range(1 + round(END_SECONDS * FRAME_RATE)):
+        yield frame
+
+
+def follow(recording: Recording) -> NDArray[np.float64]:
+    """Heading of the chase camera at every step, rad: it lags behind the car's, and jumps where the car is put (T,)."""
+    headings = np.unwrap(recording.column("heading"))
+    statuses = recording.statuses
+    is_put = [
+        now == "prepare" or before in RESET_STATUSES for before, now in zip(["", *statuses], statuses, strict=False)
+    ]
+    share = 1.0 - math.exp(-CONTROL_DT / CAMERA_LAG)
+    directions = np.empty(len(headings))
+    direction = float(headings[0]) if len(headings) else 0.0
+    for step, (heading, put) in enumerate(zip(headings.tolist(), is_put, strict=True)):
+        direction = heading if put else direction + share * (heading - direction)
+        directions[step] = direction
+    return directions
+
+
+def blink(recording: Recording) -> NDArray[np.float64]:
+    """How solid the car is at every step: 1, or fading to and fro while it stands as a penalty (T,)."""
+    stands = np.array([status == "pause" for status in recording.statuses])
+    wave = 0.5 + 0.5 * np.cos(2.0 * np.pi * recording.clock / BLINK_PERIOD)
+    return np.where(stands, BLINK_ALPHA + (1.0 - BLINK_ALPHA) * wave, 1.0)
