@@ -27,7 +27,8 @@ def blocks(language: str) -> list[tuple[str, str]]:
 
 
 def run(command: list[str], folder: Path) -> None:
-    environment = {**os.environ, "COLUMNS": "100"}
+    verbs = str(Path(sys.executable).parent)
+    environment = {**os.environ, "COLUMNS": "100", "PATH": verbs + os.pathsep + os.environ["PATH"]}
     done = subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=540, check=False
     )
@@ -49,8 +50,7 @@ def test_bash_block(where: str, text: str, tmp_path: Path) -> None:
         run([shutil.which("make") or "make", "-n", *line.split("#")[0].split()[1:]], ROOT)
     rest = "\n".join(line for line in text.splitlines() if line not in make_lines)
     if rest.strip():
-        verb = Path(sys.executable).parent / "racecraft"
-        run(["bash", "-euo", "pipefail", "-c", rest.replace(".venv/bin/racecraft", str(verb))], tmp_path)
+        run(["bash", "-euo", "pipefail", "-c", rest.replace(".venv/bin/", "")], tmp_path)
 
 
 @pytest.mark.slow
