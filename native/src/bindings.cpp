@@ -201,7 +201,7 @@ void bind_engine(nb::module_& m) {
                 const bool* masked = mask.data();
                 const uint64_t* keys = seeds ? seeds->data() : nullptr;
                 nb::gil_scoped_release release;
-                keys != nullptr ? self.reset(masked, keys) : self.reset(masked);
+                self.reset(masked, keys);
             },
             "mask"_a, "seeds"_a = nb::none())
         .def(

@@ -134,23 +134,20 @@ size_t Engine::chunk_size(size_t most) const {
     return std::clamp((num_envs() + parts - 1) / parts, size_t{1}, most);
 }
 
-void Engine::reset(const bool* mask) {
+void Engine::reset(const bool* mask, const uint64_t* seeds) {
+    const std::lock_guard lock(mutex_);
     const size_t chunk = chunk_size(kLanes);
     pool_.for_each((num_envs() + chunk - 1) / chunk, [&](size_t part) {
         for (size_t env = part * chunk; env < std::min((part + 1) * chunk, num_envs()); ++env) {
-            if (mask == nullptr || mask[env]) begin_episode(env);
+            if (mask != nullptr && !mask[env]) continue;
+            if (seeds != nullptr) {
+                seeds_[env] = seeds[env];
+                streams_[env] = 0;
+                episodes_[env].episode = -1;
+            }
+            begin_episode(env);
         }
     });
-}
-
-void Engine::reset(const bool* mask, const uint64_t* seeds) {
-    for (size_t env = 0; env < num_envs(); ++env) {
-        if (!mask[env]) continue;
-        seeds_[env] = seeds[env];
-        streams_[env] = 0;
-        episodes_[env].episode = -1;
-    }
-    reset(mask);
 }
 
 void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
@@ -196,6 +193,7 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
 }
 
 void Engine::step(const float* actions) {
+    const std::lock_guard lock(mutex_);
     // With a camera a car costs microseconds, without one nanoseconds: hand out work in matching portions.
     const size_t chunk = chunk_size(camera_ != nullptr ? kLanes : 64 * kLanes);
     pool_.for_each((num_envs() + chunk - 1) / chunk, [&](size_t part) {
@@ -204,6 +202,7 @@ void Engine::step(const float* actions) {
 }
 
 void Engine::set_pose(size_t env, float x, float y, float heading, float speed) {
+    const std::lock_guard lock(mutex_);
     VehicleState state{};
     state.x = x;
     state.y = y;
@@ -221,6 +220,7 @@ void Engine::set_pose(size_t env, float x, float y, float heading, float speed) 
 }
 
 void Engine::freeze(size_t env, int steps) {
+    const std::lock_guard lock(mutex_);
     episodes_[env].frozen_steps = steps;
 }
 
@@ -246,15 +246,21 @@ size_t Engine::num_bytes() const {
 }
 
 std::vector<uint8_t> Engine::save() const {
-    std::vector<uint8_t> bytes;
+    const std::lock_guard lock(mutex_);
+    return snapshot();
+}
+
+std::vector<uint8_t> Engine::snapshot() const {
+    std::vector<uint8_t> copy;
     const_cast<Engine*>(this)->visit_saved([&](const void* data, size_t size) {
         const uint8_t* begin = static_cast<const uint8_t*>(data);
-        bytes.insert(bytes.end(), begin, begin + size);
+        copy.insert(copy.end(), begin, begin + size);
     });
-    return bytes;
+    return copy;
 }
 
 void Engine::load(const uint8_t* bytes, size_t size) {
+    const std::lock_guard lock(mutex_);
     size_t expected = 0;
     visit_saved([&](const void*, size_t part) { expected += part; });
     if (size != expected) {
@@ -262,24 +268,42 @@ void Engine::load(const uint8_t* bytes, size_t size) {
                                     " bytes, this simulation needs " + std::to_string(expected) +
                                     ": it must have the same number of cars and version.");
     }
+    const std::vector<uint8_t> before = snapshot();
+    restore(bytes);
+    if (const char* fault = find_fault()) {
+        restore(before.data());
+        throw std::invalid_argument(std::string("Saved simulation state ") + fault);
+    }
+    for (size_t env = 0; env < num_envs(); ++env) look(env);
+}
+
+void Engine::restore(const uint8_t* bytes) {
     visit_saved([&](void* data, size_t part) {
         std::memcpy(data, bytes, part);
         bytes += part;
     });
-    // The bytes may come from a file: nothing in them may lead outside this engine's memory.
+}
+
+// The bytes may come from a file: nothing in them may lead outside this engine's memory or into a NaN.
+const char* Engine::find_fault() const {
+    const auto is_number = [](float value) { return std::abs(value) < 1e6f; };
     for (size_t env = 0; env < num_envs(); ++env) {
         const Episode& episode = episodes_[env];
-        const bool valid = episode.track >= 0 && static_cast<size_t>(episode.track) < tracks_.size() &&
-                           track_choice_[env] >= 0 && static_cast<size_t>(track_choice_[env]) < num_tracks();
-        if (!valid)
-            throw std::invalid_argument("Saved simulation state names a track that this simulation lacks.");
-        for (size_t k = 0; k < kNumVehicleFields; ++k) {
-            if (!(std::abs(vehicles_[k * num_envs() + env]) < 1e6f)) {
-                throw std::invalid_argument("Saved simulation state holds a car that is nowhere.");
-            }
-        }
-        look(env);
+        const bool has_tracks = episode.track >= 0 && static_cast<size_t>(episode.track) < tracks_.size() &&
+                                track_choice_[env] >= 0 &&
+                                static_cast<size_t>(track_choice_[env]) < num_tracks();
+        if (!has_tracks) return "names a track that this simulation lacks.";
+        const int status = static_cast<int>(episode.status);
+        if (status < 0 || status > static_cast<int>(Status::park))
+            return "holds a status that does not exist.";
     }
+    if (!std::all_of(vehicles_.begin(), vehicles_.end(), is_number)) return "holds a car that is nowhere.";
+    if (!std::all_of(parameters_.begin(), parameters_.end(), is_number)) return "holds a car that cannot be.";
+    const uint8_t* flags = reinterpret_cast<const uint8_t*>(flags_.get());
+    if (!std::all_of(flags, flags + 2 * num_envs(), [](uint8_t flag) { return flag <= 1; })) {
+        return "is damaged.";
+    }
+    return nullptr;
 }
 
 }  // namespace racecraft

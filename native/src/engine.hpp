@@ -36,6 +36,7 @@ struct EngineConfig {
     Direction direction;
 };
 
+// Calls from several threads wait for each other; the arrays are shared all the same.
 class Engine {
   public:
     // Tracks come in order; the reversed twin of track i is track i + num_tracks. Both drive over ground map
@@ -44,11 +45,10 @@ class Engine {
            std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
            const CameraSpec* camera, const GreyPalette& palette);
 
-    // Puts the masked cars (all of them without a mask) at the start of their next episode.
-    void reset(const bool* mask);
-    // As reset, but the masked cars begin anew: each draws from now on as the first car of an engine with its
-    // seed (N,), and its next episode is its first.
-    void reset(const bool* mask, const uint64_t* seeds);
+    // Puts the masked cars (all of them without a mask) at the start of their next episode. With seeds (N,)
+    // they begin anew: each draws from now on as the first car of an engine with its seed, and its next
+    // episode is its first.
+    void reset(const bool* mask, const uint64_t* seeds = nullptr);
     // actions: steering angle in rad and speed in m/s, interleaved (N, 2), finite.
     void step(const float* actions);
     // Puts one car somewhere else within its episode; counters of standstill and reversing begin anew.
@@ -75,7 +75,7 @@ class Engine {
 
     // Everything that the next step depends on, as plain bytes of this build.
     std::vector<uint8_t> save() const;
-    // Throws std::invalid_argument if the bytes are not from an engine of this shape.
+    // Throws std::invalid_argument, and changes nothing, if the bytes are not from an engine of this shape.
     void load(const uint8_t* bytes, size_t size);
 
   private:
@@ -93,8 +93,12 @@ class Engine {
 
     template <typename Visitor>
     void visit_saved(Visitor&& visit);
+    std::vector<uint8_t> snapshot() const;
+    void restore(const uint8_t* bytes);
+    const char* find_fault() const;  // null if the state is one that this engine can go on from
 
     EngineConfig config_;
+    mutable std::mutex mutex_;  // held by every public call that reads or writes cars
     std::vector<TrackStore> tracks_;
     std::vector<std::shared_ptr<const GroundMap>> grounds_;
     std::unique_ptr<CameraModel> camera_;

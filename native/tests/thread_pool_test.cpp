@@ -1,6 +1,6 @@
 // The thread pool: every index once, loops back to back, construction and destruction. Run under TSan as
 // well.
-#include "../src/thread_pool.hpp"
+#include "thread_pool.hpp"
 
 #include <memory>
 #include <set>

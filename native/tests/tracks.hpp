@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "../src/track_store.hpp"
+#include "track_store.hpp"
 
 namespace racecraft::test {
 

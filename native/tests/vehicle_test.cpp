@@ -4,8 +4,8 @@
 #include <iterator>
 #include <random>
 
-#include "../src/vehicle_kernel.hpp"
 #include "check.hpp"
+#include "vehicle_kernel.hpp"
 
 namespace racecraft {
 namespace {
