@@ -2,11 +2,13 @@
 
 from racecraft.race.autopilot import Autopilot
 from racecraft.race.evaluation import Completion, completion, evaluate, trial_simulation
+from racecraft.race.racing_line import draw_racing_line
 from racecraft.race.recording import Recording
 from racecraft.race.results import Evaluation, Lap, Trial
 from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.race.standings import RANKINGS, places, ranking_score
 from racecraft.race.statistics import Interval, mean_interval, wilson_interval
+from racecraft.race.video import film
 
 __all__ = [
     "RANKINGS",
@@ -20,7 +22,9 @@ __all__ = [
     "Recording",
     "Trial",
     "completion",
+    "draw_racing_line",
     "evaluate",
+    "film",
     "mean_interval",
     "places",
     "ranking_score",
