@@ -27,7 +27,7 @@ def test_learns_to_centre_the_stripe(is_discrete):
     spec = NetworkSpec(num_actions=3 if is_discrete else 1, is_discrete=is_discrete, state_size=2)
     ppo = ppo_for(config, spec=spec)
     rewards = []
-    for _ in range(30):
+    for _ in range(12):
         ppo.iterate()
         rewards.append(ppo._rollout.rewards.mean())
     assert np.mean(rewards[:2]) < 0.65
@@ -43,7 +43,7 @@ def test_learns_from_rewards_of_any_scale():
     config = PPOConfig(num_envs=32, num_steps=16, minibatch_size=128, update_epochs=4, learning_rate=1e-3)
     learner = TorchLearner(NetworkSpec(num_actions=3, state_size=2), num_threads=2)
     ppo = PPO(config, learner, LoudWorld(32), seed=0)
-    stats = [ppo.iterate() for _ in range(20)]
+    stats = [ppo.iterate() for _ in range(12)]
     assert stats[-1].losses.value_loss < 10
     assert stats[-1].explained_variance > 0.5
 
@@ -60,7 +60,7 @@ def test_the_same_seed_gives_the_same_bits(config):
 
 
 def test_saved_and_loaded_training_continues_to_the_bit(config):
-    straight, resumed = ppo_for(config, seed=3), ppo_for(config, seed=8)
+    straight, resumed = ppo_for(config, seed=3, time_limit=5), ppo_for(config, seed=8, time_limit=5)
     for _ in range(2):
         straight.iterate()
     resumed.load_state({name: array.copy() for name, array in straight.state().items()})
