@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata
-from racecraft.errors import ConfigError, RunError
+from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.learn import NetworkSpec, PPOConfig, network_names
 from racecraft.sim import Start, Vehicle, load_vehicle
 from racecraft.sim.columns import STATE_COLUMNS
@@ -17,6 +17,7 @@ DEFAULT_TRACK: Final = "reinvent_2018"
 DEFAULT_REWARD: Final = "racing"
 VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
 CRITICS: Final = ("privileged", "camera")
+MAX_ENVS: Final = 4096  # cars; 80 MB of frames, and more would only wait for each other
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,13 +50,16 @@ class TrainSettings:
     """Threads of simulator and learner; 0 takes one per core. Results repeat for the same number."""
 
     def __post_init__(self) -> None:
-        if self.network not in network_names():
-            raise ConfigError(f"network is {self.network!r}; allowed are {', '.join(network_names())}.")
-        if self.critic not in CRITICS:
-            raise ConfigError(f"critic is {self.critic!r}; allowed are {', '.join(CRITICS)}.")
-        if self.direction not in DIRECTIONS:
-            raise ConfigError(f"direction is {self.direction!r}; allowed are {', '.join(DIRECTIONS)}.")
+        for name, choice, allowed in (
+            ("network", self.network, network_names()),
+            ("critic", self.critic, CRITICS),
+            ("direction", self.direction, DIRECTIONS),
+        ):
+            if choice not in allowed:
+                hint = did_you_mean(str(choice), allowed)
+                raise ConfigError(f"{name} is {choice!r}; allowed are {', '.join(allowed)}.", hint=hint)
         for name, value, low, high in (
+            ("num_envs", self.ppo.num_envs, 1, MAX_ENVS),
             ("seed", self.seed, 0, 2**32 - 1),
             ("evaluate_every", self.evaluate_every, 1, 10**9),
             ("evaluation_trials", self.evaluation_trials, 1, 100),
@@ -91,22 +95,26 @@ class TrainSettings:
         """
         try:
             values = dict(document)
+            missing = [setting.name for setting in fields(cls) if setting.name not in values]
+            if missing:
+                raise RunError(f"The settings in run.json lack {', '.join(missing)}.")
             values["until"] = Until.parse(values["until"])
             values["vehicle"] = Vehicle(**values["vehicle"])
             values["start"] = Start(**values["start"])
             values["ppo"] = PPOConfig(**values["ppo"])
             return cls(**values)
-        except (KeyError, TypeError) as error:
+        except (TypeError, AttributeError) as error:
             raise RunError(f"The settings in run.json do not fit this version of Racecraft: {error}.") from error
 
 
 def make_settings(
     *,
     metadata: ModelMetadata,
-    hyperparameters: Hyperparameters | None,
+    hyperparameters: Hyperparameters | None = None,
     network: str = "",
     vehicle: Vehicle | str = "",
     num_envs: int = 0,
+    ppo: PPOConfig | None = None,
     **settings: Any,
 ) -> TrainSettings:
     """Settings from AWS's files and what the user says beyond them.
@@ -120,17 +128,34 @@ def make_settings(
         network: Overrides the metadata's.
         vehicle: Preset, file or parameters; by default the preset of the metadata's version.
         num_envs: Cars driven at once; 0 decides by itself.
+        ppo: How the policy improves, instead of hyperparameters.
         settings: Other fields of `TrainSettings`.
+
+    Raises:
+        ConfigError: There is no such setting, a value is outside its range, or two do not go together.
     """
+    known = [setting.name for setting in fields(TrainSettings)]
+    for name in settings:
+        if name not in known:
+            raise ConfigError(f"There is no setting {name!r}. {did_you_mean(name, [*known, 'num_envs'])}".rstrip())
     if not isinstance(vehicle, Vehicle):
         vehicle = load_vehicle(vehicle or VEHICLE_OF_VERSION[metadata.version])
-    if hyperparameters is None:
-        ppo = PPOConfig()
-        if num_envs:
-            num_steps = max(1, round(ppo.num_envs * ppo.num_steps / num_envs))
-            minibatch_size = min(ppo.minibatch_size, num_envs * num_steps)
-            ppo = replace(ppo, num_envs=num_envs, num_steps=num_steps, minibatch_size=minibatch_size)
-    else:
-        fields: dict[str, Any] = dict(hyperparameters.to_ppo())
-        ppo = PPOConfig(**fields, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
-    return TrainSettings(vehicle=vehicle, network=network or metadata.neural_network, ppo=ppo, **settings)
+    if hyperparameters is not None:
+        if ppo is not None:
+            raise ConfigError("ppo and hyperparameters both say how the policy improves; give one of them.")
+        learning: dict[str, Any] = hyperparameters.to_ppo()
+        ppo = PPOConfig(**learning, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
+    elif num_envs:
+        ppo = _with_num_envs(ppo or PPOConfig(), num_envs)
+    return TrainSettings(
+        vehicle=vehicle, network=network or metadata.neural_network, ppo=ppo or PPOConfig(), **settings
+    )
+
+
+def _with_num_envs(ppo: PPOConfig, num_envs: int) -> PPOConfig:
+    """The same PPO with other cars: rollouts of about as many samples."""
+    if not 1 <= num_envs <= MAX_ENVS:
+        raise ConfigError(f"num_envs is {num_envs!r}; allowed is a whole number from 1 to {MAX_ENVS}.")
+    num_steps = max(1, round(ppo.num_envs * ppo.num_steps / num_envs))
+    minibatch_size = min(ppo.minibatch_size, num_envs * num_steps)
+    return replace(ppo, num_envs=num_envs, num_steps=num_steps, minibatch_size=minibatch_size)

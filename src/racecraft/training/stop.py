@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Final
 
 from racecraft.errors import ConfigError
 
 _UNITS: Final = {
-    "lap": ("laps", 1.0),
-    "step": ("steps", 1.0),
-    "s": ("seconds", 1.0),
-    "sec": ("seconds", 1.0),
-    "second": ("seconds", 1.0),
-    "min": ("seconds", 60.0),
-    "minute": ("seconds", 60.0),
-    "h": ("seconds", 3600.0),
-    "hour": ("seconds", 3600.0),
+    **dict.fromkeys(("lap", "laps"), ("laps", 1)),
+    **dict.fromkeys(("step", "steps"), ("steps", 1)),
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), ("seconds", 1)),
+    **dict.fromkeys(("min", "mins", "minute", "minutes"), ("seconds", 60)),
+    **dict.fromkeys(("h", "hour", "hours"), ("seconds", 3600)),
 }
-_FORM: Final = re.compile(r"\s*(\d+(?:\.\d+)?)\s*([a-z]+?)s?\s*", re.IGNORECASE)
-_EXAMPLES: Final = "'5 laps', '10 minutes', '90 s' or '200000 steps'"
+_LIMIT: Final = re.compile(r"\s*(\d{1,3}(?:[,_]\d{3})+|\d+)(\.\d+)?\s*([a-z]+)\s*", re.ASCII | re.IGNORECASE)
+_EXAMPLES: Final = "'5 laps', '10 minutes', '90 s' or '200,000 steps'"
+_MAX_TEXT: Final = 400  # characters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,51 +26,60 @@ class Until:
     """Limits of a training; 0 means none. The first one reached ends it."""
 
     laps: int = 0
-    """Trials of one evaluation that must all complete their lap."""
+    """Trials of one evaluation that complete their lap."""
     seconds: float = 0.0
-    """Wall clock since the command started, across resumptions."""
+    """Wall clock since the run was started; when it is resumed, the time before counts."""
     steps: int = 0
-    """Camera steps, all cars together."""
+    """Camera steps of the run, all cars together."""
 
     @classmethod
     def parse(cls, text: str) -> Until:
-        """Read ``"5 laps"``, ``"10 minutes"``, ``"200000 steps"`` or several of them joined by ``or``.
+        """Read ``"5 laps"``, ``"10 minutes"``, ``"200,000 steps"`` or several of them joined by ``or``.
 
         Raises:
-            ConfigError: The text has another form, or a number is out of range.
+            ConfigError: The text has another form, names a limit twice, or a number is out of range.
         """
-        limits: dict[str, float] = {}
-        for part in re.split(r"\bor\b|,", text):
-            match = _FORM.fullmatch(part)
-            if match is None or match[2].lower() not in _UNITS:
-                raise ConfigError(f"until is {text!r}; write it like {_EXAMPLES}, or join several with 'or'.")
-            name, factor = _UNITS[match[2].lower()]
-            value = float(match[1]) * factor
-            if name != "seconds" and not value.is_integer():
+        limits: dict[str, Decimal] = {}
+        for part in re.split(r"\bor\b", text) if isinstance(text, str) and len(text) <= _MAX_TEXT else [""]:
+            match = _LIMIT.fullmatch(part)
+            unit = _UNITS.get(match[3].lower()) if match else None
+            if match is None or unit is None:
+                said = repr(text)[:_MAX_TEXT]
+                raise ConfigError(f"until is {said}; write it like {_EXAMPLES}, or join several with 'or'.")
+            name, factor = unit
+            value = Decimal(re.sub("[,_]", "", match[1]) + (match[2] or "")) * factor
+            if name != "seconds" and value != value.to_integral_value():
                 raise ConfigError(f"until is {text!r}; the number of {name} must be whole.")
+            if name in limits:
+                raise ConfigError(f"until is {text!r}; it limits {name} twice.")
             limits[name] = value
         return cls(
             laps=int(limits.get("laps", 0)),
-            seconds=limits.get("seconds", 0.0),
+            seconds=float(limits.get("seconds", 0)),
             steps=int(limits.get("steps", 0)),
         )
 
     def __post_init__(self) -> None:
-        if not (self.laps or self.seconds or self.steps):
-            raise ConfigError(f"until sets no limit; write it like {_EXAMPLES}.")
+        for name, value in (("laps", self.laps), ("steps", self.steps)):
+            if isinstance(value, bool) or not isinstance(value, int):
+                raise ConfigError(f"until asks for {value!r} {name}; allowed is a whole number.")
         if not 0 <= self.laps <= 100:
             raise ConfigError(f"until asks for {self.laps} laps; allowed is 1 to 100.")
         if not 0 <= self.seconds <= 30 * 86400:
-            raise ConfigError(f"until asks for {self.seconds:g} s; allowed is up to 30 days.")
+            raise ConfigError(f"until asks for {self.seconds} s; allowed is up to 30 days.")
         if not 0 <= self.steps <= 10**12:
             raise ConfigError(f"until asks for {self.steps} steps; allowed is up to 10^12.")
+        if not (self.laps or self.seconds or self.steps):
+            raise ConfigError(f"until sets no limit; write it like {_EXAMPLES}.")
 
     def __str__(self) -> str:
+        """The text that `parse` reads as the same limits, to the bit."""
         parts = []
         if self.laps:
             parts.append(f"{self.laps} laps")
         if self.seconds:
-            parts.append(f"{self.seconds / 60:g} minutes" if self.seconds >= 60 else f"{self.seconds:g} s")
+            seconds = Decimal(repr(float(self.seconds)))  # exact, and never in powers of ten as floats are
+            parts.append(f"{int(seconds // 60)} minutes" if seconds % 60 == 0 else f"{seconds:f} s")
         if self.steps:
             parts.append(f"{self.steps} steps")
         return " or ".join(parts)

@@ -1,0 +1,194 @@
+from __future__ import annotations
+
+import json
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from racecraft.agent import Hyperparameters, ModelMetadata, action_space
+from racecraft.errors import ConfigError, RunError
+from racecraft.learn import PPOConfig
+from racecraft.sim import Start, Vehicle
+from racecraft.training import Until
+from racecraft.training.settings import MAX_ENVS, VEHICLE_OF_VERSION, TrainSettings, make_settings
+
+DISCRETE = ModelMetadata(neural_network="RACECRAFT_SMALL")
+SETTINGS = TrainSettings(
+    track="oval",
+    until=Until(laps=3, seconds=100.1, steps=12_345_678),
+    seed=2**32 - 1,
+    network="DEEP_CONVOLUTIONAL_NETWORK_SHALLOW",
+    critic="camera",
+    vehicle=Vehicle(friction=0.7),
+    start=Start(mode="random", lateral_jitter=0.1),
+    direction="alternate",
+    ppo=PPOConfig(num_envs=7, learning_rate=1e-4, exploration="e-greedy"),
+    evaluate_every=1000,
+    evaluation_trials=4,
+    num_threads=3,
+)
+
+
+@pytest.mark.parametrize("settings", [TrainSettings(), SETTINGS])
+def test_the_round_trip_through_json_is_exact(settings: TrainSettings) -> None:
+    assert TrainSettings.from_dict(json.loads(json.dumps(settings.to_dict(), allow_nan=False))) == settings
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(TrainSettings)])
+def test_a_missing_field_is_refused_by_name(name: str) -> None:
+    document = SETTINGS.to_dict()
+    del document[name]
+    with pytest.raises(RunError, match=name):
+        TrainSettings.from_dict(document)
+
+
+@pytest.mark.parametrize("inside", [None, "vehicle", "start", "ppo"])
+def test_an_unknown_field_is_refused_by_name(inside: str | None) -> None:
+    document = SETTINGS.to_dict()
+    (document if inside is None else document[inside])["turbo"] = 1
+    with pytest.raises(RunError, match="turbo"):
+        TrainSettings.from_dict(document)
+
+
+@pytest.mark.parametrize("name", ["until", "vehicle", "start", "ppo"])
+@pytest.mark.parametrize("value", [None, 5, "x", []])
+def test_a_field_of_another_kind_is_refused(name: str, value: Any) -> None:
+    with pytest.raises((RunError, ConfigError)):
+        TrainSettings.from_dict({**SETTINGS.to_dict(), name: value})
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("network", "ALEXNET"),
+        ("network", None),
+        ("critic", "oracle"),
+        ("direction", "sideways"),
+        ("seed", -1),
+        ("seed", 2**32),
+        ("seed", 1.5),
+        ("seed", True),
+        ("evaluate_every", 0),
+        ("evaluation_trials", 0),
+        ("evaluation_trials", 101),
+        ("num_threads", -1),
+        ("num_threads", "2"),
+    ],
+)
+def test_a_value_out_of_range_names_field_and_value(field: str, value: Any) -> None:
+    with pytest.raises(ConfigError, match=field) as caught:
+        TrainSettings(**{field: value})
+    assert repr(value) in str(caught.value)
+    assert "allowed" in str(caught.value)
+
+
+def test_a_near_miss_is_recognised() -> None:
+    with pytest.raises(ConfigError) as caught:
+        TrainSettings(critic="privilege")
+    assert caught.value.hint == "Did you mean 'privileged'?"
+
+
+def test_more_laps_than_trials_bring_more_trials() -> None:
+    assert TrainSettings(until=Until(laps=9)).evaluation_trials == 9
+    assert TrainSettings(until=Until(laps=2)).evaluation_trials == 5
+
+
+def test_aws_hyperparameters_become_ppo() -> None:
+    hyperparameters = Hyperparameters(
+        batch_size=32,
+        num_epochs=4,
+        lr=1e-4,
+        beta_entropy=0.02,
+        discount_factor=0.9,
+        loss_type="huber",
+        num_episodes_between_training=10,
+        exploration_type="e-greedy",
+        e_greedy_value=0.1,
+        epsilon_steps=500,
+    )
+    ppo = make_settings(metadata=DISCRETE, hyperparameters=hyperparameters).ppo
+    assert ppo == replace(
+        ppo,
+        minibatch_size=32,
+        update_epochs=4,
+        learning_rate=1e-4,
+        ent_coef=0.02,
+        gamma=0.9,
+        value_loss="huber",
+        episodes_per_iteration=10,
+        num_envs=10,
+        exploration="e-greedy",
+        epsilon_start=1.0,
+        epsilon_end=0.1,
+        epsilon_steps=500,
+        max_grad_norm=0.0,
+    )
+    assert make_settings(metadata=DISCRETE, hyperparameters=hyperparameters, num_envs=3).ppo.num_envs == 3
+
+
+@pytest.mark.parametrize("episodes", [1, 100])
+def test_cars_follow_the_episodes_between_training(episodes: int) -> None:
+    hyperparameters = Hyperparameters(num_episodes_between_training=episodes)
+    settings = make_settings(metadata=DISCRETE, hyperparameters=hyperparameters)
+    assert settings.ppo.num_envs == min(episodes, 64)
+
+
+@pytest.mark.parametrize("version", VEHICLE_OF_VERSION)
+def test_version_and_network_of_the_metadata_are_used_unless_said_otherwise(version: str) -> None:
+    metadata = replace(DISCRETE, version=version, neural_network="DEEP_CONVOLUTIONAL_NETWORK")
+    settings = make_settings(metadata=metadata)
+    assert settings.network == "DEEP_CONVOLUTIONAL_NETWORK"
+    assert settings == make_settings(metadata=metadata, vehicle=VEHICLE_OF_VERSION[version])
+    assert make_settings(metadata=metadata, network="RACECRAFT_SMALL").network == "RACECRAFT_SMALL"
+    assert make_settings(metadata=metadata, vehicle=Vehicle(mass=2.0)).vehicle.mass == 2.0
+
+
+@pytest.mark.parametrize("num_envs", [1, 3, 64, 100, 1000, MAX_ENVS])
+def test_any_number_of_cars_makes_rollouts_that_ppo_accepts(num_envs: int) -> None:
+    ppo = make_settings(metadata=DISCRETE, num_envs=num_envs).ppo
+    assert ppo.num_envs == num_envs
+    assert 1 <= ppo.minibatch_size <= ppo.num_envs * ppo.num_steps
+
+
+@pytest.mark.parametrize("num_envs", [-1, MAX_ENVS + 1, 10**9])
+def test_an_impossible_number_of_cars_is_refused(num_envs: int) -> None:
+    with pytest.raises(ConfigError, match="num_envs"):
+        make_settings(metadata=DISCRETE, num_envs=num_envs)
+    with pytest.raises(ConfigError, match="num_envs"):
+        make_settings(metadata=DISCRETE, hyperparameters=Hyperparameters(), num_envs=num_envs)
+
+
+def test_ppo_can_be_given_whole_but_not_beside_hyperparameters() -> None:
+    ppo = PPOConfig(learning_rate=0.0)
+    assert make_settings(metadata=DISCRETE, ppo=ppo).ppo == ppo
+    assert make_settings(metadata=DISCRETE, ppo=ppo, num_envs=4).ppo.learning_rate == 0.0
+    with pytest.raises(ConfigError, match="one of them"):
+        make_settings(metadata=DISCRETE, ppo=ppo, hyperparameters=Hyperparameters())
+
+
+def test_an_unknown_setting_is_refused_with_the_nearest() -> None:
+    with pytest.raises(ConfigError, match=r"'num_env'.*Did you mean 'num_envs'"):
+        make_settings(metadata=DISCRETE, num_env=4)
+
+
+@pytest.mark.parametrize(("kind", "num_actions"), [("default", None), ("continuous", 2)])
+@pytest.mark.parametrize("critic", ["privileged", "camera"])
+def test_the_network_fits_the_action_space(kind: str, num_actions: int | None, critic: str) -> None:
+    metadata = replace(DISCRETE, action_space=action_space(kind))
+    spec = make_settings(metadata=metadata, critic=critic).network_spec(metadata)
+    assert spec.num_actions == (num_actions or metadata.action_space.size)  # type: ignore[union-attr]
+    assert spec.is_discrete == (kind == "default")
+    assert (spec.state_size > 0) == (critic == "privileged")
+
+
+def test_aws_own_files_give_settings() -> None:
+    folder = Path(__file__).parents[3] / "shared" / "logs" / "drfc"
+    if not folder.is_dir():
+        pytest.skip("the logs of a real AWS training are not here (../shared/logs/drfc)")
+    metadata = ModelMetadata.load(folder / "model_metadata.json")
+    settings = make_settings(metadata=metadata, hyperparameters=Hyperparameters.load(folder / "hyperparameters.json"))
+    assert settings.network == "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
+    assert settings.network_spec(metadata).num_actions == 14
+    assert (settings.ppo.gamma, settings.ppo.update_epochs, settings.ppo.value_loss) == (0.95, 3, "huber")
