@@ -130,8 +130,8 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | `laps`              | `1`             | laps to an episode, driven without a stop                      |
     | `max_episode_steps` | `3000`          | steps that truncate an episode, 200 s                          |
 
-    `render_mode="rgb_array"` renders 640 x 480 pixels. Reward functions that keep state or draw random
-    numbers begin anew with `reset(seed=...)`, callables do not.
+    `render_mode="rgb_array"` renders the car from behind, 640 x 480 pixels. Reward functions that keep state
+    or draw random numbers begin anew with `reset(seed=...)`, callables do not.
 
     ## Version History
 
@@ -154,7 +154,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
             )
         check_render_mode(render_mode)
         self.render_mode = render_mode
-        self._task = DrivingTask(track, num_envs=1, num_threads=1, has_pictures=render_mode is not None, **settings)
+        self._task = DrivingTask(track, num_envs=1, num_threads=1, **settings)
         self._renderer = Renderer(self._task.simulation) if render_mode else None
         self.observation_space = self._task.observer.space
         self.action_space = self._task.action_space.space

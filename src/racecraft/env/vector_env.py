@@ -72,7 +72,6 @@ class RacecraftVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
             track,
             num_envs=num_envs,
             num_threads=num_threads,
-            has_pictures=render_mode is not None,
             **settings,
         )
         self._renderer = Renderer(self._task.simulation) if render_mode else None
