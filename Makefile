@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 UV := $(BIN)/uv
 NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/*)
 
-.PHONY: help train test test-fast lint format bench setup build clean requirements
+.PHONY: help train test test-fast lint format bench setup build stub clean requirements
 
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | awk -F'\t' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -39,6 +39,9 @@ bench: $(VENV)/.built $(VENV)/.dev  ## measure everything, rivals included, and 
 setup: $(VENV)/.built  ## only the set-up: .venv with the command .venv/bin/racecraft
 
 build: $(VENV)/.built  ## compile the native core again if its sources changed
+
+stub: $(VENV)/.built  ## copy the generated type stub of the native core into the source tree
+	cp $$($(BIN)/python -c "import sysconfig; print(sysconfig.get_paths()['purelib'])")/racecraft/_native.pyi src/racecraft/_native.pyi
 
 clean:  ## remove the environment and everything built
 	rm -rf $(VENV) build

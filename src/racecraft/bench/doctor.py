@@ -60,7 +60,7 @@ def _simulator() -> str:
 
     simulation = Simulation(load_track("oval"), num_envs=4)
     for _ in range(10):
-        simulation.step(np.tile(np.float32([0.0, 1.0]), (4, 1)))
+        simulation.step(np.tile([0.0, 1.0], (4, 1)))
     contrast = int(simulation.frames.max()) - int(simulation.frames.min())
     if contrast < 20:
         raise RuntimeError(f"the camera's picture is blank (contrast {contrast})")
