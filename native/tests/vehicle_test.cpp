@@ -308,7 +308,7 @@ TEST(every_corner_of_the_parameters_stays_finite) {
     std::vector<uint32_t> all(1u << kNumVehicleParameters);
     for (uint32_t corner = 0; corner < all.size(); ++corner) all[corner] = corner;
     for (const int substeps : {4, kSubsteps}) {
-        const double fastest = drive_corners(all, 60, substeps);
+        const double fastest = drive_corners(all, 45, substeps);
         std::printf("       fastest of all corners with %d substeps: %.1f m/s\n", substeps, fastest);
         CHECK(fastest < 20.0);
     }
@@ -316,7 +316,7 @@ TEST(every_corner_of_the_parameters_stays_finite) {
 
 TEST(some_corners_stay_finite_for_2000_steps) {
     std::mt19937 random(6);
-    std::vector<uint32_t> some(1000);
+    std::vector<uint32_t> some(256);
     for (uint32_t& corner : some) corner = random() & ((1u << kNumVehicleParameters) - 1u);
     CHECK(drive_corners(some, 2000, kSubsteps) < 20.0);
 }

@@ -116,6 +116,8 @@ struct Episode {
     Projection projection;            // of the reference point at the current pose
 };
 
+static_assert(sizeof(Episode) == 8 * sizeof(int32_t) + 6 * sizeof(double) + 2 * sizeof(float) + 24);
+
 struct RuleLimits {
     int32_t laps;       // laps to an episode
     int32_t max_steps;  // truncates an episode

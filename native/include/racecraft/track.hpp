@@ -55,6 +55,7 @@ struct Projection {
     double arc_length;  // m, in [0, length)
     double offset;      // m, left of the direction of travel positive
     int32_t segment;    // waypoints segment and segment + 1 enclose arc_length
+    int32_t unused;     // 0; without a gap, a saved episode has no undefined bytes
 };
 
 RC_HD Projection project_onto_segment(const TrackGeometry& track, int32_t index, double x, double y,
@@ -71,7 +72,7 @@ RC_HD Projection project_onto_segment(const TrackGeometry& track, int32_t index,
     // The side is that of the segment; the magnitude, taken by project(), is the true distance also beyond
     // its ends.
     const double cross = segment.dx * ry - segment.dy * rx;
-    return {segment.arc_length + along * segment.length, cross < 0.0 ? -1.0 : 1.0, index};
+    return {segment.arc_length + along * segment.length, cross < 0.0 ? -1.0 : 1.0, index, 0};
 }
 
 RC_HD Projection project(const TrackGeometry& track, double x, double y) {
