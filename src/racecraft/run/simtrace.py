@@ -7,7 +7,7 @@ so a car's steps wait in memory until its episode ends. Numbers have full precis
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from racecraft.agent import ActionSpace, DiscreteActionSpace
-from racecraft.errors import RunError
+from racecraft.errors import CheckpointError, RunError
 from racecraft.run.episodes import STEP_SECONDS, Episode
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 
@@ -138,6 +138,33 @@ class SimTraceWriter:
         for env in np.flatnonzero(mask).tolist():
             self._first[env] = len(self._steps)
             self._packed[env] = []
+
+    def state(self) -> dict[str, NDArray[np.float64]]:
+        """The steps of the episodes under way, so that a resumed run logs them whole: plain arrays by name."""
+        self._compact()
+        tables = [table for packed in self._packed for table in packed]
+        lengths = [sum(map(len, packed)) for packed in self._packed]
+        return {
+            "trace/steps": np.concatenate([np.zeros((0, _WIDTH)), *tables]),
+            "trace/lengths": np.array(lengths, np.float64),
+        }
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Continue from what ``state`` gave.
+
+        Raises:
+            CheckpointError: It is of another number of cars, or damaged.
+        """
+        steps, lengths = state["trace/steps"], state["trace/lengths"].astype(np.int64)
+        fits = len(lengths) == len(self._first) and steps.shape == (lengths.sum(), _WIDTH) and (lengths >= 0).all()
+        if not fits:
+            raise CheckpointError(
+                f"The state of the sim-trace is of {len(lengths)} cars and {steps.shape} steps, "
+                f"expected {len(self._first)} cars and {_WIDTH} numbers a step."
+            )
+        self._steps.clear()
+        self._first = [0] * len(lengths)
+        self._packed = [[table] if len(table) else [] for table in np.split(steps, np.cumsum(lengths)[:-1])]
 
     def next_iteration(self) -> None:
         """Begin the next file; episodes go to the file of the iteration in which they end."""

@@ -67,8 +67,9 @@ def train(
 
     from racecraft.agent import Hyperparameters, ModelMetadata, action_space
     from racecraft.reward import load_reward
-    from racecraft.training.job import Training, start_run
+    from racecraft.training.job import Training
     from racecraft.training.settings import make_settings
+    from racecraft.training.start import start_run
 
     started = time.monotonic() if started is None else started
     source = load_reward(reward)

@@ -3,7 +3,9 @@
     while not done:  iterate (PPO) -> every few thousand steps: evaluate -> checkpoint
 
 Given the same settings, seed and number of threads a run repeats exactly on the same machine: nothing but the
-limits of wall clock depends on time. A checkpoint holds all that the next step depends on, cars included.
+limits of wall clock depends on time. A checkpoint holds all that the next step depends on, cars included, so a
+run that was killed and resumed ends in the same weights and logs. (Only what a reward function remembers between
+calls, or draws at random, begins anew.)
 """
 
 from __future__ import annotations
@@ -11,110 +13,56 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections import deque
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import asdict, replace
-from pathlib import Path
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
 from types import FrameType
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from racecraft.agent import Hyperparameters, ModelMetadata, check_simulated
-from racecraft.errors import CheckpointError, ConfigError, RacecraftError
-from racecraft.learn import PPO, Learner, make_learner
-from racecraft.race.evaluation import completion, trial_simulation
+from racecraft.agent import Hyperparameters
+from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RewardError, RunError
+from racecraft.learn import PPO, make_learner
 from racecraft.race.policy import NetworkPolicy
-from racecraft.race.rules import RULE_SETS
-from racecraft.reward import RewardWorker, dry_run, keeps_state, validate_reward
+from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import (
-    Episode,
+    Checkpoint,
+    CheckpointWarning,
     EpisodeCounter,
     EventWriter,
     RunFolder,
-    RunInfo,
     SimTraceWriter,
     TrainingMetrics,
 )
-from racecraft.run.training_params import TrainingParams
-from racecraft.sim import CONTROL_DT, Simulation
+from racecraft.sim import Simulation
 from racecraft.track import Track, load_track
 from racecraft.training.environment import TrainingEnvironment
-from racecraft.training.progress import (
-    EvaluationReport,
-    IterationReport,
-    Reporter,
-    SilentReporter,
-    TrainResult,
-)
-from racecraft.training.settings import TrainSettings
+from racecraft.training.evaluator import Evaluator
+from racecraft.training.meter import Meter
+from racecraft.training.progress import EvaluationReport, IterationReport, Reporter, SilentReporter, TrainResult
+from racecraft.training.start import read_settings, require_trainable, require_valid_reward
 from racecraft.training.stop import Until
 
-RECENT_EPISODES = 100  # that training's own curves average over
-SLOWEST_EVALUATED = 0.3  # m/s; an evaluation does not wait for a car that needs longer for its lap
-EVALUATION_SEED = 0x6576616C  # evaluation starts never coincide with training's
+AWS_EPISODES = 20  # between two trainings at AWS; its metrics number trials by it
 
 
-def start_run(
-    settings: TrainSettings,
-    *,
-    reward: str,
-    metadata: ModelMetadata,
-    hyperparameters: Hyperparameters | None = None,
-    root: str | Path = "runs",
-    name: str | None = None,
-) -> RunFolder:
-    """Make a run folder that `Training` can train: everything checked, nothing trained yet.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Session:
+    """What a training works with while it runs."""
 
-    Args:
-        settings: How to train.
-        reward: Source of the reward function.
-        metadata: Action space, sensors, network.
-        hyperparameters: AWS's, when the run follows them.
-        root: Where runs lie.
-        name: Name of the run; by default a new one.
+    environment: TrainingEnvironment
+    ppo: PPO
+    evaluator: Evaluator
+    trace: SimTraceWriter
+    metrics: TrainingMetrics
+    events: EventWriter
+    hyperparameters: Hyperparameters | None
 
-    Raises:
-        RewardError: The reward function has a mistake that can be seen before training.
-        ConfigError: A setting is not allowed, or two do not go together.
-        TrackNotFound: No such track.
-    """
-    check_simulated(metadata.sensors)
-    if metadata.training_algorithm != "clipped_ppo":
-        raise ConfigError(
-            f"training_algorithm is {metadata.training_algorithm!r}; this version trains 'clipped_ppo' only."
-        )
-    track = load_track(settings.track)
-    _require_valid(reward, track)
-    folder = RunFolder.create(root, name=name, prefix=track.name)
-    folder.write_inputs(
-        reward_function=reward,
-        model_metadata=metadata,
-        hyperparameters=hyperparameters,
-        training_params=TrainingParams(
-            world_name=track.name,
-            reverse_dir=settings.direction == "reverse",
-            alternate_driving_direction=settings.direction == "alternate",
-            change_start_position=settings.start.mode != "fixed",
-            round_robin_advance_dist=settings.start.advance,
-            start_position_offset=settings.start.offset % 1.0,
-            min_eval_trials=settings.evaluation_trials,
-        ),
-    )
-    document = settings.to_dict()
-    document.pop("seed")
-    document.pop("track")
-    folder.write_info(RunInfo(seed=settings.seed, track=settings.track, track_digest=track.digest, settings=document))
-    return folder
-
-
-def read_settings(folder: RunFolder) -> TrainSettings:
-    """The settings a run was started with."""
-    info = folder.read_info()
-    return TrainSettings.from_dict({**info.settings, "seed": info.seed, "track": info.track})
+    @property
+    def counter(self) -> EpisodeCounter:
+        return self.environment.counter
 
 
 class Training:
@@ -137,22 +85,10 @@ class Training:
     ) -> None:
         self.folder = folder
         self.reporter = reporter or SilentReporter()
-        self.started = time.monotonic() if started is None else started
-        self.settings = read_settings(folder)
-        self.until = until or self.settings.until
-        self.parts = dict.fromkeys(
-            ("start", "simulator", "reward", "log", "policy", "learner", "evaluation", "checkpoint"), 0.0
-        )
+        settings = read_settings(folder)
+        self.settings = settings if until is None else replace(settings, until=until)
+        self.meter = Meter(self.settings.until, started=time.monotonic() if started is None else started)
         self._stop = threading.Event()
-        self._recent: deque[Episode] = deque(maxlen=RECENT_EPISODES)
-        self._last: EvaluationReport | None = None
-        self._best_score: tuple[float, ...] | None = None
-        self._best_lap: float | None = None
-        self._seconds_before = 0.0  # wall clock of earlier sessions of a resumed run
-        self._evaluated_at = 0
-        self._rules = RULE_SETS["first_lap"]
-        self._patience = 0.0  # simulated seconds after which an evaluation stops a slow car
-        self._pace: deque[tuple[float, int]] = deque(maxlen=20)
 
     def run(self) -> TrainResult:
         """Train until a limit is reached or somebody interrupts; the run can always be resumed.
@@ -162,10 +98,14 @@ class Training:
         """
         with self.folder.lock(), self._interruptible():
             try:
-                return self._run()
+                with self._session() as session:
+                    reason = self._train(session)
+                return self._result(reason, session)
             except RacecraftError as error:
-                if not error.hint and self.folder.checkpoints.last is not None:
-                    error.hint = f"The last checkpoint is good: racecraft train --resume {self.folder.path}"
+                error.hint = error.hint or self._way_on(error)
+                raise
+            except KeyboardInterrupt:
+                self.reporter.note(f"Stopped at once. Continue with: racecraft train --resume {self.folder.path}")
                 raise
 
     def stop(self) -> None:
@@ -174,81 +114,120 @@ class Training:
 
     # ---- the run, top to bottom
 
-    def _run(self) -> TrainResult:
+    @contextmanager
+    def _session(self) -> Iterator[_Session]:
+        """Everything made, and brought to where the last checkpoint was; closed at the end, however that comes."""
         settings, folder = self.settings, self.folder
+        ppo_config = settings.ppo
         metadata = folder.read_model_metadata()
-        saved = folder.checkpoints.load("last") if folder.checkpoints.last is not None else None
+        require_trainable(settings, metadata)
+        saved = self._last_checkpoint()
         resumed = saved.metadata if saved is not None else {}
+        source = folder.read_reward_function()
 
         # The learner's backend takes longest to import, so it starts first, beside everything else.
         with ThreadPoolExecutor(1) as pool:
             spec = settings.network_spec(metadata)
             future = pool.submit(make_learner, spec, seed=settings.seed, num_threads=settings.num_threads)
             track = self._load_track()
-            simulation = self._simulation(track, metadata)
-            source = folder.read_reward_function()
-            _require_valid(source, track)
-            learner: Learner = future.result()
+            simulation = Simulation(
+                track,
+                num_envs=ppo_config.num_envs,
+                seed=settings.seed,
+                vehicle=settings.vehicle,
+                start=settings.start,
+                direction=settings.direction,
+                num_threads=settings.num_threads,
+            )
+            if saved is not None:  # the user may have edited it; that of a fresh run has just been checked
+                require_valid_reward(source, track)
+            learner = future.result()
 
-        # A function that remembers something gets a memory for each car: on AWS one process drove one car.
-        copies = settings.ppo.num_envs if keeps_state(source) else 1
-        episodes = int(resumed.get("episodes", 0))
-        with (
-            RewardWorker(source, [track], seed=settings.seed, num_cars=copies) as worker,
-            EventWriter(folder.events) as events,
-        ):
-            counter = EpisodeCounter(settings.ppo.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0)))
+        with ExitStack() as stack:
+            # A function that remembers something gets a memory for each car: on AWS one process drove one car.
+            copies = ppo_config.num_envs if keeps_state(source) else 1
+            worker = stack.enter_context(RewardWorker(source, [track], seed=settings.seed, num_cars=copies))
+            events = stack.enter_context(EventWriter(folder.events))
+            episodes = int(resumed.get("episodes", 0))
+            counter = EpisodeCounter(ppo_config.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0)))
             trace = SimTraceWriter(
                 folder.training_simtrace,
-                num_envs=settings.ppo.num_envs,
+                num_envs=ppo_config.num_envs,
                 tracks=[track],
                 action_space=metadata.action_space,
                 iteration=int(resumed.get("trace_iteration", 0)),
             )
             metrics = TrainingMetrics(
                 folder.training_metrics,
-                episodes_per_iteration=settings.ppo.episodes_per_iteration or 20,
+                episodes_per_iteration=ppo_config.episodes_per_iteration or AWS_EPISODES,
                 episodes=episodes,
             )
             environment = TrainingEnvironment(simulation, worker, metadata.action_space, counter=counter, trace=trace)
-            ppo = PPO(settings.ppo, learner, environment, seed=settings.seed)
-            self._patience = track.length / SLOWEST_EVALUATED
-            self._rules = replace(
-                RULE_SETS["first_lap"], direction="reverse" if settings.direction == "reverse" else "forward"
+            session = _Session(
+                environment=environment,
+                ppo=PPO(ppo_config, learner, environment, seed=settings.seed),
+                evaluator=Evaluator(NetworkPolicy(learner, metadata.action_space), track, settings),
+                trace=trace,
+                metrics=metrics,
+                events=events,
+                hyperparameters=folder.read_hyperparameters(),
             )
-            trials = trial_simulation(
-                track,
-                rules=self._rules,
-                num_trials=settings.evaluation_trials,
-                vehicle=settings.vehicle,
-                num_threads=settings.num_threads,
-            )
-            policy = NetworkPolicy(learner, metadata.action_space)
             if saved is not None:
-                self._resume(saved.arrays, resumed, ppo, simulation)
-            hyperparameters = folder.read_hyperparameters()
-            self.parts["start"] = time.monotonic() - self.started
-
-            reason = self._limit_reached(ppo, counter, hyperparameters)
-            while not reason:
-                stats = ppo.iterate()
-                self._account(stats.environment_seconds, stats.policy_seconds, stats.update_seconds, environment)
-                for episode in environment.take_finished():
-                    self._recent.append(episode)
-                    metrics.add(episode)
-                report = self._iteration_report(stats, counter)
-                self.reporter.iteration(report)
-                _write_iteration(events, report)
-
-                reason = self._limit_reached(ppo, counter, hyperparameters)
-                if reason or ppo.total_steps - self._evaluated_at >= settings.evaluate_every:
-                    self._evaluate(ppo, trials, policy, counter, metrics, events)
-                    reason = reason or self._limit_reached(ppo, counter, hyperparameters)
-                    trace.next_iteration()
-                    self._checkpoint(ppo, simulation, counter, trace, metrics)
+                self._load_state(session, saved)
+                self.reporter.note(f"Resumed at step {session.ppo.total_steps:,}.")
+            try:
+                yield session
+            except BaseException:
+                with suppress(RunError):  # the first error is the one to tell
+                    trace.close()
+                    metrics.write()
+                raise
             trace.close()
             metrics.write()
-        return self._result(reason, ppo)
+
+    def _train(self, session: _Session) -> str:
+        """Train until a limit is reached; its name."""
+        ppo, meter = session.ppo, self.meter
+        meter.begin(steps=ppo.total_steps)
+        reason = self._limit_reached(session)
+        if reason in ("laps", "seconds", "steps"):
+            self.reporter.note(f"The limit of {self.settings.until} was reached before; --until sets another.")
+        while not reason:
+            stats = ppo.iterate()
+            self._account(session, stats.environment_seconds, stats.policy_seconds, stats.update_seconds)
+            for episode in (finished := session.environment.take_finished()):
+                session.metrics.add(episode)
+            meter.add(finished)
+            report = meter.report(stats, episodes=session.counter.number)
+            self.reporter.iteration(report)
+            session.events.add_scalars(_iteration_scalars(report), step=ppo.total_steps)
+
+            reason = self._limit_reached(session)
+            is_due = ppo.total_steps - session.evaluator.evaluated_at >= self.settings.evaluate_every
+            if (is_due or reason) and reason != "interrupted":  # whoever interrupts does not want to wait
+                self._evaluate(session)
+                reason = reason or self._limit_reached(session)
+            if is_due or reason:
+                self._checkpoint(session)
+        return reason
+
+    def _limit_reached(self, session: _Session) -> str:
+        """Why training is to end now, or an empty string."""
+        until, steps, last = self.settings.until, session.ppo.total_steps, session.evaluator.last
+        if self._stop.is_set():
+            return "interrupted"
+        if until.laps and last is not None and last.laps_completed >= until.laps:
+            return "laps"
+        if until.steps and steps >= until.steps:
+            return "steps"
+        if until.seconds and self.meter.seconds >= until.seconds:
+            return "seconds"
+        if session.hyperparameters is not None:
+            if session.counter.number >= session.hyperparameters.term_cond_max_episodes:
+                return "episodes"
+            if self.meter.mean_reward >= session.hyperparameters.term_cond_avg_score:  # never, while it is NaN
+                return "score"
+        return ""
 
     def _load_track(self) -> Track:
         track = load_track(self.settings.track)
@@ -261,197 +240,115 @@ class Training:
             )
         return track
 
-    def _simulation(self, track: Track, metadata: ModelMetadata) -> Simulation:
-        check_simulated(metadata.sensors)
-        settings = self.settings
-        return Simulation(
-            track,
-            num_envs=settings.ppo.num_envs,
-            seed=settings.seed,
-            vehicle=settings.vehicle,
-            start=settings.start,
-            direction=settings.direction,
-            num_threads=settings.num_threads,
-        )
+    # ---- evaluate, save, resume
 
-    def _limit_reached(self, ppo: PPO, counter: EpisodeCounter, hyperparameters: Hyperparameters | None) -> str:
-        """Why training is to end now, or an empty string."""
-        until = self.until
-        if self._stop.is_set():
-            return "interrupted"
-        if until.laps and self._last is not None and self._last.laps_completed >= until.laps:
-            return "laps"
-        if until.steps and ppo.total_steps >= until.steps:
-            return "steps"
-        if until.seconds and self._seconds_before + time.monotonic() - self.started >= until.seconds:
-            return "seconds"
-        if hyperparameters is not None:
-            if counter.number >= hyperparameters.term_cond_max_episodes:
-                return "episodes"
-            scores = [episode.reward for episode in self._recent]
-            if scores and float(np.mean(scores)) >= hyperparameters.term_cond_avg_score:
-                return "score"
-        return ""
-
-    # ---- evaluate and save
-
-    def _evaluate(
-        self,
-        ppo: PPO,
-        trials: Simulation,
-        policy: NetworkPolicy,
-        counter: EpisodeCounter,
-        metrics: TrainingMetrics,
-        events: EventWriter,
-    ) -> None:
+    def _evaluate(self, session: _Session) -> None:
         begun = time.perf_counter()
-        seed = (self.settings.seed + EVALUATION_SEED) % 2**32
-        outcome = completion(policy, trials, rules=self._rules, seed=seed, max_seconds=self._patience)
-        lap_times = tuple(outcome.lap_times[np.isfinite(outcome.lap_times)].tolist())
-        score = (outcome.mean_completion, -min(lap_times, default=1e6))
-        is_best = self._best_score is None or score >= self._best_score
-        report = EvaluationReport(
-            step=ppo.total_steps,
-            seconds=self._seconds_before + time.monotonic() - self.started,
-            completions=tuple(outcome.completions.tolist()),
-            lap_times=lap_times,
-            is_best=is_best,
-        )
-        if is_best:
-            self._best_score = score
-        if report.best_lap is not None:
-            self._best_lap = min(report.best_lap, self._best_lap or report.best_lap)
-        self._last = report
-        self._evaluated_at = ppo.total_steps
-        for trial, duration in enumerate(trials.column("time").tolist()):
-            metrics.add(
-                Episode(
-                    number=counter.number,
-                    env=trial,
-                    steps=round(duration / CONTROL_DT),
-                    reward=float(outcome.rewards[trial]),
-                    progress=float(outcome.completions[trial]),
-                    status=outcome.statuses[trial],
-                    start_time=counter.place(duration),
-                    duration=duration,
-                ),
-                phase="evaluation",
-            )
-        scalars = {
-            "evaluation/completion": report.completion,
-            "evaluation/laps": float(report.laps_completed),
-        }
-        if report.best_lap is not None:
-            scalars["evaluation/best_lap_s"] = report.best_lap
-        events.add_scalars(scalars, step=ppo.total_steps)
-        self.reporter.evaluation(report)
-        self.parts["evaluation"] += time.perf_counter() - begun
+        evaluator = session.evaluator
+        trials = evaluator.evaluate(step=session.ppo.total_steps, seconds=self.meter.seconds, counter=session.counter)
+        for trial in trials:
+            session.metrics.add(trial, phase="evaluation")
+        assert evaluator.last is not None
+        session.events.add_scalars(_evaluation_scalars(evaluator.last), step=session.ppo.total_steps)
+        self.reporter.evaluation(evaluator.last)
+        self.meter.parts["evaluation"] += time.perf_counter() - begun
 
-    def _checkpoint(
-        self,
-        ppo: PPO,
-        simulation: Simulation,
-        counter: EpisodeCounter,
-        trace: SimTraceWriter,
-        metrics: TrainingMetrics,
-    ) -> None:
+    def _checkpoint(self, session: _Session) -> None:
+        """Logs first: what a checkpoint counts is then on disk, whatever happens in between."""
         begun = time.perf_counter()
-        assert self._last is not None
+        ppo, evaluator, counter = session.ppo, session.evaluator, session.counter
+        session.trace.next_iteration()
+        session.metrics.write()
+        last = evaluator.last
+        is_judged = last is not None and last.step == ppo.total_steps
+        lap = last.best_lap if last is not None else None
         self.folder.checkpoints.save(
             ppo.total_steps,
-            {**ppo.state(), "simulation": simulation.save(), "episode_rewards": counter.rewards},
+            {
+                **ppo.state(),
+                **session.trace.state(),
+                "simulation": session.environment.simulation.save(),
+                "episode_rewards": counter.rewards,
+                "recent_episodes": self.meter.state(),
+            },
             metadata={
                 "network": asdict(ppo.learner.spec),
                 "episodes": counter.number,
                 "clock": counter.clock,
-                "trace_iteration": trace.iteration,
-                "seconds": self._seconds_before + time.monotonic() - self.started,
-                "evaluated_at": self._evaluated_at,
-                "best_score": self._best_score,
-                "best_lap": self._best_lap,
-                "last": asdict(self._last),
+                "trace_iteration": session.trace.iteration,
+                "seconds": self.meter.seconds,
+                "evaluator": evaluator.state(),
             },
             metrics={
-                "completion": self._last.completion,
-                "laps": self._last.laps_completed,
-                "best_lap_s": self._last.best_lap if self._last.best_lap is not None else float("nan"),
-            },
-            score=(self._last.completion, -(self._last.best_lap or 1e6)),
+                "completion": last.completion,
+                "laps": last.laps_completed,
+                "best_lap_s": float("nan") if lap is None else lap,
+            }
+            if last is not None and is_judged
+            else {},
+            score=evaluator.score if is_judged else None,
         )
-        metrics.write()
-        self.parts["checkpoint"] += time.perf_counter() - begun
+        self.meter.parts["checkpoint"] += time.perf_counter() - begun
 
-    def _resume(
-        self, arrays: dict[str, NDArray[Any]], metadata: dict[str, Any], ppo: PPO, simulation: Simulation
-    ) -> None:
+    def _last_checkpoint(self) -> Checkpoint | None:
+        """Where to continue; a damaged checkpoint is passed over with a note."""
+        store = self.folder.checkpoints
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", CheckpointWarning)
+            saved = store.load("last") if store.entries() else None
+        for text in dict.fromkeys(str(warning.message) for warning in caught):
+            self.reporter.note(text)
+        return saved
+
+    def _load_state(self, session: _Session, saved: Checkpoint) -> None:
+        arrays, metadata = saved.arrays, saved.metadata
         try:
-            ppo.load_state(arrays)
-            simulation.load(arrays["simulation"])
-            environment = ppo.environment
-            assert isinstance(environment, TrainingEnvironment)
-            environment.counter.rewards[:] = arrays["episode_rewards"]
-            self._seconds_before = float(metadata["seconds"])
-            self._evaluated_at = int(metadata["evaluated_at"])
-            self._best_score = tuple(metadata["best_score"])
-            self._best_lap = metadata["best_lap"]
-            last = metadata["last"]
-            self._last = EvaluationReport(
-                **{**last, "completions": tuple(last["completions"]), "lap_times": tuple(last["lap_times"])}
-            )
+            session.ppo.load_state(arrays)
+            session.environment.simulation.load(arrays["simulation"])
+            session.counter.rewards[:] = arrays["episode_rewards"]
+            session.trace.load_state(arrays)
+            session.evaluator.load_state(metadata["evaluator"])
+            self.meter.load_state(arrays["recent_episodes"], seconds=float(metadata["seconds"]))
+        except RacecraftError:
+            raise
         except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, RacecraftError):
-                raise
-            raise CheckpointError(f"The checkpoint of {self.folder.path} cannot be resumed: {error}.") from error
-        self.reporter.note(f"Resumed at step {ppo.total_steps:,}.")
+            raise CheckpointError(f"{saved.path} cannot be resumed: {error!r}.") from error
+
+    def _way_on(self, error: RacecraftError) -> str:
+        """What to do after an error, as a hint."""
+        resume = f"racecraft train --resume {self.folder.path}"
+        repair = f"Correct {self.folder.reward_function}, then: " if isinstance(error, RewardError) else ""
+        with warnings.catch_warnings(), suppress(CheckpointError):
+            warnings.simplefilter("ignore", CheckpointWarning)
+            if self.folder.checkpoints.last is not None:
+                return f"The last checkpoint is good. {repair}{resume}"
+        return f"{repair}{resume}" if repair else ""
 
     # ---- tell
 
     def _account(
-        self,
-        environment_seconds: float,
-        policy_seconds: float,
-        update_seconds: float,
-        environment: TrainingEnvironment,
+        self, session: _Session, environment_seconds: float, policy_seconds: float, update_seconds: float
     ) -> None:
+        environment, parts = session.environment, self.meter.parts
         reward, log = environment.reward_seconds, environment.trace_seconds
         environment.reward_seconds = environment.trace_seconds = 0.0
-        self.parts["simulator"] += environment_seconds - reward - log
-        self.parts["reward"] += reward
-        self.parts["log"] += log
-        self.parts["policy"] += policy_seconds
-        self.parts["learner"] += update_seconds
+        parts["simulator"] += environment_seconds - reward - log
+        parts["reward"] += reward
+        parts["log"] += log
+        parts["policy"] += policy_seconds
+        parts["learner"] += update_seconds
 
-    def _iteration_report(self, stats: Any, counter: EpisodeCounter) -> IterationReport:
-        now = time.monotonic()
-        self._pace.append((now, stats.total_steps))
-        (then, steps_then), seconds = self._pace[0], self._seconds_before + now - self.started
-        speed = (stats.total_steps - steps_then) / (now - then) if now > then else float("nan")
-        remaining = []
-        if self.until.seconds:
-            remaining.append(self.until.seconds - seconds)
-        if self.until.steps and speed > 0:
-            remaining.append((self.until.steps - stats.total_steps) / speed)
-        recent = self._recent
-        return IterationReport(
-            stats=stats,
-            seconds=seconds,
-            steps_per_second=speed,
-            episodes=counter.number,
-            mean_reward=float(np.mean([e.reward for e in recent])) if recent else float("nan"),
-            completion=float(np.mean([min(max(e.progress, 0.0), 1.0) for e in recent])) if recent else float("nan"),
-            remaining=max(0.0, min(remaining)) if remaining else None,
-        )
-
-    def _result(self, reason: str, ppo: PPO) -> TrainResult:
+    def _result(self, reason: str, session: _Session) -> TrainResult:
+        last = session.evaluator.last
         return TrainResult(
             run=self.folder.path,
             reason=reason,
-            wall_seconds=time.monotonic() - self.started,
-            steps=ppo.total_steps,
-            laps_completed=self._last.laps_completed if self._last else 0,
+            wall_seconds=time.monotonic() - self.meter.started,
+            steps=session.ppo.total_steps,
+            laps_completed=last.laps_completed if last is not None else 0,
             evaluation_trials=self.settings.evaluation_trials,
-            best_lap_seconds=self._best_lap,
-            parts=self.parts,
+            best_lap_seconds=session.evaluator.best_lap,
+            parts=self.meter.parts,
         )
 
     @contextmanager
@@ -465,7 +362,9 @@ class Training:
             if self._stop.is_set() and number == signal.SIGINT:
                 raise KeyboardInterrupt
             self._stop.set()
-            self.reporter.note("Stopping after this iteration; a checkpoint is saved. Ctrl-C again stops at once.")
+            # The signal may have come in the middle of a line that this thread is printing.
+            text = "Stopping after this iteration; a checkpoint is saved. Ctrl-C again stops at once."
+            threading.Thread(target=self.reporter.note, args=(text,), daemon=True).start()
 
         before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
         try:
@@ -475,15 +374,8 @@ class Training:
                 signal.signal(number, handler)
 
 
-def _require_valid(source: str, track: Track) -> None:
-    """Refuse a reward function that cannot be right, before anything is trained with it."""
-    validate_reward(source)
-    for outcome in dry_run(source, track):
-        if outcome.error is not None:
-            raise outcome.error
-
-
-def _write_iteration(events: EventWriter, report: IterationReport) -> None:
+def _iteration_scalars(report: IterationReport) -> dict[str, float]:
+    """For TensorBoard; what is not known yet is left out."""
     stats = report.stats
     scalars = {
         "training/reward": report.mean_reward,
@@ -497,4 +389,11 @@ def _write_iteration(events: EventWriter, report: IterationReport) -> None:
         "losses/clip_fraction": stats.losses.clip_fraction,
         "losses/explained_variance": stats.explained_variance,
     }
-    events.add_scalars({tag: value for tag, value in scalars.items() if np.isfinite(value)}, step=stats.total_steps)
+    return {tag: value for tag, value in scalars.items() if np.isfinite(value)}
+
+
+def _evaluation_scalars(report: EvaluationReport) -> dict[str, float]:
+    scalars = {"evaluation/completion": report.completion, "evaluation/laps": float(report.laps_completed)}
+    if report.best_lap is not None:
+        scalars["evaluation/best_lap_s"] = report.best_lap
+    return scalars

@@ -1,0 +1,121 @@
+"""The deterministic evaluations during a training, and which checkpoint is the best.
+
+Every evaluation has the same starts, so that two of them can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any, Final
+
+import numpy as np
+
+from racecraft.race.evaluation import Completion, completion, trial_simulation
+from racecraft.race.policy import NetworkPolicy
+from racecraft.race.rules import RULE_SETS
+from racecraft.run import Episode, EpisodeCounter
+from racecraft.sim import CONTROL_DT
+from racecraft.track import Track
+from racecraft.training.progress import EvaluationReport
+from racecraft.training.settings import TrainSettings
+
+SLOWEST: Final = 0.3  # m/s; an evaluation does not wait for a car that needs longer for its lap
+SEED: Final = 0x6576616C  # evaluation starts never coincide with training's
+NO_LAP: Final = 1e6  # s, in a score, where no lap was completed
+
+
+class Evaluator:
+    """Judges the policy while it learns.
+
+    Args:
+        policy: What drives; it sees new weights as soon as they are learned.
+        track: Where.
+        settings: Of the run.
+    """
+
+    def __init__(self, policy: NetworkPolicy, track: Track, settings: TrainSettings) -> None:
+        self._policy = policy
+        self._seed = (settings.seed + SEED) % 2**32
+        self._patience = track.length / SLOWEST
+        direction = "reverse" if settings.direction == "reverse" else "forward"
+        self._rules = replace(RULE_SETS["first_lap"], direction=direction)
+        self._trials = trial_simulation(
+            track,
+            rules=self._rules,
+            num_trials=settings.evaluation_trials,
+            vehicle=settings.vehicle,
+            num_threads=settings.num_threads,
+        )
+        self.last: EvaluationReport | None = None
+        self.best_score: tuple[float, ...] | None = None
+        self.best_lap: float | None = None
+
+    @property
+    def evaluated_at(self) -> int:
+        """Camera steps of training behind the last evaluation."""
+        return self.last.step if self.last is not None else 0
+
+    @property
+    def score(self) -> tuple[float, float] | None:
+        """What makes a checkpoint the best, most important first: completion, then a fast lap."""
+        if self.last is None:
+            return None
+        return self.last.completion, -(self.last.best_lap or NO_LAP)
+
+    def evaluate(self, *, step: int, seconds: float, counter: EpisodeCounter) -> list[Episode]:
+        """Drive the trials; the outcome is in `last`.
+
+        Args:
+            step: Camera steps of training so far.
+            seconds: Wall clock since the start.
+            counter: Gives the trials their places on the run's simulated clock.
+
+        Returns:
+            The trials as episodes, for the metrics.
+        """
+        outcome = completion(self._policy, self._trials, rules=self._rules, seed=self._seed, max_seconds=self._patience)
+        lap_times = tuple(outcome.lap_times[np.isfinite(outcome.lap_times)].tolist())
+        self.last = EvaluationReport(
+            step=step,
+            seconds=seconds,
+            completions=tuple(outcome.completions.tolist()),
+            lap_times=lap_times,
+            is_best=False,
+        )
+        score = self.score
+        assert score is not None
+        if self.best_score is None or score >= self.best_score:
+            self.best_score = score
+            self.last = replace(self.last, is_best=True)
+        self.best_lap = min((lap for lap in (self.best_lap, *lap_times) if lap is not None), default=None)
+        return self._episodes(outcome, counter)
+
+    def _episodes(self, outcome: Completion, counter: EpisodeCounter) -> list[Episode]:
+        return [
+            Episode(
+                number=counter.number,
+                env=trial,
+                steps=round(duration / CONTROL_DT),
+                reward=float(outcome.rewards[trial]),
+                progress=float(outcome.completions[trial]),
+                status=outcome.statuses[trial],
+                start_time=counter.place(duration),
+                duration=duration,
+            )
+            for trial, duration in enumerate(self._trials.column("time").tolist())
+        ]
+
+    def state(self) -> dict[str, Any]:
+        """What a resumed run needs, as JSON."""
+        last = None if self.last is None else asdict(self.last)
+        return {"last": last, "best_score": self.best_score, "best_lap": self.best_lap}
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """Continue from what `state` gave; KeyError or TypeError where it is not that."""
+        last, score, lap = state["last"], state["best_score"], state["best_lap"]
+        if last is not None:
+            tuples = {name: tuple(map(float, last[name])) for name in ("completions", "lap_times")}
+            self.last = EvaluationReport(**{**last, **tuples})
+        self.best_score = None if score is None else tuple(map(float, score))
+        self.best_lap = None if lap is None else float(lap)

@@ -1,0 +1,98 @@
+"""The beginning of a run: everything checked, written into a new run folder, and nothing trained yet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from racecraft.agent import Hyperparameters, ModelMetadata, check_simulated
+from racecraft.errors import ConfigError
+from racecraft.reward import dry_run, validate_reward
+from racecraft.run import RunFolder, RunInfo
+from racecraft.run.training_params import TrainingParams
+from racecraft.track import Track, load_track
+from racecraft.training.settings import TrainSettings
+
+
+def start_run(
+    settings: TrainSettings,
+    *,
+    reward: str,
+    metadata: ModelMetadata,
+    hyperparameters: Hyperparameters | None = None,
+    root: str | Path = "runs",
+    name: str | None = None,
+) -> RunFolder:
+    """Make a run folder that `Training` can train.
+
+    Args:
+        settings: How to train.
+        reward: Source of the reward function.
+        metadata: Action space, sensors, network.
+        hyperparameters: AWS's, when the run follows them.
+        root: Where runs lie.
+        name: Name of the run; by default a new one.
+
+    Raises:
+        RewardError: The reward function has a mistake that can be seen before training.
+        ConfigError: A setting is not allowed, or two do not go together.
+        TrackNotFound: No such track.
+        RunError: The folder cannot be made, or the name is taken.
+    """
+    require_trainable(settings, metadata)
+    track = load_track(settings.track)
+    require_valid_reward(reward, track)
+    folder = RunFolder.create(root, name=name, prefix=track.name)
+    folder.write_inputs(
+        reward_function=reward,
+        model_metadata=metadata,
+        hyperparameters=hyperparameters,
+        training_params=TrainingParams(
+            world_name=track.name,
+            reverse_dir=settings.direction == "reverse",
+            alternate_driving_direction=settings.direction == "alternate",
+            change_start_position=settings.start.mode != "fixed",
+            round_robin_advance_dist=settings.start.advance % 1.0,
+            start_position_offset=settings.start.offset % 1.0,
+            min_eval_trials=settings.evaluation_trials,
+        ),
+    )
+    document = settings.to_dict()
+    del document["seed"], document["track"]  # they have places of their own
+    folder.write_info(RunInfo(seed=settings.seed, track=settings.track, track_digest=track.digest, settings=document))
+    return folder
+
+
+def read_settings(folder: RunFolder) -> TrainSettings:
+    """The settings a run was started with."""
+    info = folder.read_info()
+    return TrainSettings.from_dict({**info.settings, "seed": info.seed, "track": info.track})
+
+
+def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:
+    """Refuse what this version cannot train.
+
+    Raises:
+        ConfigError: A sensor that is not simulated, another algorithm, or settings that exclude each other.
+    """
+    check_simulated(metadata.sensors)
+    if metadata.training_algorithm != "clipped_ppo":
+        raise ConfigError(
+            f"training_algorithm is {metadata.training_algorithm!r}; this version trains 'clipped_ppo' only."
+        )
+    if settings.ppo.exploration == "e-greedy" and metadata.action_space.kind != "discrete":
+        raise ConfigError(
+            "exploration is 'e-greedy', which needs a discrete action space; this one is continuous.",
+            hint="Set exploration_type to 'categorical' in hyperparameters.json.",
+        )
+
+
+def require_valid_reward(source: str, track: Track) -> None:
+    """Refuse a reward function that cannot be right, before anything is trained with it.
+
+    Raises:
+        RewardError: The static check finds a mistake, or a call fails in one of the situations of a track.
+    """
+    validate_reward(source)
+    for outcome in dry_run(source, track):
+        if outcome.error is not None:
+            raise outcome.error
