@@ -8,6 +8,7 @@ Every array is a view of the core's own memory: it changes with the next step, s
 
 from __future__ import annotations
 
+import atexit
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -295,6 +296,9 @@ def instruction_set() -> str:
 def ground_map(track: Track, *, texel: float = 0.01) -> _native.GroundMap:
     """The ground of a track as the cameras see it, with texels of about `texel` metres."""
     return _native.GroundMap(track.centerline, track.inner, track.outer, track.is_closed, texel)
+
+
+atexit.register(ground_map.cache_clear)  # native objects must go before the module that made them
 
 
 def native_camera(camera: CameraSpec) -> _native.CameraSpec:

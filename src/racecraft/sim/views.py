@@ -18,6 +18,10 @@ CHASE_DISTANCE: Final = 1.5
 """m that the chase camera is behind the car, 1 m above the ground."""
 
 
+TEXEL: Final = 0.005
+"""m of a ground texel in pictures for people; the driver's camera makes do with twice that."""
+
+
 class CarView(NamedTuple):
     """A car in a picture."""
 
@@ -47,7 +51,7 @@ class Scene:
         if palette not in ("2018", "2020"):
             raise ConfigError(f"Palette is {palette!r}; allowed are '2018' and '2020'.")
         self.palette = palette
-        self._ground = ground_map(track)
+        self._ground = ground_map(track, texel=TEXEL)
 
     def chase_view(self, *, width: int = 640, height: int = 480) -> View:
         """The camera that follows a car from behind and above."""
