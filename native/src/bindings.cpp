@@ -18,6 +18,9 @@ namespace nb = nanobind;
 using namespace nb::literals;
 
 namespace racecraft {
+
+void bind_learner(nb::module_& m);  // bind_learner.cpp
+
 namespace {
 
 template <typename T, int Dimensions>
@@ -278,7 +281,7 @@ void bind_engine(nb::module_& m) {
 }  // namespace racecraft
 
 NB_MODULE(_native, m) {
-    m.doc() = "Racecraft's native core. Private: use racecraft.sim.";
+    m.doc() = "Racecraft's native core. Private: use racecraft.sim and racecraft.learn.";
     m.attr("ROW_COLUMNS") = racecraft::names_of(racecraft::kRowNames);
     m.attr("STATE_COLUMNS") = racecraft::names_of(racecraft::kStateNames);
     m.attr("VEHICLE_PARAMETERS") = racecraft::names_of(racecraft::kVehicleNames);
@@ -293,4 +296,5 @@ NB_MODULE(_native, m) {
     racecraft::bind_camera(m);
     racecraft::bind_views(m);
     racecraft::bind_engine(m);
+    racecraft::bind_learner(m);
 }

@@ -1,25 +1,39 @@
 """How a policy improves from a rollout: networks by name, PPO, and the learner that holds the weights.
 
-Nothing here imports torch until ``make_learner`` is called.
+Nothing here imports torch unless ``make_learner`` is asked for the torch backend.
 """
 
+from racecraft.errors import ConfigError
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats
 from racecraft.learn.networks import forward_operations, initial_weights, network_names, parameter_count
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
 
-def make_learner(spec: NetworkSpec, *, seed: int = 0, num_threads: int = 0) -> Learner:
+def make_learner(spec: NetworkSpec, *, seed: int = 0, num_threads: int = 0, backend: str = "auto") -> Learner:
     """The learner for this machine.
 
     Args:
         spec: The network.
         seed: Decides the initial weights.
         num_threads: Threads for forward and backward passes; 0 takes every core the process may use.
-    """
-    from racecraft.learn.torch_learner import (
-        TorchLearner,
-    )  # takes seconds: only when something is to be learned
+        backend: ``"native"``, ``"torch"`` (the reference, needs the extra ``torch``), or ``"auto"``: native.
 
+    Raises:
+        ConfigError: There is no such backend, or torch is not installed.
+    """
+    if backend in ("auto", "native"):
+        from racecraft.learn.native_learner import NativeLearner  # loads the native core
+
+        return NativeLearner(spec, seed=seed, num_threads=num_threads)
+    if backend != "torch":
+        raise ConfigError(f"backend is {backend!r}, expected 'auto', 'native' or 'torch'.")
+    try:
+        from racecraft.learn.torch_learner import TorchLearner  # takes seconds
+    except ImportError as error:
+        raise ConfigError(
+            "The torch backend needs PyTorch, which is not installed.",
+            hint="Use backend 'native', or install 'racecraft[torch]'.",
+        ) from error
     return TorchLearner(spec, seed=seed, num_threads=num_threads)
 
 

@@ -1,0 +1,187 @@
+// The border between Python and the learner: shapes are checked in racecraft.learn.native_learner, arrays are
+// read in place.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <stdexcept>
+#include <string>
+#include <tuple>
+
+#include "learner.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace racecraft {
+namespace {
+
+template <typename T, int Dimensions>
+using In = nb::ndarray<const T, nb::ndim<Dimensions>, nb::c_contig, nb::device::cpu>;
+template <typename T, int Dimensions>
+using Out = nb::ndarray<nb::numpy, T, nb::ndim<Dimensions>, nb::c_contig>;
+
+// A new array, (rows, columns) or (rows,) for Dimensions = 1, that Python owns.
+template <typename T, int Dimensions>
+Out<T, Dimensions> new_array(std::initializer_list<size_t> shape) {
+    size_t size = 1;
+    for (const size_t side : shape) size *= side;
+    T* data = new T[size];
+    const nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+    return Out<T, Dimensions>(data, shape, owner);
+}
+
+void require(bool is_met, const char* message) {
+    if (!is_met) throw std::invalid_argument(message);
+}
+
+size_t checked_count(const Network& network, const In<uint8_t, 4>& observations) {
+    const NetworkSpec& spec = network.spec;
+    require(observations.shape(1) == static_cast<size_t>(spec.rows()) &&
+                observations.shape(2) == static_cast<size_t>(spec.columns()) &&
+                observations.shape(3) == static_cast<size_t>(spec.channels()),
+            "The observations are not of this network's shape.");
+    return observations.shape(0);
+}
+
+void check_states(const Network& network, const In<float, 2>& states, size_t count) {
+    require(network.spec.state_size == 0 ||
+                (states.shape(0) == count && states.shape(1) == static_cast<size_t>(network.spec.state_size)),
+            "The privileged states are not of this network's shape.");
+}
+
+std::tuple<double, double, double, double, double, double> update(
+    Learner& self, const In<uint8_t, 4>& observations, const In<float, 2>& states,
+    const In<int64_t, 1>& action_indices, const In<float, 2>& actions, const In<float, 1>& log_probs,
+    const In<float, 1>& advantages, const In<float, 1>& returns, const Objective& objective) {
+    const Network& network = self.network();
+    const size_t num_actions = static_cast<size_t>(network.spec.num_actions);
+    const size_t size = checked_count(network, observations);
+    check_states(network, states, size);
+    require(size > 0, "A minibatch needs at least one sample.");
+    require(log_probs.shape(0) == size && advantages.shape(0) == size && returns.shape(0) == size,
+            "The arrays of a minibatch differ in length.");
+    if (network.spec.is_discrete) {
+        require(action_indices.shape(0) == size, "The arrays of a minibatch differ in length.");
+        for (size_t i = 0; i < size; ++i) {
+            require(action_indices(i) >= 0 && static_cast<size_t>(action_indices(i)) < num_actions,
+                    "An action of the minibatch is not one of this network's.");
+        }
+    } else {
+        require(actions.shape(0) == size && actions.shape(1) == num_actions,
+                "The actions of a minibatch are not of this network's shape.");
+    }
+    const Minibatch minibatch{size,           observations.data(), states.data(),     action_indices.data(),
+                              actions.data(), log_probs.data(),    advantages.data(), returns.data()};
+    nb::gil_scoped_release release;
+    const UpdateStats s = self.update(minibatch, objective);
+    return {s.policy_loss, s.value_loss, s.entropy, s.approx_kl, s.clip_fraction, s.grad_norm};
+}
+
+Learner::Part part_of(const std::string& name) {
+    if (name == "weights") return Learner::Part::weights;
+    if (name == "moment1") return Learner::Part::moment1;
+    if (name == "moment2") return Learner::Part::moment2;
+    throw std::invalid_argument("A learner has no part '" + name +
+                                "'; choose 'weights', 'moment1' or 'moment2'.");
+}
+
+}  // namespace
+
+void bind_learner(nb::module_& m) {
+    nb::class_<Objective>(m, "Objective", "The loss and the step taken on it; see racecraft.learn.Objective.")
+        .def(
+            "__init__",
+            [](Objective* self, double learning_rate, double clip_coef, double ent_coef, double vf_coef,
+               bool is_huber, double max_grad_norm, double adam_eps) {
+                new (self)
+                    Objective{learning_rate, clip_coef, ent_coef, vf_coef, is_huber, max_grad_norm, adam_eps};
+            },
+            nb::kw_only(), "learning_rate"_a, "clip_coef"_a, "ent_coef"_a, "vf_coef"_a, "is_huber"_a,
+            "max_grad_norm"_a, "adam_eps"_a);
+
+    nb::class_<Learner>(m, "Learner", "A network that learns; see racecraft.learn.native_learner.")
+        .def(
+            "__init__",
+            [](Learner* self, int height, int width, int pool, int block,
+               const std::vector<std::tuple<int, int, int>>& convs, const std::vector<int>& dense,
+               int num_actions, bool is_discrete, int state_size, const std::vector<int>& critic_units,
+               int num_threads) {
+                NetworkSpec spec{height, width,       pool,        block,      {},
+                                 dense,  num_actions, is_discrete, state_size, critic_units};
+                for (const auto& [filters, kernel, stride] : convs) {
+                    spec.convs.push_back({filters, kernel, stride});
+                }
+                new (self) Learner(spec, num_threads);
+            },
+            nb::kw_only(), "height"_a, "width"_a, "pool"_a, "block"_a, "convs"_a, "dense"_a, "num_actions"_a,
+            "is_discrete"_a, "state_size"_a, "critic_units"_a, "num_threads"_a)
+        .def(
+            "encode",
+            [](Learner& self, In<uint8_t, 3> frames) {
+                const NetworkSpec& spec = self.network().spec;
+                require(frames.shape(1) == static_cast<size_t>(spec.height) &&
+                            frames.shape(2) == static_cast<size_t>(spec.width),
+                        "The frames are not of this network's size.");
+                const size_t count = frames.shape(0);
+                auto out = new_array<uint8_t, 4>({count, static_cast<size_t>(spec.rows()),
+                                                  static_cast<size_t>(spec.columns()),
+                                                  static_cast<size_t>(spec.channels())});
+                uint8_t* data = out.data();
+                const uint8_t* pixels = frames.data();
+                nb::gil_scoped_release release;
+                self.encode(pixels, count, data);
+                return out;
+            },
+            "frames"_a)
+        .def(
+            "policy",
+            [](Learner& self, In<uint8_t, 4> observations) {
+                const size_t count = checked_count(self.network(), observations);
+                auto out = new_array<float, 2>({count, self.network().spec.policy_size()});
+                float* data = out.data();
+                const uint8_t* bytes = observations.data();
+                nb::gil_scoped_release release;
+                self.policy(bytes, count, data);
+                return out;
+            },
+            "observations"_a)
+        .def(
+            "values",
+            [](Learner& self, In<uint8_t, 4> observations, In<float, 2> states) {
+                const size_t count = checked_count(self.network(), observations);
+                check_states(self.network(), states, count);
+                auto out = new_array<float, 1>({count});
+                float* data = out.data();
+                const uint8_t* bytes = observations.data();
+                const float* columns = states.data();
+                nb::gil_scoped_release release;
+                self.values(bytes, columns, count, data);
+                return out;
+            },
+            "observations"_a, "states"_a)
+        .def("update", &update, "observations"_a, "states"_a, "action_indices"_a, "actions"_a, "log_probs"_a,
+             "advantages"_a, "returns"_a, "objective"_a)
+        .def(
+            "read",
+            [](Learner& self, const std::string& part) {
+                auto out = new_array<float, 1>({self.network().num_public});
+                self.read(part_of(part), out.data());
+                return out;
+            },
+            "part"_a, "A copy of 'weights', 'moment1' or 'moment2', flat.")
+        .def(
+            "write",
+            [](Learner& self, const std::string& part, In<float, 1> values) {
+                require(values.shape(0) == self.network().num_public,
+                        "The parameters are not of this network's number.");
+                self.write(part_of(part), values.data());
+            },
+            "part"_a, "values"_a)
+        .def_prop_rw("num_updates", &Learner::num_updates, &Learner::set_num_updates)
+        .def_prop_ro("num_parameters", [](const Learner& self) { return self.network().num_public; });
+}
+
+}  // namespace racecraft

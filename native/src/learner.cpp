@@ -1,0 +1,355 @@
+#include "learner.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <tuple>
+
+namespace racecraft {
+namespace {
+
+constexpr size_t kMaxGroups =
+    16;  // of samples, each with a gradient of its own; part of the result's definition
+constexpr size_t kMinGroupSize = 8;  // likewise
+constexpr size_t kBlock = 4096;      // parameters of a task that works on them one by one
+constexpr size_t kDenseRows = 128;   // inputs of a task that sums up a dense layer's gradient
+constexpr size_t kSmallDense =
+    1 << 18;  // weights of a dense layer that fit an L2 cache beside the activations
+constexpr double kBeta1 = 0.9, kBeta2 = 0.999;
+
+size_t num_blocks(size_t count) {
+    return (count + kBlock - 1) / kBlock;
+}
+
+// base to the power of a whole number, by squaring: the same bits everywhere, unlike pow().
+double power(double base, int64_t exponent) {
+    double result = 1.0;
+    for (; exponent > 0; exponent >>= 1) {
+        if ((exponent & 1) != 0) result *= base;
+        base *= base;
+    }
+    return result;
+}
+
+}  // namespace
+
+Learner::Learner(const NetworkSpec& spec, int num_threads)
+    : network_(spec),
+      pool_(num_threads),
+      chunk_size_(8),
+      weights_(network_.num_packed),
+      moment1_(network_.num_packed),
+      moment2_(network_.num_packed),
+      workers_(static_cast<size_t>(pool_.num_threads())) {
+    for (const Tower* tower : {&network_.policy, &network_.critic}) {
+        for (size_t l = 0; l < tower->layers.size(); ++l) {
+            const Layer& layer = tower->layers[l];
+            // more samples per pass over a matrix that comes from memory
+            if (layer.is_dense && layer.shape.num_weights() > kSmallDense) chunk_size_ = 16;
+            for (int panel = 0; layer.is_dense && panel * kPanel < layer.shape.out_channels; ++panel) {
+                for (size_t i = 0; i < layer.shape.num_inputs(); i += kDenseRows) {
+                    dense_tasks_.push_back(
+                        {tower, l, panel, i, std::min(layer.shape.num_inputs(), i + kDenseRows)});
+                }
+            }
+            for (int run = 0; l > 0 && run < layer.shape.num_runs; ++run) {
+                for (size_t lane = 0; lane < static_cast<size_t>(layer.shape.run_length); lane += kPanel) {
+                    transpose_tasks_.push_back({&layer, run, lane});
+                }
+            }
+        }
+    }
+    squares_.resize(num_blocks(network_.num_grouped) + dense_tasks_.size());
+    for (Worker& worker : workers_) {
+        worker.input = FloatBuffer(chunk_size_ * spec.observation_size());
+        for (const auto& [tower, buffers, at] :
+             {std::tie(network_.policy, worker.policy, worker.policy_at),
+              std::tie(network_.critic, worker.critic, worker.critic_at)}) {
+            for (const Layer& layer : tower.layers) {
+                buffers.out.emplace_back(chunk_size_ * layer.shape.out_size());
+            }
+            at.out.resize(tower.layers.size());
+            at.grad.resize(tower.layers.size());
+        }
+    }
+}
+
+template <typename Body>
+void Learner::for_each_task(size_t count, const Body& body) {
+    std::atomic<size_t> next{0};
+    pool_.for_each(workers_.size(), [&](size_t worker) {
+        for (size_t task = next++; task < count; task = next++) body(workers_[worker], task);
+    });
+}
+
+void Learner::encode(const uint8_t* frames, size_t count, uint8_t* out) {
+    const std::lock_guard lock(mutex_);
+    const NetworkSpec& spec = network_.spec;
+    const size_t pixels = static_cast<size_t>(spec.height) * spec.width;
+    pool_.for_each(count, [&](size_t i) {
+        RC_DISPATCH(fold_frame, spec, frames + i * pixels, out + i * spec.observation_size());
+    });
+}
+
+void Learner::policy(const uint8_t* observations, size_t count, float* out) {
+    const std::lock_guard lock(mutex_);
+    const NetworkSpec& spec = network_.spec;
+    const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, chunk_size_);
+    const size_t num_actions = static_cast<size_t>(spec.num_actions);
+    const size_t stride = static_cast<size_t>(network_.policy.layers.back().shape.out_channels);
+    for_each_task((count + chunk - 1) / chunk, [&](Worker& worker, size_t task) {
+        const size_t first = task * chunk, samples = std::min(chunk, count - first);
+        const size_t size = spec.observation_size();
+        RC_DISPATCH(bytes_to_unit, observations + first * size, samples * size, worker.input.data());
+        point(network_.policy, worker.policy, nullptr, 0, worker.policy_at);
+        forward(network_.policy, worker.input.data(), samples, worker.policy_at);
+        for (size_t i = 0; i < samples; ++i) {
+            float* outputs = out + (first + i) * spec.policy_size();
+            std::copy_n(worker.policy_at.out.back() + i * stride, num_actions, outputs);
+            if (!spec.is_discrete) {
+                std::copy_n(weights_.data() + network_.log_std, num_actions, outputs + num_actions);
+            }
+        }
+    });
+}
+
+void Learner::values(const uint8_t* observations, const float* states, size_t count, float* out) {
+    const std::lock_guard lock(mutex_);
+    const NetworkSpec& spec = network_.spec;
+    const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, chunk_size_);
+    const size_t stride = static_cast<size_t>(network_.critic.layers.back().shape.out_channels);
+    for_each_task((count + chunk - 1) / chunk, [&](Worker& worker, size_t task) {
+        const size_t first = task * chunk, samples = std::min(chunk, count - first);
+        const float* in = worker.input.data();
+        if (network_.critic.sees_camera) {
+            const size_t size = spec.observation_size();
+            RC_DISPATCH(bytes_to_unit, observations + first * size, samples * size, worker.input.data());
+        } else {
+            in = states + first * static_cast<size_t>(spec.state_size);
+        }
+        point(network_.critic, worker.critic, nullptr, 0, worker.critic_at);
+        forward(network_.critic, in, samples, worker.critic_at);
+        for (size_t i = 0; i < samples; ++i) out[first + i] = worker.critic_at.out.back()[i * stride];
+    });
+}
+
+UpdateStats Learner::update(const Minibatch& minibatch, const Objective& objective) {
+    const std::lock_guard lock(mutex_);
+    const size_t size = minibatch.size;
+    prepare_training(size);
+    transpose();
+    const size_t num_groups = std::clamp((size + kMinGroupSize - 1) / kMinGroupSize, size_t{1}, kMaxGroups);
+    for_each_task(num_groups, [&](Worker& worker, size_t group) {
+        run_group(worker, minibatch, objective, group, num_groups);
+    });
+    // as a float, so that a norm whose squares Adam could not hold counts as infinite
+    const double norm =
+        std::sqrt(static_cast<double>(static_cast<float>(sum_over_tasks(num_groups, minibatch))));
+
+    LossTerms sum;
+    for (size_t i = 0; i < size; ++i) {
+        sum.policy += terms_[i].policy;
+        sum.value += terms_[i].value;
+        sum.entropy += terms_[i].entropy;
+        sum.kl += terms_[i].kl;
+        sum.clipped += terms_[i].clipped;
+    }
+    const double weight = 1.0 / static_cast<double>(size);
+    const UpdateStats stats{sum.policy * weight, sum.value * weight,   sum.entropy * weight,
+                            sum.kl * weight,     sum.clipped * weight, norm};
+    if (std::isfinite(stats.policy_loss + stats.value_loss + stats.entropy + norm)) step(objective, norm);
+    return stats;
+}
+
+void Learner::read(Part part, float* published) {
+    const std::lock_guard lock(mutex_);
+    const FloatBuffer& from = part == Part::weights ? weights_ : part == Part::moment1 ? moment1_ : moment2_;
+    network_.publish(from.data(), published);
+}
+
+void Learner::write(Part part, const float* published) {
+    const std::lock_guard lock(mutex_);
+    FloatBuffer& to = part == Part::weights ? weights_ : part == Part::moment1 ? moment1_ : moment2_;
+    network_.pack(published, to.data());
+    if (part == Part::weights) is_transposed_ = false;
+}
+
+void Learner::prepare_training(size_t size) {
+    if (gradient_.size() == 0) {
+        gradient_ = FloatBuffer(network_.num_packed);
+        transposed_ = FloatBuffer(network_.num_transposed);
+        group_gradients_ = FloatBuffer(kMaxGroups * network_.num_grouped);
+        for (Worker& worker : workers_) {
+            for (const auto& [tower, buffers] :
+                 {std::tie(network_.policy, worker.policy), std::tie(network_.critic, worker.critic)}) {
+                for (const Layer& layer : tower.layers) {
+                    buffers.grad.emplace_back(layer.is_dense ? 0 : chunk_size_ * layer.shape.out_size());
+                }
+            }
+        }
+    }
+    if (size <= kept_size_) return;
+    kept_size_ = size;
+    terms_.resize(size);
+    for (const auto& [tower, kept] :
+         {std::tie(network_.policy, kept_policy_), std::tie(network_.critic, kept_critic_)}) {
+        kept = {};
+        for (size_t l = 0; l < tower.layers.size(); ++l) {
+            const Layer& layer = tower.layers[l];
+            const bool feeds_dense = l + 1 < tower.layers.size() && tower.layers[l + 1].is_dense;
+            kept.out.emplace_back(feeds_dense || layer.is_dense ? size * layer.shape.out_size() : 0);
+            kept.grad.emplace_back(layer.is_dense ? size * layer.shape.out_size() : 0);
+        }
+    }
+}
+
+// Scratch for what only the samples at hand need; `kept` for what outlives them, where there is such.
+void Learner::point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kept, size_t first,
+                    TowerPointers& at) {
+    for (size_t l = 0; l < tower.layers.size(); ++l) {
+        const size_t offset = first * tower.layers[l].shape.out_size();
+        const bool is_kept = kept != nullptr && kept->out[l].size() > 0;
+        at.out[l] = is_kept ? kept->out[l].data() + offset : scratch.out[l].data();
+        if (kept == nullptr) continue;
+        at.grad[l] = kept->grad[l].size() > 0 ? kept->grad[l].data() + offset : scratch.grad[l].data();
+    }
+}
+
+void Learner::forward(const Tower& tower, const float* in, size_t samples, const TowerPointers& at) const {
+    for (size_t l = 0; l < tower.layers.size(); ++l) {
+        const Layer& layer = tower.layers[l];
+        RC_DISPATCH(layer_forward, layer.shape, layer.activation, weights_.data() + layer.weights,
+                    weights_.data() + layer.bias, in, samples, at.out[l]);
+        in = at.out[l];
+    }
+}
+
+// From the gradient at the head's outputs to those of all biases and of the convolutions' weights, which are
+// added to `gradient`; the dense layers' gradients stay behind in `at`.
+void Learner::backward(const Tower& tower, const float* in, size_t samples, const TowerPointers& at,
+                       float* gradient) const {
+    for (size_t l = tower.layers.size(); l-- > 0;) {
+        const Layer& layer = tower.layers[l];
+        const float* input = l == 0 ? in : at.out[l - 1];
+        RC_DISPATCH(activation_gradient, layer.activation, at.out[l], samples * layer.shape.num_positions(),
+                    layer.shape.out_channels, at.grad[l], gradient + layer.bias);
+        for (int panel = 0; !layer.is_dense && panel * kPanel < layer.shape.out_channels; ++panel) {
+            RC_DISPATCH(layer_weight_gradient, layer.shape, panel, 0, layer.shape.num_inputs(), input,
+                        at.grad[l], samples, gradient + layer.weights);
+        }
+        if (l > 0) {
+            RC_DISPATCH(layer_input_gradient, layer.shape, transposed_.data() + layer.transposed, at.grad[l],
+                        samples, at.grad[l - 1]);
+        }
+    }
+}
+
+void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
+                        size_t num_groups) {
+    const NetworkSpec& spec = network_.spec;
+    const size_t num_actions = static_cast<size_t>(spec.num_actions);
+    const size_t observation_size = spec.observation_size();
+    const size_t policy_stride = static_cast<size_t>(network_.policy.layers.back().shape.out_channels);
+    const size_t critic_stride = static_cast<size_t>(network_.critic.layers.back().shape.out_channels);
+    const double weight = 1.0 / static_cast<double>(minibatch.size);
+    float* gradient = group_gradients_.data() + group * network_.num_grouped;
+    std::fill_n(gradient, network_.num_grouped, 0.0f);
+
+    const size_t end = (group + 1) * minibatch.size / num_groups;
+    for (size_t first = group * minibatch.size / num_groups; first < end; first += chunk_size_) {
+        const size_t samples = std::min(chunk_size_, end - first);
+        RC_DISPATCH(bytes_to_unit, minibatch.observations + first * observation_size,
+                    samples * observation_size, worker.input.data());
+        const float* critic_input =
+            network_.critic.sees_camera ? worker.input.data() : minibatch.states + first * spec.state_size;
+        TowerPointers &policy = worker.policy_at, &critic = worker.critic_at;
+        point(network_.policy, worker.policy, &kept_policy_, first, policy);
+        point(network_.critic, worker.critic, &kept_critic_, first, critic);
+        forward(network_.policy, worker.input.data(), samples, policy);
+        forward(network_.critic, critic_input, samples, critic);
+
+        std::fill_n(policy.grad.back(), samples * policy_stride, 0.0f);  // padding included
+        std::fill_n(critic.grad.back(), samples * critic_stride, 0.0f);
+        for (size_t i = 0; i < samples; ++i) {
+            const size_t row = first + i;
+            LossTerms& terms = terms_[row];
+            const PolicySample sample{minibatch.log_probs[row], minibatch.advantages[row], weight};
+            const float* outputs = policy.out.back() + i * policy_stride;
+            float* slope = policy.grad.back() + i * policy_stride;
+            if (spec.is_discrete) {
+                categorical_loss(outputs, num_actions, minibatch.action_indices[row], sample, objective,
+                                 terms, slope);
+            } else {
+                gaussian_loss(outputs, weights_.data() + network_.log_std, num_actions,
+                              minibatch.actions + row * num_actions, sample, objective, terms, slope,
+                              gradient + network_.log_std);
+            }
+            critic.grad.back()[i * critic_stride] = critic_loss(
+                critic.out.back()[i * critic_stride], minibatch.returns[row], weight, objective, terms);
+        }
+        backward(network_.policy, worker.input.data(), samples, policy, gradient);
+        backward(network_.critic, critic_input, samples, critic, gradient);
+    }
+}
+
+void Learner::sum_dense(const DenseTask& task, const Minibatch& minibatch) {
+    const Layer& layer = task.tower->layers[task.layer];
+    TowerBuffers& kept = task.tower == &network_.policy ? kept_policy_ : kept_critic_;
+    const float* in = task.layer > 0 ? kept.out[task.layer - 1].data() : minibatch.states;
+    const size_t width = std::min(kPanel, layer.shape.out_channels - task.panel * kPanel);
+    float* rows = gradient_.data() + layer.weights +
+                  static_cast<size_t>(task.panel) * kPanel * layer.shape.num_inputs() + task.first * width;
+    std::fill_n(rows, (task.last - task.first) * width, 0.0f);
+    RC_DISPATCH(layer_weight_gradient, layer.shape, task.panel, task.first, task.last, in,
+                kept.grad[task.layer].data(), minibatch.size, gradient_.data() + layer.weights);
+    squares_[static_cast<size_t>(&task - dense_tasks_.data()) + num_blocks(network_.num_grouped)] =
+        RC_DISPATCH(sum_of_squares, rows, (task.last - task.first) * width);
+}
+
+// Completes the gradient; returns the sum of its squares.
+double Learner::sum_over_tasks(size_t num_groups, const Minibatch& minibatch) {
+    const size_t blocks = num_blocks(network_.num_grouped);
+    for_each_task(dense_tasks_.size() + blocks, [&](Worker&, size_t task) {
+        if (task < dense_tasks_.size()) return sum_dense(dense_tasks_[task], minibatch);
+        const size_t block = task - dense_tasks_.size();
+        const size_t first = block * kBlock, count = std::min(kBlock, network_.num_grouped - first);
+        RC_DISPATCH(sum_gradients, group_gradients_.data() + first, num_groups, network_.num_grouped, count,
+                    gradient_.data() + first);
+        squares_[block] = RC_DISPATCH(sum_of_squares, gradient_.data() + first, count);
+    });
+    double total = 0.0;
+    for (const double sum : squares_) total += sum;
+    return total;
+}
+
+void Learner::step(const Objective& objective, double norm) {
+    ++num_updates_;
+    const bool is_clipped = objective.max_grad_norm > 0.0 && norm > objective.max_grad_norm;
+    const AdamStep adam_step{
+        .gradient_scale = is_clipped ? static_cast<float>(objective.max_grad_norm / norm) : 1.0f,
+        .decay1 = static_cast<float>(1.0 - kBeta1),
+        .beta2 = static_cast<float>(kBeta2),
+        .decay2 = static_cast<float>(1.0 - kBeta2),
+        .correction2 = static_cast<float>(1.0 / (1.0 - power(kBeta2, num_updates_))),
+        .step_size = static_cast<float>(objective.learning_rate / (1.0 - power(kBeta1, num_updates_))),
+        .epsilon = static_cast<float>(objective.adam_eps),
+    };
+    pool_.for_each(num_blocks(network_.num_packed), [&](size_t block) {
+        const size_t first = block * kBlock, count = std::min(kBlock, network_.num_packed - first);
+        RC_DISPATCH(adam, adam_step, gradient_.data() + first, count, moment1_.data() + first,
+                    moment2_.data() + first, weights_.data() + first);
+    });
+    is_transposed_ = false;
+}
+
+void Learner::transpose() {
+    if (is_transposed_) return;
+    pool_.for_each(transpose_tasks_.size(), [&](size_t i) {
+        const auto& [layer, run, lane] = transpose_tasks_[i];
+        RC_DISPATCH(transpose_weights, layer->shape, run, lane, weights_.data() + layer->weights,
+                    transposed_.data() + layer->transposed);
+    });
+    is_transposed_ = true;
+}
+
+}  // namespace racecraft

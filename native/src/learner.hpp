@@ -1,0 +1,127 @@
+// A network that drives, judges and improves: forward passes, the PPO gradient and Adam, on every core.
+//
+// A gradient step is four loops over all threads, each of a fixed number of tasks:
+//
+//     weights ─transpose─▶ groups of samples: forward, loss, backward ─▶ sums over samples and groups ─▶ Adam
+//
+// A group is a fixed share of the minibatch and sums up its own gradient of convolutions and biases, sample
+// by sample; the groups are then added in order. Dense layers have many weights and few activations, so their
+// inputs and gradients are kept for the whole minibatch and each part of their weight matrix is summed up by
+// one task. Hence the same bits for any number of threads.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <vector>
+
+#include "learner_loss.hpp"
+#include "network.hpp"
+#include "network_kernel.hpp"
+#include "thread_pool.hpp"
+
+namespace racecraft {
+
+// Samples of one gradient step, B of them.
+struct Minibatch {
+    size_t size;
+    const uint8_t* observations;    // (B, observation_size)
+    const float* states;            // (B, state_size)
+    const int64_t* action_indices;  // (B,), discrete; each within [0, num_actions)
+    const float* actions;           // (B, num_actions), continuous
+    const float* log_probs;         // (B,)
+    const float* advantages;        // (B,)
+    const float* returns;           // (B,)
+};
+
+struct UpdateStats {
+    double policy_loss, value_loss, entropy, approx_kl, clip_fraction, grad_norm;
+};
+
+class Learner {
+  public:
+    // Weights are zero at first. num_threads counts the calling thread; 0 takes one per core.
+    Learner(const NetworkSpec& spec, int num_threads);
+
+    const Network& network() const { return network_; }
+
+    // frames (count, height, width) -> out (count, observation_size).
+    void encode(const uint8_t* frames, size_t count, uint8_t* out);
+
+    // Logits, or means and log standard deviations  (count, policy_size).
+    void policy(const uint8_t* observations, size_t count, float* out);
+
+    // The critic's estimates  (count,).
+    void values(const uint8_t* observations, const float* states, size_t count, float* out);
+
+    // One gradient step; changes nothing when loss or gradient is not finite.
+    UpdateStats update(const Minibatch& minibatch, const Objective& objective);
+
+    // Parameters, Adam's first and second moments, as published  (num_public,).
+    enum class Part { weights, moment1, moment2 };
+    void read(Part part, float* published);
+    void write(Part part, const float* published);
+
+    int64_t num_updates() const { return num_updates_; }
+    void set_num_updates(int64_t count) { num_updates_ = count; }
+
+  private:
+    // What the layers of one tower hold for a few samples.
+    struct TowerBuffers {
+        std::vector<FloatBuffer> out, grad;
+    };
+    // Where they are for the samples at hand.
+    struct TowerPointers {
+        std::vector<float*> out, grad;
+    };
+    // One thread's scratch.
+    struct Worker {
+        FloatBuffer input;
+        TowerBuffers policy, critic;
+        TowerPointers policy_at, critic_at;
+    };
+    struct DenseTask {
+        const Tower* tower;
+        size_t layer;
+        int panel;
+        size_t first, last;  // inputs
+    };
+    struct TransposeTask {
+        const Layer* layer;
+        int run;
+        size_t lane;
+    };
+
+    template <typename Body>
+    void for_each_task(size_t count, const Body& body);  // body(worker, task)
+    void prepare_training(size_t size);
+    void point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kept, size_t first,
+               TowerPointers& at);
+    void forward(const Tower& tower, const float* in, size_t samples, const TowerPointers& at) const;
+    void backward(const Tower& tower, const float* in, size_t samples, const TowerPointers& at,
+                  float* gradient) const;
+    void run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
+                   size_t num_groups);
+    void sum_dense(const DenseTask& task, const Minibatch& minibatch);
+    double sum_over_tasks(size_t num_groups, const Minibatch& minibatch);
+    void step(const Objective& objective, double norm);
+    void transpose();
+
+    Network network_;
+    ThreadPool pool_;
+    std::mutex mutex_;  // one caller at a time
+    size_t chunk_size_;
+    FloatBuffer weights_, moment1_, moment2_, gradient_, transposed_;
+    FloatBuffer group_gradients_;  // (groups, num_grouped)
+    int64_t num_updates_ = 0;
+    bool is_transposed_ = false;
+    std::vector<Worker> workers_;
+    TowerBuffers kept_policy_,
+        kept_critic_;  // of the whole minibatch: what dense layers saw, and their gradients
+    size_t kept_size_ = 0;
+    std::vector<LossTerms> terms_;  // (B,)
+    std::vector<double> squares_;   // of the gradient, one sum per task
+    std::vector<DenseTask> dense_tasks_;
+    std::vector<TransposeTask> transpose_tasks_;
+};
+
+}  // namespace racecraft

@@ -1,0 +1,292 @@
+// Convolutions in both directions. A tile is a few positions (or inputs) by two vectors of channels, held in
+// registers while one loop runs over everything they have in common: per step two loads of channels, one
+// broadcast per position, and a fused multiply-add for each pair.
+#include "network_kernel.hpp"
+
+#include <algorithm>
+
+#include "network_lanes.hpp"
+
+namespace racecraft::RC_ISA {
+namespace {
+
+#if defined(__AVX512F__)
+constexpr int kTileRows = 8;  // 16 of 32 registers hold sums
+#else
+constexpr int kTileRows = 4;  // 8 of 16
+#endif
+constexpr int kLaneCount = FloatLanes::kCount;
+constexpr size_t kSegment =
+    256;  // inputs of a long run taken at once: 32 KB of weights, the size of an L1 cache
+
+#define RC_EACH_SUM                                          \
+    _Pragma("GCC unroll 16") for (int r = 0; r < kRows; ++r) \
+        _Pragma("GCC unroll 2") for (int v = 0; v < kVectors; ++v)
+
+// sums[r] += rows[r][i] * weights[i], for i in [0, length).
+template <int kRows, int kVectors>
+[[gnu::always_inline]] inline void multiply(FloatLanes (&sums)[kRows][kVectors],
+                                            const float* const (&rows)[kRows], size_t offset,
+                                            const float* weights, size_t width, size_t length) {
+    for (size_t i = 0; i < length; ++i) {
+        FloatLanes w[kVectors];
+#pragma GCC unroll 2
+        for (int v = 0; v < kVectors; ++v) w[v] = load(weights + v * kLaneCount);
+#pragma GCC unroll 16
+        for (int r = 0; r < kRows; ++r) {
+            const FloatLanes x = splat(rows[r][offset + i]);
+#pragma GCC unroll 2
+            for (int v = 0; v < kVectors; ++v) sums[r][v] = fused_multiply_add(x, w[v], sums[r][v]);
+        }
+        weights += width;
+    }
+}
+
+// Walks over the positions of a layer's output, sample by sample, row by row.
+struct Cursor {
+    const LayerShape& shape;
+    size_t sample = 0;  // offset of the sample's inputs
+    size_t row = 0;     // offset of the row's first input
+    int y = 0, x = 0;
+
+    size_t next() {
+        const size_t offset = sample + row + static_cast<size_t>(x) * shape.column_step;
+        if (++x == shape.out_width) {
+            x = 0;
+            row += shape.row_step;
+            if (++y == shape.out_height) {
+                y = 0;
+                row = 0;
+                sample += shape.in_size;
+            }
+        }
+        return offset;
+    }
+};
+
+// Calls body.run<rows>(first position) for tiles that cover [0, positions).
+template <typename Body>
+[[gnu::always_inline]] inline void for_each_tile(size_t positions, Body& body) {
+    size_t p = 0;
+    for (; p + kTileRows <= positions; p += kTileRows) body.template run<kTileRows>(p);
+    if constexpr (kTileRows > 4) {
+        for (; p + 4 <= positions; p += 4) body.template run<4>(p);
+    }
+    for (; p < positions; ++p) body.template run<1>(p);
+}
+
+struct ForwardTerms {
+    const LayerShape& shape;
+    const float* weights;  // of the panel, at the lanes and the segment
+    size_t width;          // of the panel
+    const float* bias;     // at the lanes
+    const float* in;       // at the segment
+    float* out;            // at the lanes
+    size_t segment;        // inputs per run
+    bool is_first, is_last, is_relu;
+};
+
+template <int kVectors>
+struct ForwardBody {
+    const ForwardTerms& t;
+    Cursor cursor;
+
+    template <int kRows>
+    [[gnu::always_inline]] void run(size_t position) {
+        const size_t channels = static_cast<size_t>(t.shape.out_channels);
+        const float* rows[kRows];
+#pragma GCC unroll 16
+        for (int r = 0; r < kRows; ++r) rows[r] = t.in + cursor.next();
+        float* out = t.out + position * channels;
+        FloatLanes sums[kRows][kVectors];
+        RC_EACH_SUM {
+            sums[r][v] =
+                load((t.is_first ? t.bias : out + static_cast<size_t>(r) * channels) + v * kLaneCount);
+        }
+        const float* weights = t.weights;
+        for (int run = 0; run < t.shape.num_runs; ++run) {
+            multiply(sums, rows, static_cast<size_t>(run) * t.shape.run_stride, weights, t.width, t.segment);
+            weights += t.segment * t.width;
+        }
+        if (t.is_last && t.is_relu) RC_EACH_SUM sums[r][v] = relu(sums[r][v]);
+        RC_EACH_SUM store(out + static_cast<size_t>(r) * channels + v * kLaneCount, sums[r][v]);
+    }
+};
+
+template <int kVectors>
+void forward_lanes(const ForwardTerms& terms, size_t positions) {
+    ForwardBody<kVectors> body{terms, Cursor{terms.shape}};
+    for_each_tile(positions, body);
+}
+
+struct InputGradientTerms {
+    const LayerShape& shape;
+    const float* transposed;  // of the panel, at the lanes
+    size_t width;             // of the panel
+    const float* grad_out;
+    float* grad_in;  // at the run and the lanes
+};
+
+template <int kVectors>
+struct InputGradientBody {
+    const InputGradientTerms& t;
+    Cursor cursor;
+
+    template <int kRows>
+    [[gnu::always_inline]] void run(size_t position) {
+        const size_t channels = static_cast<size_t>(t.shape.out_channels);
+        const float* rows[kRows];
+#pragma GCC unroll 16
+        for (int r = 0; r < kRows; ++r) rows[r] = t.grad_out + (position + static_cast<size_t>(r)) * channels;
+        FloatLanes sums[kRows][kVectors];
+        RC_EACH_SUM sums[r][v] = splat(0.0f);
+        multiply(sums, rows, 0, t.transposed, t.width, channels);
+        // neighbouring positions share inputs, so they are added one after the other
+#pragma GCC unroll 16
+        for (int r = 0; r < kRows; ++r) {
+            float* to = t.grad_in + cursor.next();
+#pragma GCC unroll 2
+            for (int v = 0; v < kVectors; ++v) {
+                store(to + v * kLaneCount, load(to + v * kLaneCount) + sums[r][v]);
+            }
+        }
+    }
+};
+
+template <int kVectors>
+void input_gradient_lanes(const InputGradientTerms& terms, size_t positions) {
+    InputGradientBody<kVectors> body{terms, Cursor{terms.shape}};
+    for_each_tile(positions, body);
+}
+
+// Positions as a nest of three loops, the innermost as long as possible.
+struct Positions {
+    size_t samples, rows, columns;
+    size_t sample_step, row_step, column_step;  // between inputs
+};
+
+template <int kRows, int kVectors>
+void weight_gradient_tile(const Positions& p, size_t channels, const float* in, const float* grad,
+                          size_t width, float* gradient) {
+    FloatLanes sums[kRows][kVectors];
+    RC_EACH_SUM sums[r][v] = load(gradient + static_cast<size_t>(r) * width + v * kLaneCount);
+    for (size_t s = 0; s < p.samples; ++s) {
+        for (size_t y = 0; y < p.rows; ++y) {
+            const float* x = in + s * p.sample_step + y * p.row_step;
+            for (size_t column = 0; column < p.columns; ++column) {
+                FloatLanes g[kVectors];
+#pragma GCC unroll 2
+                for (int v = 0; v < kVectors; ++v) g[v] = load(grad + v * kLaneCount);
+#pragma GCC unroll 16
+                for (int r = 0; r < kRows; ++r) {
+                    const FloatLanes value = splat(x[r]);
+#pragma GCC unroll 2
+                    for (int v = 0; v < kVectors; ++v)
+                        sums[r][v] = fused_multiply_add(value, g[v], sums[r][v]);
+                }
+                x += p.column_step;
+                grad += channels;
+            }
+        }
+    }
+    RC_EACH_SUM store(gradient + static_cast<size_t>(r) * width + v * kLaneCount, sums[r][v]);
+}
+
+// Inputs [first, last) of one run.
+template <int kVectors>
+void weight_gradient_lanes(const Positions& positions, size_t channels, const float* in, const float* grad,
+                           size_t width, size_t first, size_t last, float* gradient) {
+    size_t i = first;
+    const auto step = [&](auto tile, size_t rows) {
+        for (; i + rows <= last; i += rows)
+            tile(positions, channels, in + i, grad, width, gradient + i * width);
+    };
+    if constexpr (kTileRows * 2 > 8 && kVectors == 1) step(weight_gradient_tile<16, 1>, 16);
+    step(weight_gradient_tile<kTileRows, kVectors>, kTileRows);
+    if constexpr (kTileRows > 4) step(weight_gradient_tile<4, kVectors>, 4);
+    step(weight_gradient_tile<1, kVectors>, 1);
+}
+
+// Calls lanes<vectors>(lane) for the vectors that cover a panel of `width` channels.
+template <typename Lanes>
+[[gnu::always_inline]] inline void for_each_vector_pair(size_t width, const Lanes& lanes) {
+    size_t lane = 0;
+    for (; lane + 2 * kLaneCount <= width; lane += 2 * kLaneCount) lanes.template operator()<2>(lane);
+    if constexpr (kLaneCount == kChannelMultiple) {
+        for (; lane < width; lane += kLaneCount) lanes.template operator()<1>(lane);
+    }
+}
+
+size_t panel_width(size_t panel, size_t channels) {
+    return std::min<size_t>(kPanel, channels - panel * kPanel);
+}
+
+}  // namespace
+
+void layer_forward(const LayerShape& shape, Activation activation, const float* weights, const float* bias,
+                   const float* in, size_t samples, float* out) {
+    const size_t channels = static_cast<size_t>(shape.out_channels);
+    const size_t length = static_cast<size_t>(shape.run_length);
+    const size_t segment = shape.num_runs == 1 ? std::min(kSegment, length) : length;
+    for (size_t panel = 0; panel * kPanel < channels; ++panel) {
+        const size_t width = panel_width(panel, channels);
+        const float* panel_weights = weights + panel * kPanel * shape.num_inputs();
+        for (size_t first = 0; first < length; first += segment) {
+            const size_t last = std::min(length, first + segment);
+            for_each_vector_pair(width, [&]<int kVectors>(size_t lane) {
+                const size_t channel = panel * kPanel + lane;
+                const ForwardTerms terms{shape,          panel_weights + first * width + lane,
+                                         width,          bias + channel,
+                                         in + first,     out + channel,
+                                         last - first,   first == 0,
+                                         last == length, activation == Activation::relu};
+                forward_lanes<kVectors>(terms, samples * shape.num_positions());
+            });
+        }
+    }
+    if (activation == Activation::tanh) apply_tanh(out, samples * shape.out_size());
+}
+
+void layer_input_gradient(const LayerShape& shape, const float* transposed, const float* grad_out,
+                          size_t samples, float* grad_in) {
+    const size_t length = static_cast<size_t>(shape.run_length);
+    std::fill_n(grad_in, samples * shape.in_size, 0.0f);
+    for (size_t run = 0; run < static_cast<size_t>(shape.num_runs); ++run) {
+        for (size_t first = 0; first < length; first += kPanel) {
+            const size_t width = std::min<size_t>(kPanel, length - first);
+            const float* panel =
+                transposed + (run * length + first) * static_cast<size_t>(shape.out_channels);
+            for_each_vector_pair(width, [&]<int kVectors>(size_t lane) {
+                const InputGradientTerms terms{shape, panel + lane, width, grad_out,
+                                               grad_in + run * shape.run_stride + first + lane};
+                input_gradient_lanes<kVectors>(terms, samples * shape.num_positions());
+            });
+        }
+    }
+}
+
+void layer_weight_gradient(const LayerShape& shape, int panel, size_t first, size_t last, const float* in,
+                           const float* grad_out, size_t samples, float* gradient) {
+    const size_t channels = static_cast<size_t>(shape.out_channels);
+    const size_t length = static_cast<size_t>(shape.run_length);
+    const size_t first_channel = static_cast<size_t>(panel) * kPanel;
+    const size_t width = panel_width(static_cast<size_t>(panel), channels);
+    Positions positions{samples,
+                        static_cast<size_t>(shape.out_height),
+                        static_cast<size_t>(shape.out_width),
+                        shape.in_size,
+                        shape.row_step,
+                        shape.column_step};
+    if (shape.num_positions() == 1) positions = {1, 1, samples, 0, 0, shape.in_size};
+    for (size_t run = first / length; run * length < last; ++run) {
+        const size_t from = std::max(first, run * length) - run * length;
+        const size_t to = std::min(last, (run + 1) * length) - run * length;
+        float* rows = gradient + first_channel * shape.num_inputs() + run * length * width;
+        for_each_vector_pair(width, [&]<int kVectors>(size_t lane) {
+            weight_gradient_lanes<kVectors>(positions, channels, in + run * shape.run_stride,
+                                            grad_out + first_channel + lane, width, from, to, rows + lane);
+        });
+    }
+}
+
+}  // namespace racecraft::RC_ISA

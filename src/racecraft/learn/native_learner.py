@@ -1,0 +1,176 @@
+"""The learner on the native core: the default on a CPU, and all that training needs.
+
+Results are the same bits for any number of threads and on any machine with fused multiply-add.
+
+    NetworkSpec ──networks──▶ _native.Learner: parameters, forward passes, gradient, Adam (native/src/learner.hpp)
+
+Parameters cross the border as one flat vector in the order of ``racecraft.learn.networks.weight_shapes``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft import _native
+from racecraft.errors import CheckpointError, ConfigError, ShapeError
+from racecraft.learn import networks
+from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights
+
+_NO_INDICES = np.zeros(0, np.int64)
+_NO_ACTIONS = np.zeros((0, 0), np.float32)
+
+
+class NativeLearner:
+    """A ``racecraft.learn.learner.Learner``.
+
+    Args:
+        spec: The network, any of ``racecraft.learn.networks``.
+        seed: Decides the initial weights.
+        num_threads: Threads for forward and backward passes; 0 takes every core the process may use.
+
+    Raises:
+        ConfigError: There is no such network, or it does not fit the camera's image.
+    """
+
+    def __init__(self, spec: NetworkSpec, *, seed: int = 0, num_threads: int = 0) -> None:
+        self.spec = spec
+        self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
+        self._shapes = networks.weight_shapes(spec)
+        arch = networks.architecture(spec.name)
+        height, width = spec.frame_shape
+        try:
+            self._native = _native.Learner(
+                height=height,
+                width=width,
+                pool=arch.pool,
+                block=networks.block_size(spec),
+                convs=[(conv.filters, conv.kernel, conv.stride) for conv in arch.convs],
+                dense=list(arch.dense),
+                num_actions=spec.num_actions,
+                is_discrete=spec.is_discrete,
+                state_size=spec.state_size,
+                critic_units=list(networks.CRITIC_UNITS),
+                num_threads=num_threads,
+            )
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+        self.load_weights(networks.initial_weights(spec, seed=seed))
+
+    def encode(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Pool and lay out camera images (N, H, W) as (N, *observation_shape)."""
+        height, width = self.spec.frame_shape
+        if frames.dtype != np.uint8 or frames.ndim != 3 or frames.shape[1:] != (height, width):
+            raise ShapeError(
+                f"frames are {frames.dtype} of shape {frames.shape}, expected uint8 of (N, {height}, {width})."
+            )
+        return self._native.encode(np.ascontiguousarray(frames))
+
+    def policy(self, observations: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Logits, or means and log standard deviations  (N, P)."""
+        outputs: NDArray[np.float32] = self._native.policy(self._observations(observations))
+        return outputs
+
+    def values(self, observations: NDArray[np.uint8], states: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The critic's estimates  (N,)."""
+        return self._native.values(
+            self._observations(observations), self._column("states", states, (len(observations), self.spec.state_size))
+        )
+
+    def update(self, minibatch: Minibatch, objective: Objective) -> UpdateStats:
+        """Take one gradient step; leave everything as it is when loss or gradient is not finite."""
+        spec, size = self.spec, len(minibatch.advantages)
+        indices, actions = _NO_INDICES, _NO_ACTIONS
+        if spec.is_discrete:
+            indices = self._column("actions", minibatch.actions, (size,), np.int64)
+            if size and not 0 <= indices.min() <= indices.max() < spec.num_actions:
+                raise ShapeError(
+                    f"actions are indices from {indices.min()} to {indices.max()}, "
+                    f"expected 0 to {spec.num_actions - 1}."
+                )
+        else:
+            actions = self._column("actions", minibatch.actions, (size, spec.num_actions))
+        terms = self._native.update(
+            self._observations(minibatch.observations, size),
+            self._column("states", minibatch.states, (size, spec.state_size)),
+            indices,
+            actions,
+            self._column("log_probs", minibatch.log_probs, (size,)),
+            self._column("advantages", minibatch.advantages, (size,)),
+            self._column("returns", minibatch.returns, (size,)),
+            _native.Objective(
+                learning_rate=objective.learning_rate,
+                clip_coef=objective.clip_coef,
+                ent_coef=objective.ent_coef,
+                vf_coef=objective.vf_coef,
+                is_huber=objective.value_loss == "huber",
+                max_grad_norm=objective.max_grad_norm,
+                adam_eps=objective.adam_eps,
+            ),
+        )
+        policy_loss, value_loss, entropy, approx_kl, clip_fraction, grad_norm = terms
+        return UpdateStats(
+            policy_loss=policy_loss,
+            value_loss=value_loss,
+            entropy=entropy,
+            approx_kl=approx_kl,
+            clip_fraction=clip_fraction,
+            grad_norm=grad_norm,
+        )
+
+    def weights(self) -> Weights:
+        """Copy of the parameters."""
+        return self._read("weights")
+
+    def load_weights(self, weights: Weights) -> None:
+        """Replace the parameters; CheckpointError if names or shapes differ."""
+        self._native.write("weights", self._flat(weights))
+
+    def optimizer_state(self) -> Weights:
+        """Copy of Adam's moments, ``moment1/<weight>`` and ``moment2/<weight>``, and ``step`` (1,)."""
+        state = {"step": np.array([self._native.num_updates], np.float32)}
+        for moment in ("moment1", "moment2"):
+            state |= {f"{moment}/{name}": array for name, array in self._read(moment).items()}
+        return state
+
+    def load_optimizer_state(self, state: Weights) -> None:
+        """Replace what ``optimizer_state`` gives; CheckpointError if names or shapes differ."""
+        flat = {}
+        for moment in ("moment1", "moment2"):
+            prefix = f"{moment}/"
+            named = {name.removeprefix(prefix): array for name, array in state.items() if name.startswith(prefix)}
+            flat[moment] = self._flat(named)
+        if "step" not in state:
+            raise CheckpointError("The optimiser's state has no 'step'.")
+        for moment, values in flat.items():
+            self._native.write(moment, values)
+        self._native.num_updates = int(state["step"][0])
+
+    def _read(self, part: str) -> Weights:
+        flat = self._native.read(part)
+        ends = np.cumsum([int(np.prod(shape)) for shape in self._shapes.values()])
+        parts = np.split(flat, ends[:-1])
+        return {name: values.reshape(shape) for (name, shape), values in zip(self._shapes.items(), parts, strict=True)}
+
+    def _flat(self, arrays: Weights) -> NDArray[np.float32]:
+        """The arrays one after the other, in the network's order."""
+        shapes = {name: tuple(array.shape) for name, array in arrays.items()}
+        if shapes != self._shapes:
+            different = sorted(name for name, _ in set(shapes.items()) ^ set(self._shapes.items()))
+            raise CheckpointError(
+                f"The weights do not fit the network {self.spec.name}: {', '.join(dict.fromkeys(different))} "
+                "are missing, superfluous or of another shape."
+            )
+        return np.concatenate([np.asarray(arrays[name], np.float32).ravel() for name in self._shapes])
+
+    def _observations(self, observations: NDArray[np.uint8], size: int | None = None) -> NDArray[np.uint8]:
+        shape = (len(observations) if size is None else size, *self.observation_shape)
+        return self._column("observations", observations, shape, np.uint8)
+
+    @staticmethod
+    def _column(name: str, array: NDArray[Any], shape: tuple[int, ...], dtype: type = np.float32) -> NDArray[Any]:
+        if array.shape != shape:
+            raise ShapeError(f"{name} has shape {array.shape}, expected {shape}.")
+        return np.ascontiguousarray(array, dtype)
