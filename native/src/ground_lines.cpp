@@ -30,7 +30,7 @@ std::vector<Point> read_points(const double* values, int count, const char* name
     return points;
 }
 
-void add_ring(const std::vector<Point>& points, std::vector<Segment>& segments) {
+void add_ring(const std::vector<Point>& points, std::vector<BorderSegment>& segments) {
     for (size_t i = 0; i < points.size(); ++i)
         segments.push_back({points[i], points[(i + 1) % points.size()]});
 }
@@ -91,7 +91,7 @@ GroundLines read_lines(const TrackOutline& outline) {
     return lines;
 }
 
-double distance_to(const Segment& segment, Point p, Point& away) {
+double distance_to(const BorderSegment& segment, Point p, Point& away) {
     const double dx = segment.b.x - segment.a.x;
     const double dy = segment.b.y - segment.a.y;
     const double along = ((p.x - segment.a.x) * dx + (p.y - segment.a.y) * dy) / (dx * dx + dy * dy);

@@ -14,7 +14,7 @@ struct Point {
     double x, y;
 };
 
-struct Segment {
+struct BorderSegment {
     Point a, b;
 };
 
@@ -25,7 +25,7 @@ struct Dash {
 };
 
 struct GroundLines {
-    std::vector<Segment> borders;  // an odd number of crossings to a point's left means road
+    std::vector<BorderSegment> borders;  // an odd number of crossings to a point's left means road
     std::vector<Dash> dashes;
     Point low, high;  // m, bounding box
 };
@@ -35,7 +35,7 @@ struct GroundLines {
 GroundLines read_lines(const TrackOutline& outline);
 
 // Distance to the segment and the vector from its nearest point.
-double distance_to(const Segment& segment, Point p, Point& away);
+double distance_to(const BorderSegment& segment, Point p, Point& away);
 
 // Signed distance into the dash and its gradient; outside a corner it points to the corner.
 double depth_in(const Dash& dash, Point p, Point& gradient);

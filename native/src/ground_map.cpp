@@ -179,8 +179,8 @@ class Bins {
 
 class Painter {
   public:
-    Painter(std::vector<Segment> borders, std::vector<Dash> dashes, Point origin, double texel, int columns,
-            int rows)
+    Painter(std::vector<BorderSegment> borders, std::vector<Dash> dashes, Point origin, double texel,
+            int columns, int rows)
         : borders_(std::move(borders)),
           dashes_(std::move(dashes)),
           origin_(origin),
@@ -191,7 +191,7 @@ class Painter {
           near_dashes_(block_columns_, block_rows_, origin, texel * kBlock) {
         const double reach = kEdgeLineWidth + 2.0 * texel;
         for (uint32_t i = 0; i < borders_.size(); ++i) {
-            const Segment& s = borders_[i];
+            const BorderSegment& s = borders_[i];
             near_borders_.add(i, {std::min(s.a.x, s.b.x) - reach, std::min(s.a.y, s.b.y) - reach},
                               {std::max(s.a.x, s.b.x) + reach, std::max(s.a.y, s.b.y) + reach});
         }
@@ -250,7 +250,7 @@ class Painter {
     void find_crossings(int row, std::vector<double>& line) const {
         const double y = origin_.y + (row + 0.5) * texel_;
         line.clear();
-        for (const Segment& s : borders_) {
+        for (const BorderSegment& s : borders_) {
             if ((s.a.y <= y) != (s.b.y <= y))
                 line.push_back(s.a.x + (y - s.a.y) / (s.b.y - s.a.y) * (s.b.x - s.a.x));
         }
@@ -259,7 +259,7 @@ class Painter {
 
     bool is_inside(Point p) const {
         bool inside = false;
-        for (const Segment& s : borders_) {
+        for (const BorderSegment& s : borders_) {
             if ((s.a.y <= p.y) != (s.b.y <= p.y) &&
                 p.x < s.a.x + (p.y - s.a.y) / (s.b.y - s.a.y) * (s.b.x - s.a.x)) {
                 inside = !inside;
@@ -272,7 +272,7 @@ class Painter {
                       const std::vector<uint32_t>& dashes) const {
         double nearest = 1e300;
         Point away{};
-        const Segment* border = nullptr;
+        const BorderSegment* border = nullptr;
         for (const uint32_t i : segments) {
             Point vector;
             const double distance = distance_to(borders_[i], p, vector);
@@ -317,7 +317,7 @@ class Painter {
         return edge_texel(best, texel_);
     }
 
-    std::vector<Segment> borders_;
+    std::vector<BorderSegment> borders_;
     std::vector<Dash> dashes_;
     Point origin_;
     double texel_;
