@@ -1,0 +1,106 @@
+"""Builds the C++ tests with CMake and runs each of them: as users get the core, without optimisation, and under sanitizers.
+
+    pytest tests/native -m "not slow"     only the release build
+
+The build folders lie in build/ and are kept, so that only what changed is compiled again.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PROGRAMS = tuple(sorted(path.stem for path in (ROOT / "native/tests").glob("*_test.cpp")))
+THREADED = ("engine_test", "thread_pool_test")
+TOOLS = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))  # cmake and ninja of this environment
+
+
+@cache
+def build(name: str, build_type: str, sanitizers: str = "", programs: tuple[str, ...] = PROGRAMS) -> Path:
+    """Configure and compile, and give the folder of the programs."""
+    cmake = shutil.which("cmake", path=TOOLS)
+    if cmake is None:
+        pytest.skip("cmake is not installed")
+    folder = ROOT / "build" / f"cpp-{name}"
+    settings = {
+        "RACECRAFT_BUILD_TESTS": "ON",
+        "RACECRAFT_SANITIZE": sanitizers,
+        "CMAKE_BUILD_TYPE": build_type,
+    }
+    run([cmake, "-S", ROOT, "-B", folder, "-G", "Ninja", *(f"-D{key}={value}" for key, value in settings.items())])
+    run([cmake, "--build", folder, *(word for program in programs for word in ("--target", program))])
+    return folder
+
+
+def run(command: list[str | Path], **environment: str) -> str:
+    """The output of a command that must succeed."""
+    done = subprocess.run(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, "PATH": TOOLS, **environment},
+        timeout=1200,
+        check=False,
+    )
+    assert done.returncode == 0, f"{command[0]} returned {done.returncode}:\n{done.stdout[-6000:]}"
+    return done.stdout
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_release(program):
+    run([build("release", "Release") / program])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_without_optimisation_the_golden_hashes_are_the_same(program):
+    run([build("debug", "Debug") / program])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_address_and_undefined_behaviour_sanitizers_find_nothing(program):
+    run([build("asan", "Release", "address,undefined") / program], ASAN_OPTIONS="detect_leaks=1")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", THREADED)
+def test_thread_sanitizer_finds_nothing(program):
+    run([build("tsan", "Release", "thread", THREADED) / program], TSAN_OPTIONS="halt_on_error=1")
+
+
+def test_every_type_of_the_core_has_a_name_of_its_own():
+    # Two types of one name in two files are one type to the linker, which then takes either's functions.
+    names = Counter()
+    for path in sorted((ROOT / "native").glob("*/**/*.[ch]pp")):
+        if "tests" in path.parts:
+            continue
+        text = re.sub(r"^namespace \{$.*?^\}  // namespace$", "", path.read_text(), flags=re.MULTILINE | re.DOTALL)
+        names.update(re.findall(r"^(?:struct|class|union|enum class|enum) (\w+)[^;]*?\{", text, flags=re.MULTILINE))
+    assert len(names) > 20
+    assert {name: count for name, count in names.items() if count > 1} == {}
+
+
+def test_kernels_bring_no_code_that_another_instruction_set_could_link():
+    # A template of the standard library compiled for AVX-512 and chosen by the linker would crash older CPUs.
+    nm = shutil.which("nm")
+    if nm is None:
+        pytest.skip("nm is not installed")
+    folder = build("release", "Release")
+    objects = [p for isa in ("avx2", "avx512") for p in folder.glob(f"CMakeFiles/racecraft_kernels_{isa}.dir/**/*.o")]
+    if not objects:
+        pytest.skip("this machine's build has one instruction set")
+    for path in objects:
+        symbols = run([nm, "--defined-only", "--demangle", path]).splitlines()
+        weak = [line for line in symbols if re.match(r"\w+ [WVu] ", line)]
+        assert weak == [], path.name
