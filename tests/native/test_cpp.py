@@ -1,4 +1,4 @@
-"""Builds the C++ tests with CMake and runs each of them: as users get the core, without optimisation, and under sanitizers.
+"""Builds the C++ tests with CMake and runs them: as users get the core, without optimisation, and under sanitizers.
 
     pytest tests/native -m "not slow"     only the release build
 

@@ -1,0 +1,154 @@
+"""Layer order, cycles, heavy and native imports and the size of files, read from the source without importing it."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[1] / "src" / "racecraft"
+NATIVE = Path(__file__).parents[1] / "native"
+LAYERS = (
+    "errors",
+    "track",
+    "sim",
+    "reward",
+    "agent",
+    "env",
+    "learn",
+    "run",
+    "race",
+    "training",
+    "serve",
+    "bench",
+    "cli",
+)
+FACADE = ("__init__", "__main__")
+TORCH = ("learn/torch_",)
+CORE = ("sim/", "learn/native_")
+MAX_LINES = 500
+
+
+def modules(source: Path) -> dict[str, Path]:
+    """Dotted name to file; a package is its __init__."""
+    names = {}
+    for path in sorted(source.rglob("*.py")):
+        parts = ("racecraft", *path.relative_to(source).with_suffix("").parts)
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return names
+
+
+def imports(path: Path, name: str, known: dict[str, Path]) -> set[str]:
+    """Dotted names of all that a file imports, wherever in it; a name of ours is that of the module that holds it."""
+    package = name if path.stem == "__init__" else name.rpartition(".")[0]
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = ".".join(package.split(".")[: len(package.split(".")) - node.level + 1]) if node.level else ""
+            base = ".".join(filter(None, (base, node.module)))
+            for alias in node.names:
+                inner = f"{base}.{alias.name}"
+                found.add(inner if inner in known or alias.name == "_native" else base)
+    return found
+
+
+def layer_of(name: str) -> str:
+    return [*name.split("."), "__init__"][1]
+
+
+def rank(layer: str) -> int:
+    """Place in the order of layers."""
+    return LAYERS.index(layer) if layer in LAYERS else -1
+
+
+def violations(source: Path) -> list[str]:
+    known = modules(source)
+    graph = {name: imports(path, name, known) for name, path in known.items()}
+    found = []
+    for name, targets in graph.items():
+        file, layer = known[name].relative_to(source).as_posix(), layer_of(name)
+        lines = len(known[name].read_text(encoding="utf-8").splitlines())
+        if lines > MAX_LINES:
+            found.append(f"{file} has {lines} lines, more than {MAX_LINES}")
+        if layer not in (*LAYERS, *FACADE):
+            found.append(f"{file} belongs to no layer")
+            continue
+        for target in sorted(targets):
+            if target.split(".")[0] == "torch" and not file.startswith(TORCH):
+                found.append(f"{file} imports torch")
+            if target == "racecraft._native":
+                if not file.startswith(CORE):
+                    found.append(f"{file} imports the native core")
+            elif target == "racecraft" and layer not in ("cli", "bench", *FACADE):
+                found.append(f"{file} imports the facade")
+            elif target.startswith("racecraft.") and layer in LAYERS and rank(layer_of(target)) > rank(layer):
+                found.append(f"{file} imports {target}, a layer above its own")
+    return found + [f"import cycle: {' -> '.join(cycle)}" for cycle in cycles(graph)]
+
+
+def cycles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """One way round for every import that leads back to where it came from."""
+    found, done = [], set()
+
+    def visit(name: str, path: list[str]) -> None:
+        if name in path:
+            found.append([*path[path.index(name) :], name])
+        elif name in graph and name not in done:
+            for target in sorted(graph[name]):
+                visit(target, [*path, name])
+            done.add(name)
+
+    for name in graph:
+        visit(name, [])
+    return found
+
+
+def test_the_source_keeps_to_the_architecture():
+    assert len(modules(SOURCE)) > 50
+    assert violations(SOURCE) == []
+
+
+def test_native_files_keep_to_the_size_budget():
+    sizes = {path.name: len(path.read_text().splitlines()) for path in NATIVE.glob("**/*.?pp")}
+    assert {name: lines for name, lines in sizes.items() if lines > MAX_LINES} == {}
+
+
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({"sim/a.py": "from racecraft.track.b import c", "track/b.py": "c = 1"}, None),
+        ({"track/a.py": "from racecraft.sim.b import c"}, "track/a.py imports racecraft.sim.b, a layer above its own"),
+        ({"track/a.py": "def f():\n    import racecraft.race"}, "a layer above its own"),
+        ({"track/a.py": "from ..learn import ppo"}, "track/a.py imports racecraft.learn"),
+        ({"errors.py": "from racecraft.track.a import b"}, "errors.py imports racecraft.track.a"),
+        ({"env/a.py": "from racecraft import train"}, "env/a.py imports the facade"),
+        ({"env/a.py": "import racecraft"}, "env/a.py imports the facade"),
+        ({"cli.py": "import racecraft"}, None),
+        ({"run/a.py": "import torch.nn"}, "run/a.py imports torch"),
+        ({"learn/torch_a.py": "from torch import nn"}, None),
+        ({"race/a.py": "from racecraft import _native"}, "race/a.py imports the native core"),
+        ({"race/a.py": "from racecraft._native import Engine"}, "race/a.py imports the native core"),
+        ({"sim/a.py": "from racecraft import _native"}, None),
+        ({"utils/a.py": ""}, "utils/a.py belongs to no layer"),
+        ({"run/a.py": "x = 1\n" * 501}, "run/a.py has 501 lines, more than 500"),
+        (
+            {"run/a.py": "from racecraft.run.b import x", "run/b.py": "from . import a"},
+            "import cycle: racecraft.run.a -> racecraft.run.b -> racecraft.run.a",
+        ),
+        (
+            {"run/__init__.py": "from racecraft.run.a import x", "run/a.py": "from racecraft.run import y"},
+            "import cycle: racecraft.run -> racecraft.run.a -> racecraft.run",
+        ),
+    ],
+)
+def test_a_made_up_tree_is_judged(tmp_path, files, expected):
+    for name, text in files.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    found = violations(tmp_path)
+    assert len(found) == (expected is not None), found
+    assert expected is None or expected in found[0]
