@@ -47,7 +47,7 @@ clean:  ## remove the environment and everything built
 	rm -rf $(VENV) build
 
 requirements: $(UV)  ## pin the newest allowed versions again
-	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header --extra torch pyproject.toml requirements/build.in -o requirements/train.txt
+	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header pyproject.toml requirements/build.in -o requirements/train.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/dev.in -o requirements/dev.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/uv.in -o requirements/uv.txt
 
