@@ -95,7 +95,10 @@ class PPOConfig:
 
 
 class Environment(Protocol):
-    """A batch of cars to learn from. An episode's last step tells how it ended; ``reset`` begins another."""
+    """A batch of cars to learn from. An episode's last step tells how it ended; ``reset`` begins another.
+
+    A car that is not reset after its episode has ended stands, and what steps say about it means nothing.
+    """
 
     @property
     def num_envs(self) -> int:
@@ -275,8 +278,9 @@ class PPO:
             self._episode_returns[done], self._episode_lengths[done] = 0.0, 0
             if episodes:
                 quota -= done & is_driving
-            if done.any():
-                environment.reset(done)
+            begins = done & (quota > 0)
+            if begins.any():
+                environment.reset(begins)
             self._clocks["policy"] += acted - started
             self._clocks["environment"] += time.perf_counter() - acted
 

@@ -264,7 +264,10 @@ def line_of(error: BaseException) -> int:
 
 
 def line_of_return(reward_function: Reward, params: dict[str, Any]) -> int:
-    """The line that returns the value for these params, found by calling the function again under a trace."""
+    """The line that returns the bad value for these params, found by calling the function again under a trace.
+
+    A function that remembers or draws random numbers may return a good one this time; then it is not known: -1.
+    """
     line = -1
 
     def trace(frame: FrameType, event: str, value: object) -> Any:
@@ -277,12 +280,16 @@ def line_of_return(reward_function: Reward, params: dict[str, Any]) -> int:
 
     sys.settrace(trace)
     try:
-        reward_function(params)
+        returned = reward_function(params)
     except BaseException:
         return -1
     finally:
         sys.settrace(None)
-    return line
+    try:
+        is_good = abs(to_float(returned)) <= REWARD_LIMIT
+    except BadRewardError:
+        is_good = False
+    return -1 if is_good else line
 
 
 def describe(error: BaseException) -> bytes:

@@ -188,7 +188,11 @@ class RunFolder:
             document = read_json_object(path)
             if document.pop("format") != FORMAT:
                 raise RunError(f"{path} was written by another version of Racecraft.", hint="Update Racecraft.")
-            return RunInfo(**document)
+            info = RunInfo(**document)
+            for name, kind in (("seed", int), ("track", str), ("track_digest", str), ("settings", dict)):
+                if not isinstance(getattr(info, name), kind):
+                    raise TypeError(f"{name} in run.json is {getattr(info, name)!r}.")
+            return info
         except (ConfigError, KeyError, TypeError) as error:
             raise RunError(f"{self.path} cannot be opened: {error}") from error
 

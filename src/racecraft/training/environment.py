@@ -46,6 +46,7 @@ class TrainingEnvironment:
         self.reward_seconds = 0.0
         self.trace_seconds = 0.0
         self._finished: list[Episode] = []
+        self._is_driving = np.ones(simulation.num_envs, bool)  # not between an episode's end and the next reset
 
     @property
     def num_envs(self) -> int:
@@ -68,8 +69,10 @@ class TrainingEnvironment:
         rewards = self.worker(simulation.rows)
         paid = time.perf_counter()
         terminated, truncated = simulation.terminated.copy(), simulation.truncated.copy()
-        ended = self.counter.update(simulation.rows, rewards, terminated | truncated)
+        done = (terminated | truncated) & self._is_driving
+        ended = self.counter.update(simulation.rows, rewards, done)
         self._finished += ended
+        self._is_driving &= ~done
         if self.trace is not None:
             self.trace.write(simulation.rows, actions=actions, rewards=rewards, ended=ended)
         self.reward_seconds += paid - moved
@@ -78,6 +81,7 @@ class TrainingEnvironment:
 
     def reset(self, mask: NDArray[np.bool_]) -> None:
         """Put the cars of the mask (N,) at their next start; what they were driving does not count."""
+        self._is_driving |= mask
         self.counter.abandon(mask)
         if self.trace is not None:
             self.trace.abandon(mask)

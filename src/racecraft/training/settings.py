@@ -67,6 +67,8 @@ class TrainSettings:
         ):
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 raise ConfigError(f"{name} is {value!r}; allowed is a whole number from {low} to {high}.")
+        if not isinstance(self.until, Until):
+            raise ConfigError(f"until is {self.until!r}; allowed is a text such as '5 laps'.")
         if self.until.laps > self.evaluation_trials:
             object.__setattr__(self, "evaluation_trials", self.until.laps)
 

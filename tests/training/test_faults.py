@@ -1,0 +1,164 @@
+"""What may go wrong in the middle of a training: one clear error, and a checkpoint that is good."""
+
+from __future__ import annotations
+
+import errno
+import os
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from tiny_runs import Recorder, Train, assert_same
+
+from racecraft.errors import CheckpointError, RacecraftError, RewardError, RunError, TrainingError
+from racecraft.learn import UpdateStats, make_learner
+from racecraft.reward import RewardWorker
+from racecraft.run import RunFolder, checkpoint, metrics, simtrace
+from racecraft.training import job, resume
+
+# Never true in the dry run, whose only situation off the track has 95 steps.
+LATE = """\
+def reward_function(params):
+    if params['is_offtrack'] and params['steps'] != 95:
+        {fault}
+    return 1.0
+"""
+# Fails in the 20th call for a car: after the dry run, which makes 14.
+LATER = """\
+calls = 0
+def reward_function(params):
+    global calls
+    calls += 1
+    if calls == 20:
+        return None
+    return 1.0
+"""
+FAULTS = {
+    "exception": ("return 1 / (params['steps'] - params['steps'])", "ZeroDivisionError"),
+    "key": ("return params['objects_distance'][9]", "IndexError"),
+    "nan": ("return float('nan')", "nan"),
+    "infinity": ("return -float('inf')", "inf"),
+    "none": ("return None", "None"),
+    "nothing": ("return", "None"),
+    "text": ("return str(params['steps'])", "text"),
+    "huge": ("return 1e6", "1000000"),
+    "hang": ("while True: pass", "within 0.3 s"),
+    "exit": ("raise SystemExit(3)", "exit"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_reward_that_fails_late_stops_with_line_and_params(
+    tiny: Train, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
+    code, says = FAULTS[fault]
+    source = tmp_path / "reward_function.py"
+    source.write_text(LATE.format(fault=code))
+    monkeypatch.setattr(job, "RewardWorker", partial(RewardWorker, timeout_s=0.3))
+    with pytest.raises(RewardError) as caught:
+        tiny(reward=source, name="mine", until="2048 steps", evaluate_every=64)
+    error = caught.value
+    assert says in str(error)
+    assert (error.line, error.params is not None) == (3, True)
+    assert "line 3" in str(error)
+    assert code.split("\n")[0] in str(error)
+    assert "params = {" in str(error)
+    run = tmp_path / "runs" / "mine"
+    assert "last checkpoint is good" in error.hint
+    assert f"--resume {run}" in error.hint
+    saved = RunFolder.open(run).checkpoints.load("last").step
+    assert saved >= 64
+
+    (run / "reward_function.py").write_text("def reward_function(params):\n    return 1.0\n")
+    assert resume(run, until=f"{saved + 64} steps").steps == saved + 64
+
+
+def test_a_reward_that_fails_before_the_first_checkpoint_says_how_to_go_on(tiny: Train, tmp_path: Path) -> None:
+    source = tmp_path / "reward_function.py"
+    source.write_text(LATER)
+    with pytest.raises(RewardError, match="returned None") as caught:
+        tiny(reward=source, name="mine", evaluate_every=512)
+    assert "Correct" in caught.value.hint
+    assert "checkpoint is good" not in caught.value.hint
+    (tmp_path / "runs" / "mine" / "reward_function.py").write_text(LATER.replace("20", "-1"))
+    assert resume(tmp_path / "runs" / "mine").steps == 512
+
+
+def test_a_reward_edited_badly_is_refused_on_resume(tiny: Train) -> None:
+    run = tiny(until="128 steps").run
+    (run / "reward_function.py").write_text("def reward_function(params):\n    return params['sped']\n")
+    with pytest.raises(RewardError, match="sped"):
+        resume(run, until="256 steps")
+
+
+def _no_space(*_: Any, **__: Any) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_full_disk_at_a_checkpoint_leaves_the_ones_before(
+    tiny: Train, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill(step: int) -> None:
+        if step == 320:
+            monkeypatch.setattr(checkpoint, "write_file", _no_space)
+
+    with pytest.raises(CheckpointError, match="No space") as caught:
+        tiny(name="mine", reporter=Recorder(fill))
+    assert "earlier checkpoints are good" in caught.value.hint
+    monkeypatch.undo()
+    run = tmp_path / "runs" / "mine"
+    last = RunFolder.open(run).checkpoints.last
+    assert last is not None
+    assert last.step == 256
+    resume(run)
+    assert_same(run, tiny().run)
+
+
+@pytest.mark.parametrize("log", ["metrics", "sim-trace"])
+def test_a_full_disk_at_a_log_is_one_clear_error(
+    tiny: Train, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: str
+) -> None:
+    def fill(step: int) -> None:
+        if step == 256 and log == "metrics":
+            monkeypatch.setattr(metrics, "write_file", _no_space)
+        elif step == 256:
+            monkeypatch.setattr(simtrace.SimTraceWriter, "_write", write)
+
+    def write(writer: simtrace.SimTraceWriter, text: str) -> None:
+        if writer._file is not None:
+            writer._file.close()
+        writer._file = SimpleNamespace(write=_no_space, close=lambda: None)  # type: ignore[assignment]
+        write_for_real(writer, text)
+
+    write_for_real = simtrace.SimTraceWriter._write
+    with pytest.raises(RunError, match="No space") as caught:
+        tiny(name="mine", reporter=Recorder(fill), until="2048 steps")
+    monkeypatch.undo()
+    assert "--resume" in caught.value.hint
+    assert resume(tmp_path / "runs" / "mine").steps == 2048
+
+
+def test_a_loss_that_is_not_finite_stops_and_the_checkpoint_is_good(
+    tiny: Train, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def spoil(*arguments: Any, **settings: Any) -> Any:
+        learner = make_learner(*arguments, **settings)
+        update, count = learner.update, [0]
+
+        def spoiled(*minibatch: Any) -> UpdateStats:
+            count[0] += 1
+            stats = update(*minibatch)
+            return stats if count[0] < 9 else replace(stats, policy_loss=float("nan"))
+
+        monkeypatch.setattr(learner, "update", spoiled)
+        return learner
+
+    monkeypatch.setattr(job, "make_learner", spoil)
+    with pytest.raises(TrainingError) as caught:
+        tiny(name="mine")
+    assert isinstance(caught.value, RacecraftError)
+    monkeypatch.undo()
+    assert resume(tmp_path / "runs" / "mine").steps == 512
