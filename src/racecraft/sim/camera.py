@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from racecraft.errors import ConfigError
+from racecraft.sim.checks import check_number, check_whole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,9 +30,9 @@ class CameraSpec:
     """Colours of the world: ``2018`` or ``2020``."""
 
     def __post_init__(self) -> None:
+        check_whole("Camera setting width", self.width, 8, 2048)
+        check_whole("Camera setting height", self.height, 8, 2048)
         limits = {
-            "width": (8, 2048),
-            "height": (8, 2048),
             "horizontal_fov": (0.1, 2.8),
             "forward": (-2.0, 2.0),
             "left": (-2.0, 2.0),
@@ -39,8 +40,6 @@ class CameraSpec:
             "pitch": (0.0, 1.5),
         }
         for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ConfigError(f"Camera setting {name} is {value!r}; allowed is {low} to {high}.")
+            check_number(f"Camera setting {name}", getattr(self, name), low, high)
         if self.palette not in ("2018", "2020"):
             raise ConfigError(f"Camera palette is {self.palette!r}; allowed are '2018' and '2020'.")

@@ -12,6 +12,7 @@ import atexit
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from racecraft import _native
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError, did_you_mean
 from racecraft.sim.camera import CameraSpec
+from racecraft.sim.checks import check_number, check_type, check_whole
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track.track import Track
@@ -55,7 +57,7 @@ class Start:
 
     def __post_init__(self) -> None:
         if self.mode not in START_MODES:
-            hint = did_you_mean(self.mode, START_MODES)
+            hint = did_you_mean(str(self.mode), START_MODES)
             raise ConfigError(f"Start mode is {self.mode!r}; allowed are {', '.join(START_MODES)}. {hint}".strip())
         limits = {
             "offset": (-1.0, 1.0),
@@ -64,9 +66,8 @@ class Start:
             "heading_jitter": (0.0, np.pi),
         }
         for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ConfigError(f"Start setting {name} is {value!r}; allowed is {low:g} to {high:g}.")
+            check_number(f"Start setting {name}", getattr(self, name), low, high)
+        check_type("Start setting spread", self.spread, bool, "allowed are True and False")
 
 
 class Simulation:
@@ -111,7 +112,7 @@ class Simulation:
         *,
         num_envs: int = 1,
         seed: int = 0,
-        vehicle: Vehicle | str = "v5",
+        vehicle: Vehicle | str | Path = "v5",
         camera: CameraSpec | None = CameraSpec(),
         start: Start = Start(),
         direction: str = "forward",
@@ -121,19 +122,24 @@ class Simulation:
         substeps: int = 8,
         num_threads: int = 0,
     ) -> None:
-        self.tracks = (tracks,) if isinstance(tracks, Track) else tuple(tracks)
+        self.tracks: tuple[Track, ...] = tuple(tracks) if isinstance(tracks, list | tuple) else (tracks,)
         if not self.tracks:
             raise ConfigError("A simulation needs at least one track, got an empty list.")
+        for track in self.tracks:
+            check_type("track", track, Track, "get one with load_track(name or path)")
+        check_type("start", start, Start, "use racecraft.Start(...)")
+        if camera is not None:
+            check_type("camera", camera, CameraSpec, "use racecraft.CameraSpec(...), or None")
+        check_type("vehicle", vehicle, (Vehicle, str, Path), "use a preset's name, a file or racecraft.Vehicle(...)")
         if direction not in DIRECTIONS:
             raise ConfigError(f"direction is {direction!r}; allowed are {', '.join(DIRECTIONS)}.")
-        _check_range("num_envs", num_envs, 1, 1_000_000)
-        _check_range("seed", seed, 0, 2**64 - 1)
-        _check_range("laps", laps, 1, 1_000_000)
-        _check_range("max_steps", max_steps, 2, 2**31 - 1)
-        _check_range("substeps", substeps, 4, 128)
-        _check_range("num_threads", num_threads, 0, 1024)
-        if not 0.0 <= time_limit < 1e9:
-            raise ConfigError(f"time_limit is {time_limit!r}; allowed is 0 (none) to 1e9 seconds.")
+        check_whole("num_envs", num_envs, 1, 1_000_000)
+        check_whole("seed", seed, 0, 2**64 - 1)
+        check_whole("laps", laps, 1, 1_000_000)
+        check_whole("max_steps", max_steps, 2, 2**31 - 1)
+        check_whole("substeps", substeps, 4, 128)
+        check_whole("num_threads", num_threads, 0, 1024)
+        check_number("time_limit", time_limit, 0.0, 1e9)
 
         self.num_envs = num_envs
         self.seed = seed
@@ -227,7 +233,11 @@ class Simulation:
             ShapeError: Wrong shape.
             NonFiniteAction: An action is NaN or infinite; nothing has moved.
         """
-        commands = np.ascontiguousarray(actions, dtype=np.float32)
+        try:
+            with np.errstate(over="ignore"):  # infinity is refused below
+                commands = np.ascontiguousarray(actions, dtype=np.float32)
+        except (TypeError, ValueError) as error:
+            raise ShapeError(f"actions are not an array of numbers: {error}.") from error
         if commands.shape != (self.num_envs, 2):
             raise ShapeError(
                 f"action has shape {commands.shape}, expected ({self.num_envs}, 2): "
@@ -244,16 +254,19 @@ class Simulation:
         """Put one car's origin somewhere within its episode, wheels straight; its frame and state follow at once.
 
         Raises:
-            ConfigError: No such car, or a value that is not finite.
+            ConfigError: No such car, or a value out of range.
         """
-        _check_range("env", env, 0, self.num_envs - 1)
-        for name, value in {"x": x, "y": y, "heading": heading, "speed": speed}.items():
-            if not abs(value) < 1e5:
-                raise ConfigError(f"{name} of a pose is {value!r}; it must be finite and below 1e5.")
+        check_whole("env", env, 0, self.num_envs - 1)
+        for name, value in {"x": x, "y": y, "heading": heading}.items():
+            check_number(f"{name} of a pose", value, -1e5, 1e5)
+        check_number("speed of a pose", speed, 0.0, 10.0)
         self._engine.set_pose(env, x, y, heading, speed)
 
     def place(self, env: int, arc_length: float, *, offset: float = 0.0, speed: float = 0.0) -> None:
         """Put one car on its track, `arc_length` metres along and `offset` metres left of the centre line."""
+        check_whole("env", env, 0, self.num_envs - 1)
+        check_number("arc_length", arc_length, -1e5, 1e5)
+        check_number("offset", offset, -1e3, 1e3)
         track = self.driven_track(env)
         heading = float(track.heading_at(arc_length))
         x, y = track.point_at(arc_length)
@@ -261,14 +274,15 @@ class Simulation:
 
     def driven_track(self, env: int) -> Track:
         """The track of a car's current episode, in its driving direction."""
+        check_whole("env", env, 0, self.num_envs - 1)
         index = int(self.column("track_index")[env])
         track = self.tracks[index % len(self.tracks)]
         return track.reversed() if index >= len(self.tracks) else track
 
     def freeze(self, env: int, steps: int) -> None:
         """Keep one car standing for so many steps from now on, as a penalty; its status is then ``pause``."""
-        _check_range("env", env, 0, self.num_envs - 1)
-        _check_range("steps", steps, 0, 2**31 - 1)
+        check_whole("env", env, 0, self.num_envs - 1)
+        check_whole("steps", steps, 0, 2**31 - 1)
         self._engine.freeze(env, steps)
 
     def save(self) -> NDArray[np.uint8]:
@@ -334,8 +348,3 @@ def _native_track(track: Track) -> _native.NativeTrack:
         steps / track.length,
         track.is_closed,
     )
-
-
-def _check_range(name: str, value: int, low: int, high: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
-        raise ConfigError(f"{name} is {value!r}; allowed is a whole number from {low} to {high}.")

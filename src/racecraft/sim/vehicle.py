@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from racecraft.errors import ConfigError, did_you_mean
+from racecraft.sim.checks import check_number
 
 MAX_FILE_BYTES: Final = 100_000
 
@@ -53,10 +54,7 @@ class Vehicle:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            low, high = LIMITS[field.name]
-            if not isinstance(value, int | float) or isinstance(value, bool) or not low <= value <= high:
-                raise ConfigError(f"Vehicle parameter {field.name} is {value!r}; allowed is {low} to {high}.")
+            check_number(f"Vehicle parameter {field.name}", getattr(self, field.name), *LIMITS[field.name])
         least = MIN_INERTIA_RATIO * self.mass * self.front_axle * self.rear_axle
         if self.yaw_inertia < least:
             raise ConfigError(
