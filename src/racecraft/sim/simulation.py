@@ -122,7 +122,10 @@ class Simulation:
         substeps: int = 8,
         num_threads: int = 0,
     ) -> None:
-        self.tracks: tuple[Track, ...] = tuple(tracks) if isinstance(tracks, list | tuple) else (tracks,)
+        if isinstance(tracks, Track):
+            tracks = (tracks,)
+        check_type("tracks", tracks, (tuple, list), "give a Track, or several in a list; load_track(name) gets one")
+        self.tracks = tuple(tracks)
         if not self.tracks:
             raise ConfigError("A simulation needs at least one track, got an empty list.")
         for track in self.tracks:
