@@ -1,10 +1,11 @@
-"""The live view of a training in a terminal: two curves, the numbers that matter, and what happened last."""
+"""The live view of a training in a terminal: a curve of the whole run, the numbers that matter, the evaluations."""
 
 from __future__ import annotations
 
-import math
 from collections import deque
+from typing import Final, Self
 
+import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.panel import Panel
@@ -13,35 +14,38 @@ from rich.text import Text
 
 from racecraft.training.progress import EvaluationReport, IterationReport
 
-CURVE_WIDTH = 48  # characters, two points each
-CURVE_ROWS = 6
-NOTES = 4
+MAX_WIDTH: Final = 100  # characters; wider than this is hard to read
+NARROW: Final = 72  # characters; below it there is no room for the curve
+NUMBERS_WIDTH: Final = 30  # characters
+CURVE_ROWS: Final = 7
+EVALUATIONS: Final = 5  # that are listed
+NOTES: Final = 2
+REFRESH: Final = 4  # pictures per second; each takes some milliseconds from the training
+AXIS: Final = ("100 %", "", "", " 50 %", "", "", "  0 %")
 # Braille cells: one bit per dot, columns left and right, rows from the bottom up.
-_DOTS = ((0x40, 0x04, 0x02, 0x01), (0x80, 0x20, 0x10, 0x08))
+_DOTS: Final = ((0x40, 0x04, 0x02, 0x01), (0x80, 0x20, 0x10, 0x08))
 
 
-def curve(values: list[float], *, low: float, high: float, width: int, rows: int) -> list[str]:
-    """A filled curve in Braille dots, two points to a character, the newest at the right.
+def curve(values: list[float], *, width: int, rows: int) -> list[str]:
+    """A filled curve in Braille dots, stretched or squeezed to the width, two points to a character.
 
     Args:
-        values: Points, oldest first; the last ``2 * width`` are shown.
-        low: Value at the bottom.
-        high: Value at the top.
+        values: Points from 0 to 1, oldest first; NaN where nothing is known.
         width: Characters.
         rows: Lines.
 
     Returns:
         Lines, top first.
     """
-    points = values[-2 * width :]
-    points = [math.nan] * (2 * width - len(points)) + points
+    heights = np.array(values, np.float64)
+    known = np.flatnonzero(np.isfinite(heights))
     cells = [[0x2800] * width for _ in range(rows)]
-    for i, value in enumerate(points):
-        if not math.isfinite(value):
-            continue
-        height = round((min(max(value, low), high) - low) / (high - low) * (4 * rows - 1))
-        for dot in range(height + 1):
-            cells[rows - 1 - dot // 4][i // 2] |= _DOTS[i % 2][dot % 4]
+    if len(known):
+        places = np.linspace(0.0, max(len(values) - 1, 1), 2 * width)
+        points = np.interp(places, known, heights[known], left=np.nan).clip(0.0, 1.0)
+        for column in np.flatnonzero(np.isfinite(points)).tolist():
+            for dot in range(round(float(points[column]) * (4 * rows - 1)) + 1):
+                cells[rows - 1 - dot // 4][column // 2] |= _DOTS[column % 2][dot % 4]
     return ["".join(map(chr, row)) for row in cells]
 
 
@@ -49,100 +53,156 @@ class TerminalReporter:
     """Redraws a panel while training goes on; a context manager.
 
     Without a terminal (a pipe, a log file) it prints one line per evaluation instead.
+
+    Args:
+        title: What is trained.
+        console: Where to; by default stderr, so that stdout is free for the result.
     """
 
     def __init__(self, *, title: str, console: Console | None = None) -> None:
         self.console = console or Console(stderr=True)
         self.title = title
-        self._training: list[float] = []
-        self._rewards: list[float] = []
+        self._completions: list[float] = []
         self._evaluations: list[EvaluationReport] = []
         self._notes: deque[str] = deque(maxlen=NOTES)
         self._latest: IterationReport | None = None
-        self._live = (
-            Live(self._render(), console=self.console, refresh_per_second=8) if self.console.is_terminal else None
-        )
+        self._live: Live | None = None
+        if self.console.is_terminal:
+            self._live = Live(get_renderable=self._picture, console=self.console, refresh_per_second=REFRESH)
 
-    def __enter__(self) -> TerminalReporter:
+    def __enter__(self) -> Self:
         """Take the lower part of the terminal."""
         if self._live is not None:
             self._live.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave the last picture standing."""
+        """Leave the last picture standing; none, where nothing was trained."""
         if self._live is not None:
-            self._live.update(self._render())
+            self._live.transient = self._latest is None
             self._live.stop()
+            if self._latest is None:
+                for note in self._notes:
+                    self._print(note)
 
     def note(self, text: str) -> None:
-        """Show a line under the curves."""
+        """Show a line below the evaluations."""
         self._notes.append(text)
-        self._show(text)
+        if self._live is None:
+            self._print(text)
 
     def iteration(self, report: IterationReport) -> None:
-        """Move the training curve on."""
+        """Move the curve on."""
         self._latest = report
-        self._training.append(report.completion)
-        self._rewards.append(report.mean_reward)
-        if self._live is not None:
-            self._live.update(self._render())
+        self._completions.append(report.completion)
 
     def evaluation(self, report: EvaluationReport) -> None:
         """Note how the policy does when it means it."""
         self._evaluations.append(report)
-        lap = f", best lap {report.best_lap:.2f} s" if report.best_lap is not None else ""
-        trials = len(report.completions)
-        self.note(
-            f"{report.seconds:6.1f} s  step {report.step:>9,}  evaluation: {report.laps_completed} of {trials} laps, "
-            f"{100 * report.completion:.0f} % of the way{lap}{'  *best*' if report.is_best else ''}"
-        )
-
-    def _show(self, line: str) -> None:
         if self._live is None:
-            self.console.print(line, highlight=False)
+            lap = f"  best lap {report.best_lap:.2f} s" if report.best_lap is not None else ""
+            self._print(
+                f"{report.seconds:7.1f} s {report.step:>11,} steps  {_laps(report):>10}  "
+                f"{100 * report.completion:3.0f} %{lap}{'  (best so far)' if report.is_best else ''}"
+            )
+
+    def _print(self, line: str) -> None:
+        self.console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+    # ---- the picture
+
+    def _picture(self) -> RenderableType:
+        width = min(self.console.width, MAX_WIDTH)
+        inside = width - 4
+        if width < NARROW:
+            parts: list[RenderableType] = [self._numbers()]
         else:
-            self._live.update(self._render())
+            columns = Table.grid(padding=(0, 3, 0, 0))
+            columns.add_column(width=inside - NUMBERS_WIDTH - 3, no_wrap=True)
+            columns.add_column(width=NUMBERS_WIDTH)
+            columns.add_row(self._graph(inside - NUMBERS_WIDTH - 3), self._numbers())
+            parts = [columns, Text(), self._list()]
+        parts += [Text(note, style="dim", no_wrap=True, overflow="ellipsis") for note in self._notes]
+        return Panel(Group(*parts), title=Text(f" {self.title} ", style="bold"), border_style="cyan", width=width)
 
-    def _render(self) -> RenderableType:
-        grid = Table.grid(padding=(0, 3))
-        grid.add_column()
-        grid.add_column()
-        training = self._training
-        lines = curve(training, low=0.0, high=1.0, width=CURVE_WIDTH, rows=CURVE_ROWS)
-        axis = ["100 %", *[""] * (CURVE_ROWS - 2), "  0 %"]
-        graph = Text("Lap completed while training\n", style="bold")
-        for label, line in zip(axis, lines, strict=True):
-            graph.append(f"{label:>6} ", style="dim")
-            graph.append(line + "\n", style="cyan")
-        grid.add_row(graph, self._numbers())
-        notes = Text("\n".join(self._notes), style="dim")
-        return Panel(Group(grid, notes), title=f"[bold]{self.title}[/bold]", border_style="cyan", expand=False)
+    def _graph(self, width: int) -> Text:
+        """Completion over the camera steps of this session: the curve while training, a dot for each evaluation."""
+        curve_width = width - len(AXIS[0]) - 1
+        lines = curve(self._completions, width=curve_width, rows=CURVE_ROWS)
+        steps = self._latest.stats.total_steps if self._latest is not None else 0
+        first = steps - (self._latest.stats.num_steps * len(self._completions) if self._latest is not None else 0)
+        dots: dict[tuple[int, int], str] = {}
+        for report in self._evaluations:
+            share = (report.step - first) / max(steps - first, 1)
+            column = round(min(max(share, 0.0), 1.0) * (curve_width - 1))
+            row = round((1.0 - report.completion) * (CURVE_ROWS - 1))
+            dots[row, column] = "bold green" if report.laps_completed == len(report.completions) else "bold yellow"
+        graph = Text.assemble(
+            ("lap completed  ", "bold"), ("█", "cyan"), (" training  ", "dim"), ("●", "bold yellow"), " evaluation\n"
+        )
+        for row, (label, line) in enumerate(zip(AXIS, lines, strict=True)):
+            graph.append(f"{label:>5} ", style="dim")
+            for column, cell in enumerate(line):
+                style = dots.get((row, column))
+                graph.append("●" if style else cell, style=style or "cyan")
+            graph.append("\n")
+        left, right = f"{max(first, 0):,}", f"{steps:,} steps"
+        graph.append(f"{'':6}{left}{right:>{max(curve_width - len(left), 0)}}", style="dim")
+        return graph
 
-    def _numbers(self) -> RenderableType:
-        numbers = Table.grid(padding=(0, 2))
-        numbers.add_column(style="dim")
-        numbers.add_column(justify="right")
+    def _numbers(self) -> Table:
+        numbers = Table.grid(padding=(0, 1), expand=True)
+        numbers.add_column(style="dim", no_wrap=True)
+        numbers.add_column(justify="right", no_wrap=True)
         report = self._latest
         if report is None:
             numbers.add_row("starting …", "")
             return numbers
-        best = max((e for e in self._evaluations), key=lambda e: (e.completion, -(e.best_lap or 1e6)), default=None)
         numbers.add_row("time", _clock(report.seconds))
-        numbers.add_row("left", "until the laps" if report.remaining is None else _clock(report.remaining))
+        numbers.add_row("left", "–" if report.remaining is None else _clock(report.remaining))
         numbers.add_row("camera steps", f"{report.stats.total_steps:,}")
-        numbers.add_row("steps per second", f"{report.steps_per_second:,.0f}")
+        numbers.add_row("steps per second", _figure(report.steps_per_second, ",.0f"))
         numbers.add_row("episodes", f"{report.episodes:,}")
-        numbers.add_row("reward per episode", f"{report.mean_reward:.2f}")
-        if best is not None:
-            style = "bold green" if best.laps_completed == len(best.completions) else "bold"
-            numbers.add_row(
-                "best evaluation", Text(f"{best.laps_completed} of {len(best.completions)} laps", style=style)
-            )
-            if best.best_lap is not None:
-                numbers.add_row("best lap", Text(f"{best.best_lap:.2f} s", style=style))
-        numbers.add_row("entropy", f"{report.stats.losses.entropy:.2f}")
+        numbers.add_row("reward per episode", _figure(report.mean_reward, ",.2f"))
+        numbers.add_row("entropy", _figure(report.stats.losses.entropy, ".2f"))
+        best = max(self._evaluations, key=_rank, default=None)
+        style = "bold green" if best is not None and best.laps_completed == len(best.completions) else "bold"
+        numbers.add_row("best evaluation", Text("–" if best is None else _laps(best), style=style))
+        lap = None if best is None else best.best_lap
+        numbers.add_row("best lap", Text("–" if lap is None else f"{lap:.2f} s", style=style))
         return numbers
+
+    def _list(self) -> Table:
+        """The last evaluations; empty lines stand for those to come, so that the panel keeps its height."""
+        table = Table.grid(padding=(0, 2, 0, 0))
+        for width in (10, 12, 12, 10, 9, 4):
+            table.add_column(width=width, justify="right", no_wrap=True)
+        table.add_row("evaluation", "steps", "laps", "completion", "best lap", "", style="dim")
+        shown = self._evaluations[-EVALUATIONS:]
+        for report in shown:
+            table.add_row(
+                f"{report.seconds:.1f} s",
+                f"{report.step:,}",
+                _laps(report),
+                f"{100 * report.completion:.0f} %",
+                "–" if report.best_lap is None else f"{report.best_lap:.2f} s",
+                Text("best", style="green") if report.is_best else "",
+            )
+        for _ in range(EVALUATIONS - len(shown)):
+            table.add_row()
+        return table
+
+
+def _rank(report: EvaluationReport) -> tuple[float, float]:
+    return report.completion, -(report.best_lap or 1e6)
+
+
+def _laps(report: EvaluationReport) -> str:
+    return f"{report.laps_completed} of {len(report.completions)} laps"
+
+
+def _figure(value: float, form: str) -> str:
+    return format(value, form) if value == value else "–"
 
 
 def _clock(seconds: float) -> str:
