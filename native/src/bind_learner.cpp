@@ -182,6 +182,17 @@ void bind_learner(nb::module_& m) {
             "part"_a, "values"_a)
         .def_prop_rw("num_updates", &Learner::num_updates, &Learner::set_num_updates)
         .def_prop_ro("num_parameters", [](const Learner& self) { return self.network().num_public; });
+
+    m.def(
+        "orthonormalize",
+        [](nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu> vectors) {
+            require(vectors.shape(0) <= vectors.shape(1), "There are more vectors than dimensions.");
+            double* data = vectors.data();
+            const size_t count = vectors.shape(0), length = vectors.shape(1);
+            nb::gil_scoped_release release;
+            RC_DISPATCH(orthonormalize, data, count, length);
+        },
+        "vectors"_a, "Make the rows orthonormal in place, each from itself and those before it.");
 }
 
 }  // namespace racecraft

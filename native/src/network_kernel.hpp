@@ -31,7 +31,8 @@ struct AdamStep {
 // the panel) within each, run by run. fold_frame: pools one image and folds blocks of pixels into channels.
 // sum_gradients: out = parts[0] + parts[1] + ..., each `stride` apart.
 // sum_of_squares: in double.
-// All pointers but `in` of a first layer are on a border of 16 floats.
+// orthonormalize: makes `count` independent vectors orthonormal, each from itself and those before it (Gram
+// and Schmidt). All pointers to floats but `in` of a first layer are on a border of 16 floats.
 #define RC_DECLARE(isa)                                                                                  \
     namespace isa {                                                                                      \
     void layer_forward(const LayerShape& shape, Activation activation, const float* weights,             \
@@ -51,6 +52,7 @@ struct AdamStep {
     double sum_of_squares(const float* values, size_t count);                                            \
     void adam(const AdamStep& step, const float* gradient, size_t count, float* moment1, float* moment2, \
               float* weights);                                                                           \
+    void orthonormalize(double* vectors, size_t count, size_t length);                                   \
     }
 RC_FOR_EACH_ISA(RC_DECLARE)
 #undef RC_DECLARE

@@ -135,3 +135,8 @@ class Learner:
 
     @property
     def num_parameters(self) -> int: ...
+
+def orthonormalize(vectors: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> None:
+    """
+    Make the rows orthonormal in place, each from itself and those before it.
+    """

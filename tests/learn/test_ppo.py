@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from conftest import StripeWorld
+from stripe_world import StripeWorld
 
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
-from racecraft.learn import PPO, NetworkSpec, PPOConfig
+from racecraft.learn import PPO, NetworkSpec, PPOConfig, make_learner
 from racecraft.learn.torch_learner import TorchLearner
 
 
@@ -21,11 +21,13 @@ def assert_same_weights(a: PPO, b: PPO) -> None:
         np.testing.assert_array_equal(array, b.learner.weights()[name], err_msg=name)
 
 
+@pytest.mark.parametrize("backend", ["native", "torch"])
 @pytest.mark.parametrize("is_discrete", [True, False])
-def test_learns_to_centre_the_stripe(is_discrete):
+def test_learns_to_centre_the_stripe(is_discrete, backend):
     config = PPOConfig(num_envs=32, num_steps=16, minibatch_size=128, update_epochs=4, learning_rate=1e-3, ent_coef=0.0)
     spec = NetworkSpec(num_actions=3 if is_discrete else 1, is_discrete=is_discrete, state_size=2)
-    ppo = ppo_for(config, spec=spec)
+    learner = make_learner(spec, num_threads=2, backend=backend)
+    ppo = PPO(config, learner, StripeWorld(config.num_envs))
     rewards = []
     for _ in range(12):
         ppo.iterate()

@@ -6,50 +6,11 @@ import sys
 
 import numpy as np
 import pytest
+from minibatches import OBJECTIVE, minibatch_for, reference_tower
 
 from racecraft.errors import CheckpointError, ConfigError
-from racecraft.learn import Minibatch, NetworkSpec, Objective, networks
-from racecraft.learn.distributions import log_prob
+from racecraft.learn import NetworkSpec, networks
 from racecraft.learn.torch_learner import TorchLearner
-
-OBJECTIVE = Objective(
-    learning_rate=1e-3, clip_coef=0.2, ent_coef=0.01, vf_coef=0.5, value_loss="mse", max_grad_norm=0.5
-)
-
-
-def minibatch_for(learner: TorchLearner, size: int = 192, *, seed: int = 0) -> Minibatch:
-    rng, spec = np.random.default_rng(seed), learner.spec
-    observations = learner.encode(rng.integers(0, 256, (size, *spec.frame_shape), dtype=np.uint8))
-    if spec.is_discrete:
-        actions = rng.integers(0, spec.num_actions, size)
-    else:
-        actions = rng.normal(size=(size, spec.num_actions)).astype(np.float32)
-    return Minibatch(
-        observations=observations,
-        states=rng.normal(size=(size, spec.state_size)).astype(np.float32),
-        actions=actions,
-        log_probs=log_prob(learner.policy(observations), actions, is_discrete=spec.is_discrete),
-        advantages=rng.normal(size=size).astype(np.float32),
-        returns=rng.normal(size=size).astype(np.float32),
-    )
-
-
-def reference_tower(spec: NetworkSpec, weights, frames, tower: str) -> np.ndarray:
-    """The camera tower, slowly and obviously, in float64."""
-    arch = networks.architecture(spec.name)
-    height, width = (side // arch.pool for side in spec.frame_shape)
-    pooled = frames.reshape(len(frames), height, arch.pool, width, arch.pool).mean((2, 4))
-    x = (np.floor(pooled + 0.5) / 255)[:, None]
-    for i, conv in enumerate(arch.convs, 1):
-        weight, bias = (weights[f"{tower}.conv{i}.{part}"].astype(float) for part in ("weight", "bias"))
-        windows = np.lib.stride_tricks.sliding_window_view(x, (conv.kernel, conv.kernel), (2, 3))
-        windows = windows[:, :, :: conv.stride, :: conv.stride]
-        x = np.einsum("nchwij,fcij->nfhw", windows, weight, optimize=True) + bias[:, None, None]
-        x = x.clip(0)
-    x = x.transpose(0, 2, 3, 1).reshape(len(x), -1)
-    for i in range(1, len(arch.dense) + 1):
-        x = (x @ weights[f"{tower}.dense{i}.weight"].T + weights[f"{tower}.dense{i}.bias"]).clip(0)
-    return x @ weights[f"{tower}.head.weight"].T + weights[f"{tower}.head.bias"]
 
 
 @pytest.mark.parametrize("name", networks.network_names())

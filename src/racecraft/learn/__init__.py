@@ -9,12 +9,12 @@ from racecraft.learn.networks import forward_operations, initial_weights, networ
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
 
-def make_learner(spec: NetworkSpec, *, seed: int = 0, num_threads: int = 0, backend: str = "auto") -> Learner:
+def make_learner(spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0, backend: str = "auto") -> Learner:
     """The learner for this machine.
 
     Args:
         spec: The network.
-        seed: Decides the initial weights.
+        seed: Decides the initial weights; None leaves them zero, for others to be loaded.
         num_threads: Threads for forward and backward passes; 0 takes every core the process may use.
         backend: ``"native"``, ``"torch"`` (the reference, needs the extra ``torch``), or ``"auto"``: native.
 

@@ -28,14 +28,14 @@ class NativeLearner:
 
     Args:
         spec: The network, any of ``racecraft.learn.networks``.
-        seed: Decides the initial weights.
+        seed: Decides the initial weights; None leaves them zero, for others to be loaded.
         num_threads: Threads for forward and backward passes; 0 takes every core the process may use.
 
     Raises:
         ConfigError: There is no such network, or it does not fit the camera's image.
     """
 
-    def __init__(self, spec: NetworkSpec, *, seed: int = 0, num_threads: int = 0) -> None:
+    def __init__(self, spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0) -> None:
         self.spec = spec
         self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
         self._shapes = networks.weight_shapes(spec)
@@ -57,7 +57,8 @@ class NativeLearner:
             )
         except ValueError as error:
             raise ConfigError(str(error)) from None
-        self.load_weights(networks.initial_weights(spec, seed=seed))
+        if seed is not None:
+            self.load_weights(networks.initial_weights(spec, seed=seed, orthonormalize=_native.orthonormalize))
 
     def encode(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Pool and lay out camera images (N, H, W) as (N, *observation_shape)."""

@@ -9,6 +9,7 @@ A backend needs nothing but this file.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,8 +166,22 @@ def weight_shapes(spec: NetworkSpec) -> dict[str, tuple[int, ...]]:
     return shapes
 
 
-def initial_weights(spec: NetworkSpec, *, seed: int) -> Weights:
-    """Orthogonal weights (gain √2 inside, 0.01 before the policy, 1 before the value), all else zero."""
+def orthonormalize_by_qr(vectors: NDArray[np.float64]) -> None:
+    """Make the rows orthonormal in place, each from itself and those before it; the bits are LAPACK's."""
+    q, r = np.linalg.qr(vectors.T)
+    vectors[:] = (q * np.sign(np.diag(r))).T
+
+
+def initial_weights(
+    spec: NetworkSpec, *, seed: int, orthonormalize: Callable[[NDArray[np.float64]], None] = orthonormalize_by_qr
+) -> Weights:
+    """Orthogonal weights (gain √2 inside, 0.01 before the policy, 1 before the value), all else zero.
+
+    Args:
+        spec: The network.
+        seed: Decides the weights.
+        orthonormalize: Does what ``orthonormalize_by_qr`` does.
+    """
     rng = np.random.default_rng([seed, 0x6E6574])
     weights: Weights = {}
     for name, shape in weight_shapes(spec).items():
@@ -174,7 +189,11 @@ def initial_weights(spec: NetworkSpec, *, seed: int) -> Weights:
             weights[name] = np.zeros(shape, np.float32)
             continue
         gain = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}.get(name, 2.0**0.5)
-        weights[name] = (gain * _orthogonal(rng, shape[0], int(np.prod(shape[1:])))).reshape(shape).astype(np.float32)
+        rows, columns = shape[0], int(np.prod(shape[1:]))
+        vectors = np.ascontiguousarray(rng.standard_normal((max(rows, columns), min(rows, columns))).T)
+        orthonormalize(vectors)
+        matrix = vectors if rows < columns else vectors.T
+        weights[name] = (gain * matrix).reshape(shape).astype(np.float32)
     return weights
 
 
@@ -198,11 +217,3 @@ def forward_operations(spec: NetworkSpec) -> int:
             places = height * width
         total += 2 * places * int(np.prod(shape))
     return total
-
-
-def _orthogonal(rng: np.random.Generator, rows: int, columns: int) -> NDArray[np.float64]:
-    """A random matrix with orthonormal rows, or columns where there are fewer  (rows, columns)."""
-    tall = rng.standard_normal((max(rows, columns), min(rows, columns)))
-    q, r = np.linalg.qr(tall)
-    q *= np.sign(np.diag(r))  # makes the distribution uniform and independent of LAPACK's sign choice
-    return q if rows >= columns else q.T

@@ -37,13 +37,15 @@ class TorchLearner:
 
     Args:
         spec: The network.
-        seed: Decides the initial weights.
+        seed: Decides the initial weights; None leaves them zero, for others to be loaded.
         num_threads: Threads for forward and backward passes; 0 takes every core the process may use.
         precision: ``"float32"``, ``"bfloat16"``, or ``"auto"``: bfloat16 where the CPU has it.
             Weights, loss and optimiser are float32 in any case.
     """
 
-    def __init__(self, spec: NetworkSpec, *, seed: int = 0, num_threads: int = 0, precision: str = "auto") -> None:
+    def __init__(
+        self, spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0, precision: str = "auto"
+    ) -> None:
         self.spec = spec
         self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
         self._dtype = _dtype(precision)
@@ -56,7 +58,8 @@ class TorchLearner:
         self._pool = ThreadPoolExecutor(num_threads or _num_cores(), "learner", initializer=_prepare_thread)
         self._shards: list[tuple[Tensor, torch_networks.Parameters]] = []
         self._parameters = self._views(self._flat)
-        self.load_weights(networks.initial_weights(spec, seed=seed))
+        if seed is not None:
+            self.load_weights(networks.initial_weights(spec, seed=seed))
 
     def encode(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Pool and lay out camera images (N, H, W) as (N, *observation_shape)."""

@@ -53,7 +53,7 @@ def load_policy(run: RunFolder, *, checkpoint: str | int = "best", num_threads: 
         )
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"{saved.path} does not describe its network: {error}.") from error
-    learner = make_learner(spec, num_threads=num_threads)
+    learner = make_learner(spec, seed=None, num_threads=num_threads)
     learner.load_weights(
         {name.removeprefix(WEIGHTS): array for name, array in saved.arrays.items() if name.startswith(WEIGHTS)}
     )
