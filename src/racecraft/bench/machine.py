@@ -6,7 +6,6 @@ import os
 import platform
 import time
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ def describe_machine() -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "memory_gib": round(_memory_bytes() / 2**30, 1),
+        "memory_gib": _memory_gib(),
         "instruction_set": instruction_set(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
@@ -32,7 +31,7 @@ def describe_machine() -> dict[str, Any]:
 
 
 def copy_bandwidth() -> float:
-    """Bytes per second that one thread writes when it copies memory; median of 5."""
+    """Bytes per second that one thread writes when it copies memory; best of 5, as a limit should be."""
     source = np.ones(COPY_BYTES, np.uint8)
     target = np.empty_like(source)
     np.copyto(target, source)
@@ -41,11 +40,11 @@ def copy_bandwidth() -> float:
         begun = time.perf_counter()
         np.copyto(target, source)
         seconds.append(time.perf_counter() - begun)
-    return COPY_BYTES / median(seconds)
+    return COPY_BYTES / min(seconds)
 
 
 def matrix_flops() -> float:
-    """Floating-point operations per second of a large float32 matrix product on all cores; median of 5."""
+    """Floating-point operations per second of a large float32 matrix product on all cores; best of 5."""
     side = 1536
     left, right = np.ones((side, side), np.float32), np.ones((side, side), np.float32)
     product = left @ right
@@ -54,7 +53,7 @@ def matrix_flops() -> float:
         begun = time.perf_counter()
         np.matmul(left, right, out=product)
         seconds.append(time.perf_counter() - begun)
-    return 2.0 * side**3 / median(seconds)
+    return 2.0 * side**3 / min(seconds)
 
 
 def _processor() -> str:
@@ -67,8 +66,8 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def _memory_bytes() -> float:
+def _memory_gib() -> float | None:
     try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1)
     except (AttributeError, OSError, ValueError):
-        return float("nan")
+        return None

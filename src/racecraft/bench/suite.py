@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from racecraft.agent import action_space
 from racecraft.bench.machine import copy_bandwidth, describe_machine, matrix_flops
 from racecraft.bench.rivals import measure_rivals
 from racecraft.errors import ConfigError, RacecraftError, did_you_mean
@@ -26,6 +27,7 @@ TRACK = "reinvent_2018"
 CAMERA_CARS = 256
 STATE_CARS = 8192
 REWARD_BATCH = 64
+START_SECONDS = 2.0  # that a training may take to start, beside the time it is measured for
 SKILL_TIMEOUT_S = 300.0
 
 Say = Callable[[str], None]
@@ -69,23 +71,33 @@ def measure_simulator(seconds: float, seeds: int) -> dict[str, Any]:
     camera = _steps_per_second(track, CAMERA_CARS, CameraSpec(), seconds)
     state = _steps_per_second(track, STATE_CARS, None, seconds)
     one = _steps_per_second(track, CAMERA_CARS, CameraSpec(), seconds, num_threads=1)
-    frame = CameraSpec().width * CameraSpec().height
-    memory = copy_bandwidth() / frame
+    frame, car = CameraSpec().width * CameraSpec().height, bytes_per_car(track)
+    copied = copy_bandwidth()
     return {
         "camera_steps_per_second": round(camera),
         "camera_steps_per_second_one_thread": round(one),
         "state_steps_per_second": round(state),
-        "bytes_per_car": bytes_per_car(track),
-        "limit_steps_per_second": round(memory),
-        "limit": f"copying finished {frame}-byte frames to memory, one thread",
+        "bytes_per_car": car,
         "cars": {"camera": CAMERA_CARS, "state": STATE_CARS},
+        "limits": {
+            "camera_steps_per_second": _limit(
+                copied / frame, f"copying finished frames of {frame:,} bytes, one thread"
+            ),
+            "state_steps_per_second": _limit(copied / car, f"copying the {car} bytes of a car, one thread"),
+        },
     }
+
+
+def _limit(value: float, what: str) -> dict[str, Any]:
+    """What the machine could do at most: a figure, and what was measured for it."""
+    return {"value": round(value), "what": what}
 
 
 def bytes_per_car(track: Track) -> int:
     """Memory of the simulator for one more car, beside its frame."""
-    few, many = (Simulation(track, num_envs=count, camera=None, num_threads=1) for count in (64, 1088))
-    return (many.num_bytes - few.num_bytes) // 1024
+    few, more = 64, 1024
+    sizes = [Simulation(track, num_envs=n, camera=None, num_threads=1).num_bytes for n in (few, few + more)]
+    return (sizes[1] - sizes[0]) // more
 
 
 def measure_reward(seconds: float, seeds: int) -> dict[str, Any]:
@@ -111,20 +123,19 @@ def measure_reward(seconds: float, seeds: int) -> dict[str, Any]:
         "calls_per_second": round(calls),
         "microseconds_per_call": round(1e6 / calls, 3),
         "batch": REWARD_BATCH,
-        "limit_calls_per_second": round(bare),
-        "limit": "calling the same Python function on ready-made params, without a process border",
+        "limits": {"calls_per_second": _limit(bare, "the same function called on ready params, in one process")},
     }
 
 
 def measure_training(seconds: float, seeds: int) -> dict[str, Any]:
     """Camera steps per second end to end: simulator, reward process, learner, logs, evaluation, checkpoints."""
     del seeds
-    from racecraft.training import train
+    from racecraft.training import Until, train
 
     with tempfile.TemporaryDirectory() as root:
-        result = train(TRACK, until=f"{seconds + 6.0:g} s", seed=1, root=root)
+        result = train(TRACK, until=Until(seconds=seconds + START_SECONDS), seed=1, root=root)
     busy = result.wall_seconds - result.parts["start"]
-    spec = NetworkSpec(num_actions=10, state_size=len(STATE_COLUMNS))
+    spec = NetworkSpec(num_actions=action_space("default").size, state_size=len(STATE_COLUMNS))
     # One pass to act and one for the values; in every epoch a forward pass and a backward one that costs twice that.
     per_step = forward_operations(spec) * (2 + 3 * PPOConfig().update_epochs)
     peak = matrix_flops()
@@ -132,8 +143,11 @@ def measure_training(seconds: float, seeds: int) -> dict[str, Any]:
         "steps_per_second": round(result.steps / busy),
         "steps": result.steps,
         "parts_percent": {name: round(100 * part / busy, 1) for name, part in result.parts.items() if name != "start"},
-        "limit_steps_per_second": round(peak / per_step),
-        "limit": f"{per_step / 1e6:.1f} MFLOP a step at {peak / 1e9:.0f} GFLOP/s of float32 matrix product",
+        "limits": {
+            "steps_per_second": _limit(
+                peak / per_step, f"{per_step / 1e6:.1f} MFLOP a step, {peak / 1e9:.0f} GFLOP/s of a float32 product"
+            )
+        },
     }
 
 
@@ -146,7 +160,7 @@ def measure_skill(seconds: float, seeds: int) -> dict[str, Any]:
             command = [sys.executable, "-m", "racecraft", "train", "--until", f"5 laps or {SKILL_TIMEOUT_S:g} s"]
             command += ["--seed", str(seed), "--runs", root, "--json"]
             begun = time.perf_counter()
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            done = subprocess.run(command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
             wall = time.perf_counter() - begun
             if done.returncode != 0:
                 raise RacecraftError(f"Training with seed {seed} failed: {done.stderr.strip()[-500:]}")
