@@ -3,37 +3,41 @@
     racecraft train --until "5 laps"
     racecraft evaluate runs/NAME --laps 3
 
-Everything heavy is imported inside the verbs, so that ``--help`` is instant.
+Everything heavy is imported inside the verbs, so that ``--help`` is instant; what people read is in `cli_text`.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import time
+import traceback
+import warnings
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
 from racecraft import __version__
 from racecraft.errors import RacecraftError
 
+UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])  # typer hands out no name for this base
+INTERRUPTED = 130  # 128 + SIGINT, as shells say it
+
 app = typer.Typer(
     name="racecraft",
     help="Teach a small car to race: reward function in, lap on video out.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,  # rich would take two thirds of the time that --help takes
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-reward_app = typer.Typer(
-    name="reward", help="Look at reward functions before training with them.", no_args_is_help=True
-)
-tracks_app = typer.Typer(name="tracks", help="List the tracks, or draw one.", invoke_without_command=True)
-app.add_typer(reward_app)
-app.add_typer(tracks_app)
+tracks_app = typer.Typer(help="List the tracks, or draw one.", rich_markup_mode=None)
+reward_app = typer.Typer(help="Look at reward functions.", no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(tracks_app, name="tracks")
+app.add_typer(reward_app, name="reward")
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout instead of text.")]
 TrackOption = Annotated[str, typer.Option("--track", "-t", help="Name of a track, or path of a track file.")]
@@ -52,6 +56,7 @@ def root(
 
 @app.command()
 def train(
+    context: typer.Context,
     track: TrackOption = "reinvent_2018",
     reward: Annotated[str, typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py.")] = "racing",
     until: Annotated[
@@ -86,16 +91,14 @@ def train(
 ) -> None:
     """Train a car from camera pixels with a reward function."""
     started = _process_start()
+    if resume is not None:
+        _refuse_beside_resume(context)
     from racecraft import training
     from racecraft.training.progress import SilentReporter
     from racecraft.training.terminal import TerminalReporter
 
-    title = f"Racecraft · {resume}" if resume else f"Racecraft · {track} · {Path(reward).stem}"
-    view = TerminalReporter(title=title) if not as_json else None
-    reporter = view or SilentReporter()
-    if view is not None:
-        view.__enter__()
-    try:
+    title = f"Racecraft · {resume}" if resume else f"Racecraft · {Path(track).stem} · {Path(reward).stem}"
+    with SilentReporter() if as_json else TerminalReporter(title=title) as reporter:
         if resume is not None:
             result = training.resume(resume, until=until or None, reporter=reporter, started=started)
         else:
@@ -119,17 +122,28 @@ def train(
                 reporter=reporter,
                 started=started,
             )
-    finally:
-        if view is not None:
-            view.__exit__()
+    outcome = None
+    if not as_json:
+        _text().say_trained(result)
+    if video and result.reason != "interrupted":
+        from racecraft.race.run_evaluation import evaluate_run
+
+        outcome = evaluate_run(result.run)
+        if not as_json:
+            _text().say_evaluated(outcome)
     if as_json:
-        _print_json(result.to_dict())
-    else:
-        _say_trained(result)
-    if video:
-        evaluate(result.run, as_json=False) if not as_json else None
+        _print_json({**result.to_dict(), **({"evaluation": outcome.to_dict()} if outcome is not None else {})})
     if result.reason == "interrupted":
-        raise typer.Exit(130)
+        raise typer.Exit(INTERRUPTED)
+
+
+def _refuse_beside_resume(context: typer.Context) -> None:
+    """A resumed run keeps its settings: only its limit may change."""
+    for option in context.command.params:
+        source = context.get_parameter_source(str(option.name))
+        is_given = source is not None and source.name == "COMMANDLINE"
+        if is_given and option.name not in ("resume", "until", "video", "as_json"):
+            context.fail(f"{option.opts[0]} does not go with --resume: a run keeps the settings it was started with.")
 
 
 @app.command()
@@ -143,7 +157,9 @@ def evaluate(
     rules: Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")] = "drfc",
     checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
-    direction: Annotated[str, typer.Option("--direction", help="forward or reverse.")] = "forward",
+    direction: Annotated[
+        str, typer.Option("--direction", help="forward or reverse; by default as it was trained.")
+    ] = "",
     offtrack_penalty: Annotated[
         float | None, typer.Option("--offtrack-penalty", help="Seconds; by default the rules'.")
     ] = None,
@@ -152,7 +168,7 @@ def evaluate(
     video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of the best trial.")] = True,
     as_json: Json = False,
 ) -> None:
-    """Race a run's policy against the clock: lap times, penalties, a video and a picture of the racing line."""
+    """Race a run's policy against the clock and film it."""
     from racecraft.race.run_evaluation import evaluate_run
 
     outcome = evaluate_run(
@@ -163,7 +179,7 @@ def evaluate(
         rules=rules,
         checkpoint=int(checkpoint) if checkpoint.isdigit() else checkpoint,
         vehicle=vehicle or None,
-        direction=direction,
+        direction=direction or None,
         offtrack_penalty=offtrack_penalty,
         max_resets=max_resets,
         seed=seed,
@@ -172,7 +188,7 @@ def evaluate(
     if as_json:
         _print_json(outcome.to_dict())
     else:
-        _say_evaluated(outcome)
+        _text().say_evaluated(outcome)
 
 
 @tracks_app.callback(invoke_without_command=True)
@@ -186,27 +202,7 @@ def tracks(context: typer.Context, as_json: Json = False) -> None:
     if as_json:
         _print_json({"tracks": [_track_facts(track) for track, _ in listed]})
         return
-    from rich.table import Table
-
-    table = Table(title="Tracks", title_style="bold", header_style="bold", border_style="dim")
-    for heading, justify in (
-        ("name", "left"),
-        ("length", "right"),
-        ("width", "right"),
-        ("radius", "right"),
-        ("", "left"),
-    ):
-        table.add_column(heading, justify=justify)  # type: ignore[arg-type]
-    for track, design in listed:
-        table.add_row(
-            f"[bold]{track.name}[/bold]",
-            f"{track.length:.1f} m",
-            f"{track.mean_width:.2f} m",
-            f"{track.min_radius:.2f} m",
-            design.description,
-        )
-    _console().print(table)
-    _console().print("Draw one with [bold]racecraft tracks show NAME[/bold]; 'generated:7' and files work too.")
+    _text().say_tracks(listed)
 
 
 @tracks_app.command("show")
@@ -224,7 +220,7 @@ def show_track(
     if as_json:
         _print_json({**_track_facts(track), "picture": str(path)})
     else:
-        _console().print(f"{track.name}: {track.length:.2f} m, drawn to [bold]{path}[/bold]")
+        typer.echo(f"{track.name}: {track.length:.2f} m, drawn to {path}")
 
 
 @reward_app.command("check")
@@ -257,7 +253,7 @@ def check(
             }
         )
     else:
-        _say_checked(problems, outcomes, failed=failed)
+        _text().say_checked(problems, outcomes, failed=failed)
     if failed:
         raise typer.Exit(1)
 
@@ -273,14 +269,7 @@ def list_rewards(as_json: Json = False) -> None:
     if as_json:
         _print_json({"rewards": listed})
         return
-    from rich.table import Table
-
-    table = Table(header_style="bold", border_style="dim")
-    table.add_column("name")
-    table.add_column("")
-    for name, text in listed.items():
-        table.add_row(f"[bold]{name}[/bold]", text)
-    _console().print(table)
+    _text().say_rewards(listed)
 
 
 @reward_app.command("show")
@@ -300,12 +289,7 @@ def doctor(as_json: Json = False) -> None:
     if as_json:
         _print_json({"ok": all(f.ok for f in findings), "checks": [f.to_dict() for f in findings]})
     else:
-        console = _console()
-        for finding in findings:
-            mark = "[green]ok[/green]  " if finding.ok else "[red]bad[/red] "
-            console.print(f"{mark} {finding.name:<18} {finding.text}", highlight=False)
-            if finding.hint:
-                console.print(f"      [dim]hint: {finding.hint}[/dim]", highlight=False)
+        _text().say_examined(findings)
     if not all(f.ok for f in findings):
         raise typer.Exit(1)
 
@@ -319,134 +303,67 @@ def bench(
     seeds: Annotated[int, typer.Option("--seeds", help="Trainings of the skill benchmark.")] = 5,
     as_json: Json = False,
 ) -> None:
-    """Measure speed on this machine: simulator, reward worker, training, time to a lap, rivals."""
-    from racecraft.bench import run_benchmarks, table
+    """Measure speed on this machine, with its limits."""
+    from racecraft.bench import run_benchmarks
 
-    results = run_benchmarks(only=only or [], seconds=seconds, seeds=seeds, say=None if as_json else _say_progress)
+    say = None if as_json else _text().say_progress
+    results = run_benchmarks(only=only or [], seconds=seconds, seeds=seeds, say=say)
     if as_json:
         _print_json(results)
     else:
-        _console().print(table(results))
+        _text().say_measured(results)
 
 
 def main() -> None:
-    """Run the command line: errors in one sentence, exit status 1; 2 for wrong usage; 130 when interrupted."""
-    debug = "--debug" in sys.argv
-    if debug:
-        sys.argv.remove("--debug")
+    """Run the command line.
+
+    The exit status is 0; 1 for a mistake in what the user gave, told in one sentence; 2 for wrong usage; 130 when
+    interrupted. With ``--json`` an error is a JSON object on stdout, too. ``--debug`` shows the stack trace.
+    """
+    arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
+    is_debug, is_json = len(arguments) < len(sys.argv) - 1, "--json" in arguments
+    warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {message}", err=True)
     try:
-        app()
-    except RacecraftError as error:
-        if debug:
-            raise
-        if "--json" in sys.argv:
-            _print_json({"error": {"code": type(error).__name__, "message": str(error), "hint": error.hint}})
-        _say_error(type(error).__name__, str(error), error.hint)
+        status = app(arguments, prog_name="racecraft", standalone_mode=False)
+    except UsageError as error:
+        usage: Any = error
+        if is_json:
+            verb = usage.ctx.command_path if usage.ctx is not None else "racecraft"
+            _print_error("UsageError", usage.format_message(), f"See '{verb} --help'.")
+        usage.show()
+        sys.exit(2)
+    except typer.Abort:
+        sys.exit(INTERRUPTED)
+    except Exception as error:
+        is_expected = isinstance(error, RacecraftError | OSError)
+        code, message = type(error).__name__, str(error)
+        hint = getattr(error, "hint", "") if is_expected else "This is a bug in Racecraft. --debug shows where."
+        if is_debug:
+            traceback.print_exc()
+        if is_json:
+            _print_error(code, message, hint)
+        if not is_debug:
+            _text().say_error(code, message, hint)
         sys.exit(1)
-    except (KeyboardInterrupt, BrokenPipeError):
-        if debug:
-            raise
-        sys.exit(130)
+    sys.exit(status if isinstance(status, int) else 0)
 
 
 # ---- printing
 
 
-def _console(*, stderr: bool = False) -> Any:
-    from rich.console import Console
+def _text() -> Any:
+    """What is printed for people; imported late, as rich takes its time."""
+    from racecraft import cli_text
 
-    return Console(stderr=stderr)
+    return cli_text
 
 
 def _print_json(document: dict[str, Any]) -> None:
     typer.echo(json.dumps(document, allow_nan=False, default=str))
 
 
-def _say_progress(text: str) -> None:
-    _console(stderr=True).print(text, style="dim", highlight=False)
-
-
-def _say_error(name: str, message: str, hint: str) -> None:
-    from rich.text import Text
-
-    console = _console(stderr=True)
-    console.print(Text.assemble((f"{name}: ", "bold red"), message))
-    if hint:
-        console.print(Text.assemble(("hint: ", "bold"), hint))
-
-
-def _say_trained(result: Any) -> None:
-    console = _console()
-    ended = {
-        "laps": "Learned it",
-        "seconds": "Time is up",
-        "steps": "All steps are done",
-        "episodes": "All episodes are done",
-        "score": "The score is reached",
-        "interrupted": "Stopped",
-    }[result.reason]
-    lap = f", best lap {result.best_lap_seconds:.2f} s" if result.best_lap_seconds is not None else ""
-    console.print(
-        f"[bold]{ended}[/bold] after {result.wall_seconds:.1f} s and {result.steps:,} camera steps: "
-        f"{result.laps_completed} of {result.evaluation_trials} evaluation laps{lap}.",
-        highlight=False,
-    )
-    parts = ", ".join(f"{name} {seconds:.1f}" for name, seconds in result.parts.items() if seconds >= 0.05)
-    console.print(f"[dim]Seconds: {parts}.[/dim]", highlight=False)
-    console.print(f"Run folder: [bold]{result.run}[/bold]", highlight=False)
-    if result.reason != "laps":
-        console.print(f"Continue with: [bold]racecraft train --resume {result.run}[/bold]", highlight=False)
-
-
-def _say_evaluated(outcome: Any) -> None:
-    from rich.table import Table
-
-    console = _console()
-    evaluation = outcome.evaluation
-    table = Table(header_style="bold", border_style="dim", title=f"{outcome.run.name} on {evaluation.track.name}")
-    for heading in ("trial", "laps", "best lap", "mean lap", "total", "off track", "resets", "penalty", "completion"):
-        table.add_column(heading, justify="right")
-    for trial in evaluation.trials:
-        times = trial.lap_times
-        table.add_row(
-            str(trial.index + 1),
-            f"{len(times)} of {evaluation.rules.laps}",
-            f"{min(times):.2f} s" if times else "–",
-            f"{sum(times) / len(times):.2f} s" if times else "–",
-            f"{trial.time:.2f} s",
-            str(sum(lap.off_track_count for lap in trial.laps)),
-            str(sum(lap.resets for lap in trial.laps)),
-            f"{sum(lap.penalty_seconds for lap in trial.laps):.1f} s",
-            f"{100 * trial.completion:.0f} %",
-        )
-    console.print(table)
-    console.print(outcome.summary, highlight=False)
-    for what, path in outcome.files.items():
-        console.print(f"  {what:<12} [bold]{path}[/bold]", highlight=False, soft_wrap=True)
-
-
-def _say_checked(problems: list[Any], outcomes: list[Any], *, failed: bool) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
-    console = _console()
-    for problem in problems:
-        style = "bold red" if problem.severity == "error" else "bold yellow"
-        console.print(Text.assemble((f"{problem.severity}: ", style), str(problem)))
-    if outcomes:
-        table = Table(header_style="bold", border_style="dim")
-        table.add_column("situation")
-        table.add_column("reward", justify="right")
-        for outcome in outcomes:
-            reward = "error" if outcome.reward is None else f"{outcome.reward:.4g}"
-            table.add_row(outcome.situation.description, reward)
-        console.print(table)
-        first = next((outcome.error for outcome in outcomes if outcome.error is not None), None)
-        if first is not None:
-            console.print(Text.assemble(("error: ", "bold red"), str(first)))
-    console.print(
-        "[bold red]Not fit for training.[/bold red]" if failed else "[bold green]Fit for training.[/bold green]"
-    )
+def _print_error(code: str, message: str, hint: str) -> None:
+    _print_json({"error": {"code": code, "message": message, "hint": hint}})
 
 
 def _track_facts(track: Any) -> dict[str, Any]:
@@ -454,7 +371,7 @@ def _track_facts(track: Any) -> dict[str, Any]:
         "name": track.name,
         "length_m": round(track.length, 3),
         "mean_width_m": round(track.mean_width, 3),
-        "min_radius_m": round(track.min_radius, 3),
+        "min_radius_m": round(track.min_radius, 3) if math.isfinite(track.min_radius) else None,
         "direction": track.direction,
         "is_closed": track.is_closed,
     }

@@ -9,13 +9,13 @@ mp4/camera-pip/<n>-video.mp4                             the best trial, filmed
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.agent import ActionSpace
+from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.evaluation import evaluate
 from racecraft.race.policy import load_policy
@@ -24,7 +24,7 @@ from racecraft.race.results import Evaluation
 from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.race.video import film
 from racecraft.run.atomic import write_json
-from racecraft.run.folder import RunFolder
+from racecraft.run.folder import RunFolder, RunInfo
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import Track, load_track
 
@@ -73,7 +73,7 @@ def evaluate_run(
     rules: str | RaceRules = "drfc",
     checkpoint: str | int = "best",
     vehicle: str | Vehicle | None = None,
-    direction: str = "forward",
+    direction: str | None = None,
     offtrack_penalty: float | None = None,
     max_resets: int | None = None,
     seed: int = 0,
@@ -90,7 +90,7 @@ def evaluate_run(
         rules: A name of `RULE_SETS`, or rules.
         checkpoint: ``best``, ``last`` or a number of steps.
         vehicle: By default the one it was trained with.
-        direction: ``forward`` or ``reverse``.
+        direction: ``forward`` or ``reverse``; by default the one it was trained in, ``forward`` if in both.
         offtrack_penalty: Seconds; by default the rules'.
         max_resets: By default the rules'.
         seed: Of the starts.
@@ -102,60 +102,83 @@ def evaluate_run(
     """
     folder = RunFolder.open(run)
     info = folder.read_info()
-    if isinstance(rules, str):
-        if rules not in RULE_SETS:
-            allowed = ", ".join(RULE_SETS)
-            raise ConfigError(
-                f"Rules {rules!r} do not exist; allowed are {allowed}.", hint=did_you_mean(rules, RULE_SETS)
-            )
-        rules = RULE_SETS[rules]
-    changes: dict[str, Any] = {"laps": laps, "direction": direction}
-    if offtrack_penalty is not None:
-        changes["offtrack_penalty"] = offtrack_penalty
-    if max_resets is not None:
-        changes["max_resets"] = max_resets
-    rules = replace(rules, **changes)
-    if vehicle is None:
-        vehicle = Vehicle(**info.settings["vehicle"]) if "vehicle" in info.settings else Vehicle()
-    elif isinstance(vehicle, str):
-        vehicle = load_vehicle(vehicle)
-    where = track if isinstance(track, Track) else load_track(track or info.track)
+    if direction is None:
+        direction = "reverse" if info.settings.get("direction") == "reverse" else "forward"
+    changes = {"laps": laps, "direction": direction, "offtrack_penalty": offtrack_penalty, "max_resets": max_resets}
+    rules = _rules(rules, {name: value for name, value in changes.items() if value is not None})
+    if not isinstance(vehicle, Vehicle):
+        vehicle = load_vehicle(vehicle) if vehicle else _trained_vehicle(info)
+    where = track if isinstance(track, Track) else load_track(track) if track else _trained_track(info)
 
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=num_threads)
     evaluation = evaluate(
         policy, where, rules=rules, num_trials=num_trials, seed=seed, vehicle=vehicle, num_threads=num_threads
     )
-    files = _write(folder, evaluation, policy.action_space, is_filmed=video)
+    try:
+        files = _write(folder, evaluation, policy.action_space, is_filmed=video)
+    except OSError as error:
+        raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
     return RunEvaluation(run=folder.path, step=step, evaluation=evaluation, files=files)
 
 
-def _write(folder: RunFolder, evaluation: Evaluation, action_space: Any, *, is_filmed: bool) -> dict[str, Path]:
-    stamp = _new_stamp(folder)
-    inside = folder.evaluation(stamp)
-    inside.mkdir(parents=True)
+def _rules(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
+    if isinstance(rules, str):
+        if rules not in RULE_SETS:
+            raise ConfigError(
+                f"Rules {rules!r} do not exist; allowed are {', '.join(RULE_SETS)}.",
+                hint=did_you_mean(rules, RULE_SETS),
+            )
+        rules = RULE_SETS[rules]
+    return replace(rules, **changes)
+
+
+def _trained_vehicle(info: RunInfo) -> Vehicle:
+    try:
+        return Vehicle(**info.settings.get("vehicle", {}))
+    except TypeError as error:
+        raise RunError(f"The vehicle in run.json does not fit this version of Racecraft: {error}.") from error
+
+
+def _trained_track(info: RunInfo) -> Track:
+    track = load_track(info.track)
+    if track.digest != info.track_digest:
+        raise ConfigError(
+            f"Track {info.track!r} has changed since the run was trained on it.",
+            hint="Say which one you mean with --track, be it the same name.",
+        )
+    return track
+
+
+def _write(folder: RunFolder, evaluation: Evaluation, action_space: ActionSpace, *, is_filmed: bool) -> dict[str, Path]:
+    stamp, inside = _new_folder(folder)
     metrics = folder.evaluation_metrics(stamp)
     metrics.parent.mkdir(exist_ok=True)
     write_metrics(evaluation, metrics)
     write_simtrace(evaluation, inside / "evaluation-simtrace", action_space=action_space)
-    write_json(inside / "evaluation.json", json.loads(json.dumps(evaluation.summary())))
+    write_json(inside / "evaluation.json", evaluation.summary())
+    best = evaluation.best_trial
     files = {
         "metrics": metrics,
         "sim-trace": inside / "evaluation-simtrace" / "0-iteration.csv",
         "summary": inside / "evaluation.json",
+        "racing line": draw_racing_line(best.recording, inside / "racing-line.png", subtitle=folder.name),
     }
-    best = evaluation.best_trial
-    files["racing line"] = draw_racing_line(best.recording, inside / "racing-line.png", title=folder.name)
     if is_filmed:
         videos = folder.videos / "camera-pip"
         videos.mkdir(parents=True, exist_ok=True)
-        path = videos / f"{len(list(videos.glob('*-video.mp4')))}-video.mp4"
+        number = next(n for n in range(10**6) if not (videos / f"{n}-video.mp4").exists())
+        path = videos / f"{number}-video.mp4"
         files["video"] = film(best.recording, path, laps=evaluation.rules.laps, name=folder.name)
     return files
 
 
-def _new_stamp(folder: RunFolder) -> str:
-    """Now, to the second, or a little later where an evaluation of this second exists."""
-    stamp = int(datetime.now(UTC).strftime("%Y%m%d%H%M%S"))
-    while folder.evaluation(str(stamp)).exists():
-        stamp += 1
-    return str(stamp)
+def _new_folder(folder: RunFolder) -> tuple[str, Path]:
+    """A folder named after now, to the second, or a little later where one of this second exists."""
+    moment = datetime.now(UTC)
+    while True:
+        stamp = moment.strftime("%Y%m%d%H%M%S")
+        try:
+            folder.evaluation(stamp).mkdir()
+            return stamp, folder.evaluation(stamp)
+        except FileExistsError:
+            moment += timedelta(seconds=1)

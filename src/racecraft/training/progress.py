@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, Self
 
 from racecraft.learn import IterationStats
 
@@ -108,7 +108,13 @@ class Reporter(Protocol):
 
 
 class SilentReporter:
-    """Shows nothing."""
+    """Shows nothing; a context manager, as the other reporters are."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing."""
 
     def note(self, text: str) -> None:
         """Nothing."""

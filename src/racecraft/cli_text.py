@@ -1,0 +1,158 @@
+"""What the command line prints for people: tables and sentences, on stdout unless it is progress or an error."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from racecraft.bench.doctor import Finding
+    from racecraft.race.run_evaluation import RunEvaluation
+    from racecraft.reward import Outcome, Problem
+    from racecraft.track import Track
+    from racecraft.training import TrainResult
+
+ENDED = {
+    "laps": "Learned it",
+    "seconds": "Time is up",
+    "steps": "All steps are done",
+    "episodes": "All episodes are done",
+    "score": "The score is reached",
+    "interrupted": "Stopped",
+}
+
+
+def say_error(name: str, message: str, hint: str) -> None:
+    """An error, and what to do about it."""
+    console = Console(stderr=True)
+    _say(console, (f"{name}: ", "bold red"), message)
+    if hint:
+        _say(console, ("hint: ", "bold"), hint)
+
+
+def say_progress(text: str) -> None:
+    """What is being done, on stderr."""
+    _say(Console(stderr=True), (text, "dim"))
+
+
+def say_trained(result: TrainResult) -> None:
+    """How a training ended, where its time went and where its files are."""
+    console = Console()
+    lap = f", best lap {result.best_lap_seconds:.2f} s" if result.best_lap_seconds is not None else ""
+    _say(
+        console,
+        (ENDED[result.reason], "bold"),
+        f" after {result.wall_seconds:.1f} s and {result.steps:,} camera steps: "
+        f"{result.laps_completed} of {result.evaluation_trials} evaluation laps{lap}.",
+    )
+    parts = ", ".join(f"{name} {seconds:.1f}" for name, seconds in result.parts.items() if seconds >= 0.05)
+    if parts:
+        _say(console, (f"Seconds: {parts}.", "dim"))
+    _say(console, "Run folder: ", (str(result.run), "bold"))
+    if result.reason != "laps":
+        _say(console, "Continue:   ", (f"racecraft train --resume {result.run}", "bold"))
+    if result.reason != "interrupted":
+        _say(console, "Race it:    ", (f"racecraft evaluate {result.run}", "bold"))
+
+
+def say_evaluated(outcome: RunEvaluation) -> None:
+    """Every trial, the summary, and what was written."""
+    console, evaluation = Console(), outcome.evaluation
+    table = _table(title=f"{outcome.run.name} on {evaluation.track.name}")
+    for heading in ("trial", "laps", "best lap", "total", "off track", "resets", "penalty", "driven"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for trial in evaluation.trials:
+        table.add_row(
+            str(trial.index + 1),
+            f"{len(trial.lap_times)} of {evaluation.rules.laps}",
+            f"{min(trial.lap_times):.2f} s" if trial.lap_times else "–",
+            f"{trial.time:.2f} s",
+            str(sum(lap.off_track_count for lap in trial.laps)),
+            str(sum(lap.resets for lap in trial.laps)),
+            f"{sum(lap.penalty_seconds for lap in trial.laps):.1f} s",
+            f"{100 * trial.completion:.0f} %",
+        )
+    console.print(table)
+    _say(console, outcome.summary)
+    for what, path in outcome.files.items():
+        _say(console, f"  {what:<12} ", (str(path), "bold"))
+
+
+def say_tracks(listed: list[tuple[Track, Any]]) -> None:
+    """The library, a line for each track."""
+    console, table = Console(), _table()
+    table.expand = True
+    table.add_column("track", style="bold", no_wrap=True)
+    for heading in ("length", "width", "radius"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True, overflow="ellipsis", ratio=1)
+    for track, design in listed:
+        radius = f"{track.min_radius:.2f} m" if track.min_radius < 1000 else "–"
+        table.add_row(track.name, f"{track.length:.1f} m", f"{track.mean_width:.2f} m", radius, design.description)
+    console.print(table)
+    _say(console, "Draw one with ", ("racecraft tracks show NAME", "bold"), "; files and 'generated:7' work too.")
+
+
+def say_rewards(listed: dict[str, str]) -> None:
+    """The presets and what they pay for."""
+    console, table = Console(), _table()
+    table.add_column("reward", style="bold", no_wrap=True)
+    table.add_column("", overflow="fold")
+    for name, text in listed.items():
+        table.add_row(name, text)
+    console.print(table)
+    _say(console, "Start your own from one: ", ("racecraft reward show racing > reward_function.py", "bold"))
+
+
+def say_checked(problems: list[Problem], outcomes: list[Outcome], *, failed: bool) -> None:
+    """What is wrong with a reward function, and what it pays in each situation."""
+    console = Console()
+    for problem in problems:
+        style = "bold red" if problem.severity == "error" else "bold yellow"
+        _say(console, (f"{problem.severity}: ", style), str(problem))
+    if outcomes:
+        table = _table()
+        table.add_column("situation")
+        table.add_column("reward", justify="right", no_wrap=True)
+        for outcome in outcomes:
+            reward = Text("error", "bold red") if outcome.reward is None else Text(f"{outcome.reward:.4g}")
+            table.add_row(outcome.situation.description, reward)
+        console.print(table)
+    error = next((outcome.error for outcome in outcomes if outcome.error is not None), None)
+    if error is not None:
+        _say(console, ("error: ", "bold red"), str(error))
+    _say(console, ("Not fit for training.", "bold red") if failed else ("Fit for training.", "bold green"))
+
+
+def say_examined(findings: list[Finding]) -> None:
+    """What works and what does not."""
+    console, table = Console(), Table.grid(padding=(0, 2, 0, 0))
+    for finding in findings:
+        text = Text(finding.text)
+        if finding.hint:
+            text.append(f"\n{finding.hint}", style="yellow")
+        mark = Text("ok", "green") if finding.ok else Text("bad", "bold red")
+        table.add_row(mark, Text(finding.name, "bold"), text)
+    console.print(table)
+
+
+def say_measured(results: dict[str, Any]) -> None:
+    """The benchmarks."""
+    from racecraft.bench import table
+
+    Console().print(table(results))
+
+
+def _table(*, title: str | None = None) -> Table:
+    return Table(
+        title=title, title_justify="left", title_style="bold", header_style="bold", box=SIMPLE_HEAD, pad_edge=False
+    )
+
+
+def _say(console: Console, *parts: str | tuple[str, str]) -> None:
+    """One line, whatever its length: paths and commands must survive copying."""
+    console.print(Text.assemble(*parts), soft_wrap=True)
