@@ -300,8 +300,8 @@ class Simulation:
         """
         try:
             self._engine.load(np.ascontiguousarray(saved, dtype=np.uint8))
-        except ValueError as error:
-            raise ShapeError(str(error)) from error
+        except (TypeError, ValueError) as error:
+            raise ShapeError(f"{error}") from error
 
 
 def instruction_set() -> str:
