@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "learner.hpp"
+#include "learner_profile.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -181,7 +182,23 @@ void bind_learner(nb::module_& m) {
             },
             "part"_a, "values"_a)
         .def_prop_rw("num_updates", &Learner::num_updates, &Learner::set_num_updates)
+        .def(
+            "profile_layers",
+            [](const Learner& self, size_t samples, int repeats) {
+                require(samples > 0 && repeats > 0, "Profiling needs at least one sample and one repeat.");
+                return profile_layers(self.network().spec, samples, repeats);
+            },
+            "samples"_a = 8, "repeats"_a = 200)
         .def_prop_ro("num_parameters", [](const Learner& self) { return self.network().num_public; });
+
+    nb::class_<LayerTime>(m, "LayerTime", "Speed of one pass of one layer, for one sample on one thread.")
+        .def_ro("tower", &LayerTime::tower)
+        .def_ro("shape", &LayerTime::shape)
+        .def_ro("pass_name", &LayerTime::pass)
+        .def_ro("operations", &LayerTime::operations)
+        .def_ro("seconds", &LayerTime::seconds);
+    m.def("peak_operations_per_second", &peak_operations_per_second,
+          "Fused multiply-adds on registers alone, counted as two operations each, on one thread.");
 
     m.def(
         "orthonormalize",

@@ -289,4 +289,20 @@ void layer_weight_gradient(const LayerShape& shape, int panel, size_t first, siz
     }
 }
 
+double multiply_add_only(size_t steps, float* out) {
+    constexpr int kChains = 12;  // latency times throughput of any CPU, and they fit 16 registers
+    const FloatLanes factor = load(out);
+    FloatLanes sums[kChains];
+#pragma GCC unroll 12
+    for (int i = 0; i < kChains; ++i) sums[i] = splat(static_cast<float>(i));
+    for (size_t step = 0; step < steps; ++step) {
+#pragma GCC unroll 12
+        for (int i = 0; i < kChains; ++i) sums[i] = fused_multiply_add(sums[i], factor, factor);
+    }
+#pragma GCC unroll 12
+    for (int i = 1; i < kChains; ++i) sums[0] = sums[0] + sums[i];
+    store(out, sums[0]);
+    return 2.0 * kChains * kLaneCount * static_cast<double>(steps);
+}
+
 }  // namespace racecraft::RC_ISA

@@ -53,6 +53,7 @@ struct AdamStep {
     void adam(const AdamStep& step, const float* gradient, size_t count, float* moment1, float* moment2, \
               float* weights);                                                                           \
     void orthonormalize(double* vectors, size_t count, size_t length);                                   \
+    double multiply_add_only(size_t steps, float* out);                                                  \
     }
 RC_FOR_EACH_ISA(RC_DECLARE)
 #undef RC_DECLARE

@@ -133,8 +133,33 @@ class Learner:
     @num_updates.setter
     def num_updates(self, arg: int, /) -> None: ...
 
+    def profile_layers(self, samples: int = 8, repeats: int = 200) -> list[LayerTime]: ...
+
     @property
     def num_parameters(self) -> int: ...
+
+class LayerTime:
+    """Speed of one pass of one layer, for one sample on one thread."""
+
+    @property
+    def tower(self) -> str: ...
+
+    @property
+    def shape(self) -> str: ...
+
+    @property
+    def pass_name(self) -> str: ...
+
+    @property
+    def operations(self) -> float: ...
+
+    @property
+    def seconds(self) -> float: ...
+
+def peak_operations_per_second() -> float:
+    """
+    Fused multiply-adds on registers alone, counted as two operations each, on one thread.
+    """
 
 def orthonormalize(vectors: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> None:
     """
