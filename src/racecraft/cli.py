@@ -229,7 +229,7 @@ def check(
     track: TrackOption = "reinvent_2018",
     as_json: Json = False,
 ) -> None:
-    """Check a reward function, then try it in the situations a car gets into."""
+    """Check a reward function and try it in a car's situations."""
     from racecraft.reward import check_reward, dry_run, load_reward
     from racecraft.track import load_track
 
@@ -274,7 +274,7 @@ def list_rewards(as_json: Json = False) -> None:
 
 @reward_app.command("show")
 def show_reward(name: Annotated[str, typer.Argument(help="Preset, or path.")]) -> None:
-    """Print a reward function, to start your own from: racecraft reward show racing > reward_function.py."""
+    """Print a reward function, to start your own from."""
     from racecraft.reward import load_reward
 
     typer.echo(load_reward(name), nl=False)

@@ -1,0 +1,33 @@
+"""Does it learn? From camera pixels to laps on the oval; and the control, which must not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tiny_runs import Recorder
+
+from racecraft import evaluate, train
+from racecraft.learn import PPOConfig
+
+BUDGET = 60_000  # camera steps; about 8,000 are usual
+
+
+def test_a_car_learns_five_of_five_laps_of_the_oval(tmp_path: Path) -> None:
+    recorder = Recorder()
+    result = train("oval", until=f"5 laps or {BUDGET} steps", seed=1, root=tmp_path, reporter=recorder)
+    assert (result.reason, result.laps_completed) == ("laps", 5), [report.completion for report in recorder.evaluations]
+    assert result.best_lap_seconds is not None
+    assert 4 < result.best_lap_seconds < 25  # 16.8 m at no more than 4 m/s
+
+    raced = evaluate(result.run, laps=1, num_trials=5, video=False)
+    assert raced.evaluation.laps_completed == 5
+    assert raced.evaluation.best_lap == pytest.approx(result.best_lap_seconds, rel=0.2)
+
+
+@pytest.mark.slow
+def test_without_learning_it_does_not(tmp_path: Path) -> None:
+    blind = replace(PPOConfig(), learning_rate=0.0)
+    result = train("oval", until="5 laps or 20000 steps", ppo=blind, seed=1, root=tmp_path)
+    assert (result.reason, result.laps_completed) == ("steps", 0)
