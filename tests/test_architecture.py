@@ -22,6 +22,7 @@ LAYERS = (
     "training",
     "serve",
     "bench",
+    "cli_text",
     "cli",
 )
 FACADE = ("__init__", "__main__")

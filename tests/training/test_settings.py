@@ -21,7 +21,7 @@ SETTINGS = TrainSettings(
     seed=2**32 - 1,
     network="DEEP_CONVOLUTIONAL_NETWORK_SHALLOW",
     critic="camera",
-    vehicle=Vehicle(friction=0.7),
+    vehicle=Vehicle(mass=5.0),
     start=Start(mode="random", lateral_jitter=0.1),
     direction="alternate",
     ppo=PPOConfig(num_envs=7, learning_rate=1e-4, exploration="e-greedy"),

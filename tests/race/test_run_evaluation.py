@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from racecraft import evaluate, train
+from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
+from racecraft.learn import PPOConfig
+from racecraft.run import RunFolder
+from racecraft.sim import Vehicle
+from racecraft.track import generate_track
+
+
+def trained(root: Path, **settings: Any) -> Path:
+    ppo = PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1)
+    small = {"ppo": ppo, "until": "64 steps", "evaluate_every": 64, "evaluation_trials": 1, "num_threads": 1}
+    return train(settings.pop("track", "oval"), **{**small, **settings}, root=root).run
+
+
+QUICK = {"laps": 1, "num_trials": 2, "max_resets": 1, "video": False, "num_threads": 1}
+
+
+def test_it_evaluates_as_it_was_trained(tmp_path: Path) -> None:
+    run = trained(tmp_path, direction="reverse", vehicle=Vehicle(mass=5.0))
+    found = evaluate(run, **QUICK)
+    assert found.evaluation.rules.direction == "reverse"
+    assert found.evaluation.track.name == "oval"
+    assert found.step == 64
+    assert evaluate(run, **QUICK, direction="forward").evaluation.rules.direction == "forward"
+    best = [evaluate(run, **QUICK, vehicle=vehicle).to_dict()["mean_completion"] for vehicle in (None, "v4")]
+    assert best[0] == found.to_dict()["mean_completion"]
+
+
+def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path: Path) -> None:
+    run = trained(tmp_path)
+    first, again = evaluate(run, **QUICK, seed=3), evaluate(run, **QUICK, seed=3)
+    assert first.evaluation.summary() == again.evaluation.summary()
+    assert len({*first.files.values(), *again.files.values()}) == 8
+    assert len(list(run.glob("evaluation-*"))) == 2
+    traces = [found.files["sim-trace"].read_text() for found in (first, again)]
+    assert traces[0] == traces[1]
+    assert json.loads(first.files["summary"].read_text()) == first.evaluation.summary()
+
+
+def test_a_track_that_changed_since_must_be_named(tmp_path: Path) -> None:
+    def save(seed: int) -> None:
+        track = generate_track(seed)
+        np.save(tmp_path / "mine.npy", np.hstack([track.centerline, track.inner, track.outer]))
+
+    save(1)
+    run = trained(tmp_path, track=str(tmp_path / "mine.npy"))
+    save(2)
+    with pytest.raises(ConfigError, match="changed"):
+        evaluate(run, **QUICK)
+    assert evaluate(run, **QUICK, track=str(tmp_path / "mine.npy")).evaluation.track.digest == generate_track(2).digest
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only for root")
+def test_a_run_that_cannot_be_written_to_is_an_error_of_ours(tmp_path: Path) -> None:
+    run = trained(tmp_path)
+    run.chmod(0o500)
+    try:
+        with pytest.raises(RunError, match="cannot be written"):
+            evaluate(run, **QUICK)
+    finally:
+        run.chmod(0o700)
+
+
+def test_a_folder_with_a_file_in_the_way_is_an_error_of_ours(tmp_path: Path) -> None:
+    run = trained(tmp_path)
+    (run / "mp4").write_text("in the way")
+    with pytest.raises(RunError, match="cannot be written"):
+        evaluate(run, **{**QUICK, "video": True})
+
+
+def test_a_checkpoint_that_does_not_describe_its_network_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = trained(tmp_path)
+    store = RunFolder.open(run).checkpoints
+    saved = store.load("last")
+    for network in (None, {}, {"name": "RACECRAFT_SMALL"}, {**saved.metadata["network"], "name": "NONE"}):
+        store.save(128, saved.arrays, metadata={"network": network}, score=(2.0,))
+        with pytest.raises(RacecraftError) as caught:
+            evaluate(run, **QUICK)
+        assert isinstance(caught.value, CheckpointError | ConfigError)
+
+
+def test_a_run_without_a_checkpoint_says_so(tmp_path: Path) -> None:
+    run = trained(tmp_path)
+    for path in (run / "checkpoints").iterdir():
+        path.unlink()
+    with pytest.raises(CheckpointError, match="no checkpoint"):
+        evaluate(run, **QUICK)
