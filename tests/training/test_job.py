@@ -170,7 +170,7 @@ def test_whole_episodes_as_aws(tiny: Train, tmp_path: Path) -> None:
     assert all(report.stats.episodes == 8 for report in recorder.iterations)
     lines = read_metrics(result.run / "metrics" / "TrainingMetrics.json")["metrics"]
     trials = [line["trial"] for line in lines if line["phase"] == "training"]
-    assert trials[:9] == [1, 2, 3, 4, 5, 6, 7, 8, 1]
+    assert trials == [1, 2, 3, 4, 5, 6, 7, 8] * len(recorder.iterations)  # no car drives more than its share
 
 
 def test_e_greedy_exploration(tiny: Train, tmp_path: Path) -> None:
