@@ -16,7 +16,8 @@ from racecraft.track import Track
 
 GRAVITY = 9.8  # m/s²
 DT = 1.0 / 15.0  # s, one control step
-DRIVE_SHARE = 0.9  # most that drive and brakes may take of the friction circle
+DRIVE_OVER_FRICTION = 3.0  # most that drive and brakes may give over what the slipperier axle gives across
+YAW_RATE = 60.0  # rad/s, fastest spin
 REFERENCE_AHEAD = 0.14  # m, from the origin to the point that x, y and progress speak of
 WHEELS = ((-0.08166, 0.08105), (-0.08166, -0.08105), (0.08231, 0.0796), (0.08231, -0.0796))  # m, forward and left
 PATIENCE = 15  # steps of standing or of falling progress that end an episode
@@ -49,33 +50,45 @@ def command(action: tuple[float, float]) -> tuple[float, float]:
     return clip(steering, -math.pi / 6, math.pi / 6), 0.0 if speed == 0.0 else clip(speed, 0.1, 4.0)
 
 
+def saturated(wanted: float, limit: float) -> float:
+    return wanted / math.sqrt(1.0 + (wanted / limit) ** 2)
+
+
 def rates(car: Vehicle, state: np.ndarray, steering_command: float, speed_command: float) -> np.ndarray:
     """Time derivatives of the seven numbers of a Pose."""
     _, _, heading, u, v, r, delta = state
     weight = car.mass * GRAVITY
-    wheelbase = car.front_axle + car.rear_axle
+    target = speed_command * car.speed_gain
+    most = DRIVE_OVER_FRICTION * min(car.front_friction, car.rear_friction) * GRAVITY
 
-    def axle(load: float, stiffness: float, forward: float, sideways: float) -> tuple[float, float]:
-        """Forces of an axle's tyres along and across its wheels, newtons."""
-        limit = DRIVE_SHARE * car.friction * GRAVITY
-        wanted = (speed_command * car.speed_gain - forward) / car.speed_time_constant
-        acceleration = clip(wanted, -min(car.brake_acceleration, limit), min(car.drive_acceleration, limit))
-        along = load / GRAVITY * acceleration
-        capacity = math.sqrt((car.friction * load) ** 2 - along**2)
-        slip = sideways / max(forward, car.slip_speed)
-        s = stiffness * load * slip / capacity
-        return along, -capacity * s / math.sqrt(1.0 + s * s)
+    def across(load: float, friction: float, stiffness: float, forward: float, sideways: float) -> float:
+        """Force of an axle's tyres across its wheels, newtons."""
+        return -load * saturated(stiffness * sideways / max(forward, car.slip_speed), friction)
 
-    # Velocity of the front axle in the car's frame, then in that of its wheels.
-    front_v = v + car.front_axle * r
-    front_forward = u * math.cos(delta) + front_v * math.sin(delta)
-    front_sideways = front_v * math.cos(delta) - u * math.sin(delta)
-    front_load, rear_load = weight * car.rear_axle / wheelbase, weight * car.front_axle / wheelbase
-    along_front, across_front = axle(front_load, car.front_stiffness, front_forward, front_sideways)
-    along_rear, across_rear = axle(rear_load, car.rear_stiffness, u, v - car.rear_axle * r)
+    def along(load: float, forward: float) -> float:
+        """Force of one wheel that turns at the target speed, newtons."""
+        limit = car.drive_acceleration if forward < target else car.brake_acceleration
+        return load / GRAVITY * saturated((target - forward) / car.speed_time_constant, min(limit, most))
 
-    force_x = along_front * math.cos(delta) - across_front * math.sin(delta) + along_rear
-    force_front_y = along_front * math.sin(delta) + across_front * math.cos(delta)
+    # Every wheel's velocity along its own plane, and each axle's across.
+    front_v, rear_v = v + car.front_axle * r, v - car.rear_axle * r
+    front_load, rear_load = weight * car.front_load, weight * (1.0 - car.front_load)
+    force_x = force_y = moment = 0.0
+    for axle_x, load, angle in ((car.front_axle, front_load, delta), (-car.rear_axle, rear_load, 0.0)):
+        axle_v = front_v if axle_x > 0 else rear_v
+        c, s = math.cos(angle), math.sin(angle)
+        friction, stiffness = (
+            (car.front_friction, car.front_stiffness) if axle_x > 0 else (car.rear_friction, car.rear_stiffness)
+        )
+        side = across(load, friction, stiffness, u * c + axle_v * s, axle_v * c - u * s)
+        parts = [(axle_x, 0.0, -side * s, side * c)]
+        for y in (car.half_track, -car.half_track):
+            pull = along(load / 2, (u - r * y) * c + axle_v * s)
+            parts.append((axle_x, y, pull * c, pull * s))
+        for x, y, fx, fy in parts:
+            force_x += fx
+            force_y += fy
+            moment += x * fy - y * fx
     steering_rate = (steering_command + car.steering_bias - delta) / car.steering_time_constant
     return np.array(
         [
@@ -83,8 +96,8 @@ def rates(car: Vehicle, state: np.ndarray, steering_command: float, speed_comman
             u * math.sin(heading) + v * math.cos(heading),
             r,
             force_x / car.mass + r * v,
-            (force_front_y + across_rear) / car.mass - r * u,
-            (car.front_axle * force_front_y - car.rear_axle * across_rear) / car.yaw_inertia,
+            force_y / car.mass - r * u,
+            moment / car.yaw_inertia,
             clip(steering_rate, -car.steering_rate, car.steering_rate),
         ]
     )
@@ -102,6 +115,7 @@ def move(car: Vehicle, pose: Pose, action: tuple[float, float], *, substeps: int
         state = state + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         state[2] = math.remainder(state[2], 2 * math.pi)
         state[3] = max(state[3], 0.0)
+        state[5] = clip(state[5], -YAW_RATE, YAW_RATE)
     return Pose(*state.tolist())
 
 

@@ -185,10 +185,12 @@ def test_commands_are_clipped():
     assert command((0.1, 0.0)) == (0.1, 0.0)
 
 
-def test_the_reference_itself_obeys_the_friction_limit():
+def test_the_reference_itself_obeys_the_friction_limits():
     rng, car = np.random.default_rng(2), load_vehicle("v5")
+    friction = car.front_load * car.front_friction + (1 - car.front_load) * car.rear_friction
+    limit = math.hypot(friction * 9.8, max(car.drive_acceleration, car.brake_acceleration))
     for _ in range(500):
         state = rng.uniform([-3, -3, -3, 0, -2, -5, -0.5], [3, 3, 3, 4, 2, 5, 0.5])
         rate = rates(car, state, 0.3, 2.0)
         along, across = rate[3] - state[5] * state[4], rate[4] + state[5] * state[3]
-        assert math.hypot(along, across) <= car.friction * 9.8 * (1 + 1e-9)
+        assert math.hypot(along, across) <= limit * (1 + 1e-9)

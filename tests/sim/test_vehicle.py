@@ -11,10 +11,10 @@ import pytest
 from racecraft import _native
 from racecraft.errors import ConfigError
 from racecraft.sim import Vehicle, load_vehicle
-from racecraft.sim.vehicle import LIMITS, MIN_INERTIA_RATIO, PRESETS
+from racecraft.sim.vehicle import LEAST_REACH, LIMITS, MIN_INERTIA_RATIO, PRESETS
 
 CPP = (Path(__file__).parents[2] / "native/tests/vehicle_test.cpp").read_text()
-FULL = replace(Vehicle(), mass=1.0, yaw_inertia=5.0, front_axle=1.0, rear_axle=1.0)
+FULL = replace(Vehicle(), mass=1.0, yaw_inertia=5.0, front_axle=1.0, rear_axle=1.0, half_track=0.5)
 
 
 def test_fields_are_the_cores_parameters_in_its_order():
@@ -29,6 +29,7 @@ def test_the_corners_driven_by_the_cpp_test_are_the_limits():
         table[name] = (float(low), float(high))
     assert table == LIMITS
     assert float(re.search(rf"kMinInertiaRatio = {number}", CPP)[1]) == MIN_INERTIA_RATIO
+    assert float(re.search(rf"kLeastReach = {number}", CPP)[1]) == LEAST_REACH
 
 
 def test_the_default_car_of_the_cpp_tests_is_ours():
@@ -45,9 +46,9 @@ def test_parameters_have_a_range(name):
 
 
 def test_a_car_that_turns_faster_than_the_substeps_is_refused():
-    with pytest.raises(ConfigError, match=r"yaw_inertia is 0\.02; a car of 7\.5 kg .* at least 0\.0293"):
+    with pytest.raises(ConfigError, match=r"yaw_inertia is 0\.02; a car of 7\.5 kg .* at least 0\.056"):
         Vehicle(yaw_inertia=0.02)
-    assert Vehicle(yaw_inertia=0.03).yaw_inertia == 0.03
+    assert Vehicle(yaw_inertia=0.06).yaw_inertia == 0.06
 
 
 @pytest.mark.parametrize("name", list(PRESETS))

@@ -1,15 +1,19 @@
-// The car: a dynamic single-track model with saturating tyres, a friction circle, limited drive and brake
-// forces and a lagging steering actuator.
+// The car: four wheels that all turn at the commanded speed, as the original's four motors drive them, and
+// that rub over the ground.
 //
-//        front axle               One tyre per axle. Its lateral force follows its slip (sideways over
-//      \  lf   | lr               forward speed) linearly at first and saturates at its capacity, what
-//       \------o------|   --> x   friction leaves beside the drive force:
-//      steer  origin  rear         F = -capacity * s / sqrt(1 + s^2),  s = stiffness * load * slip / capacity
+//        left  o------------o        Across, one tyre law per axle: the force follows the slip (sideways over
+//              |  lr   lf   |  ->    forward speed) linearly at first and saturates at what friction allows,
+//              |---- + -----|          F = -friction * load * s / sqrt(1 + s^2),  s = stiffness * slip /
+//              friction | origin     |        Along, every wheel pulls the car towards the speed it turns at:
+//        right o------------o          F = load * e / sqrt(1 + (e / limit)^2),    e = (target - forward) /
+//        time
 //
-// Below `slip_speed` the slip's denominator is held constant, which turns the tyre into a viscous one: no
-// division by zero, no singularity at standstill, and a standing car with turned wheels feels no force.
-// Integrated with classic Runge-Kutta of order 4 over fixed substeps; everything is branch-free, so a loop
-// over cars becomes vector code with the same bits.
+// Neither takes from the other: the original's contacts are friction boxes, not circles. In a bend the inner
+// wheels turn too fast for their way and the outer ones too slowly; this scrub turns the car back and is most
+// of its understeer. Below `slip_speed` the slip's denominator is held constant, which turns the tyre into a
+// viscous one: no division by zero, no singularity at standstill, and a standing car with turned wheels feels
+// no force. Integrated with classic Runge-Kutta of order 4 over fixed substeps; everything is branch-free, so
+// a loop over cars becomes vector code with the same bits.
 #pragma once
 
 #include "racecraft/math.hpp"
@@ -21,22 +25,28 @@ constexpr float kGravity = 9.8f;              // m/s^2, as in the original's phy
 constexpr float kMaxSteering = 0.523598776f;  // rad, 30 degrees: hard clip of the steering command
 constexpr float kMinSpeedCommand = 0.1f;      // m/s; a command of exactly 0 (stop) is allowed below it
 constexpr float kMaxSpeedCommand = 4.0f;      // m/s
-// Of the friction circle, for drive and brakes: a tyre always keeps some grip across.
-constexpr float kMaxDriveShare = 0.9f;
+// Drive and brakes give at most this many times what the slipperier axle gives across: a car that is pushed
+// harder than it can be held gains speed sideways.
+constexpr float kMaxDriveOverFriction = 3.0f;
+// rad/s; a spin that substeps of 1/60 s still follow. Real cars stay below 10.
+constexpr float kMaxYawRate = 60.0f;
 
 // One value per car, so that every parameter can be randomised. Column order of Engine's parameter block.
 #define RC_VEHICLE_PARAMETERS(X)                                                        \
     X(mass)                   /* kg */                                                  \
     X(yaw_inertia)            /* kg m^2 */                                              \
-    X(front_axle)             /* m, car origin to the effective front axle */           \
-    X(rear_axle)              /* m, car origin to the effective rear axle */            \
-    X(friction)               /* tyre force limit over load, 1 */                       \
+    X(front_axle)             /* m, car origin to the front axle */                     \
+    X(rear_axle)              /* m, car origin to the rear axle */                      \
+    X(half_track)             /* m, middle of an axle to its wheels */                  \
+    X(front_load)             /* share of the weight on the front axle, 1 */            \
+    X(front_friction)         /* lateral tyre force limit over load, 1 */               \
+    X(rear_friction)          /* the same at the rear */                                \
     X(front_stiffness)        /* lateral tyre force over load per unit of slip, 1 */    \
     X(rear_stiffness)         /* the same at the rear */                                \
     X(slip_speed)             /* m/s below which slip turns viscous */                  \
     X(drive_acceleration)     /* m/s^2, limit of the drive force over mass */           \
     X(brake_acceleration)     /* m/s^2, limit of the brake force over mass, positive */ \
-    X(speed_time_constant)    /* s, of the speed controller */                          \
+    X(speed_time_constant)    /* s, of the speed near its command */                    \
     X(steering_time_constant) /* s, of the steering actuator */                         \
     X(steering_rate)          /* rad/s, limit of the steering actuator */               \
     X(steering_bias)          /* rad, added to the steering command */                  \
@@ -72,24 +82,25 @@ struct VehicleRates {
 
 // What the equations need of the parameters, once per control step: divisions are the dearest operations
 // here.
-#define RC_VEHICLE_CONSTANTS(X)                                                 \
-    X(front_axle)             /* m */                                           \
-    X(rear_axle)              /* m */                                           \
-    X(front_load)             /* share of the weight, 1 */                      \
-    X(rear_load)              /* 1 */                                           \
-    X(front_stiffness)        /* lateral force over load per unit of slip, 1 */ \
-    X(rear_stiffness)         /* 1 */                                           \
-    X(friction)               /* 1 */                                           \
-    X(inverse_friction_limit) /* s^2/m */                                       \
-    X(slip_speed)             /* m/s */                                         \
-    X(drive_limit)            /* m/s^2 */                                       \
-    X(brake_limit)            /* m/s^2, positive */                             \
-    X(inverse_speed_time)     /* 1/s */                                         \
-    X(speed_gain)             /* 1 */                                           \
-    X(inverse_steering_time)  /* 1/s */                                         \
-    X(steering_rate)          /* rad/s */                                       \
-    X(steering_bias)          /* rad */                                         \
-    X(mass_over_inertia)      /* 1/m^2 */
+#define RC_VEHICLE_CONSTANTS(X)                                                \
+    X(front_axle)            /* m */                                           \
+    X(rear_axle)             /* m */                                           \
+    X(half_track)            /* m */                                           \
+    X(front_load)            /* share of the weight, 1 */                      \
+    X(rear_load)             /* 1 */                                           \
+    X(front_friction)        /* 1 */                                           \
+    X(rear_friction)         /* 1 */                                           \
+    X(front_stiffness)       /* lateral force over load per unit of slip, 1 */ \
+    X(rear_stiffness)        /* 1 */                                           \
+    X(slip_speed)            /* m/s */                                         \
+    X(inverse_drive_limit)   /* s^2/m */                                       \
+    X(inverse_brake_limit)   /* s^2/m */                                       \
+    X(inverse_speed_time)    /* 1/s */                                         \
+    X(speed_gain)            /* 1 */                                           \
+    X(inverse_steering_time) /* 1/s */                                         \
+    X(steering_rate)         /* rad/s */                                       \
+    X(steering_bias)         /* rad */                                         \
+    X(mass_over_inertia)     /* 1/m^2 */
 
 struct VehicleConstants {
 #define RC_FIELD(name) float name;
@@ -99,18 +110,19 @@ struct VehicleConstants {
 
 RC_HD VehicleConstants vehicle_constants(const VehicleParameters& p) {
     VehicleConstants c;
-    const float limit = p.friction * kGravity;
+    const float most = kMaxDriveOverFriction * kGravity * min_of(p.front_friction, p.rear_friction);
     c.front_axle = p.front_axle;
     c.rear_axle = p.rear_axle;
-    c.front_load = p.rear_axle / (p.front_axle + p.rear_axle);
-    c.rear_load = p.front_axle / (p.front_axle + p.rear_axle);
+    c.half_track = p.half_track;
+    c.front_load = p.front_load;
+    c.rear_load = 1.0f - p.front_load;
+    c.front_friction = p.front_friction;
+    c.rear_friction = p.rear_friction;
     c.front_stiffness = p.front_stiffness;
     c.rear_stiffness = p.rear_stiffness;
-    c.friction = p.friction;
-    c.inverse_friction_limit = 1.0f / limit;
     c.slip_speed = p.slip_speed;
-    c.drive_limit = min_of(p.drive_acceleration, kMaxDriveShare * limit);
-    c.brake_limit = min_of(p.brake_acceleration, kMaxDriveShare * limit);
+    c.inverse_drive_limit = 1.0f / min_of(p.drive_acceleration, most);
+    c.inverse_brake_limit = 1.0f / min_of(p.brake_acceleration, most);
     c.inverse_speed_time = 1.0f / p.speed_time_constant;
     c.speed_gain = p.speed_gain;
     c.inverse_steering_time = 1.0f / p.steering_time_constant;
@@ -120,13 +132,20 @@ RC_HD VehicleConstants vehicle_constants(const VehicleParameters& p) {
     return c;
 }
 
-// Lateral force of an axle over the car's mass, m/s^2: the tyre law above with s multiplied out, so that it
-// takes one division and one root. grip is what the friction circle leaves, as force over load.
-RC_HD float tyre_acceleration(float stiffness, float load, float grip, float sideways, float forward,
+// Lateral acceleration, m/s^2, that a tyre carrying the whole car would give: the law above with s multiplied
+// out, so that it takes one division and one root.
+RC_HD float tyre_acceleration(float stiffness, float friction, float sideways, float forward,
                               float slip_speed) {
     const float wanted = stiffness * sideways;
-    const float available = grip * max_of(forward, slip_speed);
-    return -(kGravity * load * grip) * wanted / sqrt_of(available * available + wanted * wanted);
+    const float available = friction * max_of(forward, slip_speed);
+    return -(kGravity * friction) * wanted / sqrt_of(available * available + wanted * wanted);
+}
+
+// The same along, of a wheel that rolls at `forward` m/s.
+RC_HD float drive_acceleration(const VehicleConstants& c, float target, float forward) {
+    const float wanted = (target - forward) * c.inverse_speed_time;
+    const float share = wanted * (wanted > 0.0f ? c.inverse_drive_limit : c.inverse_brake_limit);
+    return wanted / sqrt_of(1.0f + share * share);
 }
 
 RC_HD VehicleRates vehicle_rates(const VehicleConstants& c, const VehicleState& state, float steering_command,
@@ -141,32 +160,34 @@ RC_HD VehicleRates vehicle_rates(const VehicleConstants& c, const VehicleState& 
     const float front_sideways = front_sideways_body * cos_steering - state.speed * sin_steering;
     const float rear_sideways = state.lateral_speed - c.rear_axle * state.yaw_rate;
 
-    // Each axle's wheels are driven towards the commanded speed by how fast they roll, as the original's four
-    // motors do. Control of the car's forward speed alone would feed a sliding car energy without end.
+    // Half of an axle's load on each of its wheels; right ones travel further in a left bend.
     const float target = speed_command * c.speed_gain;
-    const float front_drive =
-        clamp((target - front_forward) * c.inverse_speed_time, -c.brake_limit, c.drive_limit);
-    const float rear_drive =
-        clamp((target - state.speed) * c.inverse_speed_time, -c.brake_limit, c.drive_limit);
-    const float front_share = front_drive * c.inverse_friction_limit;
-    const float rear_share = rear_drive * c.inverse_friction_limit;
-    const float front_grip = c.friction * sqrt_of(1.0f - front_share * front_share);
-    const float rear_grip = c.friction * sqrt_of(1.0f - rear_share * rear_share);
-    const float front_lateral = tyre_acceleration(c.front_stiffness, c.front_load, front_grip, front_sideways,
-                                                  front_forward, c.slip_speed);
-    const float rear_lateral =
-        tyre_acceleration(c.rear_stiffness, c.rear_load, rear_grip, rear_sideways, state.speed, c.slip_speed);
-    const float front_along = c.front_load * front_drive;
-    const float rear_along = c.rear_load * rear_drive;
+    const float rear_scrub = c.half_track * state.yaw_rate;
+    const float front_scrub = rear_scrub * cos_steering;
+    const float front_left = drive_acceleration(c, target, front_forward - front_scrub);
+    const float front_right = drive_acceleration(c, target, front_forward + front_scrub);
+    const float rear_left = drive_acceleration(c, target, state.speed - rear_scrub);
+    const float rear_right = drive_acceleration(c, target, state.speed + rear_scrub);
+    const float front_half = 0.5f * c.front_load;
+    const float rear_half = 0.5f * c.rear_load;
+    const float front_along = front_half * (front_left + front_right);
+    const float rear_along = rear_half * (rear_left + rear_right);
+    const float scrub_moment = c.half_track * (front_half * cos_steering * (front_right - front_left) +
+                                               rear_half * (rear_right - rear_left));
+    const float front_across = c.front_load * tyre_acceleration(c.front_stiffness, c.front_friction,
+                                                                front_sideways, front_forward, c.slip_speed);
+    const float rear_across = c.rear_load * tyre_acceleration(c.rear_stiffness, c.rear_friction,
+                                                              rear_sideways, state.speed, c.slip_speed);
 
-    const float front_x = front_along * cos_steering - front_lateral * sin_steering;
-    const float front_y = front_along * sin_steering + front_lateral * cos_steering;
+    const float front_x = front_along * cos_steering - front_across * sin_steering;
+    const float front_y = front_along * sin_steering + front_across * cos_steering;
     rates.x = state.speed * cos_heading - state.lateral_speed * sin_heading;
     rates.y = state.speed * sin_heading + state.lateral_speed * cos_heading;
     rates.heading = state.yaw_rate;
     rates.speed = front_x + rear_along + state.yaw_rate * state.lateral_speed;
-    rates.lateral_speed = front_y + rear_lateral - state.yaw_rate * state.speed;
-    rates.yaw_rate = (c.front_axle * front_y - c.rear_axle * rear_lateral) * c.mass_over_inertia;
+    rates.lateral_speed = front_y + rear_across - state.yaw_rate * state.speed;
+    rates.yaw_rate =
+        (c.front_axle * front_y - c.rear_axle * rear_across + scrub_moment) * c.mass_over_inertia;
     rates.steering = clamp((steering_command + c.steering_bias - state.steering) * c.inverse_steering_time,
                            -c.steering_rate, c.steering_rate);
     return rates;
@@ -208,6 +229,7 @@ RC_HD VehicleState vehicle_substep(const VehicleConstants& c, const VehicleState
 
     VehicleState next = vehicle_advance(state, mean, sim_dt);
     next.heading = wrap_angle(next.heading);
+    next.yaw_rate = clamp(next.yaw_rate, -kMaxYawRate, kMaxYawRate);
     next.speed = max_of(next.speed, 0.0f);  // brakes stop the car, they do not push it backwards
     return next;
 }
