@@ -14,9 +14,7 @@ speeds = st.floats(0.1, 4).map(lambda value: round(value, 3))
 
 @given(st.lists(st.tuples(angles, speeds), min_size=2, max_size=30))
 def test_discrete_goes_through_aws_degrees_unchanged(actions):
-    document = [
-        {"steering_angle": angle, "speed": speed, "index": i} for i, (angle, speed) in enumerate(actions)
-    ]
+    document = [{"steering_angle": angle, "speed": speed, "index": i} for i, (angle, speed) in enumerate(actions)]
     space = DiscreteActionSpace.from_aws(document)
     assert space.to_aws() == document
     assert DiscreteActionSpace.from_aws(space.to_aws()) == space
@@ -34,9 +32,7 @@ def test_discrete_commands_are_rows_of_the_table():
 
 
 def test_steering_of_45_degrees_drives_as_30():
-    space = DiscreteActionSpace.from_aws(
-        [{"steering_angle": 45, "speed": 0.8}, {"steering_angle": -45, "speed": 0.8}]
-    )
+    space = DiscreteActionSpace.from_aws([{"steering_angle": 45, "speed": 0.8}, {"steering_angle": -45, "speed": 0.8}])
     np.testing.assert_allclose(space.to_commands([0, 1])[:, 0], np.radians([30, -30]), rtol=1e-6)
     assert space.to_aws()[0]["steering_angle"] == 45
 

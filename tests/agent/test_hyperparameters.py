@@ -36,9 +36,7 @@ def test_missing_fields_get_the_defaults_of_aws_code():
 
 
 def test_numbers_may_be_strings():
-    settings = Hyperparameters.from_dict(
-        {"batch_size": "128", "lr": "0.0005", "num_epochs": "5", "epsilon_steps": 1e4}
-    )
+    settings = Hyperparameters.from_dict({"batch_size": "128", "lr": "0.0005", "num_epochs": "5", "epsilon_steps": 1e4})
     assert (settings.batch_size, settings.lr, settings.num_epochs, settings.epsilon_steps) == (
         128,
         0.0005,

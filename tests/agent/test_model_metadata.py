@@ -41,9 +41,7 @@ def test_all_real_runs_are_accepted():
 
 
 def test_ancient_file_with_45_degrees():
-    actions = [
-        {"steering_angle": a, "speed": s} for a, s in ((45, 0.8), (-45, 0.8), (22.5, 0.8), (-22.5, 0.8))
-    ]
+    actions = [{"steering_angle": a, "speed": s} for a, s in ((45, 0.8), (-45, 0.8), (22.5, 0.8), (-22.5, 0.8))]
     metadata = ModelMetadata.from_dict({"action_space": actions}, name="old.json")
     assert (metadata.version, metadata.sensors) == ("1", ("observation",))
     assert metadata.neural_network == "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"

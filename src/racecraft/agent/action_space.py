@@ -39,9 +39,7 @@ class DiscreteActionSpace:
     def __init__(self, table: ArrayLike) -> None:
         self.table = _frozen(table, name="table")
         if self.table.ndim != 2 or self.table.shape[1] != 2:
-            raise ShapeError(
-                f"table has shape {self.table.shape}, expected (actions, 2): steering_angle, speed."
-            )
+            raise ShapeError(f"table has shape {self.table.shape}, expected (actions, 2): steering_angle, speed.")
         if not MIN_ACTIONS <= len(self.table) <= MAX_ACTIONS:
             count = len(self.table)
             raise ConfigError(f"action_space has {count} actions, allowed: {MIN_ACTIONS} to {MAX_ACTIONS}.")
@@ -140,9 +138,7 @@ class DiscreteActionSpace:
     def __repr__(self) -> str:
         angles, speeds = zip(*self.to_degrees(), strict=True)
         widest = max(map(abs, angles))
-        return (
-            f"DiscreteActionSpace({self.size} actions, ±{widest:g}°, {min(speeds):g} to {max(speeds):g} m/s)"
-        )
+        return f"DiscreteActionSpace({self.size} actions, ±{widest:g}°, {min(speeds):g} to {max(speeds):g} m/s)"
 
 
 class ContinuousActionSpace:
@@ -162,8 +158,7 @@ class ContinuousActionSpace:
         self.low, self.high = _frozen(low, name="low"), _frozen(high, name="high")
         if self.low.shape != (2,) or self.high.shape != (2,):
             raise ShapeError(
-                f"low has shape {self.low.shape} and high {self.high.shape}, "
-                "expected (2,): steering_angle, speed."
+                f"low has shape {self.low.shape} and high {self.high.shape}, expected (2,): steering_angle, speed."
             )
         left, right = _degrees(float(self.low[0])), _degrees(float(self.high[0]))
         _check("action_space.steering_angle.low", left, -MAX_STEERING, 0.0, "degrees")
@@ -204,9 +199,7 @@ class ContinuousActionSpace:
             )
         if np.isnan(values).any():
             car = int(np.isnan(values).any(axis=1).argmax())
-            raise NonFiniteAction(
-                f"action[{car}] = {tuple(values[car].tolist())}, expected two numbers in [-1, 1]."
-            )
+            raise NonFiniteAction(f"action[{car}] = {tuple(values[car].tolist())}, expected two numbers in [-1, 1].")
         share = (np.clip(values, -1.0, 1.0) + 1.0) * 0.5
         commands: NDArray[np.float32] = (self.low * (1.0 - share) + self.high * share).astype(np.float32)
         return commands

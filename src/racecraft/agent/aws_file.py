@@ -46,13 +46,9 @@ def parse_json_object(data: bytes | str, *, name: str) -> dict[str, Any]:
     try:
         text = data.decode("utf-8-sig") if isinstance(data, bytes) else data
     except UnicodeDecodeError as error:
-        raise ConfigError(
-            f"{name} is not UTF-8 text: byte {error.start} is {data[error.start]:#04x}."
-        ) from error
+        raise ConfigError(f"{name} is not UTF-8 text: byte {error.start} is {data[error.start]:#04x}.") from error
     try:
-        document = json.loads(
-            text, object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite_float
-        )
+        document = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite_float)
     except RecursionError as error:
         raise ConfigError(f"{name} is nested too deeply.") from error
     except json.JSONDecodeError as error:
@@ -134,9 +130,7 @@ def file_model(settings: type[Any], *, rename: Callable[[str], str] = str) -> ty
     """
     hints = get_type_hints(settings, include_extras=True)
     from_file = {
-        rename(f.name): (hints[f.name], f.default)
-        for f in fields(settings)
-        if get_origin(hints[f.name]) is Annotated
+        rename(f.name): (hints[f.name], f.default) for f in fields(settings) if get_origin(hints[f.name]) is Annotated
     }
     model: type[AwsModel] = create_model(settings.__name__, __base__=AwsModel, **from_file)  # type: ignore[call-overload]
     return model
@@ -184,9 +178,7 @@ def _sentence(model: type[BaseModel], fault: Any) -> str:
         choices = re.findall("'([^']+)'", fault["ctx"]["expected"])
         allowed = allowed or ", ".join(choices)
         suggestion = did_you_mean(fault["input"], choices) if isinstance(fault["input"], str) else ""
-    return f"{where} is {value}, allowed: {allowed or fault['msg']}" + (
-        f" ({suggestion})" if suggestion else ""
-    )
+    return f"{where} is {value}, allowed: {allowed or fault['msg']}" + (f" ({suggestion})" if suggestion else "")
 
 
 def _description(model: type[BaseModel], location: tuple[str | int, ...]) -> str:

@@ -41,9 +41,7 @@ class Hyperparameters:
         ConfigError: A value is outside its range.
     """
 
-    batch_size: Annotated[
-        Whole, AfterValidator(_batch_size), Field(description="32, 64, 128, 256 or 512 samples")
-    ] = 64
+    batch_size: Annotated[Whole, AfterValidator(_batch_size), Field(description="32, 64, 128, 256 or 512 samples")] = 64
     """Samples in a minibatch."""
     num_epochs: Annotated[Whole, Field(ge=3, le=10, description="3 to 10")] = 10
     """Passes over each rollout."""
@@ -102,9 +100,7 @@ class Hyperparameters:
         checked = validate(_file(), document, name=name)
         notes = list(unknown_fields(checked, name=name))
         if "stack_size" in document and document["stack_size"] not in (1, "1"):
-            notes.append(
-                f"{name}: stack_size {document['stack_size']} has no effect, the network sees one frame."
-            )
+            notes.append(f"{name}: stack_size {document['stack_size']} has no effect, the network sees one frame.")
         values = {field: getattr(checked, field) for field in _file().model_fields}
         return cls(**values, extra=dict(checked.model_extra or {}), notes=tuple(notes))
 

@@ -87,16 +87,10 @@ class _Common(AwsModel):
 
     sensor: list[str] = Field(["observation"], description="a list of sensor names")
     neural_network: NeuralNetwork = Field(NEURAL_NETWORKS[0], description=", ".join(NEURAL_NETWORKS))
-    training_algorithm: Literal["clipped_ppo", "sac"] = Field(
-        "clipped_ppo", description="'clipped_ppo' or 'sac'"
-    )
-    action_space_type: Literal["discrete", "continuous"] = Field(
-        "discrete", description="'discrete' or 'continuous'"
-    )
+    training_algorithm: Literal["clipped_ppo", "sac"] = Field("clipped_ppo", description="'clipped_ppo' or 'sac'")
+    action_space_type: Literal["discrete", "continuous"] = Field("discrete", description="'discrete' or 'continuous'")
     version: str = Field("1", description="'1' to '6'")
-    lidar_config: _Lidar | None = Field(
-        None, description="an object with num_sectors, num_values_per_sector, ..."
-    )
+    lidar_config: _Lidar | None = Field(None, description="an object with num_sectors, num_values_per_sector, ...")
 
     @field_validator("version", mode="before")
     @classmethod
@@ -116,9 +110,7 @@ class _DiscreteFile(_Common):
 
 
 class _ContinuousFile(_Common):
-    action_space: _Limits = Field(
-        description="an object with steering_angle and speed, as the type is continuous"
-    )
+    action_space: _Limits = Field(description="an object with steering_angle and speed, as the type is continuous")
 
 
 @dataclass(frozen=True)
@@ -156,9 +148,7 @@ class ModelMetadata:
             if value not in allowed:
                 raise ConfigError(f"{name} is {value!r}, allowed: {', '.join(allowed)}.")
         if self.training_algorithm == "sac" and self.action_space.kind != "continuous":
-            raise ConfigError(
-                "training_algorithm 'sac' needs action_space_type 'continuous', but it is 'discrete'."
-            )
+            raise ConfigError("training_algorithm 'sac' needs action_space_type 'continuous', but it is 'discrete'.")
 
     @classmethod
     def load(cls, path: str | Path) -> ModelMetadata:
@@ -185,9 +175,7 @@ class ModelMetadata:
                 file = validate(_ContinuousFile, document, name=name)
                 space = ContinuousActionSpace.from_aws(file.action_space.model_dump())
                 if space.low[1] < DROA_MIN_SPEED:
-                    notes.append(
-                        f"{name}: DeepRacer on AWS refuses a continuous speed below {DROA_MIN_SPEED} m/s."
-                    )
+                    notes.append(f"{name}: DeepRacer on AWS refuses a continuous speed below {DROA_MIN_SPEED} m/s.")
             else:
                 file = validate(_DiscreteFile, document, name=name)
                 notes += _action_notes(file.action_space, version, name=name)
@@ -207,9 +195,7 @@ class ModelMetadata:
             )
         except ConfigError as error:
             message = str(error)
-            raise ConfigError(
-                message if message.startswith(name) else f"{name}: {message}", hint=error.hint
-            ) from error
+            raise ConfigError(message if message.startswith(name) else f"{name}: {message}", hint=error.hint) from error
 
     def save(self, path: str | Path) -> None:
         """Write AWS's file."""
@@ -238,12 +224,8 @@ def _action_notes(actions: list[_Action], version: str, *, name: str) -> list[st
             where = f"action_space[{place}].steering_angle is {action.steering_angle:g}"
             if version not in ("1", "2"):
                 limits = f"{-MAX_STEERING:g} to {MAX_STEERING:g} degrees"
-                raise ConfigError(
-                    f"{where}, allowed: {limits} (up to {MAX_FILE_STEERING:g} only in version 1 or 2)."
-                )
+                raise ConfigError(f"{where}, allowed: {limits} (up to {MAX_FILE_STEERING:g} only in version 1 or 2).")
             notes.append(f"{name}: {where}, driven as {MAX_STEERING:g}: the wheels turn no further.")
         if action.index not in (None, place):
-            notes.append(
-                f"{name}: action_space[{place}].index is {action.index}; its place in the list counts."
-            )
+            notes.append(f"{name}: action_space[{place}].index is {action.index}; its place in the list counts.")
     return notes

@@ -45,13 +45,9 @@ def check_sensors(names: Sequence[str]) -> tuple[str, ...]:
     cameras = [name for name in names if name in CAMERAS]
     lidars = [name for name in names if name in LIDARS]
     if len(cameras) != 1:
-        raise ConfigError(
-            f"sensor has {len(cameras)} cameras {cameras}, allowed: exactly one of {', '.join(CAMERAS)}."
-        )
+        raise ConfigError(f"sensor has {len(cameras)} cameras {cameras}, allowed: exactly one of {', '.join(CAMERAS)}.")
     if len(lidars) > 1:
-        raise ConfigError(
-            f"sensor has {len(lidars)} LIDARs {lidars}, allowed: at most one of {', '.join(LIDARS)}."
-        )
+        raise ConfigError(f"sensor has {len(lidars)} LIDARs {lidars}, allowed: at most one of {', '.join(LIDARS)}.")
     return tuple(names)
 
 
