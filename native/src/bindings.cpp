@@ -98,7 +98,9 @@ void bind_camera(nb::module_& m) {
             "__init__",
             [](CameraSpec* self, int width, int height, float hfov, float forward, float left, float above,
                float pitch) { new (self) CameraSpec{width, height, hfov, pitch, forward, left, above}; },
-            "width"_a, "height"_a, "hfov"_a, "forward"_a, "left"_a, "above"_a, "pitch"_a);
+            "width"_a, "height"_a, "hfov"_a, "forward"_a, "left"_a, "above"_a, "pitch"_a)
+        .def_ro("width", &CameraSpec::width)
+        .def_ro("height", &CameraSpec::height);
     nb::class_<GreyPalette>(m, "GreyPalette", "Brightness of everything a driver's camera can see.");
     m.def("grey_palette", [](const std::string& name) { return grey_palette(rgb_palette(name)); }, "name"_a);
     nb::class_<GroundMap>(m, "GroundMap", "The ground of a track as cameras see it.")

@@ -51,20 +51,24 @@ class Scene:
         if palette not in ("2018", "2020"):
             raise ConfigError(f"Palette is {palette!r}; allowed are '2018' and '2020'.")
         self.palette = palette
-        self._ground = ground_map(track, texel=TEXEL)
+        self._track = track
 
     def chase_view(self, *, width: int = 640, height: int = 480) -> View:
         """The camera that follows a car from behind and above."""
-        return View(self, _native.chase_camera(width, height), width, height)
+        return View(self._fine_ground(), self.palette, _native.chase_camera(width, height))
 
     def driver_view(self, camera: CameraSpec = CameraSpec()) -> View:
-        """The driver's camera in colour; leave the own car out of its pictures."""
-        return View(self, native_camera(camera), camera.width, camera.height)
+        """The driver's camera in colour, on the ground the driver sees; leave the own car out of its pictures."""
+        return View(ground_map(self._track), self.palette, native_camera(camera))
 
     def top_view(self, *, width: int = 640, height: int = 480) -> View:
         """The whole track from above; its camera stands still, so the pose it is given does not matter."""
-        spec, x, y, heading = _native.top_down_camera(self._ground, width, height)
-        return View(self, spec, width, height, fixed=(x, y, heading))
+        ground = self._fine_ground()
+        spec, x, y, heading = _native.top_down_camera(ground, width, height)
+        return View(ground, self.palette, spec, fixed=(x, y, heading))
+
+    def _fine_ground(self) -> _native.GroundMap:
+        return ground_map(self._track, texel=TEXEL)
 
 
 class View:
@@ -72,16 +76,16 @@ class View:
 
     def __init__(
         self,
-        scene: Scene,
+        ground: _native.GroundMap,
+        palette: str,
         spec: _native.CameraSpec,
-        width: int,
-        height: int,
         *,
         fixed: tuple[float, float, float] | None = None,
     ) -> None:
-        self.width = width
-        self.height = height
-        self._scene = scene
+        self.width = spec.width
+        self.height = spec.height
+        self._ground = ground
+        self._palette = palette
         self._camera = _native.CameraModel(spec)
         self._fixed = fixed
 
@@ -107,5 +111,5 @@ class View:
             out = np.empty((self.height, self.width, 3), dtype=np.uint8)
         table = np.array([(*car[:4], *car.color, car.alpha) for car in cars], dtype=np.float32).reshape(-1, 8)
         x, y, heading = self._fixed or (x, y, heading)
-        _native.render_rgb(self._camera, self._scene._ground, self._scene.palette, x, y, heading, table, out)
+        _native.render_rgb(self._camera, self._ground, self._palette, x, y, heading, table, out)
         return out
