@@ -13,8 +13,8 @@ constexpr size_t kMaxGroups =
 constexpr size_t kMinGroupSize = 8;  // likewise
 constexpr size_t kBlock = 4096;      // parameters of a task that works on them one by one
 constexpr size_t kDenseRows = 128;   // inputs of a task that sums up a dense layer's gradient
-constexpr size_t kSmallDense =
-    1 << 18;  // weights of a dense layer that fit an L2 cache beside the activations
+constexpr size_t kChunk = 8;  // samples between which a layer's weights stay in the L1 cache, and these in L2
+1 << 18;                      // weights of a dense layer that fit an L2 cache beside the activations
 constexpr double kBeta1 = 0.9, kBeta2 = 0.999;
 
 size_t num_blocks(size_t count) {
@@ -36,7 +36,6 @@ double power(double base, int64_t exponent) {
 Learner::Learner(const NetworkSpec& spec, int num_threads)
     : network_(spec),
       pool_(num_threads),
-      chunk_size_(8),
       weights_(network_.num_packed),
       moment1_(network_.num_packed),
       moment2_(network_.num_packed),
@@ -44,8 +43,6 @@ Learner::Learner(const NetworkSpec& spec, int num_threads)
     for (const Tower* tower : {&network_.policy, &network_.critic}) {
         for (size_t l = 0; l < tower->layers.size(); ++l) {
             const Layer& layer = tower->layers[l];
-            // more samples per pass over a matrix that comes from memory
-            if (layer.is_dense && layer.shape.num_weights() > kSmallDense) chunk_size_ = 16;
             for (int panel = 0; layer.is_dense && panel * kPanel < layer.shape.out_channels; ++panel) {
                 for (size_t i = 0; i < layer.shape.num_inputs(); i += kDenseRows) {
                     dense_tasks_.push_back(
@@ -61,12 +58,12 @@ Learner::Learner(const NetworkSpec& spec, int num_threads)
     }
     squares_.resize(num_blocks(network_.num_grouped) + dense_tasks_.size());
     for (Worker& worker : workers_) {
-        worker.input = FloatBuffer(chunk_size_ * spec.observation_size());
+        worker.input = FloatBuffer(kChunk * spec.observation_size());
         for (const auto& [tower, buffers, at] :
              {std::tie(network_.policy, worker.policy, worker.policy_at),
               std::tie(network_.critic, worker.critic, worker.critic_at)}) {
             for (const Layer& layer : tower.layers) {
-                buffers.out.emplace_back(chunk_size_ * layer.shape.out_size());
+                buffers.out.emplace_back(kChunk * layer.shape.out_size());
             }
             at.out.resize(tower.layers.size());
             at.grad.resize(tower.layers.size());
@@ -94,7 +91,7 @@ void Learner::encode(const uint8_t* frames, size_t count, uint8_t* out) {
 void Learner::policy(const uint8_t* observations, size_t count, float* out) {
     const std::lock_guard lock(mutex_);
     const NetworkSpec& spec = network_.spec;
-    const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, chunk_size_);
+    const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, kChunk);
     const size_t num_actions = static_cast<size_t>(spec.num_actions);
     const size_t stride = static_cast<size_t>(network_.policy.layers.back().shape.out_channels);
     for_each_task((count + chunk - 1) / chunk, [&](Worker& worker, size_t task) {
@@ -116,7 +113,7 @@ void Learner::policy(const uint8_t* observations, size_t count, float* out) {
 void Learner::values(const uint8_t* observations, const float* states, size_t count, float* out) {
     const std::lock_guard lock(mutex_);
     const NetworkSpec& spec = network_.spec;
-    const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, chunk_size_);
+    const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, kChunk);
     const size_t stride = static_cast<size_t>(network_.critic.layers.back().shape.out_channels);
     for_each_task((count + chunk - 1) / chunk, [&](Worker& worker, size_t task) {
         const size_t first = task * chunk, samples = std::min(chunk, count - first);
@@ -183,7 +180,7 @@ void Learner::prepare_training(size_t size) {
             for (const auto& [tower, buffers] :
                  {std::tie(network_.policy, worker.policy), std::tie(network_.critic, worker.critic)}) {
                 for (const Layer& layer : tower.layers) {
-                    buffers.grad.emplace_back(layer.is_dense ? 0 : chunk_size_ * layer.shape.out_size());
+                    buffers.grad.emplace_back(layer.is_dense ? 0 : kChunk * layer.shape.out_size());
                 }
             }
         }
@@ -256,8 +253,8 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
     std::fill_n(gradient, network_.num_grouped, 0.0f);
 
     const size_t end = (group + 1) * minibatch.size / num_groups;
-    for (size_t first = group * minibatch.size / num_groups; first < end; first += chunk_size_) {
-        const size_t samples = std::min(chunk_size_, end - first);
+    for (size_t first = group * minibatch.size / num_groups; first < end; first += kChunk) {
+        const size_t samples = std::min(kChunk, end - first);
         RC_DISPATCH(bytes_to_unit, minibatch.observations + first * observation_size,
                     samples * observation_size, worker.input.data());
         const float* critic_input =

@@ -109,7 +109,6 @@ class Learner {
     Network network_;
     ThreadPool pool_;
     std::mutex mutex_;  // one caller at a time
-    size_t chunk_size_;
     FloatBuffer weights_, moment1_, moment2_, gradient_, transposed_;
     FloatBuffer group_gradients_;  // (groups, num_grouped)
     int64_t num_updates_ = 0;

@@ -7,11 +7,13 @@
 #include "network_kernel.hpp"
 #include "network_lanes.hpp"
 #include "network_math.hpp"
+#include "racecraft/math.hpp"
 
 namespace racecraft::RC_ISA {
 namespace {
 
 constexpr int kLaneCount = FloatLanes::kCount;
+constexpr float kNothing = 1e-30f;  // smaller moments move no weight
 
 // One vector of channels over all positions; `slope` gives the gradient before the activation.
 template <typename Slope>
@@ -132,8 +134,11 @@ void adam(const AdamStep& step, const float* gradient, size_t count, float* mome
           float* weights) {
     for (size_t i = 0; i < count; ++i) {
         const float g = gradient[i] * step.gradient_scale;
-        const float m = moment1[i] + (g - moment1[i]) * step.decay1;
-        const float v = moment2[i] * step.beta2 + g * g * step.decay2;
+        float m = moment1[i] + (g - moment1[i]) * step.decay1;
+        float v = moment2[i] * step.beta2 + g * g * step.decay2;
+        // the moments of a unit that died would fade into subnormal numbers, which are slow
+        m = abs_of(m) < kNothing ? 0.0f : m;
+        v = v < kNothing ? 0.0f : v;
         moment1[i] = m;
         moment2[i] = v;
         weights[i] -= step.step_size * m / (std::sqrt(v * step.correction2) + step.epsilon);
