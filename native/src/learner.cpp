@@ -14,7 +14,6 @@ constexpr size_t kMinGroupSize = 8;  // likewise
 constexpr size_t kBlock = 4096;      // parameters of a task that works on them one by one
 constexpr size_t kDenseRows = 128;   // inputs of a task that sums up a dense layer's gradient
 constexpr size_t kChunk = 8;  // samples between which a layer's weights stay in the L1 cache, and these in L2
-1 << 18;                      // weights of a dense layer that fit an L2 cache beside the activations
 constexpr double kBeta1 = 0.9, kBeta2 = 0.999;
 
 size_t num_blocks(size_t count) {
