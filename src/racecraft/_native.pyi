@@ -28,6 +28,12 @@ class CameraSpec:
 
     def __init__(self, width: int, height: int, hfov: float, forward: float, left: float, above: float, pitch: float) -> None: ...
 
+    @property
+    def width(self) -> int: ...
+
+    @property
+    def height(self) -> int: ...
+
 class GreyPalette:
     """Brightness of everything a driver's camera can see."""
 
@@ -103,6 +109,10 @@ class Engine:
 
     @property
     def track_choice(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None,), order='C')]: ...
+
+def judge_log(track: NativeTrack, reversed: bool, log: Annotated[NDArray[numpy.float64], dict(shape=(None, 7), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+def replay_windows(vehicle: Sequence[float], poses: Annotated[NDArray[numpy.float64], dict(shape=(None, 3), order='C', device='cpu', writable=False)], commands: Annotated[NDArray[numpy.float32], dict(shape=(None, 2), order='C', device='cpu', writable=False)], durations: Annotated[NDArray[numpy.float32], dict(shape=(None,), order='C', device='cpu', writable=False)], first: Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C', device='cpu', writable=False)], known: int, free: int, substeps: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C')]: ...
 
 class Objective:
     """The loss and the step taken on it; see racecraft.learn.Objective."""
