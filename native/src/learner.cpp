@@ -8,12 +8,11 @@
 namespace racecraft {
 namespace {
 
-constexpr size_t kMaxGroups =
-    16;  // of samples, each with a gradient of its own; part of the result's definition
+constexpr size_t kMaxGroups = 16;    // of samples, each with a gradient of its own; decides the bits
 constexpr size_t kMinGroupSize = 8;  // likewise
 constexpr size_t kBlock = 4096;      // parameters of a task that works on them one by one
 constexpr size_t kDenseRows = 128;   // inputs of a task that sums up a dense layer's gradient
-constexpr size_t kChunk = 8;  // samples between which a layer's weights stay in the L1 cache, and these in L2
+constexpr size_t kChunk = 8;  // samples that pass through a layer together, so that they fit an L2 cache
 constexpr double kBeta1 = 0.9, kBeta2 = 0.999;
 
 size_t num_blocks(size_t count) {

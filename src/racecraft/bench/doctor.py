@@ -103,7 +103,7 @@ CHECKS: list[tuple[str, Callable[[], str], str]] = [
     ("native core", _core, "Build it again: make clean setup."),
     ("simulator", _simulator, "Build it again: make clean setup."),
     ("reward worker", _reward, "Racecraft must be allowed to start processes."),
-    ("learner", _learner, "Install the learner: make setup, or pip install 'racecraft[torch]'."),
+    ("learner", _learner, "Compile the native core again: make build."),
     ("video", _video, "Install PyAV with H.264: pip install av."),
     ("folder", _disk, "Change into a folder that you may write to."),
 ]
