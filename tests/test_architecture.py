@@ -19,6 +19,7 @@ LAYERS = (
     "learn",
     "run",
     "race",
+    "replay",
     "training",
     "serve",
     "bench",

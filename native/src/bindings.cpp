@@ -8,10 +8,13 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "dispatch.hpp"
 #include "engine.hpp"
+#include "log_judge.hpp"
+#include "replay_kernel.hpp"
 #include "scene.hpp"
 
 namespace nb = nanobind;
@@ -279,6 +282,60 @@ void bind_engine(nb::module_& m) {
         });
 }
 
+void bind_replay(nb::module_& m) {
+    constexpr int kNumLogged = sizeof(LoggedRow) / sizeof(double);
+    using Log = nb::ndarray<const double, nb::shape<-1, kNumLogged>, nb::c_contig, nb::device::cpu>;
+    using Poses = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+    using Commands = nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+    using Firsts = nb::ndarray<const int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+    m.def(
+        "judge_log",
+        [](const NativeTrack& track, bool reversed, Log log) {
+            const size_t count = log.shape(0);
+            double* rows = new double[count * kNumRowColumns];
+            const nb::capsule owner(rows, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+            const TrackStore store = track.store(reversed);
+            const LoggedRow* logged = reinterpret_cast<const LoggedRow*>(log.data());
+            {
+                nb::gil_scoped_release release;
+                judge_log(store.geometry(), reversed, logged, count, rows);
+            }
+            return Array<double, 2>(rows, {count, kNumRowColumns}, owner);
+        },
+        "track"_a, "reversed"_a, "log"_a);
+    m.def(
+        "replay_windows",
+        [](const std::vector<float>& vehicle, Poses poses, Commands commands, Table durations, Firsts first,
+           int known, int free, int substeps) {
+            const size_t rows = poses.shape(0), count = first.shape(0);
+            if (commands.shape(0) != rows || durations.shape(0) != rows)
+                throw std::invalid_argument("Poses, commands and durations need the same number of rows.");
+            if (known < 2 || free < 1 || substeps < 1)
+                throw std::invalid_argument(
+                    "A window needs 2 known rows, 1 free row and 1 substep at least.");
+            for (size_t i = 0; i < count; ++i) {
+                if (first.data()[i] < 0 || static_cast<size_t>(first.data()[i]) + known + free > rows)
+                    throw std::invalid_argument("A window reaches beyond the log.");
+            }
+            const size_t width = static_cast<size_t>(free);
+            double* out = new double[count * width * 3];
+            const nb::capsule owner(out, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+            const VehicleParameters car = vehicle_of(vehicle);
+            const ReplayLog log{poses.data(), commands.data(), durations.data()};
+            const ReplayWindows windows{first.data(), known, free, substeps};
+            {
+                nb::gil_scoped_release release;
+                for (size_t begin = 0; begin < count; begin += kReplayLanes) {
+                    const int lanes = static_cast<int>(std::min(count - begin, size_t{kReplayLanes}));
+                    RC_DISPATCH(replay_windows, car, log, windows, begin, lanes, out);
+                }
+            }
+            return Array<double, 3>(out, {count, width, 3}, owner);
+        },
+        "vehicle"_a, "poses"_a, "commands"_a, "durations"_a, "first"_a, "known"_a, "free"_a, "substeps"_a);
+}
+
 }  // namespace
 }  // namespace racecraft
 
@@ -298,5 +355,6 @@ NB_MODULE(_native, m) {
     racecraft::bind_camera(m);
     racecraft::bind_views(m);
     racecraft::bind_engine(m);
+    racecraft::bind_replay(m);
     racecraft::bind_learner(m);
 }

@@ -153,7 +153,7 @@ class Simulation:
         self.laps = laps
         self._everyone = np.ones(num_envs, dtype=np.bool_)
         self._engine = _native.Engine(
-            tracks=[_native_track(track) for track in self.tracks],
+            tracks=[native_track(track) for track in self.tracks],
             grounds=[ground_map(track) for track in self.tracks] if camera else [],
             vehicle=self.vehicle.values(),
             camera=native_camera(camera) if camera else None,
@@ -331,7 +331,8 @@ def native_camera(camera: CameraSpec) -> _native.CameraSpec:
     )
 
 
-def _native_track(track: Track) -> _native.NativeTrack:
+def native_track(track: Track) -> _native.NativeTrack:
+    """The core's form of a track: both directions, with tables of width and curvature."""
     twin = track.reversed()
     count = max(2, int(np.ceil(track.length / TABLE_SPACING)))
     # On a closed track the sample after the last is the first again; an open one needs both ends.

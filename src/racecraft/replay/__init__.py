@@ -1,0 +1,12 @@
+"""Replay: logs that the original wrote, held against the simulator, and cars fitted to them.
+
+log -> *replay* -> rules (agreement), dynamics (error), rewards (agreement)
+log -> *calibrate* -> vehicle file
+"""
+
+from racecraft.replay.calibrate import Calibration, calibrate
+from racecraft.replay.comparison import Comparison, replay
+from racecraft.replay.logs import Log, read_logs
+from racecraft.replay.rules import TrackRules
+
+__all__ = ["Calibration", "Comparison", "Log", "TrackRules", "calibrate", "read_logs", "replay"]

@@ -1,0 +1,191 @@
+"""Logs of the original against the simulator: rules, dynamics and rewards in one pass over the files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import RunError
+from racecraft.replay.dynamics import REPORTED_STEPS, Windows, reported_errors, windows_of
+from racecraft.replay.logs import Faults, Log, read_logs
+from racecraft.replay.rules import RulesAgreement, TrackRules
+from racecraft.sim.vehicle import Vehicle, load_vehicle
+from racecraft.track import load_track
+
+if TYPE_CHECKING:
+    from racecraft.track.track import Track
+
+REWARD_TOLERANCE: Final = 1.0001e-4
+MAX_WINDOWS: Final = 2_000_000
+"""Windows kept for the percentiles; beyond it every other one is driven."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """One window to look at: where it is, and what was predicted."""
+
+    source: str
+    line: int  # of its first row
+    error: float  # m, after the last step
+    known: NDArray[np.float64]  # poses   (K, 3)
+    truth: NDArray[np.float64]  # (S, 3)
+    prediction: NDArray[np.float64]  # (S, 3)
+
+
+@dataclass
+class Comparison:
+    """What came out. Shares are of all rows, 0 to 1."""
+
+    track: Track
+    vehicle: Vehicle
+    reversed: bool
+    rules: RulesAgreement
+    faults: Faults
+    errors: NDArray[np.float64]  # m and rad after REPORTED_STEPS   (W, 3, 2)
+    clocks: tuple[str, ...]  # readings of the time stamps that were met
+    rewards: int = 0  # rows whose reward was compared
+    good_rewards: int = 0
+    examples: tuple[Example, ...] = ()  # the median and the worst window
+    reward_differences: list[str] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``racecraft replay --json`` prints."""
+        rules = self.rules
+        return {
+            "rows": rules.rows,
+            "episodes": rules.episodes,
+            "windows": len(self.errors),
+            "broken_rows": self.faults.count,
+            "progress_agreement": _share(rules.progress, rules.rows),
+            "all_wheels_agreement": _share(rules.all_wheels, rules.rows),
+            "closest_waypoint_agreement": _share(rules.closest_waypoint, rules.rows),
+            "episode_end_agreement": _share(rules.ends, rules.episodes),
+            "position_error_m": self._quantile(0, 0.5),
+            "position_error_p90_m": self._quantile(0, 0.9),
+            "heading_error_deg": self._quantile(1, 0.5),
+            "heading_error_p90_deg": self._quantile(1, 0.9),
+            "reward_agreement": _share(self.good_rewards, self.rewards),
+        }
+
+    def _quantile(self, quantity: int, share: float) -> dict[str, float] | None:
+        if not len(self.errors):
+            return None
+        values = np.quantile(self.errors[:, :, quantity], share, axis=0)
+        values = np.degrees(values) if quantity else values
+        return {str(step): float(value) for step, value in zip(REPORTED_STEPS, values, strict=True)}
+
+
+def replay(
+    logs: str | Path | Sequence[str | Path],
+    *,
+    track: str | Track,
+    vehicle: str | Vehicle = "v5",
+    reward: str | None = None,
+) -> Comparison:
+    """Compare logs that the original (or this simulator) wrote with what the simulator makes of them.
+
+    Args:
+        logs: Sim-traces: CSV, or logs with SIM_TRACE_LOG lines; gzip or not. Several are taken together.
+        track: The track they were driven on: a name, a file or a `Track`. Its direction is found by itself.
+        vehicle: The car to compare with: a preset, a vehicle file or a `Vehicle`.
+        reward: Source of the reward function that was in force, to compare rewards too.
+
+    Raises:
+        RunError: A log cannot be read, or was not driven on this track.
+        RewardError: The reward function is not valid or fails.
+    """
+    paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    road = load_track(track) if isinstance(track, str) else track
+    car = load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+    judges: tuple[TrackRules, ...] = (TrackRules(road), TrackRules(road, reversed=True))
+    rules: TrackRules | None = None
+    agreement, faults = RulesAgreement(), Faults()
+    result = Comparison(road, car, False, agreement, faults, np.zeros((0, len(REPORTED_STEPS), 2)), ())
+    errors: list[NDArray[np.float64]] = []
+    clocks: set[str] = set()
+    best: list[tuple[float, Windows, int]] = []
+    stride = 1
+    with ExitStack() as stack:
+        worker = None
+        if reward is not None:
+            from racecraft.reward.worker import RewardWorker
+
+            worker = stack.enter_context(RewardWorker(reward, road))
+        for log in read_logs(paths, faults):
+            if rules is None:
+                rules = max(judges, key=lambda judge: _num_agreeing(judge, log))
+                result.reversed = rules.reversed
+                _require_this_track(rules, log)
+            rows = rules.judge(log)
+            agreement.add(rules, log, rows)
+            if worker is not None:
+                _compare_rewards(result, log, worker(rows[~log.is_prepare]))
+            windows = windows_of([log], stride=stride)
+            if windows is not None:
+                errors.append(reported_errors(windows, car).astype(np.float32))
+                clocks.add(windows.clock)
+                worst = int(errors[-1][:, -1, 0].argmax())
+                best.append((float(errors[-1][worst, -1, 0]), windows.take(np.array([worst])), 0))
+                best = [max(best, key=lambda entry: entry[0])]
+                middle = int(np.argsort(errors[-1][:, -1, 0])[len(windows) // 2])
+                typical = windows.take(np.array([middle]))
+                if sum(map(len, errors)) > MAX_WINDOWS:
+                    stride *= 2
+                    errors = [np.concatenate(errors)[::2]]
+    if errors:
+        result.errors = np.concatenate(errors)
+        result.examples = (_example(typical, car), _example(best[0][1], car))
+    result.clocks = tuple(sorted(clocks))
+    return result
+
+
+def _num_agreeing(judge: TrackRules, log: Log) -> int:
+    agreement = RulesAgreement()
+    agreement.add(judge, log, judge.judge(log))
+    return agreement.progress + agreement.closest_waypoint
+
+
+def _require_this_track(rules: TrackRules, log: Log) -> None:
+    length = float(np.median(log.track_length))
+    if abs(length - rules.track.length) > 0.005 * length + 0.01:
+        raise RunError(
+            f"{log.source} was driven on a track of {length:.2f} m; {rules.track.name} has {rules.track.length:.2f} m.",
+            hint="Give the log's own track with --track: a name of 'racecraft tracks', or a .npy file.",
+        )
+
+
+def _compare_rewards(result: Comparison, log: Log, rewards: NDArray[np.float64]) -> None:
+    logged = log.reward[~log.is_prepare]
+    good = np.abs(rewards - logged) <= REWARD_TOLERANCE
+    result.rewards += len(logged)
+    result.good_rewards += int(good.sum())
+    lines = log.lines[~log.is_prepare]
+    for row in np.flatnonzero(~good)[: 10 - len(result.reward_differences)]:
+        result.reward_differences.append(
+            f"{log.source}, line {lines[row]}: reward {logged[row]:.6g}, here {rewards[row]:.6g}"
+        )
+
+
+def _example(windows: Windows, car: Vehicle) -> Example:
+    from racecraft.replay.dynamics import KNOWN_ROWS, errors_of
+
+    first = int(windows.first[0])
+    prediction, truth = windows.drive(car)[0], windows.truth()[0]
+    return Example(
+        source=windows.source[0],
+        line=int(windows.lines[first]),
+        error=float(errors_of(prediction, truth)[-1, 0]),
+        known=windows.poses[first : first + KNOWN_ROWS],
+        truth=truth,
+        prediction=prediction,
+    )
+
+
+def _share(good: int, of: int) -> float | None:
+    return good / of if of else None
