@@ -4,11 +4,12 @@ import pytest
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
 from racecraft.race import Autopilot, RaceRules, completion, evaluate, trial_simulation
 from racecraft.race.placement import reset_pose, start_pose
-from racecraft.sim import ROW_COLUMNS, STATE_COLUMNS
+from racecraft.sim import ROW_COLUMNS, STATE_COLUMNS, Vehicle
 from racecraft.track import Track, load_track
 
 OVAL, RING, STRAIGHT = load_track("oval"), load_track("reinvent_2018"), load_track("straight")
 DT = 1 / 15
+EVEN = Vehicle(steering_bias=0.0, speed_gain=1.0)  # drives straight on, as fast as it is told
 
 
 class Constant:
@@ -22,7 +23,8 @@ class Constant:
 
 
 def drive(driver, track=OVAL, *, num_trials=1, seed=0, **rules):
-    return evaluate(driver, track, rules=RaceRules(**rules), num_trials=num_trials, seed=seed, sees="state")
+    rules = RaceRules(**rules)
+    return evaluate(driver, track, rules=rules, num_trials=num_trials, seed=seed, sees="state", vehicle=EVEN)
 
 
 def runs_of(statuses):
@@ -288,7 +290,7 @@ def test_bad_commands_and_settings():
 
 def test_completion_agrees_with_an_evaluation_of_the_first_lap():
     rules = RaceRules(laps=1, max_resets=0)
-    simulation = trial_simulation(RING, rules=rules, num_trials=4, camera=None)
+    simulation = trial_simulation(RING, rules=rules, num_trials=4, camera=None, vehicle=EVEN)
     for driver in (Autopilot(speed=2.0), Constant(0.0, 1.0), Autopilot(speed=1.0)):
         quick = completion(driver, simulation, rules=rules, seed=3, sees="state")
         whole = drive(driver, RING, num_trials=4, seed=3, laps=1, max_resets=0)
@@ -302,7 +304,7 @@ def test_completion_agrees_with_an_evaluation_of_the_first_lap():
 
 
 def test_completion_stops_a_slow_car():
-    simulation = trial_simulation(OVAL, num_trials=2, camera=None)
+    simulation = trial_simulation(OVAL, num_trials=2, camera=None, vehicle=EVEN)
     slow = completion(Constant(0.0, 0.1), simulation, sees="state", max_seconds=2.0)
     assert slow.statuses == ("in_progress",) * 2
     assert slow.laps_completed == 0

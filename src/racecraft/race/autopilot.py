@@ -38,8 +38,8 @@ class Autopilot:
 
     speed: float = 1.0
     """m/s on a straight, 0.1 to 4."""
-    lateral_acceleration: float = 3.0
-    """m/s² it allows itself in bends."""
+    lateral_acceleration: float = 2.0
+    """m/s² it allows itself in bends; the default car holds about 3."""
     lookahead: float = 0.3
     """m to the point it steers for when standing, beyond the car's nose."""
     lookahead_time: float = 0.25
