@@ -33,8 +33,24 @@ Outline polygon() {
 }
 
 // The default car of racecraft.sim.vehicle.
-constexpr VehicleParameters kCar{7.5f, 0.1f, 0.125f, 0.125f, 0.75f, 3.2f, 10.0f, 0.4f,
-                                 3.2f, 6.5f, 0.2f,   0.15f,  10.0f, 0.0f, 1.0f};
+constexpr VehicleParameters kCar{.mass = 7.5f,
+                                 .yaw_inertia = 0.109f,
+                                 .front_axle = 0.116f,
+                                 .rear_axle = 0.078f,
+                                 .half_track = 0.08f,
+                                 .front_load = 0.396f,
+                                 .front_friction = 0.315f,
+                                 .rear_friction = 0.29f,
+                                 .front_stiffness = 6.92f,
+                                 .rear_stiffness = 12.0f,
+                                 .slip_speed = 0.5f,
+                                 .drive_acceleration = 3.33f,
+                                 .brake_acceleration = 3.91f,
+                                 .speed_time_constant = 0.1155f,
+                                 .steering_time_constant = 0.02f,
+                                 .steering_rate = 40.0f,
+                                 .steering_bias = 0.0247f,
+                                 .speed_gain = 1.049f};
 
 struct Settings {
     size_t num_envs = 1;
@@ -128,7 +144,7 @@ uint64_t hash_of_drive(size_t batch, int num_threads, bool camera = false) {
 }
 
 // A change of the physics, the rules or the starts on purpose is the only reason to change it.
-constexpr uint64_t kGolden = 16254813213260022184u;
+constexpr uint64_t kGolden = 12395099405159814937u;
 
 }  // namespace
 
