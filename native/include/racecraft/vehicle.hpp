@@ -1,12 +1,15 @@
 // The car: four wheels that all turn at the commanded speed, as the original's four motors drive them, and
 // that rub over the ground.
 //
-//        left  o------------o        Across, one tyre law per axle: the force follows the slip (sideways over
-//              |  lr   lf   |  ->    forward speed) linearly at first and saturates at what friction allows,
-//              |---- + -----|          F = -friction * load * s / sqrt(1 + s^2),  s = stiffness * slip /
-//              friction | origin     |        Along, every wheel pulls the car towards the speed it turns at:
-//        right o------------o          F = load * e / sqrt(1 + (e / limit)^2),    e = (target - forward) /
-//        time
+//    left  o--------------o        Across, one tyre law per axle: the force follows the slip (sideways over
+//          |  lr     lf   |  -->   forward speed) linearly at first and saturates at what friction allows,
+//          |------+-------|
+//          |    origin    |        F = -friction * load * s / sqrt(1 + s^2)
+//    right o--------------o        s = stiffness * slip / friction
+//
+//                                  Along, every wheel pulls the car towards the speed it turns at:
+//                                  F = load * e / sqrt(1 + (e / limit)^2)
+//                                  e = (target - forward) / time
 //
 // Neither takes from the other: the original's contacts are friction boxes, not circles. In a bend the inner
 // wheels turn too fast for their way and the outer ones too slowly; this scrub turns the car back and is most
