@@ -10,8 +10,11 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from racecraft.bench.doctor import Finding
     from racecraft.race.run_evaluation import RunEvaluation
+    from racecraft.replay import Calibration, Comparison
     from racecraft.reward import Outcome, Problem
     from racecraft.track import Track
     from racecraft.training import TrainResult
@@ -137,6 +140,62 @@ def say_examined(findings: list[Finding]) -> None:
             text.append(f"\n{finding.hint}", style="yellow")
         mark = Text("ok", "green") if finding.ok else Text("bad", "bold red")
         table.add_row(mark, Text(finding.name, "bold"), text)
+    console.print(table)
+
+
+def say_replayed(result: Comparison, picture: Path | None) -> None:
+    """How much of the logs comes out the same here, and what does not."""
+    console, found = Console(), result.to_dict()
+    _say(console, f"{found['rows']:,} rows, {found['episodes']:,} finished episodes on {result.track.name}.")
+    table = _table()
+    for heading, justify in (("same as logged", "left"), ("share", "right")):
+        table.add_column(heading, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    for name, key in (
+        ("progress", "progress_agreement"),
+        ("wheels on track", "all_wheels_agreement"),
+        ("closest waypoint", "closest_waypoint_agreement"),
+        ("end of the episode", "episode_end_agreement"),
+        ("reward", "reward_agreement"),
+    ):
+        if found[key] is not None:
+            table.add_row(name, f"{100 * found[key]:.3f} %")
+    console.print(table)
+    if result.examples:
+        _say_errors(console, {"median": _medians(found), "90 %": _medians(found, "_p90")})
+    for note in (*result.rules.differences[:5], *result.reward_differences[:5], *result.faults.notes[:5]):
+        _say(console, (f"  {note}", "dim"))
+    if result.faults.count:
+        _say(console, (f"{result.faults.count:,} rows could not be read.", "bold yellow"))
+    if picture is not None:
+        _say(console, "Median and worst window: ", (str(picture), "bold"))
+
+
+def say_calibrated(result: Calibration, output: Path) -> None:
+    """How well the fitted car predicts episodes that the fit did not see, beside the one it began with."""
+    console, found = Console(), result.to_dict()
+    _say(console, f"Fitted to {result.windows:,} windows, judged on {result.held_out_windows:,} others.")
+    _say_errors(console, {"started from": found["preset"], "fitted": found["held_out"]})
+    _say(console, "Vehicle file: ", (str(output), "bold"))
+    _say(console, "Drive it:     ", (f"racecraft train --vehicle {output}", "bold"))
+
+
+def _medians(found: dict[str, Any], kind: str = "") -> dict[str, dict[str, float]]:
+    return {
+        "position_error_m": found[f"position_error{kind}_m"],
+        "heading_error_deg": found[f"heading_error{kind}_deg"],
+    }
+
+
+def _say_errors(console: Console, rows: dict[str, dict[str, dict[str, float]]]) -> None:
+    """A line for each of several errors: position and heading after so many steps alone."""
+    table = _table()
+    table.add_column("error after")
+    steps = list(next(iter(rows.values()))["position_error_m"])
+    for step in steps:
+        table.add_column(f"{step} steps", justify="right", no_wrap=True)
+    for name, errors in rows.items():
+        pairs = zip(errors["position_error_m"].values(), errors["heading_error_deg"].values(), strict=True)
+        table.add_row(name, *(f"{100 * metres:.1f} cm, {degrees:.1f}°" for metres, degrees in pairs))
     console.print(table)
 
 

@@ -7,6 +7,7 @@ log -> *calibrate* -> vehicle file
 from racecraft.replay.calibrate import Calibration, calibrate
 from racecraft.replay.comparison import Comparison, replay
 from racecraft.replay.logs import Log, read_logs
+from racecraft.replay.picture import draw_comparison
 from racecraft.replay.rules import TrackRules
 
-__all__ = ["Calibration", "Comparison", "Log", "TrackRules", "calibrate", "read_logs", "replay"]
+__all__ = ["Calibration", "Comparison", "Log", "TrackRules", "calibrate", "draw_comparison", "read_logs", "replay"]

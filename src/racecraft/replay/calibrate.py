@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,15 @@ from numpy.typing import NDArray
 from racecraft.errors import ConfigError, RunError
 from racecraft.replay.dynamics import REPORTED_STEPS, Windows, reported_errors, windows_of
 from racecraft.replay.logs import Faults, Log, read_logs
+from racecraft.replay.rules import require_track
 from racecraft.sim.vehicle import LIMITS, Vehicle, load_vehicle
+from racecraft.track import load_track
+
+if TYPE_CHECKING:
+    from racecraft.track.track import Track
 
 SEARCHED: Final[dict[str, tuple[float, float]]] = {
-    "yaw_inertia": (0.06, 0.4),
+    "yaw_inertia": (0.06, 0.8),
     "front_axle": (0.03, 0.25),
     "rear_axle": (0.03, 0.25),
     "front_load": (0.15, 0.85),
@@ -67,6 +72,7 @@ def calibrate(
     logs: str | Path | Sequence[str | Path],
     *,
     vehicle: str | Vehicle = "v5",
+    track: str | Track | None = None,
     held_out: float = 0.3,
     num_windows: int = 2000,
     iterations: int = 12,
@@ -76,7 +82,8 @@ def calibrate(
     Args:
         logs: Sim-traces, as for `replay`.
         vehicle: Where the fit starts, and what it is compared with.
-        held_out: Share of the episodes that only judge.
+        track: Logs of another track are refused.
+        held_out: Share of the driving that only judges.
         num_windows: Windows to fit.
         iterations: Steps of the fit at most.
 
@@ -87,7 +94,9 @@ def calibrate(
     if not 0.05 <= held_out <= 0.9:
         raise ConfigError(f"held_out is {held_out!r}; allowed is a share from 0.05 to 0.9.")
     start = load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
-    fit, judged = _split(_load([logs] if isinstance(logs, str | Path) else list(logs)), held_out, num_windows)
+    road = load_track(track) if isinstance(track, str) else track
+    windows = _load([logs] if isinstance(logs, str | Path) else list(logs), road)
+    fit, judged = _split(windows, held_out, num_windows)
     car = _fit(start, fit, iterations)
     return Calibration(
         vehicle=car,
@@ -100,10 +109,12 @@ def calibrate(
     )
 
 
-def _load(paths: Sequence[str | Path]) -> Windows:
+def _load(paths: Sequence[str | Path], track: Track | None) -> Windows:
     read: list[Log] = []
     rows = 0
     for log in read_logs(paths, Faults()):
+        if track is not None:
+            require_track(track, log)
         read.append(log)
         rows += len(log)
         if rows >= MAX_ROWS:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import RunError
-from racecraft.replay.dynamics import REPORTED_STEPS, Windows, reported_errors, windows_of
+from racecraft.replay.dynamics import KNOWN_ROWS, REPORTED_STEPS, Windows, errors_of, reported_errors, windows_of
 from racecraft.replay.logs import Faults, Log, read_logs
-from racecraft.replay.rules import RulesAgreement, TrackRules
+from racecraft.replay.rules import RulesAgreement, TrackRules, require_track
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import load_track
 
@@ -109,7 +109,8 @@ def replay(
     result = Comparison(road, car, False, agreement, faults, np.zeros((0, len(REPORTED_STEPS), 2)), ())
     errors: list[NDArray[np.float64]] = []
     clocks: set[str] = set()
-    best: list[tuple[float, Windows, int]] = []
+    typical: list[Example] = []
+    worst: Example | None = None
     stride = 1
     with ExitStack() as stack:
         worker = None
@@ -121,7 +122,8 @@ def replay(
             if rules is None:
                 rules = max(judges, key=lambda judge: _num_agreeing(judge, log))
                 result.reversed = rules.reversed
-                _require_this_track(rules, log)
+                require_track(rules.track, log)
+                _require_agreement(rules, log)
             rows = rules.judge(log)
             agreement.add(rules, log, rows)
             if worker is not None:
@@ -130,17 +132,16 @@ def replay(
             if windows is not None:
                 errors.append(reported_errors(windows, car).astype(np.float32))
                 clocks.add(windows.clock)
-                worst = int(errors[-1][:, -1, 0].argmax())
-                best.append((float(errors[-1][worst, -1, 0]), windows.take(np.array([worst])), 0))
-                best = [max(best, key=lambda entry: entry[0])]
-                middle = int(np.argsort(errors[-1][:, -1, 0])[len(windows) // 2])
-                typical = windows.take(np.array([middle]))
+                order = np.argsort(errors[-1][:, -1, 0])
+                typical.append(_example(windows, int(order[len(order) // 2]), car))
+                worst = max(worst, _example(windows, int(order[-1]), car), key=lambda e: -1.0 if e is None else e.error)
                 if sum(map(len, errors)) > MAX_WINDOWS:
                     stride *= 2
                     errors = [np.concatenate(errors)[::2]]
-    if errors:
+    if errors and worst is not None:
         result.errors = np.concatenate(errors)
-        result.examples = (_example(typical, car), _example(best[0][1], car))
+        middle = float(np.median(result.errors[:, -1, 0]))
+        result.examples = (min(typical, key=lambda example: abs(example.error - middle)), worst)
     result.clocks = tuple(sorted(clocks))
     return result
 
@@ -151,11 +152,13 @@ def _num_agreeing(judge: TrackRules, log: Log) -> int:
     return agreement.progress + agreement.closest_waypoint
 
 
-def _require_this_track(rules: TrackRules, log: Log) -> None:
-    length = float(np.median(log.track_length))
-    if abs(length - rules.track.length) > 0.005 * length + 0.01:
+def _require_agreement(rules: TrackRules, log: Log) -> None:
+    agreement = RulesAgreement()
+    agreement.add(rules, log, rules.judge(log))
+    if agreement.progress < 0.5 * agreement.rows:
         raise RunError(
-            f"{log.source} was driven on a track of {length:.2f} m; {rules.track.name} has {rules.track.length:.2f} m.",
+            f"{log.source} was not driven on {rules.track.name}: the progress of only "
+            f"{100 * agreement.progress / agreement.rows:.0f} % of the first rows fits its poses.",
             hint="Give the log's own track with --track: a name of 'racecraft tracks', or a .npy file.",
         )
 
@@ -172,16 +175,15 @@ def _compare_rewards(result: Comparison, log: Log, rewards: NDArray[np.float64])
         )
 
 
-def _example(windows: Windows, car: Vehicle) -> Example:
-    from racecraft.replay.dynamics import KNOWN_ROWS, errors_of
-
-    first = int(windows.first[0])
-    prediction, truth = windows.drive(car)[0], windows.truth()[0]
+def _example(windows: Windows, number: int, car: Vehicle) -> Example:
+    window = windows.take(np.array([number]))
+    first = int(window.first[0])
+    prediction, truth = window.drive(car)[0], window.truth()[0]
     return Example(
-        source=windows.source[0],
-        line=int(windows.lines[first]),
+        source=window.source[0],
+        line=int(window.lines[first]),
         error=float(errors_of(prediction, truth)[-1, 0]),
-        known=windows.poses[first : first + KNOWN_ROWS],
+        known=window.poses[first : first + KNOWN_ROWS].copy(),
         truth=truth,
         prediction=prediction,
     )

@@ -12,10 +12,11 @@ import gzip
 import io
 import math
 import re
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, TextIO
+from typing import BinaryIO, Final, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,11 +95,11 @@ def _read_file(path: Path, faults: Faults) -> Iterator[Log]:
     rows: list[tuple[int, list[str]]] = []
     good, broken_before = 0, faults.count
     try:
-        with _open(path) as file:
+        with path.open("rb") as raw, _decoded(raw) as file:
             for log in _batches(path.name, file, rows, faults):
                 good += len(log)
                 yield log
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         text = getattr(error, "strerror", None) or error
         raise RunError(f"{path} cannot be read: {text}.") from error
     broken = faults.count - broken_before
@@ -111,12 +112,11 @@ def _read_file(path: Path, faults: Faults) -> Iterator[Log]:
         raise RunError(f"{path} has {broken:,} broken rows and {good:,} good ones. {faults.notes[-1]}.")
 
 
-def _open(path: Path) -> TextIO:
-    raw = path.open("rb")
+def _decoded(raw: BinaryIO) -> TextIO:
     is_gzip = raw.read(2) == b"\x1f\x8b"
     raw.seek(0)
     stream = gzip.GzipFile(fileobj=raw) if is_gzip else raw
-    return io.TextIOWrapper(stream, encoding="utf-8-sig", errors="replace", newline=None)
+    return io.TextIOWrapper(stream, encoding="utf-8-sig", errors="replace")
 
 
 def _batches(source: str, file: TextIO, rows: list[tuple[int, list[str]]], faults: Faults) -> Iterator[Log]:

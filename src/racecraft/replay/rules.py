@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.errors import RunError
 from racecraft.replay.logs import Log
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.logged import LogJudge
@@ -108,3 +109,17 @@ def closest_waypoints(track: Track, rows: NDArray[np.float64]) -> NDArray[np.int
 
 def _num_waypoints(track: Track) -> int:
     return len(track.centerline) - int(track.is_closed)
+
+
+def require_track(track: Track, log: Log) -> None:
+    """Refuse a log whose track has another length.
+
+    Raises:
+        RunError: It has.
+    """
+    length = float(np.median(log.track_length))
+    if abs(length - track.length) > 0.005 * length + 0.01:
+        raise RunError(
+            f"{log.source} was driven on a track of {length:.2f} m; {track.name} has {track.length:.2f} m.",
+            hint="Give the log's own track with --track: a name of 'racecraft tracks', or a .npy file.",
+        )

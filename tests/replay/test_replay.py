@@ -1,0 +1,241 @@
+"""Logs of our own making: a drive of the simulator, written in every form, must come back without a difference."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+
+import numpy as np
+import pytest
+
+from racecraft.errors import ConfigError, RunError
+from racecraft.replay import calibrate, draw_comparison, read_logs, replay
+from racecraft.replay.dynamics import clock_of, step_durations
+from racecraft.replay.logs import Faults
+from racecraft.run.simtrace import COLUMNS
+from racecraft.sim import ROW_COLUMNS, STATUS_NAMES, Simulation, Start
+from racecraft.track import load_track
+
+OVAL = load_track("oval")
+STAMPED = 15  # columns up to tstamp
+AT = {name: index for index, name in enumerate(ROW_COLUMNS)}
+
+
+def drive(*, episodes: int, direction: str = "forward", vehicle: str = "v5") -> list[list[str]]:
+    """Fields of a log of 19 columns, written from the simulation's rows."""
+    start = Start(mode="random", lateral_jitter=0.1)
+    simulation = Simulation(OVAL, camera=None, seed=4, start=start, direction=direction, vehicle=vehicle)
+    waypoints = (OVAL if direction == "forward" else OVAL.reversed()).centerline
+    rng, lines, clock = np.random.default_rng(3), [], 10.0
+    action = np.array([0.0, 1.0])
+    for episode in range(episodes):
+        simulation.reset()
+        row, is_over = simulation.rows[0].tolist(), False
+        while True:
+            behind, ahead = int(row[AT["closest_prev"]]), int(row[AT["closest_next"]])
+            here = row[AT["x"]], row[AT["y"]]
+            nearer = min((behind, ahead), key=lambda i: math.dist(waypoints[i], here))
+            clock += 1 / 15
+            status = STATUS_NAMES[int(row[AT["status"]])]
+            reward = 0.0 if status == "prepare" else row[AT["speed"]]
+            lines.append(
+                [
+                    *(str(episode), repr(row[AT["steps"]]), repr(here[0]), repr(here[1])),
+                    repr(math.degrees(row[AT["heading"]])),
+                    *(repr(math.degrees(row[AT["steering_angle"]])), repr(row[AT["speed"]]), "[1.0 2.0]"),
+                    *(repr(reward), str(is_over), str(row[AT["all_wheels_on_track"]] > 0)),
+                    "100" if row[AT["progress"]] >= 1 else repr(100 * row[AT["progress"]]),
+                    *(str(nearer), repr(OVAL.length), repr(clock), status, "0.0", "0", "1700000000.5"),
+                ]
+            )
+            if is_over:
+                break
+            s = simulation.state[0]
+            if rng.random() < 0.3:
+                action = np.array([rng.uniform(-0.3, 0.3), rng.uniform(0.8, 2.0)])
+            steer = -0.5 * s[4] - 1.2 * s[5] + 0.2 * s[9]
+            simulation.step([np.clip(action + np.array([steer, 0.0]), -0.5, 3.0)])
+            row, is_over = simulation.rows[0].tolist(), bool(simulation.terminated[0])
+    return lines
+
+
+@pytest.fixture(scope="module")
+def lines() -> list[list[str]]:
+    return drive(episodes=25)
+
+
+def write(path, lines, *, columns: int = 19, form: str = "csv"):
+    rows = [",".join(fields[:columns]) for fields in lines]
+    if form == "log":
+        rows = [f"2026-01-01 INFO something\nSIM_TRACE_LOG:{row}" for row in rows]
+    elif form == "csv":
+        rows.insert(0, ",".join(COLUMNS[:columns]))
+    data = ("\n".join(rows) + "\n").encode()
+    path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else data)
+    return path
+
+
+@pytest.mark.parametrize("columns", [15, 17, 18, 19])
+@pytest.mark.parametrize(("form", "name"), [("csv", "a.csv"), ("bare", "a.csv"), ("log", "a.log"), ("csv", "a.csv.gz")])
+def test_our_own_drive_comes_back_in_every_form(lines, tmp_path, columns, form, name):
+    found = replay(write(tmp_path / name, lines, columns=columns, form=form), track="oval").to_dict()
+    assert found["rows"] == len(lines)
+    assert found["broken_rows"] == 0
+    assert found["progress_agreement"] == found["closest_waypoint_agreement"] == found["episode_end_agreement"] == 1.0
+    assert found["all_wheels_agreement"] > 0.999  # single precision at a border
+    assert found["position_error_m"]["15"] < 0.02  # what remains: six rows do not tell the start exactly
+
+
+def test_the_direction_is_found(tmp_path):
+    result = replay(write(tmp_path / "a.csv", drive(episodes=3, direction="reverse")), track="oval")
+    assert result.reversed
+    assert result.to_dict()["progress_agreement"] == 1.0
+
+
+def test_rewards(lines, tmp_path):
+    path = write(tmp_path / "a.csv", lines)
+    right, wrong = ("def reward_function(params):\n    return params['speed']" + tail for tail in ("\n", " + 1\n"))
+    assert replay(path, track="oval", reward=right).to_dict()["reward_agreement"] == 1.0
+    result = replay(path, track="oval", reward=wrong)
+    assert result.to_dict()["reward_agreement"] == 0.0
+    assert "line 3: reward" in result.reward_differences[0]
+
+
+def test_another_cars_drive_is_told_apart_and_calibrated(tmp_path):
+    path = write(tmp_path / "a.csv", drive(episodes=40, vehicle="v6"))
+    assert replay(path, track="oval", vehicle="v5").to_dict()["position_error_m"]["15"] > 0.05
+    result = calibrate(path, vehicle="v5", track="oval")
+    fitted, preset = (np.median(errors[:, -1, 0]) for errors in (result.errors, result.preset_errors))
+    assert fitted < 0.25 * preset
+    result.vehicle.save(tmp_path / "car.json")
+    assert replay(path, track="oval", vehicle=str(tmp_path / "car.json")).to_dict()["position_error_m"]["15"] < 0.05
+
+
+def test_time_stamps_of_the_next_row_are_recognised(tmp_path, lines):
+    def clock(offset: int) -> str:
+        rng, told = np.random.default_rng(0), [list(fields) for fields in lines]
+        moved = [float(fields[2]) for fields in told], [float(fields[3]) for fields in told]
+        # The car of the log moved 1/15 s between rows; pretend that its speed was even and time was not.
+        distance = np.hypot(*(np.diff(values, append=values[-1]) for values in moved))
+        passed = np.where(distance > 0, distance, 1 / 15)
+        passed = 1 / 15 * passed / np.convolve(passed, np.ones(11) / 11, mode="same") + rng.normal(0, 1e-4, len(told))
+        stamps = np.cumsum(np.roll(passed, offset))
+        for fields, stamp in zip(told, stamps, strict=True):
+            fields[14] = repr(float(stamp))
+        (log,) = read_logs([write(tmp_path / f"{offset}.csv", told)], Faults())
+        lasts = step_durations(log, "late")
+        assert np.isnan(lasts[log.is_first]).all()
+        return clock_of([log])
+
+    assert clock(0) == "late"
+    assert clock(1) == "prompt"
+
+
+def test_broken_rows_are_counted_and_named(lines, tmp_path):
+    broken = [list(fields) for fields in lines]
+    broken[10][2], broken[20][3], broken[30] = "nan", "far", broken[30][:7]
+    result = replay(write(tmp_path / "a.csv", broken), track="oval")
+    assert result.to_dict()["broken_rows"] == 3
+    assert result.to_dict()["rows"] == len(lines) - 3
+    assert {note.split(":")[0] for note in result.faults.notes} == {f"a.csv, line {line}" for line in (12, 22, 32)}
+    assert result.to_dict()["progress_agreement"] > 0.99
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "holds no sim-trace"),
+        ("hello\nworld\n" * 100, "holds no sim-trace"),
+        ("\x00\xff" * 1000, "holds no sim-trace"),
+        ("episode,steps,X\n0,1,2\n", "lacks the column 'Y'"),
+        ("SIM_TRACE_LOG:1,2,3\n", "1 broken rows and 0 good"),
+        ("x" * 3_000_000, "holds no sim-trace"),
+    ],
+)
+def test_what_is_no_log_says_so(text, message, tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(RunError, match=message):
+        replay(path, track="oval")
+
+
+def test_files_that_cannot_be_read(tmp_path, lines):
+    with pytest.raises(RunError, match="cannot be read"):
+        replay(tmp_path / "none.csv", track="oval")
+    with pytest.raises(RunError, match="cannot be read"):
+        replay(tmp_path, track="oval")
+    whole = write(tmp_path / "a.csv.gz", lines).read_bytes()
+    (tmp_path / "half.csv.gz").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(RunError, match=r"half\.csv\.gz cannot be read"):
+        replay(tmp_path / "half.csv.gz", track="oval")
+
+
+def test_another_track_is_refused(lines, tmp_path):
+    path = write(tmp_path / "a.csv", lines)
+    with pytest.raises(RunError, match="was driven on a track of"):
+        replay(path, track="bowtie")
+    with pytest.raises(RunError, match="was driven on a track of"):
+        calibrate(path, track="bowtie")
+    moved = [[*fields[:2], str(float(fields[2]) + 0.4), *fields[3:]] for fields in lines]
+    with pytest.raises(RunError, match="was not driven on oval"):
+        replay(write(tmp_path / "b.csv", moved), track="oval")
+
+
+def test_too_little_to_calibrate(lines, tmp_path):
+    with pytest.raises(RunError, match="windows of 21 rows"):
+        calibrate(write(tmp_path / "a.csv", lines[:40]))
+    with pytest.raises(ConfigError, match="held_out"):
+        calibrate(write(tmp_path / "a.csv", lines), held_out=1.0)
+
+
+def test_picture(lines, tmp_path):
+    from PIL import Image
+
+    result = replay(write(tmp_path / "a.csv", lines), track="oval")
+    with Image.open(draw_comparison(result, tmp_path / "pictures" / "a.png")) as picture:
+        assert picture.size == (1600, 884)
+        assert len(picture.getcolors(1 << 20)) > 100
+    with pytest.raises(ConfigError, match=r"ends in '\.txt'"):
+        draw_comparison(result, tmp_path / "a.txt")
+    with pytest.raises(ConfigError, match="nothing to draw"):
+        draw_comparison(replay(write(tmp_path / "b.csv", lines[:10]), track="oval"), tmp_path / "b.png")
+
+
+def test_the_verbs(lines, tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    from racecraft.cli import app
+
+    monkeypatch.chdir(tmp_path)
+    path = str(write(tmp_path / "a.csv", lines))
+    done = CliRunner().invoke(app, ["replay", path, "--track", "oval", "--json"])
+    assert done.exit_code == 0
+    assert json.loads(done.stdout)["rows"] == len(lines)
+    assert not (tmp_path / "replay.png").exists()
+    done = CliRunner().invoke(app, ["replay", path, "--track", "oval"])
+    assert done.exit_code == 0
+    assert "progress" in done.stdout
+    assert (tmp_path / "replay.png").exists()
+    done = CliRunner().invoke(app, ["calibrate", path, "--track", "oval", "--output", "car.json"])
+    assert done.exit_code == 0
+    assert "car.json" in done.stdout
+    assert json.loads((tmp_path / "car.json").read_text())["mass"] == 7.5
+
+
+@pytest.mark.slow
+def test_a_long_log_does_not_fill_the_memory(lines, tmp_path):
+    import resource
+    import subprocess
+    import sys
+
+    path = tmp_path / "long.csv"
+    text = "".join(",".join(fields) + "\n" for fields in lines)
+    with path.open("w") as file:
+        file.write(",".join(COLUMNS) + "\n")
+        for _ in range(500_000 // len(lines)):
+            file.write(text)
+    code = f"from racecraft.replay import replay; print(replay({str(path)!r}, track='oval').rules.rows)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert int(done.stdout) == 500_000 // len(lines) * len(lines)
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 500_000
