@@ -264,6 +264,21 @@ def test_limits_truncate_and_the_last_action_still_acts(status):
     assert (simulation.vehicles == pose).all()
 
 
+@pytest.mark.parametrize(
+    ("time_limit", "expected"), [(0.0, "lap_complete"), (5 / 15, "time_up"), (6 / 15, "lap_complete")]
+)
+def test_time_up_goes_before_lap_complete(status, time_limit, expected):
+    simulation = Simulation(OVAL, camera=None, start=FIXED, time_limit=time_limit)
+    for fraction in (0.3, 0.6, 0.9, 1.01):  # steps 2 to 5
+        simulation.place(0, fraction * OVAL.length)
+        simulation.step([[0.0, 0.0]])
+    assert simulation.column("progress")[0] > 1.0
+    assert status(simulation) == expected
+    assert simulation.truncated[0] == (expected == "time_up")
+    assert simulation.terminated[0] == (expected == "lap_complete")
+    assert simulation.column("lap")[0] == (expected == "lap_complete")
+
+
 # --- penalties and places
 
 

@@ -188,12 +188,15 @@ RC_HD Verdict judge(const TrackGeometry& track, const RuleLimits& limits, const 
     const int32_t wheels = wheels_on_road(track, state, episode);
     episode.steps += 1;
 
+    // Half a step of slack: the clock is a multiple of 1/15 s and the limit need not be.
+    const double time = episode.steps * (1.0 / 15.0);
+    const bool time_up = limits.time_limit > 0.0 && time >= limits.time_limit - 0.5 / 15.0;
     const bool is_frozen = episode.frozen_steps > 0;
+    bool lap_complete = false;
     Verdict verdict{false, false, false};
     if (is_frozen) {
         episode.frozen_steps -= 1;
         episode.status = Status::pause;
-        write_row(track, episode, state, steering_command, speed_command, wheels, is_reversed, row);
     } else {
         // Divided, not multiplied by an inverse: at the end of an open road the quotient is 1 exactly.
         const double here =
@@ -206,7 +209,8 @@ RC_HD Verdict judge(const TrackGeometry& track, const RuleLimits& limits, const 
         const bool is_still = dx * dx + dy * dy <= kImmobilizedDistance * kImmobilizedDistance;
         episode.still_steps = is_still ? episode.still_steps + 1 : 0;
 
-        const bool lap_complete = episode.progress >= 1.0;
+        // The original's order: time up, then lap complete, then whatever else went wrong.
+        lap_complete = episode.progress >= 1.0 && !time_up;
         episode.laps += lap_complete ? 1 : 0;
         episode.status = Status::in_progress;
         if (episode.falling_steps >= kReversedSteps) episode.status = Status::reversed;
@@ -214,17 +218,11 @@ RC_HD Verdict judge(const TrackGeometry& track, const RuleLimits& limits, const 
         if (wheels == 0) episode.status = Status::off_track;
         if (lap_complete) episode.status = Status::lap_complete;
         verdict.terminated =
-            lap_complete ? episode.laps >= limits.laps : episode.status != Status::in_progress;
-        write_row(track, episode, state, steering_command, speed_command, wheels, is_reversed, row);
-        if (lap_complete && !verdict.terminated) episode.progress -= 1.0;  // the next lap flies on
+            lap_complete ? episode.laps >= limits.laps : episode.status != Status::in_progress && !time_up;
     }
-
-    // Half a step of slack: the clock is a multiple of 1/15 s and the limit need not be.
-    const bool time_up = limits.time_limit > 0.0 && row[kRow_time] >= limits.time_limit - 0.5 / 15.0;
-    if (time_up && !verdict.terminated) {
-        episode.status = Status::time_up;
-        row[kRow_status] = static_cast<int32_t>(Status::time_up);
-    }
+    if (time_up) episode.status = Status::time_up;
+    write_row(track, episode, state, steering_command, speed_command, wheels, is_reversed, row);
+    if (lap_complete && !verdict.terminated) episode.progress -= 1.0;  // the next lap flies on
     verdict.truncated = !verdict.terminated && (time_up || episode.steps >= limits.max_steps);
     verdict.moves = !verdict.terminated && !is_frozen;
     episode.last_x = episode.reference_x;
