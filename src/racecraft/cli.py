@@ -307,7 +307,7 @@ def replay(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Hold logs of the original against the simulator: rules, dynamics, rewards."""
+    """Compare logs of the original with the simulator."""
     from racecraft.replay import draw_comparison
     from racecraft.replay import replay as compare
     from racecraft.reward import load_reward
@@ -335,7 +335,7 @@ def calibrate(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Fit a car to your own logs and write it to a vehicle file."""
+    """Fit a car to your own logs and write a vehicle file."""
     from racecraft.replay import calibrate as fit
 
     result = fit(logs, vehicle=vehicle, track=track or None)
