@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -39,6 +39,9 @@ SEARCHED: Final[dict[str, tuple[float, float]]] = {
 _STEPS: Final = np.array([3, 5, 7, 10, 12, 15]) - 1
 _METRES: Final = np.array([0.02, 0.03, 0.048, 0.07, 0.09, 0.12])  # typical errors after _STEPS
 _RADIANS: Final = np.radians([5.0, 7.5, 10.0, 12.5, 14.5, 17.5])
+_BALANCE: Final = 1.6
+"""Least yaw moment that the rear tyres can hold over the front ones'. Logs hold few slides, so the fit alone does not
+know whether a car at its limit ploughs or spins; the original's plough."""
 _NUDGE: Final = 2e-3  # of a parameter's range, for derivatives
 MAX_ROWS: Final = 400_000
 MIN_WINDOWS: Final = 50
@@ -159,6 +162,8 @@ def _fit(start: Vehicle, windows: Windows, iterations: int) -> Vehicle:
         values = start.values()
         for name, value in zip(names, low + unit * (high - low), strict=True):
             values[all_names.index(name)] = float(value)
+        rear = all_names.index("rear_friction")
+        values[rear] = max(values[rear], _least_rear_friction(dict(zip(all_names, values, strict=True))))
         return _residuals(windows.drive_values(values)[:, _STEPS], truth)
 
     place = np.array([getattr(start, name) for name in names])
@@ -193,7 +198,15 @@ def _fit(start: Vehicle, windows: Windows, iterations: int) -> Vehicle:
         if gain < 1e-5:
             break
     fitted = {name: float(f"{value:.5g}") for name, value in zip(names, low + unit * (high - low), strict=True)}
+    least = _least_rear_friction({**asdict(start), **fitted})
+    fitted["rear_friction"] = float(f"{max(fitted['rear_friction'], least):.5g}")
     return replace(start, **fitted)
+
+
+def _least_rear_friction(car: dict[str, float]) -> float:
+    front = car["front_axle"] * car["front_load"] * car["front_friction"]
+    least = _BALANCE * front / (car["rear_axle"] * (1.0 - car["front_load"]))
+    return min(least, LIMITS["rear_friction"][1])
 
 
 def _residuals(prediction: NDArray[np.float64], truth: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,39 +24,39 @@ class Vehicle:
 
     mass: float = 7.5
     """kg; matters where forces, not accelerations, are given."""
-    yaw_inertia: float = 0.109
+    yaw_inertia: float = 0.116
     """kg m², about the vertical axis."""
-    front_axle: float = 0.116
+    front_axle: float = 0.117
     """m from the car's origin to the effective front axle."""
-    rear_axle: float = 0.078
+    rear_axle: float = 0.0767
     """m from the car's origin to the effective rear axle."""
     half_track: float = 0.08
     """m from the middle of an axle to its wheels; all four turn equally fast, and their scrub in a bend understeers."""
-    front_load: float = 0.396
+    front_load: float = 0.387
     """Share of the weight on the front axle."""
-    front_friction: float = 0.315
+    front_friction: float = 0.32
     """Limit of the front tyres' lateral force over their load."""
-    rear_friction: float = 0.29
+    rear_friction: float = 0.494
     """Limit of the rear tyres' lateral force over their load."""
-    front_stiffness: float = 6.92
+    front_stiffness: float = 7.92
     """Lateral force of the front tyres over their load, per unit of slip."""
     rear_stiffness: float = 12.0
     """Lateral force of the rear tyres over their load, per unit of slip."""
     slip_speed: float = 0.5
     """m/s below which slip is computed at this speed, so that a standing car feels no tyre force."""
-    drive_acceleration: float = 3.33
+    drive_acceleration: float = 3.39
     """m/s², what the motors give at most; beyond 3 times what the tyres hold across, that is the limit."""
-    brake_acceleration: float = 3.91
+    brake_acceleration: float = 4.05
     """m/s², positive, what the motors brake at most."""
-    speed_time_constant: float = 0.1155
+    speed_time_constant: float = 0.123
     """s, of the speed near its command."""
     steering_time_constant: float = 0.02
     """s, of the steering servo."""
     steering_rate: float = 40.0
     """rad/s, limit of the steering servo."""
-    steering_bias: float = 0.0247
+    steering_bias: float = 0.0252
     """rad, added to every steering command; the original pulls a little to the left."""
-    speed_gain: float = 1.049
+    speed_gain: float = 1.041
     """Speed reached over speed commanded, on a straight; the original's wheels are larger than its arithmetic."""
 
     def __post_init__(self) -> None:
