@@ -89,7 +89,7 @@ def _video() -> str:
     import av
 
     codec = av.codec.Codec("libx264", "w")
-    return f"H.264 encoder: {codec.long_name}"
+    return f"H.264 encoder {codec.name} found"
 
 
 def _disk() -> str:
