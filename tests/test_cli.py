@@ -313,7 +313,9 @@ def test_presets_are_listed_shown_and_fit(racecraft: Run) -> None:
     assert {"centerline", "racing"} <= listed.keys()
     assert all(text.endswith(".") for text in listed.values())
     assert "centerline" in racecraft("reward", "list").out
-    assert "def reward_function(params):" in racecraft("reward", "show", "centerline").out
+    source = racecraft("reward", "show", "centerline").out
+    assert "def reward_function(params):" in source
+    assert json.loads(racecraft("reward", "show", "centerline", "--json").out) == {"source": source}
 
 
 # ---- train, evaluate

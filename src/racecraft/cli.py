@@ -273,11 +273,15 @@ def list_rewards(as_json: Json = False) -> None:
 
 
 @reward_app.command("show")
-def show_reward(name: Annotated[str, typer.Argument(help="Preset, or path.")]) -> None:
+def show_reward(name: Annotated[str, typer.Argument(help="Preset, or path.")], as_json: Json = False) -> None:
     """Print a reward function, to start your own from."""
     from racecraft.reward import load_reward
 
-    typer.echo(load_reward(name), nl=False)
+    source = load_reward(name)
+    if as_json:
+        _print_json({"source": source})
+    else:
+        typer.echo(source, nl=False)
 
 
 @app.command()
