@@ -1,0 +1,47 @@
+"""The Typer application, the options that several verbs share, and what a verb prints with."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import typer
+
+from racecraft import __version__
+
+app = typer.Typer(
+    name="racecraft",
+    help="Teach a small car to race: reward function in, lap on video out.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # rich would take two thirds of the time that --help takes
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+INTERRUPTED = 130  # 128 + SIGINT, as shells say it
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout instead of text.")]
+TrackOption = Annotated[str, typer.Option("--track", "-t", help="Name of a track, or path of a track file.")]
+
+
+@app.callback(invoke_without_command=True)
+def root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the stack trace of an error.")] = False,
+) -> None:
+    """Options of every verb."""
+    if version:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+def text() -> Any:
+    """What is printed for people; imported late, as rich takes its time."""
+    from racecraft.cli import text as sentences
+
+    return sentences
+
+
+def print_json(document: dict[str, Any]) -> None:
+    """One JSON object on stdout."""
+    typer.echo(json.dumps(document, allow_nan=False, default=str))

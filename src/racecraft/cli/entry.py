@@ -1,0 +1,61 @@
+"""The entry point: every verb registered, every error told in one sentence."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import traceback
+import warnings
+from typing import Any, cast
+
+import typer
+
+from racecraft.cli.app import INTERRUPTED, app, print_json, text
+from racecraft.errors import RacecraftError
+
+UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])  # typer hands out no name for this base
+
+VERBS = ("train", "evaluate", "tracks", "reward", "logs", "machine")
+"""Files of verbs in the order of ``--help``; to import one is to register it."""
+
+for name in VERBS:
+    importlib.import_module(f"racecraft.cli.{name}")
+
+
+def main() -> None:
+    """Run the command line.
+
+    The exit status is 0; 1 for a mistake in what the user gave, told in one sentence; 2 for wrong usage; 130 when
+    interrupted. With ``--json`` an error is a JSON object on stdout, too. ``--debug`` shows the stack trace.
+    """
+    arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
+    is_debug, is_json = len(arguments) < len(sys.argv) - 1, "--json" in arguments
+    warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {message}", err=True)
+    try:
+        status = app(arguments, prog_name="racecraft", standalone_mode=False)
+    except UsageError as error:
+        usage: Any = error
+        if is_json:
+            verb = usage.ctx.command_path if usage.ctx is not None else "racecraft"
+            print_error("UsageError", usage.format_message(), f"See '{verb} --help'.")
+        usage.show()
+        sys.exit(2)
+    except typer.Abort:
+        sys.exit(INTERRUPTED)
+    except Exception as error:
+        is_expected = isinstance(error, RacecraftError | OSError)
+        code, message = type(error).__name__, str(error)
+        hint = getattr(error, "hint", "") if is_expected else "This is a bug in Racecraft. --debug shows where."
+        if is_debug:
+            traceback.print_exc()
+        if is_json:
+            print_error(code, message, hint)
+        if not is_debug:
+            text().say_error(code, message, hint)
+        sys.exit(1)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def print_error(code: str, message: str, hint: str) -> None:
+    """An error as one JSON object on stdout."""
+    print_json({"error": {"code": code, "message": message, "hint": hint}})

@@ -1,0 +1,55 @@
+"""`racecraft evaluate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from racecraft.cli.app import Json, app, print_json, text
+
+
+@app.command()
+def evaluate(
+    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    track: Annotated[str, typer.Option("--track", "-t", help="Track; by default the one it was trained on.")] = "",
+    laps: Annotated[int, typer.Option("--laps", "-l", help="Laps to a trial.")] = 3,
+    trials: Annotated[
+        int, typer.Option("--trials", help="Cars that start side by side, each a little differently.")
+    ] = 5,
+    rules: Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")] = "drfc",
+    checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
+    vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
+    direction: Annotated[
+        str, typer.Option("--direction", help="forward or reverse; by default as it was trained.")
+    ] = "",
+    offtrack_penalty: Annotated[
+        float | None, typer.Option("--offtrack-penalty", help="Seconds; by default the rules'.")
+    ] = None,
+    max_resets: Annotated[int | None, typer.Option("--max-resets", help="Resets to a trial.")] = None,
+    seed: Annotated[int, typer.Option("--seed", "-s", help="Of the starts.")] = 0,
+    video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of the best trial.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Race a run's policy against the clock and film it."""
+    from racecraft.race.run_evaluation import evaluate_run
+
+    outcome = evaluate_run(
+        run,
+        track=track or None,
+        laps=laps,
+        num_trials=trials,
+        rules=rules,
+        checkpoint=int(checkpoint) if checkpoint.isdigit() else checkpoint,
+        vehicle=vehicle or None,
+        direction=direction or None,
+        offtrack_penalty=offtrack_penalty,
+        max_resets=max_resets,
+        seed=seed,
+        video=video,
+    )
+    if as_json:
+        print_json(outcome.to_dict())
+    else:
+        text().say_evaluated(outcome)

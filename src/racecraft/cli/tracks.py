@@ -1,0 +1,58 @@
+"""`racecraft tracks`: the list, and pictures."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from racecraft.cli.app import Json, app, print_json, text
+
+tracks_app = typer.Typer(help="List the tracks, or draw one.", rich_markup_mode=None)
+app.add_typer(tracks_app, name="tracks")
+
+
+@tracks_app.callback(invoke_without_command=True)
+def tracks(context: typer.Context, as_json: Json = False) -> None:
+    """List the tracks of the library."""
+    if context.invoked_subcommand is not None:
+        return
+    from racecraft.track import course, load_track, track_names
+
+    listed = [(load_track(name), course(name)) for name in track_names()]
+    if as_json:
+        print_json({"tracks": [track_facts(track) for track, _ in listed]})
+        return
+    text().say_tracks(listed)
+
+
+@tracks_app.command("show")
+def show_track(
+    name: Annotated[str, typer.Argument(help="Name, file, or generated:SEED.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="PNG file; by default NAME.png.")] = None,
+    width: Annotated[int, typer.Option("--width", help="Pixels.")] = 1600,
+    as_json: Json = False,
+) -> None:
+    """Draw a track as a picture to hang on a wall."""
+    from racecraft.track import draw_track, load_track
+
+    track = load_track(name)
+    path = draw_track(track, output or Path(f"{track.name.replace(':', '-')}.png"), width_px=width)
+    if as_json:
+        print_json({**track_facts(track), "picture": str(path)})
+    else:
+        typer.echo(f"{track.name}: {track.length:.2f} m, drawn to {path}")
+
+
+def track_facts(track: Any) -> dict[str, Any]:
+    """What ``--json`` says of a track."""
+    return {
+        "name": track.name,
+        "length_m": round(track.length, 3),
+        "mean_width_m": round(track.mean_width, 3),
+        "min_radius_m": round(track.min_radius, 3) if math.isfinite(track.min_radius) else None,
+        "direction": track.direction,
+        "is_closed": track.is_closed,
+    }

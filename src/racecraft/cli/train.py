@@ -1,0 +1,115 @@
+"""`racecraft train`."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from racecraft.cli.app import INTERRUPTED, Json, TrackOption, app, print_json, text
+
+
+@app.command()
+def train(
+    context: typer.Context,
+    track: TrackOption = "reinvent_2018",
+    reward: Annotated[str, typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py.")] = "racing",
+    until: Annotated[
+        str, typer.Option("--until", "-u", help="When to stop: '5 laps', '10 minutes', '200000 steps', 'A or B'.")
+    ] = "",
+    actions: Annotated[
+        str, typer.Option("--actions", help="Action space: default, aws, fast or continuous.")
+    ] = "default",
+    model_metadata: Annotated[
+        Path | None, typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions.")
+    ] = None,
+    hyperparameters: Annotated[
+        Path | None, typer.Option("--hyperparameters", help="AWS's hyperparameters.json; trains as AWS did.")
+    ] = None,
+    network: Annotated[str, typer.Option("--network", help="RACECRAFT_SMALL or one of AWS's three names.")] = "",
+    critic: Annotated[str, typer.Option("--critic", help="What the critic sees: privileged or camera.")] = "privileged",
+    vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
+    direction: Annotated[str, typer.Option("--direction", help="forward, reverse or alternate.")] = "forward",
+    num_envs: Annotated[int, typer.Option("--num-envs", help="Cars driven at once; 0 decides by itself.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", "-s", help="The same seed repeats a run on the same machine.")] = 0,
+    evaluate_every: Annotated[
+        int, typer.Option("--evaluate-every", help="Camera steps between evaluations, and so checkpoints.")
+    ] = 4096,
+    num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
+    name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the run.")] = None,
+    runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
+    resume: Annotated[Path | None, typer.Option("--resume", help="Continue this run from its last checkpoint.")] = None,
+    video: Annotated[
+        bool, typer.Option("--video", help="Afterwards evaluate the best checkpoint and film it.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Train a car from camera pixels with a reward function."""
+    started = process_start()
+    if resume is not None:
+        _refuse_beside_resume(context)
+    from racecraft import training
+    from racecraft.training.progress import SilentReporter
+    from racecraft.training.terminal import TerminalReporter
+
+    title = f"Racecraft · {resume}" if resume else f"Racecraft · {Path(track).stem} · {Path(reward).stem}"
+    with SilentReporter() if as_json else TerminalReporter(title=title) as reporter:
+        if resume is not None:
+            result = training.resume(resume, until=until or None, reporter=reporter, started=started)
+        else:
+            result = training.train(
+                track,
+                reward=reward,
+                until=until or "5 laps",
+                actions=actions,
+                model_metadata=model_metadata,
+                hyperparameters=hyperparameters,
+                network=network,
+                critic=critic,
+                vehicle=vehicle,
+                direction=direction,
+                num_envs=num_envs,
+                seed=seed,
+                evaluate_every=evaluate_every,
+                num_threads=num_threads,
+                root=runs,
+                name=name,
+                reporter=reporter,
+                started=started,
+            )
+    outcome = None
+    if not as_json:
+        text().say_trained(result)
+    if video and result.reason != "interrupted":
+        from racecraft.race.run_evaluation import evaluate_run
+
+        outcome = evaluate_run(result.run)
+        if not as_json:
+            text().say_evaluated(outcome)
+    if as_json:
+        print_json({**result.to_dict(), **({"evaluation": outcome.to_dict()} if outcome is not None else {})})
+    if result.reason == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+
+
+def _refuse_beside_resume(context: typer.Context) -> None:
+    """A resumed run keeps its settings: only its limit may change."""
+    for option in context.command.params:
+        source = context.get_parameter_source(str(option.name))
+        is_given = source is not None and source.name == "COMMANDLINE"
+        if is_given and option.name not in ("resume", "until", "video", "as_json"):
+            context.fail(f"{option.opts[0]} does not go with --resume: a run keeps the settings it was started with.")
+
+
+def process_start() -> float:
+    """`time.monotonic()` at which this process began, so that a training counts its own start-up."""
+    try:
+        with open("/proc/self/stat", encoding="ascii") as file:
+            ticks = int(file.read().rsplit(")", 1)[1].split()[19])
+        age = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+    except (OSError, ValueError, AttributeError, IndexError):
+        return time.monotonic()  # no such file outside Linux: the imports so far are not counted
+    return time.monotonic() - max(age, 0.0)
