@@ -62,3 +62,13 @@ def test_confidence_must_be_a_probability(confidence):
         wilson_interval(1, 2, confidence=confidence)
     with pytest.raises(ConfigError, match="confidence"):
         mean_interval([1.0, 2.0], confidence=confidence)
+
+
+@pytest.mark.parametrize("probability", [0.6, 0.75, 0.95, 0.975, 0.9995])
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 6, 10, 11, 100, 101])
+def test_mean_interval_is_students(count: int, probability: float) -> None:
+    from scipy.special import stdtrit
+
+    values = np.linspace(-1.0, 1.0, count)
+    half = stdtrit(count - 1, probability) * values.std(ddof=1) / np.sqrt(count)
+    assert mean_interval(list(values), confidence=2 * probability - 1) == pytest.approx((-half, half), rel=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from statistics import NormalDist
 from typing import NamedTuple
@@ -62,12 +63,35 @@ def mean_interval(
     count = len(values)
     if count < 2:
         return Interval(low, high)
-    from scipy.special import stdtrit  # a tenth of a second to import, and only reports need it
-
     samples = np.asarray(values, dtype=np.float64)
     mean = float(samples.mean())
-    half = float(stdtrit(count - 1, probability) * samples.std(ddof=1) / np.sqrt(count))
+    half = float(_student_quantile(count - 1, probability) * samples.std(ddof=1) / np.sqrt(count))
     return Interval(max(low, mean - half), min(high, mean + half))
+
+
+def _student_quantile(freedom: int, probability: float) -> float:
+    """The value that Student's t with `freedom` degrees stays below with a probability of 0.5 or more.
+
+    By bisection of the angle whose tangent is t / √freedom: for whole degrees of freedom the distribution is a finite
+    sum over it (Abramowitz and Stegun, 26.7.3 and 26.7.4).
+    """
+    low, high = 0.0, math.pi / 2
+    for _ in range(60):  # halves: the last bit of a float64
+        angle = (low + high) / 2
+        is_below = 0.5 + _student_within(freedom, angle) / 2 < probability
+        low, high = (angle, high) if is_below else (low, angle)
+    return math.sqrt(freedom) * math.tan(low)
+
+
+def _student_within(freedom: int, angle: float) -> float:
+    """Probability that |t| stays below √freedom · tan(angle)."""
+    sine, cosine = math.sin(angle), math.cos(angle)
+    is_odd = freedom % 2 == 1
+    term, total = (cosine, 0.0) if is_odd else (1.0, 0.0)
+    for index in range(freedom // 2):
+        total += term
+        term *= cosine * cosine * ((2 * index + 2) / (2 * index + 3) if is_odd else (2 * index + 1) / (2 * index + 2))
+    return 2.0 / math.pi * (angle + sine * total) if is_odd else sine * total
 
 
 def _checked(confidence: float) -> float:
