@@ -75,8 +75,9 @@ def test_the_car_of_version_6():
 
 
 def test_logged_rewards():
-    found = replay(RUNS[4], track=str(ROUTE), reward=REWARD).to_dict()
-    assert found["reward_agreement"] > 0.999
+    result = replay(RUNS[4], track=str(ROUTE), reward=REWARD)
+    assert result.rewards > 19_000
+    assert result.to_dict()["reward_agreement"] > 0.999  # within 1e-4; the others are on an edge: a wheel, or the pace
 
 
 @pytest.mark.parametrize("folder", ["console", "drfc"])

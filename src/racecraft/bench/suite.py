@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from importlib import import_module
 from statistics import median
 from typing import Any
 
@@ -26,6 +27,7 @@ ROUNDS = 5
 TRACK = "reinvent_2018"
 CAMERA_CARS = 256
 STATE_CARS = 8192
+REWARD = "centerline"
 REWARD_BATCH = 64
 START_SECONDS = 2.0  # that a training may take to start, beside the time it is measured for
 SKILL_TIMEOUT_S = 300.0
@@ -104,7 +106,7 @@ def measure_reward(seconds: float, seeds: int) -> dict[str, Any]:
     """Calls per second of the centre-line reward through the worker process, at batch 64."""
     del seeds
     track = load_track(TRACK)
-    source = load_preset("centerline")
+    source = load_preset(REWARD)
     rows = _recorded_rows(track)
     batches = [rows[i : i + REWARD_BATCH] for i in range(0, len(rows), REWARD_BATCH)]
     with RewardWorker(source, track) as worker:
@@ -115,10 +117,9 @@ def measure_reward(seconds: float, seeds: int) -> dict[str, Any]:
             return len(rows)
 
         calls = _rate(work, seconds)
-    namespace: dict[str, Any] = {}
-    exec(compile(source, "centerline.py", "exec"), namespace)
+    function = import_module(f"racecraft.reward.presets.{REWARD}").reward_function
     params = _example_params(rows, track)
-    bare = _rate(lambda: _call_many(namespace["reward_function"], params), min(seconds, 1.0))
+    bare = _rate(lambda: _call_many(function, params), min(seconds, 1.0))
     return {
         "calls_per_second": round(calls),
         "microseconds_per_call": round(1e6 / calls, 3),
