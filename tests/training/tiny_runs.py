@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.learn import PPOConfig
+from racecraft.race.policy import NetworkPolicy
 from racecraft.run import RunFolder
+from racecraft.sim import Simulation
 from racecraft.training import EvaluationReport, IterationReport, TrainResult
 
 TINY = PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1)
@@ -28,6 +30,9 @@ class Recorder:
         self.iterations: list[IterationReport] = []
         self.evaluations: list[EvaluationReport] = []
         self._after_iteration = after_iteration
+
+    def begin(self, simulation: Simulation, policy: NetworkPolicy) -> None:
+        self.simulation, self.policy = simulation, policy
 
     def note(self, text: str) -> None:
         self.notes.append(text)

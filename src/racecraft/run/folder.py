@@ -2,7 +2,7 @@
 
 runs/<name>/run.json                      what is needed to repeat the run
             reward_function.py  model_metadata.json  hyperparameters.json  training_params.yaml
-            metrics/                      TrainingMetrics.json, EvaluationMetrics-<time>.json
+            metrics/                      TrainingMetrics.json, EvaluationMetrics-<time>.json, history.jsonl
             training-simtrace/            <iteration>-iteration.csv
             evaluation-<time>/            evaluation-simtrace/, pictures
             mp4/  model/  events/         videos, AWS's index of checkpoints, TensorBoard
@@ -138,6 +138,11 @@ class RunFolder:
     def training_metrics(self) -> Path:
         """Every episode's result."""
         return self.path / "metrics" / "TrainingMetrics.json"
+
+    @property
+    def history(self) -> Path:
+        """The curves, see racecraft.run.history."""
+        return self.path / "metrics" / "history.jsonl"
 
     @property
     def training_simtrace(self) -> Path:

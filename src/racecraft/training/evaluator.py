@@ -35,7 +35,7 @@ class Evaluator:
     """
 
     def __init__(self, policy: NetworkPolicy, track: Track, settings: TrainSettings) -> None:
-        self._policy = policy
+        self.policy = policy
         self._seed = (settings.seed + SEED) % 2**32
         self._patience = track.length / SLOWEST
         direction = "reverse" if settings.direction == "reverse" else "forward"
@@ -74,7 +74,7 @@ class Evaluator:
         Returns:
             The trials as episodes, for the metrics.
         """
-        outcome = completion(self._policy, self._trials, rules=self._rules, seed=self._seed, max_seconds=self._patience)
+        outcome = completion(self.policy, self._trials, rules=self._rules, seed=self._seed, max_seconds=self._patience)
         lap_times = tuple(outcome.lap_times[np.isfinite(outcome.lap_times)].tolist())
         self.last = EvaluationReport(
             step=step,

@@ -36,6 +36,7 @@ from racecraft.run import (
     SimTraceWriter,
     TrainingMetrics,
 )
+from racecraft.run.history import HistoryWriter
 from racecraft.sim import Simulation
 from racecraft.track import Track, load_track
 from racecraft.training.environment import TrainingEnvironment
@@ -58,6 +59,7 @@ class _Session:
     trace: SimTraceWriter
     metrics: TrainingMetrics
     events: EventWriter
+    history: HistoryWriter
     hyperparameters: Hyperparameters | None
 
     @property
@@ -148,6 +150,8 @@ class Training:
             copies = ppo_config.num_envs if keeps_state(source) else 1
             worker = stack.enter_context(RewardWorker(source, [track], seed=settings.seed, num_cars=copies))
             events = stack.enter_context(EventWriter(folder.events))
+            kept = saved.step if saved is not None else 0
+            history = stack.enter_context(HistoryWriter(folder.history, step=kept))
             episodes = int(resumed.get("episodes", 0))
             counter = EpisodeCounter(ppo_config.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0)))
             trace = SimTraceWriter(
@@ -170,6 +174,7 @@ class Training:
                 trace=trace,
                 metrics=metrics,
                 events=events,
+                history=history,
                 hyperparameters=folder.read_hyperparameters(),
             )
             if saved is not None:
@@ -189,6 +194,7 @@ class Training:
         """Train until a limit is reached; its name."""
         ppo, meter = session.ppo, self.meter
         meter.begin(steps=ppo.total_steps)
+        self.reporter.begin(session.environment.simulation, session.evaluator.policy)
         reason = self._limit_reached(session)
         if reason in ("laps", "seconds", "steps"):
             self.reporter.note(f"The limit of {self.settings.until} was reached before; --until sets another.")
@@ -201,6 +207,7 @@ class Training:
             report = meter.report(stats, episodes=session.counter.number)
             self.reporter.iteration(report)
             session.events.add_scalars(_iteration_scalars(report), step=ppo.total_steps)
+            session.history.add_iteration(report.point())
 
             reason = self._limit_reached(session)
             is_due = ppo.total_steps - session.evaluator.evaluated_at >= self.settings.evaluate_every
@@ -250,6 +257,7 @@ class Training:
             session.metrics.add(trial, phase="evaluation")
         assert evaluator.last is not None
         session.events.add_scalars(_evaluation_scalars(evaluator.last), step=session.ppo.total_steps)
+        session.history.add("evaluation", evaluator.last.point())
         self.reporter.evaluation(evaluator.last)
         self.meter.parts["evaluation"] += time.perf_counter() - begun
 

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from racecraft.learn import IterationStats
+
+if TYPE_CHECKING:
+    from racecraft.race.policy import NetworkPolicy
+    from racecraft.sim import Simulation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +27,16 @@ class EvaluationReport:
     """s, of the trials that completed the lap."""
     is_best: bool
     """Better than every checkpoint before: more completion, then a faster lap."""
+
+    def point(self) -> dict[str, Any]:
+        """For the run's history."""
+        return {
+            "step": self.step,
+            "seconds": round(self.seconds, 3),
+            "completions": [round(share, 4) for share in self.completions],
+            "lap_times": [round(lap, 3) for lap in self.lap_times],
+            "is_best": self.is_best,
+        }
 
     @property
     def completion(self) -> float:
@@ -57,6 +71,26 @@ class IterationReport:
     """Mean fraction of a lap in the last 100 training episodes; NaN before the first."""
     remaining: float | None
     """Estimated seconds until a limit of steps or seconds; None when only laps count."""
+
+    def point(self) -> dict[str, Any]:
+        """For the run's history; NaN is what is not known yet."""
+        losses = self.stats.losses
+        return {
+            "step": self.stats.total_steps,
+            "seconds": round(self.seconds, 3),
+            "pace": round(self.steps_per_second, 1),
+            "episodes": self.episodes,
+            "reward": round(self.mean_reward, 4),
+            "completion": round(self.completion, 4),
+            "episode_length": round(self.stats.mean_length, 2),
+            "remaining": self.remaining,
+            "policy_loss": losses.policy_loss,
+            "value_loss": losses.value_loss,
+            "entropy": losses.entropy,
+            "approx_kl": losses.approx_kl,
+            "clip_fraction": losses.clip_fraction,
+            "explained_variance": self.stats.explained_variance,
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +131,9 @@ class TrainResult:
 class Reporter(Protocol):
     """Shows a training to somebody. Calls come from the training's own thread, so they must be quick."""
 
+    def begin(self, simulation: Simulation, policy: NetworkPolicy) -> None:
+        """Training begins; both may be looked at in the calls that follow, which is how cars are shown live."""
+
     def note(self, text: str) -> None:
         """Something worth a line."""
 
@@ -114,6 +151,9 @@ class SilentReporter:
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Nothing."""
+
+    def begin(self, simulation: Simulation, policy: NetworkPolicy) -> None:
         """Nothing."""
 
     def note(self, text: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 from rich.console import Console, Group, RenderableType
@@ -13,6 +13,10 @@ from rich.table import Table
 from rich.text import Text
 
 from racecraft.training.progress import EvaluationReport, IterationReport
+
+if TYPE_CHECKING:
+    from racecraft.race.policy import NetworkPolicy
+    from racecraft.sim import Simulation
 
 MAX_WIDTH: Final = 100  # characters; wider than this is hard to read
 NARROW: Final = 72  # characters; below it there is no room for the curve
@@ -84,6 +88,9 @@ class TerminalReporter:
             if self._latest is None:
                 for note in self._notes:
                     self._print(note)
+
+    def begin(self, simulation: Simulation, policy: NetworkPolicy) -> None:
+        """Nothing to show of it in a terminal."""
 
     def note(self, text: str) -> None:
         """Show a line below the evaluations."""
