@@ -24,11 +24,11 @@ MAX_SHOWN = 60  # characters of a wrong value in a message
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
-def read_json_object(path: str | Path, *, max_bytes: int = MAX_BYTES) -> dict[str, Any]:
-    """The JSON object in a UTF-8 file (a byte order mark is fine).
+def read_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> str:
+    """The UTF-8 text in a small file (a byte order mark is fine); never more than `max_bytes` are read.
 
     Raises:
-        ConfigError: Not readable, too large, not UTF-8, not a JSON object, or with duplicate keys or NaN.
+        ConfigError: Not readable, too large, or not UTF-8.
     """
     path = Path(path)
     try:
@@ -37,16 +37,30 @@ def read_json_object(path: str | Path, *, max_bytes: int = MAX_BYTES) -> dict[st
     except OSError as error:
         raise ConfigError(f"{path} cannot be read: {error.strerror or error}.") from error
     if len(data) > max_bytes:
-        raise ConfigError(f"{path} is larger than {max_bytes:,} bytes, too large for a settings file.")
-    return parse_json_object(data, name=str(path))
+        raise ConfigError(f"{path} is larger than {max_bytes:,} bytes, too large for a file of its kind.")
+    return decode_text(data, name=str(path))
+
+
+def decode_text(data: bytes, *, name: str) -> str:
+    """As :func:`read_text`, from memory; ``name`` is what messages call it."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{name} is not UTF-8 text: byte {error.start} is {data[error.start]:#04x}.") from error
+
+
+def read_json_object(path: str | Path, *, max_bytes: int = MAX_BYTES) -> dict[str, Any]:
+    """The JSON object in a UTF-8 file.
+
+    Raises:
+        ConfigError: Not readable, too large, not UTF-8, not a JSON object, or with duplicate keys or NaN.
+    """
+    return parse_json_object(read_text(path, max_bytes=max_bytes), name=str(path))
 
 
 def parse_json_object(data: bytes | str, *, name: str) -> dict[str, Any]:
     """As :func:`read_json_object`, from memory; ``name`` is what messages call it."""
-    try:
-        text = data.decode("utf-8-sig") if isinstance(data, bytes) else data
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{name} is not UTF-8 text: byte {error.start} is {data[error.start]:#04x}.") from error
+    text = decode_text(data, name=name) if isinstance(data, bytes) else data
     try:
         document = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite_float)
     except RecursionError as error:

@@ -223,17 +223,12 @@ class RunFolder:
         Raises:
             RunError: It is missing, too large or not UTF-8.
         """
-        path = self.reward_function
+        from racecraft.agent.aws_file import read_text
+
         try:
-            with path.open("rb") as file:
-                data = file.read(MAX_REWARD_BYTES + 1)
-            if len(data) > MAX_REWARD_BYTES:
-                raise RunError(f"{path} is larger than {MAX_REWARD_BYTES:,} bytes.")
-            return data.decode("utf-8-sig")
-        except OSError as error:
-            raise RunError(f"{path} cannot be read: {error.strerror or error}.") from error
-        except UnicodeDecodeError as error:
-            raise RunError(f"{path} is not UTF-8 text.") from error
+            return read_text(self.reward_function, max_bytes=MAX_REWARD_BYTES)
+        except ConfigError as error:
+            raise RunError(str(error)) from error
 
     def read_model_metadata(self) -> ModelMetadata:
         """Action space, sensors, network. Raises ConfigError where a value is not allowed."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, validate
+from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, read_text, validate
 from racecraft.errors import ConfigError
 from racecraft.run.atomic import write_file
 
@@ -57,7 +57,7 @@ class TrainingParams:
         Raises:
             ConfigError: Names the file, the key, its value and what is allowed.
         """
-        return cls.from_yaml(_read(Path(path)), name=str(path))
+        return cls.from_yaml(read_text(path, max_bytes=MAX_BYTES), name=str(path))
 
     @classmethod
     def from_yaml(cls, text: str, *, name: str = "training_params") -> TrainingParams:
@@ -103,19 +103,6 @@ class TrainingParams:
             write_file(Path(path), self.to_yaml().encode())
         except OSError as error:
             raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
-
-
-def _read(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise ConfigError(f"{path} is larger than {MAX_BYTES:,} bytes, too large for a settings file.")
-        return data.decode("utf-8-sig")
-    except OSError as error:
-        raise ConfigError(f"{path} cannot be read: {error.strerror or error}.") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path} is not UTF-8 text.") from error
 
 
 @cache
