@@ -21,6 +21,7 @@ LAYERS = (
     "race",
     "replay",
     "training",
+    "importing",
     "serve",
     "bench",
     "cli",

@@ -84,6 +84,14 @@ class RunError(RacecraftError, ValueError):
     """A run folder is missing, in use or unreadable."""
 
 
+class ArchiveError(RacecraftError, ValueError):
+    """An archive is damaged, hostile, or of a kind that is not read."""
+
+
+class SourceError(RacecraftError, ValueError):
+    """What is to be imported is not something that is understood."""
+
+
 class TrainingError(RacecraftError, RuntimeError):
     """Training cannot go on; the last checkpoint is good."""
 

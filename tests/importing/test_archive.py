@@ -1,0 +1,469 @@
+"""The archive reader against archives that Python's own writers make, and against everything hostile."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import struct
+import tarfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from racecraft.errors import ArchiveError
+from racecraft.importing.archive import DEFAULT_LIMITS, read_archive
+from racecraft.importing.archive_guard import Limits
+
+FILES = {
+    "reward_function.py": b"def reward_function(params):\n    return 1.0\n",
+    "model/a.json": b"{}" * 40_000,
+    "e": b"",
+}
+
+
+def make_tar(files: dict[str, bytes], *, format: int = tarfile.PAX_FORMAT) -> bytes:
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=format) as tar:
+        for name, data in files.items():
+            info = tarfile.TarInfo(name)
+            info.size = len(data)
+            tar.addfile(info, io.BytesIO(data))
+    return buffer.getvalue()
+
+
+def make_zip(files: dict[str, bytes], method: int = zipfile.ZIP_DEFLATED) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", method) as archive:
+        for name, data in files.items():
+            archive.writestr(zipfile.ZipInfo(name), data, compress_type=method)
+    return buffer.getvalue()
+
+
+def member(name: str, kind: bytes = tarfile.REGTYPE, size: int = 0, data: bytes = b"", **fields: object) -> bytes:
+    """A tar of one member, whose header may say anything."""
+    info = tarfile.TarInfo(name)
+    info.type, info.size = kind, size
+    for field, value in fields.items():
+        setattr(info, field, value)
+    body = data + bytes(-len(data) % 512)
+    return info.tobuf(tarfile.GNU_FORMAT) + body + bytes(1024)
+
+
+def read(data: bytes, tmp_path: Path, *, name: str = "x.tar.gz", limits: Limits = DEFAULT_LIMITS) -> dict[str, bytes]:
+    path = tmp_path / name
+    path.write_bytes(data)
+    found = {}
+    for entry in read_archive(path, limits=limits):
+        parts = []
+        while part := entry.read(1000):
+            parts.append(part)
+        found[entry.name] = b"".join(parts)
+        assert len(found[entry.name]) == entry.size
+    return found
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        make_tar(FILES, format=tarfile.USTAR_FORMAT),
+        make_tar(FILES, format=tarfile.GNU_FORMAT),
+        make_tar(FILES, format=tarfile.PAX_FORMAT),
+        gzip.compress(make_tar(FILES)),
+        gzip.compress(make_tar(FILES)[:5000]) + gzip.compress(make_tar(FILES)[5000:]),
+        make_zip(FILES),
+        make_zip(FILES, zipfile.ZIP_STORED),
+    ],
+    ids=["ustar", "gnu", "pax", "gzip", "gzip-in-two-parts", "deflated", "stored"],
+)
+def test_what_other_writers_wrote_is_read(data: bytes, tmp_path: Path) -> None:
+    assert read(data, tmp_path) == FILES
+    assert [entry.name for entry in read_archive(tmp_path / "x.tar.gz")] == list(FILES)  # skipped, not read
+
+
+@pytest.mark.parametrize("format", [tarfile.GNU_FORMAT, tarfile.PAX_FORMAT, tarfile.USTAR_FORMAT])
+def test_long_and_foreign_names(format: int, tmp_path: Path) -> None:
+    long = {"/".join(["folder" * 5] * 5) + "/reward_function.py": b"a"}  # 170 characters
+    assert read(make_tar(long, format=format), tmp_path) == long
+    if format != tarfile.USTAR_FORMAT:
+        foreign = {"Müller/赛道.json": b"b", "Mu\u0308ller2/x": b"c"}
+        assert read(make_tar(foreign, format=format), tmp_path) == foreign
+
+
+def test_folders_and_dots_are_no_files(tmp_path: Path) -> None:
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w") as tar:
+        for name in (".", "./model", "./model"):
+            info = tarfile.TarInfo(name)
+            info.type = tarfile.DIRTYPE
+            tar.addfile(info)
+        tar.addfile(tarfile.TarInfo("./model//a"))
+    assert read(buffer.getvalue(), tmp_path) == {"model/a": b""}
+    assert read(make_zip({"model/": b"", "model/a": b"1"}), tmp_path) == {"model/a": b"1"}
+    assert read(make_zip({}), tmp_path) == {}
+    assert read(make_tar({}), tmp_path) == {}
+
+
+def test_a_header_for_all_members_that_says_nothing_of_names_is_fine(tmp_path: Path) -> None:
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", pax_headers={"comment": "made by hand"}) as tar:
+        tar.addfile(tarfile.TarInfo("a"))
+    assert read(buffer.getvalue(), tmp_path) == {"a": b""}
+
+
+# ---- names
+
+BAD_NAMES = {
+    "../evil": "leads out",
+    "a/../../evil": "leads out",
+    "a/..": "leads out",
+    "a/... /b": "leads out",
+    "/etc/passwd": "absolute",
+    "C:/evil": "absolute",
+    "./C:evil": "absolute",
+    "a\\..\\evil": "backslash",
+    "a\uff3cevil": "backslash",
+    "\uff0e\uff0e/evil": "leads out",
+    "\u2025/evil": "leads out",
+    "a\uff0fb": "something like a slash",
+    "a\u2100b": "something like a slash",
+    "evil\u202egnp.py": "cannot be seen",
+    "a\u200bb": "cannot be seen",
+    "a\nb": "cannot be seen",
+    "a" * 501: "501 characters",
+    "/".join("a" * 21): "21 deep",
+}
+
+
+@pytest.mark.parametrize(("name", "says"), BAD_NAMES.items(), ids=[ascii(name)[:20] for name in BAD_NAMES])
+def test_names_that_lead_elsewhere(name: str, says: str, tmp_path: Path) -> None:
+    for data in (make_tar({name: b""}, format=tarfile.GNU_FORMAT), make_tar({name: b""}), make_zip({name: b""})):
+        with pytest.raises(ArchiveError, match=says) as caught:
+            read(data, tmp_path)
+        assert "\n" not in str(caught.value)
+        assert len(str(caught.value)) < 200
+
+
+def test_a_nul_in_a_name(tmp_path: Path) -> None:
+    pax = make_pax({"path": "reward\0.py"})
+    with pytest.raises(ArchiveError, match="cannot be seen"):
+        read(pax, tmp_path)
+    with pytest.raises(ArchiveError, match="cannot be seen"):
+        read(make_zip({"rewardX.py": b""}).replace(b"rewardX.py", b"reward\0.py"), tmp_path)
+
+
+def make_pax(records: dict[str, str], *, kind: bytes = tarfile.XHDTYPE) -> bytes:
+    """A tar of one member with pax records of any content."""
+    lines = b""
+    for key, value in records.items():
+        rest = f" {key}={value}\n".encode()
+        length = len(rest) + len(str(len(rest)))
+        lines += str(length + (len(str(length + 1)) > len(str(len(rest))))).encode() + rest
+    return member("pax", kind, len(lines), lines)[:-1024] + member("a")
+
+
+TWINS = [("reward.py", "Reward.py"), ("a", "a"), ("straße", "STRASSE"), ("ﬁle", "file"), ("a", "a/b"), ("a/b", "A")]
+
+
+@pytest.mark.parametrize(("first", "second"), TWINS)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_members_that_some_system_cannot_tell_apart(first: str, second: str, tmp_path: Path) -> None:
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w") as archive:
+        archive.addfile(tarfile.TarInfo(first))
+        archive.addfile(tarfile.TarInfo(second))
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as zipped:
+        zipped.writestr(first, b"")
+        zipped.writestr(second, b"")
+    for data in (buffer.getvalue(), packed.getvalue()):
+        with pytest.raises(ArchiveError, match="twice"):
+            read(data, tmp_path)
+
+
+# ---- kinds
+
+
+@pytest.mark.parametrize(
+    ("kind", "says"),
+    [
+        (tarfile.SYMTYPE, "a link"),
+        (tarfile.LNKTYPE, "a link"),
+        (tarfile.CHRTYPE, "a device"),
+        (tarfile.BLKTYPE, "a device"),
+        (tarfile.FIFOTYPE, "a pipe"),
+        (tarfile.GNUTYPE_SPARSE, "a sparse file"),
+        (tarfile.GNUTYPE_LONGLINK, "a link"),
+        (b"V", "kind b'V'"),
+    ],
+)
+def test_only_files_and_folders(kind: bytes, says: str, tmp_path: Path) -> None:
+    with pytest.raises(ArchiveError, match=says):
+        read(member("x", kind, linkname="/etc/passwd"), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("mode", "says"), [(0o120777, "a link"), (0o020666, "a device"), (0o060666, "a device"), (0o010666, "a pipe")]
+)
+def test_only_files_and_folders_in_a_zip(mode: int, says: str, tmp_path: Path) -> None:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        info = zipfile.ZipInfo("x")
+        info.create_system, info.external_attr = 3, mode << 16
+        archive.writestr(info, "/etc/passwd")
+    with pytest.raises(ArchiveError, match=says):
+        read(buffer.getvalue(), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("records", "says"),
+    [
+        ({"GNU.sparse.major": "1", "GNU.sparse.realsize": "99999999999"}, "sparse"),
+        ({"size": "99999999999999"}, "more than"),
+        ({"size": "-1"}, "size is not a number"),
+        ({"size": "1e9"}, "size is not a number"),
+        ({"size": "5000"}, "cut off"),
+        ({"path": "../evil"}, "leads out"),
+        ({"comment": "x" * 70_000}, "header of 7"),
+    ],
+)
+def test_pax_records(records: dict[str, str], says: str, tmp_path: Path) -> None:
+    with pytest.raises(ArchiveError, match=says):
+        read(make_pax(records), tmp_path)
+
+
+def test_pax_records_for_all_members(tmp_path: Path) -> None:
+    with pytest.raises(ArchiveError, match="one header"):
+        read(make_pax({"path": "same"}, kind=tarfile.XGLTYPE), tmp_path)
+
+
+@pytest.mark.parametrize("records", [b"no records", b"999 path=a\n", b"5 a=b\n", b"0 a=b\n", b"8 path=a"])
+def test_broken_pax_records(records: bytes, tmp_path: Path) -> None:
+    with pytest.raises(ArchiveError, match="pax header"):
+        read(member("pax", tarfile.XHDTYPE, len(records), records)[:-1024] + member("a"), tmp_path)
+
+
+def test_headers_without_end(tmp_path: Path) -> None:
+    endless = make_pax({"comment": "x"})[:1024] * 50
+    with pytest.raises(ArchiveError, match="more than 20 members"):
+        read(endless, tmp_path, limits=Limits(members=20))
+
+
+# ---- sizes
+
+
+def test_limits(tmp_path: Path) -> None:
+    files = {f"{number}": b"x" * 1000 for number in range(20)}
+    for data in (make_tar(files), gzip.compress(make_tar(files)), make_zip(files), make_zip(files, 0)):
+        assert len(read(data, tmp_path)) == 20
+        for limits, says in (
+            (Limits(members=19), "more than 19 members"),
+            (Limits(member_bytes=999), "to 1,000 bytes, more than 999"),
+            (Limits(total_bytes=15_000), "more than 15,000 bytes"),
+            (Limits(file_bytes=100), "archives of at most 100"),
+        ):
+            with pytest.raises(ArchiveError, match=says):
+                read(data, tmp_path, limits=limits)
+
+
+@pytest.mark.parametrize("pack", [lambda files: gzip.compress(make_tar(files)), make_zip])
+def test_a_bomb(pack: Callable[[dict[str, bytes]], bytes], tmp_path: Path) -> None:
+    bomb = pack({"zeros": bytes(20_000_000)})
+    assert len(bomb) < 25_000
+    with pytest.raises(ArchiveError, match="only a bomb does"):
+        read(bomb, tmp_path)
+    path = tmp_path / "x.tar.gz"
+    with pytest.raises(ArchiveError, match="only a bomb does"):
+        list(read_archive(path))  # also when nobody reads the member
+
+
+def test_a_header_that_claims_more_than_there_is(tmp_path: Path) -> None:
+    with pytest.raises(ArchiveError, match="more than"):
+        read(member("x", size=1 << 40), tmp_path)
+    with pytest.raises(ArchiveError, match="cut off"):
+        read(member("x", size=100_000), tmp_path)
+
+
+def test_members_of_a_zip_that_share_bytes(tmp_path: Path) -> None:
+    """Two names for one content: many of them make a bomb of any ratio."""
+    data = make_zip({"a": b"x" * 100, "b": b"x" * 100}, 0)
+    second = data.rindex(b"PK\x01\x02")
+    overlapping = data[: second + 42] + struct.pack("<L", 0) + data[second + 46 :]
+    with pytest.raises(ArchiveError, match=r"share bytes"):
+        read(overlapping, tmp_path)
+    first = data.index(b"PK\x01\x02")
+    longer = data[: first + 20] + struct.pack("<2L", 180, 180) + data[first + 28 :]
+    with pytest.raises(ArchiveError, match="share bytes"):
+        read(longer, tmp_path)
+
+
+# ---- damage
+
+
+@pytest.mark.parametrize("pack", [make_tar, lambda files: gzip.compress(make_tar(files)), make_zip])
+def test_cut_off_anywhere(pack: Callable[[dict[str, bytes]], bytes], tmp_path: Path) -> None:
+    data = pack({"a": bytes(range(256)) * 4, "b": b"1"})
+    whole = data.rstrip(b"\0") if pack is make_tar else data
+    for length in range(0, len(whole) - 1, max(1, len(whole) // 97)):
+        with pytest.raises(ArchiveError):
+            read(data[:length], tmp_path)
+
+
+def test_wrong_checksums(tmp_path: Path) -> None:
+    tar = bytearray(make_tar({"a": b"1", "b": b"2"}))
+    tar[1024 + 5] ^= 1  # the name in the second header
+    with pytest.raises(ArchiveError, match="checksum of a header"):
+        read(bytes(tar), tmp_path)
+    packed = bytearray(gzip.compress(make_tar({"a": b"1"})))
+    packed[-6] ^= 1
+    with pytest.raises(ArchiveError, match="CRC check failed"):
+        read(bytes(packed), tmp_path)
+    stored = make_zip({"a": b"content"}, 0).replace(b"content", b"CONTENT", 1)
+    with pytest.raises(ArchiveError, match="checksum of 'a' is wrong"):
+        read(stored, tmp_path)
+
+
+def test_something_behind_the_end(tmp_path: Path) -> None:
+    with pytest.raises(ArchiveError, match="behind its end"):
+        read(make_tar({"a": b"1"}) + b"more", tmp_path)
+    with pytest.raises(ArchiveError, match=r"damaged|behind"):
+        read(gzip.compress(make_tar({"a": b"1"})) + b"more", tmp_path)
+    with pytest.raises(ArchiveError, match="missing"):
+        read(make_zip({"a": b"1"}) + b"more", tmp_path)
+
+
+def patched(data: bytes, offset: int, value: bytes) -> bytes:
+    """A zip of one member with some bytes of its directory replaced."""
+    at = data.index(b"PK\x01\x02") + offset
+    return data[:at] + value + data[at + len(value) :]
+
+
+@pytest.mark.parametrize(
+    ("offset", "value", "says"),
+    [
+        (8, b"\x01\x00", "is encrypted"),
+        (8, b"\x41\x00", "is encrypted"),
+        (10, b"\x0c\x00", "method 12"),
+        (10, b"\x00\x00", "something else"),
+        (24, b"\x09\x00\x00\x00", "another length"),
+        (24, b"\x07\x00\x00\x00", "another length|checksum"),
+        (20, b"\x05\x00\x00\x00", "another length|unpacked"),
+        (20, b"\xff\xff\xff\xff", "zip64"),
+        (42, b"\x01\x00\x00\x00", "something else"),
+        (42, b"\x00\x00\x00\x7f", "cut off|something else"),
+        (46, b"b", "something else"),
+        (0, b"QK", "something else"),
+    ],
+)
+def test_a_zip_that_contradicts_itself(offset: int, value: bytes, says: str, tmp_path: Path) -> None:
+    data = make_zip({"a": b"content!"})
+    assert read(data, tmp_path) == {"a": b"content!"}
+    with pytest.raises(ArchiveError, match=says):
+        read(patched(data, offset, value), tmp_path)
+
+
+def test_zip64_and_several_parts(tmp_path: Path) -> None:
+    data = make_zip({"a": b"1"})
+    end = data.rindex(b"PK\x05\x06")
+    for place, value, says in (
+        (8, b"\xff\xff", "one part of several|zip64"),
+        (4, b"\x01\x00", "one part"),
+        (10, b"\xff\xff", "zip64"),
+        (12, b"\xff\xff\xff\xff", "zip64"),
+        (12, b"\xff\xff\xff\x00", "where it should be"),
+    ):
+        with pytest.raises(ArchiveError, match=says):
+            read(data[: end + place] + value + data[end + place + len(value) :], tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"", "is empty"),
+        (b"hello", "no archive"),
+        (b"hello" * 1000, "no archive"),
+        (b"\x1f\x8b", "cut off"),
+        (b"\x1f\x8bnonsense" * 100, "damaged"),
+        (gzip.compress(b"episode,steps\n" * 100), "no archive"),
+        (gzip.compress(gzip.compress(make_tar(FILES))), "compressed twice"),
+        (b"BZh91AY&SY", "bzip2"),
+        (b"\xfd7zXZ\x00\x00", "xz"),
+        (b"7z\xbc\xaf\x27\x1c\x00", "7z"),
+        (b"Rar!\x1a\x07", "Rar|rar"),
+        (b"\x28\xb5\x2f\xfd\x00", "zstandard"),
+    ],
+)
+def test_no_archive(data: bytes, says: str, tmp_path: Path) -> None:
+    with pytest.raises(ArchiveError, match=says):
+        read(data, tmp_path)
+
+
+def test_a_large_number_as_gnu_writes_it(tmp_path: Path) -> None:
+    data = bytearray(member("x", size=3, data=b"abc"))
+    for number, says in ((3, None), (1 << 62, "more than"), (-1, "size is not a number")):
+        data[124:136] = (number % (1 << 88) | 0x80 << 88).to_bytes(12, "big") if number >= 0 else b"\xff" * 12
+        data[148:156] = b" " * 8
+        data[148:156] = f"{sum(data[:512]):06o}\0 ".encode()
+        if says is None:
+            assert read(bytes(data), tmp_path) == {"x": b"abc"}
+        else:
+            with pytest.raises(ArchiveError, match=says):
+                read(bytes(data), tmp_path)
+
+
+def test_paths_that_are_no_files(tmp_path: Path) -> None:
+    import os
+
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path, tmp_path / "pipe", tmp_path / "missing", Path("a\0b")):
+        with pytest.raises(ArchiveError, match=r"regular file|cannot be read"):
+            list(read_archive(path))
+
+
+# ---- fuzzing
+
+BASES = [
+    make_tar(FILES, format=tarfile.GNU_FORMAT),
+    gzip.compress(make_tar(FILES)),
+    make_zip(FILES),
+    make_zip(FILES, 0),
+]
+
+
+@settings(deadline=None, max_examples=300)
+@given(data=st.data(), base=st.sampled_from(BASES))
+def test_damage_is_an_error_or_changes_nothing(
+    data: st.DataObject, base: bytes, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Whatever bytes are changed, an archive is refused, or gives clean names of no more than allowed."""
+    changed = bytearray(base)
+    near = st.integers(0, min(len(base), 2000) - 1) | st.integers(max(0, len(base) - 300), len(base) - 1)
+    for place in data.draw(st.lists(near, min_size=1, max_size=6)):
+        changed[place] = data.draw(st.integers(0, 255))
+    limits = Limits(members=100, member_bytes=1 << 20, total_bytes=1 << 21)
+    try:
+        found = read(bytes(changed), tmp_path_factory.getbasetemp(), name="fuzz", limits=limits)
+    except ArchiveError as error:
+        message, found = str(error), {}
+        assert message.endswith(".")
+        assert len(message.splitlines()) == 1
+        assert len(message) < 300
+    for name, content in found.items():
+        assert not name.startswith("/")
+        assert ".." not in name.split("/")
+        assert len(content) <= 1 << 20
+
+
+@settings(deadline=None, max_examples=200)
+@given(files=st.dictionaries(st.from_regex(r"[a-z]{1,8}(/[a-z]{1,8}){0,3}", fullmatch=True), st.binary(max_size=3000)))
+def test_any_content_comes_back(files: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory) -> None:
+    clashes = any(other.startswith(f"{name}/") for name in files for other in files)
+    for data in (make_tar(files), gzip.compress(make_tar(files)), make_zip(files)):
+        if clashes:
+            with pytest.raises(ArchiveError, match="twice"):
+                read(data, tmp_path_factory.getbasetemp(), name="any")
+        else:
+            assert read(data, tmp_path_factory.getbasetemp(), name="any") == files
