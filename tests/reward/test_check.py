@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from racecraft.errors import RewardError
 from racecraft.reward.check import check_reward, validate_reward
-from racecraft.reward.imports import keeps_state
 from racecraft.reward.source import MAX_CHARACTERS, load_preset, preset_names
 
 
@@ -199,32 +198,3 @@ def test_any_text_gives_problems_and_never_an_exception(text):
     for problem in check_reward(text):
         assert problem.line >= 1
         assert problem.column >= 1
-
-
-STATEFUL = [
-    body("global last", "last = 1.0", "return last"),
-    body("memory['x'] = 1.0", RETURN, top="memory = {}\n"),
-    body("memory.append(1.0)", RETURN, top="memory = []\n"),
-    body("Memory.last = 1.0", RETURN, top="class Memory:\n    last = 0.0\n"),
-    body(
-        "return reward.step()",
-        top="class R:\n    def step(self):\n        self.n = 1\n        return 1.0\nreward = R()\n",
-    ),
-]
-STATELESS = [
-    body("x = []", "x.append(1)", "params['x'] = 2", RETURN),
-    body("return A(1).x", top="class A:\n    def __init__(self, x):\n        self.x = x\n"),
-    body("memory = {}", "memory['x'] = 1", RETURN),
-    body("return LINE[0]", top="LINE = []\nLINE.append(1.0)\n"),
-    *(load_preset(name) for name in preset_names()),
-]
-
-
-@pytest.mark.parametrize("source", STATEFUL, ids=range(len(STATEFUL)))
-def test_state_is_seen(source):
-    assert keeps_state(source)
-
-
-@pytest.mark.parametrize("source", STATELESS, ids=range(len(STATELESS)))
-def test_no_state_is_seen_where_there_is_none(source):
-    assert not keeps_state(source)

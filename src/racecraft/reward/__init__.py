@@ -10,9 +10,9 @@
 
 from racecraft.reward.check import Problem, check_reward, validate_reward
 from racecraft.reward.dry_run import Outcome, Situation, dry_run, situations
-from racecraft.reward.imports import keeps_state
 from racecraft.reward.params import format_params, make_params
 from racecraft.reward.source import load_preset, load_reward, preset_names
+from racecraft.reward.state import keeps_state
 from racecraft.reward.worker import RewardWorker
 
 __all__ = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import warnings
 from collections.abc import Iterator
 from typing import Final, Literal
 
@@ -160,51 +159,6 @@ class ImportRules:
         if not isinstance(node, ast.Name) or node.id not in self._meaning:
             return None
         return ".".join([self._meaning[node.id], *reversed(parts)])
-
-
-def keeps_state(source: str) -> bool:
-    """Whether the source remembers something between calls, as far as can be seen.
-
-    True for ``global``, and for changes inside a function to an attribute, item or container that is not
-    its own. Such functions need one copy of their globals per car (``num_cars`` of the worker) to mean what
-    they meant on AWS.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        tree = ast.parse(source)
-    top = {name for statement in tree.body for name in bound_names(statement, into_functions=False)} | {
-        "self",
-        "cls",
-    }
-    changers = (
-        "append",
-        "appendleft",
-        "extend",
-        "insert",
-        "add",
-        "update",
-        "setdefault",
-        "pop",
-        "clear",
-        "remove",
-    )
-    for function in ast.walk(tree):
-        if not isinstance(function, ast.FunctionDef) or function.name == "__init__":
-            continue
-        own = {argument.arg for argument in function.args.args} - {"self", "cls"}
-        for node in ast.walk(function):
-            if isinstance(node, (ast.Global, ast.Nonlocal)):
-                return True
-            target: ast.expr | None = None
-            if isinstance(node, (ast.Attribute, ast.Subscript)) and not isinstance(node.ctx, ast.Load):
-                target = node.value
-            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in changers:
-                target = node.func.value
-            while isinstance(target, (ast.Attribute, ast.Subscript)):
-                target = target.value
-            if isinstance(target, ast.Name) and target.id in top - own:
-                return True
-    return False
 
 
 def _check_import_from(node: ast.ImportFrom) -> Iterator[Finding]:
