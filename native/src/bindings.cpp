@@ -30,6 +30,7 @@ template <typename T, int Dimensions>
 using Array = nb::ndarray<nb::numpy, T, nb::ndim<Dimensions>, nb::c_contig>;
 using Points = nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 using Table = nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Indices = nb::ndarray<const int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Mask = nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Seeds = nb::ndarray<const uint64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Bytes = nb::ndarray<const uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
@@ -51,6 +52,7 @@ struct NativeTrack {
     Table widths, curvatures, reversed_widths, reversed_curvatures;
     double samples_per_metre;
     bool is_closed;
+    Indices waypoints, reversed_waypoints;
 
     TrackStore store(bool reversed) const {
         const Table& width = reversed ? reversed_widths : widths;
@@ -59,11 +61,17 @@ struct NativeTrack {
             throw std::invalid_argument(
                 "Width and curvature tables need the same number of samples, at least 2.");
         }
-        return TrackStore(
+        TrackOutline outline =
             reversed ? outline_of(reversed_centerline, reversed_inner, reversed_outer, is_closed)
-                     : outline_of(centerline, inner, outer, is_closed),
-            std::vector<float>(width.data(), width.data() + width.shape(0)),
-            std::vector<float>(curvature.data(), curvature.data() + curvature.shape(0)), samples_per_metre);
+                     : outline_of(centerline, inner, outer, is_closed);
+        const Indices& indices = reversed ? reversed_waypoints : waypoints;
+        if (indices.shape(0) + 1 != static_cast<size_t>(outline.count)) {
+            throw std::invalid_argument("Every piece of the centre line needs the index of its waypoint.");
+        }
+        outline.waypoints = indices.data();
+        return TrackStore(outline, std::vector<float>(width.data(), width.data() + width.shape(0)),
+                          std::vector<float>(curvature.data(), curvature.data() + curvature.shape(0)),
+                          samples_per_metre);
     }
 };
 
@@ -163,10 +171,10 @@ void bind_views(nb::module_& m) {
 void bind_engine(nb::module_& m) {
     nb::class_<NativeTrack>(m, "NativeTrack", "Both directions of one track, as arrays in metres.")
         .def(nb::init<Points, Points, Points, Points, Points, Points, Table, Table, Table, Table, double,
-                      bool>(),
+                      bool, Indices, Indices>(),
              "centerline"_a, "inner"_a, "outer"_a, "reversed_centerline"_a, "reversed_inner"_a,
              "reversed_outer"_a, "widths"_a, "curvatures"_a, "reversed_widths"_a, "reversed_curvatures"_a,
-             "samples_per_metre"_a, "is_closed"_a);
+             "samples_per_metre"_a, "is_closed"_a, "waypoints"_a, "reversed_waypoints"_a);
 
     nb::class_<Engine>(m, "Engine", "A batch of cars; see racecraft.sim.Simulation, its Python face.")
         .def(

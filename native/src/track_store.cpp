@@ -55,6 +55,7 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
         segment.arc_length = arc_length;
         segment.length = length_of(segment.dx, segment.dy);
         segment.inverse_length = 1.0 / segment.length;
+        segment.waypoint = outline.waypoints != nullptr ? outline.waypoints[i] : static_cast<int32_t>(i);
         arc_length += segment.length;
         segments_.push_back(segment);
     }

@@ -7,7 +7,6 @@ import gc
 import os
 import signal
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ from racecraft.reward import worker_process
 from racecraft.reward.source import load_preset
 from racecraft.reward.worker import LOG_BYTES, MAX_BATCH, RewardWorker
 from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.track.track import Track
 
 INDENT = "    "
 
@@ -95,7 +95,8 @@ def test_the_result_belongs_to_the_caller(track, rows):
 
 
 def test_waypoints_of_several_tracks_and_directions(track, make_row):
-    other = SimpleNamespace(centerline=np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [0.0, 0.0]]))
+    line = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0], [0.0, 0.0]])
+    other = Track("triangle", line, 0.9 * line, 1.1 * line)
     rows = np.stack([make_row(track_index=i) for i in range(4)])
     with running(
         function("return 100 * len(params['waypoints']) + params['waypoints'][1][0]"), [track, other]

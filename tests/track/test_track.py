@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from round_tracks import ring, track_of
 
 from racecraft.errors import ShapeError, TrackError
 from racecraft.track import Track, generate_track, load_track, track_names
+from racecraft.track.readers import read_route, save_route
 
 SOME = ["straight", "oval", "reinvent_2018", "lakeside", "bottleneck", "generated:3"]
 
@@ -54,6 +56,24 @@ def test_consecutive_duplicates_go_and_the_lap_still_closes() -> None:
     assert track.is_closed
     assert (np.diff(track.arc_length) > 0).all()
     assert track.digest == track_of(rows).digest
+    assert track.repeats == (0, 19, 49)
+    np.testing.assert_array_equal(track.waypoints, doubled[:, :2])
+
+
+def test_waypoints_are_counted_as_the_route_has_them(tmp_path: Path) -> None:
+    rows = ring(50)
+    doubled = np.concatenate((rows[:20], rows[19:20], rows[19:]))  # row 19 three times
+    forward = track_of(doubled)
+    for track, points in ((forward, doubled[:, :2]), (forward.reversed(), doubled[::-1, :2])):
+        np.testing.assert_array_equal(track.waypoints, points)
+        # A piece lies between two neighbouring waypoints that are not the same point.
+        np.testing.assert_array_equal(track.waypoints[track.waypoint_indices], track.centerline[:-1])
+        np.testing.assert_array_equal(track.waypoints[track.waypoint_indices + 1], track.centerline[1:])
+    assert forward.reversed().reversed().repeats == forward.repeats == (19, 19)
+    written = read_route(save_route(forward, tmp_path / "ring.npy"))
+    assert (written.repeats, written.digest) == (forward.repeats, forward.digest)
+    assert track_of(rows).repeats == ()
+    np.testing.assert_array_equal(track_of(rows).waypoint_indices, np.arange(49))
 
 
 @pytest.mark.parametrize("name", SOME)

@@ -167,8 +167,9 @@ RC_HD void write_row(const TrackGeometry& track, const Episode& episode, const V
     row[kRow_track_width] =
         static_cast<double>(table_at(track.width_table, table_position(track, projection.arc_length)));
     row[kRow_track_length] = track.length;
-    row[kRow_closest_prev] = projection.segment;
-    row[kRow_closest_next] = projection.segment + 1;
+    const int32_t waypoint = track.segments[projection.segment].waypoint;
+    row[kRow_closest_prev] = waypoint;
+    row[kRow_closest_next] = waypoint + 1;
     row[kRow_all_wheels_on_track] = wheels == 4;
     row[kRow_is_offtrack] = wheels == 0;
     row[kRow_is_crashed] = episode.status == Status::crashed;

@@ -23,6 +23,8 @@ struct Segment {
     double arc_length;      // m, of its start
     double length;          // m
     double inverse_length;  // 1/m
+    int32_t waypoint;       // index of its start among the route's waypoints; its end's is one more
+    int32_t unused;         // 0
 };
 
 struct TrackGeometry {

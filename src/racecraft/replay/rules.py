@@ -67,7 +67,7 @@ class RulesAgreement:
         logged = np.where(log.progress >= 1.0, np.maximum(log.progress, progress), log.progress)
         good_progress = np.abs(progress - logged) <= PROGRESS_TOLERANCE
         good_wheels = (rows[:, _COLUMN["all_wheels_on_track"]] > 0) == log.all_wheels_on_track
-        good_closest = closest_waypoints(rules.track, rows) == log.closest_waypoint % _num_waypoints(rules.track)
+        good_closest = closest_waypoints(rules.track, rows) == log.closest_waypoint
         self.rows += len(log)
         self.progress += int(good_progress.sum())
         self.all_wheels += int(good_wheels.sum())
@@ -98,17 +98,13 @@ _OVER: Final = [STATUS_NAMES.index(name) for name in ("lap_complete", "off_track
 
 
 def closest_waypoints(track: Track, rows: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The nearer of the waypoint behind and the one ahead; on a closed track the last is the first   (R,)."""
+    """The nearer of the waypoint behind and the one ahead   (R,)."""
     behind = rows[:, _COLUMN["closest_prev"]].astype(np.int64)
     ahead = rows[:, _COLUMN["closest_next"]].astype(np.int64)
     points = rows[:, [_COLUMN["x"], _COLUMN["y"]]]
-    to_behind = np.hypot(*(track.centerline[behind] - points).T)
-    to_ahead = np.hypot(*(track.centerline[ahead] - points).T)
-    return np.asarray(np.where(to_ahead < to_behind, ahead, behind) % _num_waypoints(track))
-
-
-def _num_waypoints(track: Track) -> int:
-    return len(track.centerline) - int(track.is_closed)
+    to_behind = np.hypot(*(track.waypoints[behind] - points).T)
+    to_ahead = np.hypot(*(track.waypoints[ahead] - points).T)
+    return np.asarray(np.where(to_ahead < to_behind, ahead, behind))
 
 
 def require_track(track: Track, log: Log) -> None:

@@ -307,7 +307,7 @@ class RewardWorker:
 
 def waypoints_of(tracks: Sequence[Track]) -> list[list[tuple[float, float]]]:
     """The centre lines as AWS hands them out, for each track and then for each driven the other way."""
-    forward = [[(x, y) for x, y in track.centerline.tolist()] for track in tracks]
+    forward = [[(x, y) for x, y in track.waypoints.tolist()] for track in tracks]
     return forward + [line[::-1] for line in forward]
 
 

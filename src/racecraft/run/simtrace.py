@@ -97,7 +97,7 @@ class SimTraceWriter:
         self.iteration = iteration
         self.max_bytes = max_bytes
         self._action_space = action_space
-        self._waypoints = [track.centerline for track in (*tracks, *(track.reversed() for track in tracks))]
+        self._waypoints = [track.waypoints for track in (*tracks, *(track.reversed() for track in tracks))]
         self._stride = 1
         self._file: TextIO | None = None
         self._steps: list[NDArray[np.float64]] = []  # (N, _WIDTH) each

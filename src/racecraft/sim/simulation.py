@@ -351,4 +351,6 @@ def native_track(track: Track) -> _native.NativeTrack:
         twin.curvature_at(s).astype(np.float32),
         steps / track.length,
         track.is_closed,
+        track.waypoint_indices,
+        twin.waypoint_indices,
     )

@@ -109,13 +109,15 @@ def save_route(track: Track, path: str | Path) -> Path:
     if path.suffix.lower() != ".npy":
         raise TrackError(f"A route is an .npy file; {path.name!r} does not end in .npy.")
     with path.open("wb") as file:
-        np.save(file, np.concatenate((track.centerline, track.inner, track.outer), axis=1), allow_pickle=False)
+        rows = np.concatenate((track.centerline, track.inner, track.outer), axis=1)
+        rows = np.insert(rows, track.repeats, rows[list(track.repeats)], axis=0)
+        np.save(file, rows, allow_pickle=False)
     return path
 
 
 def _checked(name: str, lines: dict[str, Floats]) -> Track:
     check_rows(lines, name=name)
-    track = Track(name=name, **lines)
+    track = Track(name, lines["centerline"], lines["inner"], lines["outer"])
     validate(track)
     return track
 

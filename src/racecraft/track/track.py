@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from racecraft.errors import ShapeError, TrackError
 from racecraft.track.polyline import (
@@ -40,8 +40,8 @@ CURVATURE_WINDOW = 0.15  # metres to each side over which the heading difference
 class Track:
     """A closed circuit or an open stretch of road. Arrays are float64, C-contiguous and read-only.
 
-    Consecutive duplicate waypoints are removed on construction. Geometry is taken as given: `validate`
-    judges it.
+    Consecutive duplicate waypoints are merged on construction; `waypoints` still has them. Geometry is taken as
+    given: `validate` judges it.
 
     Raises:
         ShapeError: The lines are not three arrays of the same shape (W, 2).
@@ -56,6 +56,9 @@ class Track:
     """Border on the inside of the circuit, metres, (W, 2), row by row beside the centre line."""
     outer: Floats
     """Border on the outside of the circuit, metres, (W, 2), row by row beside the centre line."""
+    repeats: tuple[int, ...] = ()
+    """Rows of the centre line that the route names once more; many of AWS's routes have one such row. No road lies
+    between equal points, but they are counted: AWS's waypoint indices, in logs and rewards, are those of the file."""
 
     def __post_init__(self) -> None:
         lines = {name: np.array(getattr(self, name), dtype=np.float64) for name in ("centerline", "inner", "outer")}
@@ -72,6 +75,8 @@ class Track:
         keep = np.concatenate(([True], steps > SAME_POINT))[: shape[0]]
         if keep.sum() < 2:
             raise TrackError(f"Track {self.name!r} has {keep.sum()} different waypoints; it needs at least two.")
+        repeats = (np.cumsum(keep) - 1)[~keep] if len(keep) else keep
+        object.__setattr__(self, "repeats", tuple(sorted((*self.repeats, *map(int, repeats)))))
         is_closed = np.hypot(*(lines["centerline"][0] - lines["centerline"][-1])) <= CLOSED_GAP
         for name, line in lines.items():
             line = line[keep] + 0.0  # adding zero turns -0.0 into 0.0, so that equal geometry has equal bytes
@@ -98,6 +103,21 @@ class Track:
         arc = arc_length(self.centerline)
         arc.flags.writeable = False
         return arc
+
+    @cached_property
+    def waypoints(self) -> Floats:
+        """The centre line as the route's file has it, repeated points and all: what AWS's rewards see, (W', 2)."""
+        waypoints = np.insert(self.centerline, self.repeats, self.centerline[list(self.repeats)], axis=0)
+        waypoints.flags.writeable = False
+        return waypoints
+
+    @cached_property
+    def waypoint_indices(self) -> NDArray[np.int32]:
+        """Index in `waypoints` of where each piece of the centre line starts, (W - 1,); where it ends is one more."""
+        pieces = np.arange(len(self.centerline) - 1)
+        indices = (pieces + np.searchsorted(self.repeats, pieces, side="right")).astype(np.int32)
+        indices.flags.writeable = False
+        return indices
 
     @property
     def length(self) -> float:
@@ -161,7 +181,8 @@ class Track:
     def reversed(self) -> Track:
         """The same road driven the other way, from the same start if closed; borders keep their names."""
         lines = {name: getattr(self, name)[::-1] for name in ("centerline", "inner", "outer")}
-        return replace(self, **lines)
+        last = len(self.centerline) - 1
+        return replace(self, **lines, repeats=tuple(last - row for row in reversed(self.repeats)))
 
     # --- along the track; `s` is in metres, of any shape, taken round a closed track, clamped on an open one
 
