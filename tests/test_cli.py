@@ -83,6 +83,7 @@ VERBS = (
     "evaluate",
     "tracks",
     "tracks show",
+    "tracks sheet",
     "reward",
     "reward check",
     "reward list",
@@ -98,7 +99,7 @@ def test_every_verb_explains_itself_in_80_columns(racecraft: Run, verb: str) -> 
     assert outcome.status == 0
     assert outcome.out.startswith(f"Usage: racecraft {verb}".rstrip())
     assert all(len(line) <= 80 for line in outcome.out.splitlines())
-    assert "..." not in re.sub(r"(ARGS\]|logs\}?)\.\.\.", "", outcome.out)  # nothing is cut
+    assert "..." not in re.sub(r"(ARGS\]|TRACKS\]|logs\}?)\.\.\.", "", outcome.out)  # nothing is cut
     assert racecraft(*verb.split(), "-h").out == outcome.out
 
 
@@ -199,6 +200,9 @@ def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str
         (["tracks", "show", "oval", "--width", "-5"], "TrackError", "-5"),
         (["tracks", "show", "oval", "-o", "nowhere/oval.png"], "", "nowhere"),
         (["tracks", "show", "oval", "-o", "oval.txt"], "TrackError", "txt"),
+        (["tracks", "sheet", "oval", "ovla"], "TrackNotFound", "Did you mean 'oval'?"),
+        (["tracks", "sheet", "oval", "--columns", "0"], "TrackError", "0"),
+        (["tracks", "sheet", "oval", "-o", "oval.txt"], "TrackError", "txt"),
         (["reward", "check", "racign"], "RewardError", "Did you mean 'racing'?"),
         (["reward", "show", "racign"], "RewardError", "Did you mean 'racing'?"),
         (["bench", "--only", "simulatr"], "ConfigError", "Did you mean 'simulator'?"),
@@ -261,6 +265,20 @@ def test_tracks_are_listed(racecraft: Run) -> None:
     (line,) = (line for line in lines if "reinvent_2018" in line)
     assert "17.7 m" in line
     assert "0.76 m" in line
+
+
+def test_a_sheet_of_tracks(racecraft: Run) -> None:
+    from PIL import Image
+
+    outcome = racecraft("tracks", "sheet", "--width", "600", "-o", "all.webp")
+    assert (outcome.status, outcome.out) == (0, "18 tracks drawn to all.webp\n")
+    document = racecraft(
+        "tracks", "sheet", "generated:1", "oval", "--columns", "2", "--width", "400", "--json"
+    ).document
+    assert document["picture"] == "tracks.png"
+    assert [track["name"] for track in document["tracks"]] == ["generated:1", "oval"]
+    with Image.open("tracks.png") as picture:
+        assert picture.size[0] == 400
 
 
 def test_tracks_as_json(racecraft: Run) -> None:

@@ -48,6 +48,15 @@ def test_a_circle_has_its_length_width_radius_and_area() -> None:
     assert track.curvature_at(np.linspace(0, 30, 99)) == pytest.approx(np.full(99, 1 / 3), rel=1e-3)
 
 
+def test_the_width_is_that_of_the_road_also_where_rows_are_slanted() -> None:
+    rows = ring(400, radius=3.0, width=0.8)
+    for border, turned in ((slice(2, 4), 7), (slice(4, 6), -7)):
+        rows[:-1, border] = np.roll(rows[:-1, border], turned, axis=0)
+    rows[-1] = rows[0]
+    assert np.hypot(*(rows[:, 2:4] - rows[:, 4:6]).T).min() > 1.0
+    assert track_of(rows).widths == pytest.approx(np.full(400, 0.8), abs=1e-3)
+
+
 def test_consecutive_duplicates_go_and_the_lap_still_closes() -> None:
     rows = ring(50)
     doubled = np.concatenate((rows[:1], rows[:20], rows[19:], rows[-1:]))

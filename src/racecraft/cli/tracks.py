@@ -10,7 +10,7 @@ import typer
 
 from racecraft.cli.app import Json, app, print_json, text
 
-tracks_app = typer.Typer(help="List the tracks, or draw one.", rich_markup_mode=None)
+tracks_app = typer.Typer(help="List the tracks, or draw them.", rich_markup_mode=None)
 app.add_typer(tracks_app, name="tracks")
 
 
@@ -44,6 +44,28 @@ def show_track(
         print_json({**track_facts(track), "picture": str(path)})
     else:
         typer.echo(f"{track.name}: {track.length:.2f} m, drawn to {path}")
+
+
+@tracks_app.command("sheet")
+def draw_sheet(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="TRACKS", help="Names or files; by default the library.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="PNG, JPEG or WebP file.")] = Path("tracks.png"),
+    columns: Annotated[int, typer.Option("--columns", help="Tracks side by side.")] = 6,
+    width: Annotated[int, typer.Option("--width", help="Pixels.")] = 1500,
+    title: Annotated[str, typer.Option("--title", help="Written above.")] = "",
+    as_json: Json = False,
+) -> None:
+    """Draw many tracks in one picture."""
+    from racecraft.track import draw_contact_sheet, load_track, track_names
+
+    tracks = [load_track(name) for name in names or track_names()]
+    path = draw_contact_sheet(tracks, output, columns=columns, width_px=width, title=title)
+    if as_json:
+        print_json({"tracks": [track_facts(track) for track in tracks], "picture": str(path)})
+    else:
+        typer.echo(f"{len(tracks)} tracks drawn to {path}")
 
 
 def track_facts(track: Any) -> dict[str, Any]:

@@ -23,7 +23,17 @@ from racecraft.track.canvas import Canvas, text_width
 from racecraft.track.corners import TrackCorner, find_corners
 from racecraft.track.library import course, track_names
 from racecraft.track.polyline import Floats
-from racecraft.track.road_art import GRID, INK, KERB_WIDTH, PAPER, SOFT_INK, Ribbon, paint_infield, paint_road
+from racecraft.track.road_art import (
+    GRID,
+    INK,
+    KERB_WIDTH,
+    PAPER,
+    SOFT_INK,
+    Ribbon,
+    paint_arrow,
+    paint_infield,
+    paint_road,
+)
 from racecraft.track.track import Track
 
 if TYPE_CHECKING:
@@ -32,6 +42,7 @@ if TYPE_CHECKING:
 RULE = (205, 200, 188)  # colour of the hairline above the figures
 MIN_WIDTH_PX, MAX_WIDTH_PX = 320, 6000
 SCALE_BARS = (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)  # metres
+SMALL_ROAD = 9.0  # hundredths of a cell; on narrower roads the chevrons at the start cannot be read
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 
 
@@ -266,11 +277,13 @@ def _cell(track: Track, size: tuple[int, int]) -> Image.Image:
     canvas, ribbon = _canvas_for(track, size, area, scale), Ribbon(track)
     paint_infield(canvas, ribbon)
     paint_road(canvas, track, ribbon, find_corners(track), shadow_px=1.2 * unit)
-    name, _ = describe(track)
+    if track.mean_width * scale < SMALL_ROAD * unit:
+        paint_arrow(canvas, track, ribbon, length_px=0.75 * SMALL_ROAD * unit)
+    name = describe(track)[0] if track.name in track_names() else track.name
     room = 88.0 * unit
-    _fitted(canvas, (6.0 * unit, size[1] - 11.5 * unit), name, size=5.0 * unit, room=room, weight=0.025)
+    _fitted(canvas, (6.0 * unit, size[1] - 12.0 * unit), name, size=5.8 * unit, room=room, weight=0.022)
     figures = f"{track.length:.1f} m  ·  {track.mean_width:.2f} m wide"
-    _fitted(canvas, (6.0 * unit, size[1] - 6.0 * unit), figures, size=3.6 * unit, room=room, is_soft=True)
+    _fitted(canvas, (6.0 * unit, size[1] - 5.5 * unit), figures, size=4.6 * unit, room=room, is_soft=True)
     return canvas.finish()
 
 

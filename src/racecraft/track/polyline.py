@@ -72,6 +72,15 @@ def project(queries: Floats, points: Floats, arc: Floats) -> tuple[Floats, Float
     return s, offset
 
 
+def nearest(queries: Floats, points: Floats) -> Floats:
+    """The nearest place on a polyline (W, 2), which may repeat points, for each query (Q, 2)."""
+    points = points[np.concatenate(([True], (points[1:] != points[:-1]).any(axis=1)))]
+    if len(points) < 2:
+        return np.broadcast_to(points[0], queries.shape)
+    arc = arc_length(points)
+    return interpolate(points, arc, project(queries, points, arc)[0])
+
+
 def signed_area(ring: Floats) -> float:
     """Area inside a ring, positive when it runs counter-clockwise."""
     x, y = (ring - ring[0]).T

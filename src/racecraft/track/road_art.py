@@ -121,6 +121,19 @@ def paint_road(canvas: Canvas, track: Track, ribbon: Ribbon, corners: list[Track
         canvas.line(dash, CENTRE, width_px=DASH_WIDTH * canvas.scale, is_round=False)
 
 
+def paint_arrow(canvas: Canvas, track: Track, ribbon: Ribbon, *, length_px: float) -> None:
+    """An arrow beyond the start line that points the way, of a size in finished pixels."""
+    length = length_px / canvas.scale
+    tip, rim = 0.3 + 1.6 * length, 0.14 * length
+    place, leftwards = ribbon.place(tip - 0.5 * length), ribbon.leftwards(tip - 0.5 * length)
+    ahead = np.array([leftwards[1], -leftwards[0]])
+    for grown, color in ((2.4 * rim, INK), (0.0, CENTRE)):
+        half = 0.42 * length + grown
+        nose, tail = place + (0.5 * length + 1.4 * grown) * ahead, place - (0.5 * length + 0.7 * grown) * ahead
+        notch = place - (0.25 * length + 0.7 * grown) * ahead
+        canvas.polygon(np.array([nose, tail + half * leftwards, notch, tail - half * leftwards]), color)
+
+
 def _paint_kerb(canvas: Canvas, ribbon: Ribbon, corner: TrackCorner) -> None:
     """Red and white stripes along the inside of a corner."""
     start, end = corner.start - 0.1, corner.end + 0.1

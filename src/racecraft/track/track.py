@@ -26,6 +26,7 @@ from racecraft.track.polyline import (
     arc_length,
     as_points,
     interpolate,
+    nearest,
     project,
     signed_area,
     wrap_angle,
@@ -33,6 +34,7 @@ from racecraft.track.polyline import (
 
 SAME_POINT = 1e-9  # metres; waypoints closer than this are one
 CLOSED_GAP = 1e-6  # metres; a centre line whose ends are closer than this is closed
+SLANTED = 0.95  # of a row's length: a road narrower than that is not square to the row
 CURVATURE_WINDOW = 0.15  # metres to each side over which the heading difference is taken
 
 
@@ -126,8 +128,15 @@ class Track:
 
     @cached_property
     def widths(self) -> Floats:
-        """Distance from the inner to the outer border at each waypoint, metres, (W,)."""
+        """Distance from the inner to the outer border at each waypoint, metres, (W,).
+
+        That of the row, unless the row is slanted, as those of some routes are: then, as AWS measures it, between the
+        places of both borders that are nearest to the waypoint.
+        """
         widths: Floats = np.hypot(*(self.inner - self.outer).T)
+        inner, outer = (nearest(self.centerline, border) for border in (self.inner, self.outer))
+        across = np.hypot(*(inner - outer).T)
+        widths = np.where(across < SLANTED * widths, across, widths)
         widths.flags.writeable = False
         return widths
 

@@ -110,7 +110,7 @@ def _check_centerline(track: Track) -> None:
 
 
 def _check_widths(track: Track) -> None:
-    name, widths = track.name, track.widths
+    name, widths = track.name, np.hypot(*(track.inner - track.outer).T)  # of the rows, which may be slanted
     for row, is_bad, limit in (
         (int(widths.argmin()), widths.min() < MIN_WIDTH, f"at least {MIN_WIDTH:g}"),
         (int(widths.argmax()), widths.max() > MAX_WIDTH, f"at most {MAX_WIDTH:g}"),
