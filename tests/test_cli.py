@@ -442,6 +442,7 @@ def test_evaluate_as_json_names_files_that_can_be_read(racecraft: Run, trained: 
     assert {"laps_completed", "best_lap_seconds", "mean_completion", "completion_interval", "off_track_count"} <= (
         document.keys()
     )
+    assert document["official_races"] == []  # our own tracks have none
     files = {name: Path(path) for name, path in document["files"].items()}
     assert len(read_metrics(files["metrics"])["metrics"]) >= 2
     assert len(read_simtrace(files["sim-trace"])["steps"]) > 2

@@ -81,6 +81,8 @@ def say_evaluated(outcome: RunEvaluation) -> None:
         )
     console.print(table)
     _say(console, outcome.summary)
+    for placing in outcome.placings[:1]:
+        _say(console, placing.sentence)
     for what, path in outcome.files.items():
         _say(console, f"  {what:<12} ", (str(path), "bold"))
 

@@ -9,6 +9,7 @@ from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.race.standings import RANKINGS, places, ranking_score
 from racecraft.race.statistics import Interval, mean_interval, wilson_interval
 from racecraft.race.video import film
+from racecraft.race.yardstick import OfficialRace, Placing, official_races, placings
 
 __all__ = [
     "RANKINGS",
@@ -18,6 +19,8 @@ __all__ = [
     "Evaluation",
     "Interval",
     "Lap",
+    "OfficialRace",
+    "Placing",
     "RaceRules",
     "Recording",
     "Trial",
@@ -26,7 +29,9 @@ __all__ = [
     "evaluate",
     "film",
     "mean_interval",
+    "official_races",
     "places",
+    "placings",
     "ranking_score",
     "trial_simulation",
     "wilson_interval",

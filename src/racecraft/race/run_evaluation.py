@@ -23,6 +23,7 @@ from racecraft.race.racing_line import draw_racing_line
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.race.video import film
+from racecraft.race.yardstick import Placing, placings
 from racecraft.run.atomic import write_json
 from racecraft.run.folder import RunFolder, RunInfo
 from racecraft.sim.vehicle import Vehicle, load_vehicle
@@ -53,6 +54,11 @@ class RunEvaluation:
             f"(95 % interval {100 * low:.0f} to {100 * high:.0f} %){best}."
         )
 
+    @property
+    def placings(self) -> list[Placing]:
+        """Where it would have placed in the official races on this track, most entrants first."""
+        return placings(self.evaluation)
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
         return {
@@ -60,6 +66,7 @@ class RunEvaluation:
             "step": self.step,
             **self.evaluation.summary(),
             "lap_seconds": [list(trial.lap_times) for trial in self.evaluation.trials],
+            "official_races": [placing.to_dict() for placing in self.placings],
             "files": {name: str(path) for name, path in self.files.items()},
         }
 
