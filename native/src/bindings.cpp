@@ -87,6 +87,8 @@ VehicleParameters vehicle_of(const std::vector<float>& values) {
 const char* const kRowNames[] = {RC_ROW_COLUMNS(RC_NAME)};
 const char* const kStateNames[] = {RC_STATE_COLUMNS(RC_NAME)};
 const char* const kVehicleNames[] = {RC_VEHICLE_PARAMETERS(RC_NAME)};
+const char* const kObjectHeaderNames[] = {RC_OBJECT_HEADER(RC_NAME)};
+const char* const kObjectNames[] = {RC_OBJECT_COLUMNS(RC_NAME)};
 #undef RC_NAME
 
 template <size_t Count>
@@ -168,6 +170,42 @@ void bind_views(nb::module_& m) {
         "camera"_a, "ground"_a, "palette"_a, "x"_a, "y"_a, "heading"_a, "cars"_a, "out"_a);
 }
 
+ObjectGroup group_of(int kind, int count, int placement, double min_distance,
+                     const std::vector<double>& fractions, const std::vector<float>& lanes) {
+    ObjectGroup group;
+    group.kind = static_cast<ObjectKind>(kind);
+    group.placement = static_cast<Placement>(placement);
+    group.count = count;
+    group.min_distance = min_distance;
+    const size_t positions = group.placement == Placement::fixed ? static_cast<size_t>(count) : 0;
+    if (count < 0 || count > kMaxObjects || fractions.size() < positions || lanes.size() < positions)
+        throw std::invalid_argument("Wrong number of objects or of their positions.");
+    std::copy_n(fractions.begin(), positions, group.fractions);
+    std::copy_n(lanes.begin(), positions, group.lanes);
+    return group;
+}
+
+void bind_objects(nb::module_& m) {
+    nb::class_<ObjectGroup>(m, "ObjectGroup", "Obstacles or bot cars, and where an episode puts them.")
+        .def(
+            "__init__",
+            [](ObjectGroup* self, int kind, int count, int placement, double min_distance,
+               const std::vector<double>& fractions, const std::vector<float>& lanes) {
+                new (self) ObjectGroup(group_of(kind, count, placement, min_distance, fractions, lanes));
+            },
+            "kind"_a, "count"_a, "placement"_a, "min_distance"_a, "fractions"_a, "lanes"_a);
+    nb::class_<ObjectRule>(m, "ObjectRule", "What stands and drives on the track besides the car.")
+        .def(
+            "__init__",
+            [](ObjectRule* self, const ObjectGroup& obstacles, const ObjectGroup& bots, float speed,
+               bool changes_lane, float shortest_stay, float longest_stay, float change_distance) {
+                new (self) ObjectRule{
+                    obstacles, bots, {speed, changes_lane, shortest_stay, longest_stay, change_distance}};
+            },
+            "obstacles"_a, "bots"_a, "speed"_a, "changes_lane"_a, "shortest_stay"_a, "longest_stay"_a,
+            "change_distance"_a);
+}
+
 void bind_engine(nb::module_& m) {
     nb::class_<NativeTrack>(m, "NativeTrack", "Both directions of one track, as arrays in metres.")
         .def(nb::init<Points, Points, Points, Points, Points, Points, Table, Table, Table, Table, double,
@@ -184,7 +222,7 @@ void bind_engine(nb::module_& m) {
                const CameraSpec* camera, const GreyPalette& palette, size_t num_envs, uint64_t seed,
                int substeps, int num_threads, int laps, int max_steps, double time_limit, int start_mode,
                double start_offset, double start_advance, bool start_spread, float lateral_jitter,
-               float heading_jitter, int direction) {
+               float heading_jitter, int direction, const ObjectRule& objects) {
                 std::vector<TrackStore> stores;
                 for (const bool reversed : {false, true}) {
                     for (const NativeTrack* track : tracks) stores.push_back(track->store(reversed));
@@ -197,7 +235,8 @@ void bind_engine(nb::module_& m) {
                     RuleLimits{laps, max_steps, time_limit},
                     StartRule{static_cast<StartMode>(start_mode), start_offset, start_advance, start_spread,
                               lateral_jitter, heading_jitter},
-                    static_cast<Direction>(direction)};
+                    static_cast<Direction>(direction),
+                    objects};
                 new (self)
                     Engine(config, std::move(stores),
                            std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
@@ -206,7 +245,7 @@ void bind_engine(nb::module_& m) {
             "tracks"_a, "grounds"_a, "vehicle"_a, "camera"_a.none(), "palette"_a, "num_envs"_a, "seed"_a,
             "substeps"_a, "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a,
             "start_offset"_a, "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a,
-            "direction"_a)
+            "direction"_a, "objects"_a)
         .def(
             "reset",
             [](Engine& self, Mask mask, std::optional<Seeds> seeds) {
@@ -248,12 +287,12 @@ void bind_engine(nb::module_& m) {
         .def_prop_ro("rows",
                      [](nb::handle_t<Engine> self) {
                          Engine& e = nb::cast<Engine&>(self);
-                         return Array<double, 2>(e.rows(), {e.num_envs(), kNumRowColumns}, self);
+                         return Array<double, 2>(e.rows(), {e.num_envs(), e.row_width()}, self);
                      })
         .def_prop_ro("state",
                      [](nb::handle_t<Engine> self) {
                          Engine& e = nb::cast<Engine&>(self);
-                         return Array<float, 2>(e.state(), {e.num_envs(), kNumStateColumns}, self);
+                         return Array<float, 2>(e.state(), {e.num_envs(), e.state_width()}, self);
                      })
         .def_prop_ro("frames",
                      [](nb::handle_t<Engine> self) {
@@ -351,6 +390,8 @@ NB_MODULE(_native, m) {
     m.doc() = "Racecraft's native core. Private: use racecraft.sim and racecraft.learn.";
     m.attr("ROW_COLUMNS") = racecraft::names_of(racecraft::kRowNames);
     m.attr("STATE_COLUMNS") = racecraft::names_of(racecraft::kStateNames);
+    m.attr("OBJECT_HEADER") = racecraft::names_of(racecraft::kObjectHeaderNames);
+    m.attr("OBJECT_COLUMNS") = racecraft::names_of(racecraft::kObjectNames);
     m.attr("VEHICLE_PARAMETERS") = racecraft::names_of(racecraft::kVehicleNames);
     m.def("isa", [] { return std::string(racecraft::isa_name(racecraft::current_isa())); });
     m.def("available_isas", [] {
@@ -362,6 +403,7 @@ NB_MODULE(_native, m) {
     m.def("set_isa", &racecraft::set_isa, "name"_a);
     racecraft::bind_camera(m);
     racecraft::bind_views(m);
+    racecraft::bind_objects(m);
     racecraft::bind_engine(m);
     racecraft::bind_replay(m);
     racecraft::bind_learner(m);

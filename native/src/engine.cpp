@@ -12,15 +12,19 @@ namespace racecraft {
 Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
                std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
                const CameraSpec* camera, const GreyPalette& palette)
-    : config_(config), tracks_(std::move(tracks)), grounds_(std::move(grounds)), pool_(config.num_threads) {
+    : config_(config),
+      tracks_(std::move(tracks)),
+      grounds_(std::move(grounds)),
+      objects_(config.objects, config.num_envs, camera),
+      pool_(config.num_threads) {
     const size_t n = config_.num_envs;
     vehicles_.resize(kNumVehicleFields * n);
     parameters_.resize(kNumVehicleParameters * n);
     steering_command_.resize(n);
     speed_command_.resize(n);
     is_moving_.resize(n);
-    state_.resize(kNumStateColumns * n);
-    rows_.resize(kNumRowColumns * n);
+    state_.resize(state_width() * n);
+    rows_.resize(row_width() * n);
     episodes_.resize(n);
     track_choice_.resize(n);
     seeds_.assign(n, config_.seed);
@@ -85,9 +89,12 @@ VehicleState Engine::start_pose(size_t env) {
 
     const RandomBlock random = philox(seed, car, number, 0, Purpose::start_pose);
     const double lateral = static_cast<double>(rule.lateral_jitter * symmetric_of(random.words[0]));
+    const float lane = start_lane(track, objects_.objects_of(env), objects_.count(), arc_length);
+    const LanePoint middle = lane == 0.0f ? LanePoint{segment->x + along * ux, segment->y + along * uy}
+                                          : lane_point(track, arc_length, lane);
     VehicleState state{};
-    state.x = static_cast<float>(segment->x + along * ux - lateral * uy);
-    state.y = static_cast<float>(segment->y + along * uy + lateral * ux);
+    state.x = static_cast<float>(middle.x - lateral * uy);
+    state.y = static_cast<float>(middle.y + lateral * ux);
     state.heading = wrap_angle(atan2_of(static_cast<float>(uy), static_cast<float>(ux)) +
                                rule.heading_jitter * symmetric_of(random.words[1]));
     return state;
@@ -101,6 +108,7 @@ void Engine::begin_episode(size_t env) {
     const bool reversed = config_.direction == Direction::reverse ||
                           (config_.direction == Direction::alternate && (number & 1) != 0);
     episode.track = track_choice_[env] + (reversed ? static_cast<int32_t>(num_tracks()) : 0);
+    objects_.place(env, track_of(env), seeds_[env], streams_[env], static_cast<uint32_t>(number));
     const VehicleState state = start_pose(env);
     store_vehicle(env, state);
     look(env);
@@ -113,14 +121,17 @@ void Engine::begin_episode(size_t env) {
     episode.last_x = episode.reference_x;
     episode.last_y = episode.reference_y;
     write_row(track, episode, state, 0.0f, 0.0f, wheels_on_road(track, state, episode), is_reversed(env),
-              &rows_[env * kNumRowColumns]);
+              &rows_[env * row_width()]);
+    objects_.write_row(env, episode, state, -1, &rows_[env * row_width() + kNumRowColumns]);
     terminated()[env] = false;
     truncated()[env] = false;
 }
 
 void Engine::look(size_t env) {
     const VehicleState state = vehicle(env);
-    observe(track_of(env), state, episodes_[env], &state_[env * kNumStateColumns]);
+    float* seen = &state_[env * state_width()];
+    observe(track_of(env), state, episodes_[env], seen);
+    objects_.observe(env, track_of(env), episodes_[env], seen + kNumStateColumns);
     if (camera_ != nullptr) {
         const size_t ground = static_cast<size_t>(episodes_[env].track) % num_tracks();
         const size_t pixels = frames_.size() / num_envs();
@@ -160,15 +171,19 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
         const float speed = actions[2 * env + 1];
         steering_command_[env] = steering;
         speed_command_[env] = speed == 0.0f ? 0.0f : clamp(speed, kMinSpeedCommand, kMaxSpeedCommand);
-        const Verdict verdict =
-            judge(track_of(env), config_.limits, vehicle(env), steering, speed_command_[env],
-                  is_reversed(env), episodes_[env], &rows_[env * kNumRowColumns]);
+        double* row = &rows_[env * row_width()];
+        const VehicleState car = vehicle(env);
+        const int32_t crashed = objects_.find_crash(env, track_of(env), episodes_[env], car);
+        const Verdict verdict = judge(track_of(env), config_.limits, car, steering, speed_command_[env],
+                                      is_reversed(env), crashed >= 0, episodes_[env], row);
+        const bool has_crashed = row[kRow_is_crashed] != 0.0;
+        objects_.write_row(env, episodes_[env], car, has_crashed ? crashed : -1, row + kNumRowColumns);
         terminated()[env] = verdict.terminated;
         truncated()[env] = verdict.truncated;
         is_moving_[env] = verdict.moves ? 1.0f : 0.0f;
         any_moving |= verdict.moves;
     }
-    if (!any_moving) return;
+    if (!any_moving && !objects_.has_bots()) return;
 
     float* fields = vehicles_.data();
     const VehicleArrays arrays{fields,
@@ -188,7 +203,11 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
         RC_DISPATCH(advance_vehicles, arrays, env, count, config_.substeps);
     }
     for (size_t env = begin; env < end; ++env) {
-        if (is_moving_[env] != 0.0f) look(env);
+        // Bots drive on around a car that stands as a penalty, so its view changes, too.
+        const bool lives = objects_.has_bots() && !terminated()[env] && !truncated()[env];
+        if (is_moving_[env] == 0.0f && !lives) continue;
+        objects_.advance(env, track_of(env), seeds_[env], streams_[env], episodes_[env], vehicle(env));
+        look(env);
     }
 }
 
@@ -235,6 +254,7 @@ void Engine::visit_saved(Visitor&& visit) {
     visit(seeds_.data(), seeds_.size() * sizeof(uint64_t));
     visit(streams_.data(), streams_.size() * sizeof(uint32_t));
     visit(palettes_.data(), palettes_.size() * sizeof(GreyPalette));
+    visit(objects_.states().data(), objects_.states().size() * sizeof(ObjectState));
     visit(flags_.get(), 2 * num_envs() * sizeof(bool));
 }
 
@@ -299,6 +319,7 @@ const char* Engine::find_fault() const {
     }
     if (!std::all_of(vehicles_.begin(), vehicles_.end(), is_number)) return "holds a car that is nowhere.";
     if (!std::all_of(parameters_.begin(), parameters_.end(), is_number)) return "holds a car that cannot be.";
+    if (const char* fault = objects_.find_fault()) return fault;
     const uint8_t* flags = reinterpret_cast<const uint8_t*>(flags_.get());
     if (!std::all_of(flags, flags + 2 * num_envs(), [](uint8_t flag) { return flag <= 1; })) {
         return "is damaged.";

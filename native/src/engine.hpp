@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera_model.hpp"
+#include "object_field.hpp"
 #include "racecraft/random.hpp"
 #include "racecraft/rules.hpp"
 #include "thread_pool.hpp"
@@ -34,6 +35,7 @@ struct EngineConfig {
     RuleLimits limits;
     StartRule start;
     Direction direction;
+    ObjectRule objects;  // none by default
 };
 
 // Calls from several threads wait for each other; the arrays are shared all the same.
@@ -61,8 +63,11 @@ class Engine {
     int num_threads() const { return pool_.num_threads(); }
     size_t num_bytes() const;  // of the batch's own buffers, frames included
     const CameraModel* camera() const { return camera_.get(); }
-    double* rows() { return rows_.data(); }                  // (N, kNumRowColumns)
-    float* state() { return state_.data(); }                 // (N, kNumStateColumns)
+    // Columns of a row and of a state: more than kNumRowColumns and kNumStateColumns where there are objects.
+    size_t row_width() const { return kNumRowColumns + static_cast<size_t>(objects_.row_width()); }
+    size_t state_width() const { return kNumStateColumns + static_cast<size_t>(objects_.state_width()); }
+    double* rows() { return rows_.data(); }                  // (N, row_width())
+    float* state() { return state_.data(); }                 // (N, state_width())
     uint8_t* frames() { return frames_.data(); }             // (N, height, width)
     bool* terminated() { return flags_.get(); }              // (N,)
     bool* truncated() { return flags_.get() + num_envs(); }  // (N,)
@@ -102,6 +107,7 @@ class Engine {
     std::vector<TrackStore> tracks_;
     std::vector<std::shared_ptr<const GroundMap>> grounds_;
     std::unique_ptr<CameraModel> camera_;
+    ObjectField objects_;
     ThreadPool pool_;
 
     std::vector<float> vehicles_, parameters_, steering_command_, speed_command_, is_moving_, state_;

@@ -29,7 +29,7 @@ void judge_log(const TrackGeometry& track, bool is_reversed, const LoggedRow* lo
         const float speed = static_cast<float>(logged.speed);
         double* row = rows + i * kNumRowColumns;
         if (logged.is_first == 0.0) {
-            judge(track, kNoLimits, state, steering, speed, is_reversed, episode, row);
+            judge(track, kNoLimits, state, steering, speed, is_reversed, false, episode, row);
             continue;
         }
         // As the engine begins an episode, but the log tells the progress.

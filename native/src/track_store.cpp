@@ -59,6 +59,12 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
         arc_length += segment.length;
         segments_.push_back(segment);
     }
+    for (size_t i = 0; i < 2 * count; i += 2) {
+        lane_offsets_.push_back({0.5 * (outline.inner[i] - outline.center[i]),
+                                 0.5 * (outline.inner[i + 1] - outline.center[i + 1]),
+                                 0.5 * (outline.outer[i] - outline.center[i]),
+                                 0.5 * (outline.outer[i + 1] - outline.center[i + 1])});
+    }
     extend(widths_, samples_per_metre, outline.is_closed);
     extend(curvatures_, samples_per_metre, outline.is_closed);
 
@@ -89,6 +95,7 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
     g.is_closed = outline.is_closed ? 1 : 0;
     g.length = arc_length;
     g.segments = segments_.data();
+    g.lane_offsets = lane_offsets_.data();
     g.grid_x = x_min - kMargin;
     g.grid_y = y_min - kMargin;
     g.inverse_cell = 1.0 / cell;

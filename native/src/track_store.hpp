@@ -25,6 +25,7 @@ class TrackStore {
 
     TrackGeometry geometry_{};
     std::vector<Segment> segments_;
+    std::vector<LaneOffset> lane_offsets_;
     std::vector<double> border_;  // x0, y0, x1, y1 of every border edge
     std::vector<uint8_t> cell_kind_;
     std::vector<uint32_t> segment_begin_;

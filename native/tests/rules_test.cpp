@@ -53,7 +53,7 @@ class Judge {
 
     Verdict judge_at(const VehicleState& state) {
         observe(track(), state, episode_, state_);
-        return judge(track(), limits_, state, 0.1f, 1.5f, false, episode_, row_);
+        return judge(track(), limits_, state, 0.1f, 1.5f, false, false, episode_, row_);
     }
 
   private:

@@ -14,6 +14,9 @@ namespace racecraft {
 enum class Purpose : uint32_t {
     start_position = 1,  // where along the lap an episode starts
     start_pose = 2,      // lateral and heading jitter of the start
+    object_place = 3,    // where objects stand at the start of an episode
+    lane_change = 4,     // when a bot car changes its lane
+    lidar_noise = 5,     // of every ray
 };
 
 struct RandomBlock {

@@ -1,5 +1,5 @@
-// The rules of an episode: progress, wheels on track, off track, reversed, immobilised, lap complete, time
-// up.
+// The rules of an episode: progress, wheels on track, crashed, off track, reversed, immobilised, lap
+// complete, time up.
 //
 // A step is judged at the pose *before* its action acts, as AWS logs it; so a row holds the pose at time t
 // and the command of time t. Thresholds are the original's (simapp: markov/reset, markov/agent_ctrl).
@@ -184,8 +184,8 @@ RC_HD void write_row(const TrackGeometry& track, const Episode& episode, const V
 
 // Judges the current pose with the action that is about to act and writes the step's row.
 RC_HD Verdict judge(const TrackGeometry& track, const RuleLimits& limits, const VehicleState& state,
-                    float steering_command, float speed_command, bool is_reversed, Episode& episode,
-                    double* row) {
+                    float steering_command, float speed_command, bool is_reversed, bool has_crashed,
+                    Episode& episode, double* row) {
     const int32_t wheels = wheels_on_road(track, state, episode);
     episode.steps += 1;
 
@@ -210,13 +210,14 @@ RC_HD Verdict judge(const TrackGeometry& track, const RuleLimits& limits, const 
         const bool is_still = dx * dx + dy * dy <= kImmobilizedDistance * kImmobilizedDistance;
         episode.still_steps = is_still ? episode.still_steps + 1 : 0;
 
-        // The original's order: time up, then lap complete, then whatever else went wrong.
+        // The original's order: time up, then lap complete, then crashed, then whatever else went wrong.
         lap_complete = episode.progress >= 1.0 && !time_up;
         episode.laps += lap_complete ? 1 : 0;
         episode.status = Status::in_progress;
         if (episode.falling_steps >= kReversedSteps) episode.status = Status::reversed;
         if (episode.still_steps >= kImmobilizedSteps) episode.status = Status::immobilized;
         if (wheels == 0) episode.status = Status::off_track;
+        if (has_crashed) episode.status = Status::crashed;
         if (lap_complete) episode.status = Status::lap_complete;
         verdict.terminated =
             lap_complete ? episode.laps >= limits.laps : episode.status != Status::in_progress && !time_up;

@@ -27,11 +27,17 @@ struct Segment {
     int32_t unused;         // 0
 };
 
+// From a waypoint to the middle of each lane, half of the way to the border, m.
+struct LaneOffset {
+    double inner_x, inner_y, outer_x, outer_y;
+};
+
 struct TrackGeometry {
-    int32_t num_segments;     // W - 1
-    int32_t is_closed;        // 1 or 0
-    double length;            // m, of the centre line
-    const Segment* segments;  //                                       (W - 1,)
+    int32_t num_segments;            // W - 1
+    int32_t is_closed;               // 1 or 0
+    double length;                   // m, of the centre line
+    const Segment* segments;         //                                       (W - 1,)
+    const LaneOffset* lane_offsets;  // of every waypoint                    (W,)
 
     double grid_x, grid_y;  // m, lower left corner of the grid
     double inverse_cell;    // 1/m

@@ -111,7 +111,7 @@ class DrivingTask:
         self.simulation.step(self.action_space.to_commands(actions))
         if reset is not None and reset.any():
             self.reset(reset)
-        return self._reward(self.simulation.rows)
+        return self._reward(self.simulation.judged)
 
     def lap_times(self) -> tuple[NDArray[np.bool_], NDArray[np.float64]] | None:
         """Which cars completed a lap in this step and their times in s; to be asked once per step."""

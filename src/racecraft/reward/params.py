@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 
 DEGREES = 57.29577951308232  # degrees in one radian; the same product as math.degrees
 
+# Layout of the columns about objects, see racecraft.sim.columns; a test compares them.
+OBJECT_HEADER_SIZE = 4
+OBJECT_SIZE = 7
+FIRST_MOVING_KIND = 2.0  # boxes and parked cars have the heading 0 at AWS, whichever way they stand
+
 TEMPLATE: dict[str, Any] = {
     "all_wheels_on_track": False,  # bool: all four wheel centres are on the road
     "x": 0.0,  # float, m: point 0.14 m ahead of the car's origin
@@ -38,7 +43,7 @@ TEMPLATE: dict[str, Any] = {
     "objects_left_of_center": [],  # list of bool
     "object_in_camera": False,  # bool
     "objects_speed": [],  # list of float, m/s
-    "objects_heading": [],  # list of float, rad
+    "objects_heading": [],  # list of float, rad (AWS's documentation says degrees, its code gives radians)
     "objects_distance_from_center": [],  # list of float, m
     "objects_distance": [],  # list of float, m along the centre line
     "is_crashed": False,  # bool
@@ -54,7 +59,8 @@ def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[st
     call.
 
     Args:
-        row: One row of the simulation, its values in the order of ``racecraft.sim.columns.ROW_COLUMNS``.
+        row: One row of the simulation, its values in the order of ``racecraft.sim.columns.ROW_COLUMNS``; with
+            objects followed by ``OBJECT_HEADER`` and ``OBJECT_COLUMNS`` of each.
         waypoints: For every track index, the centre line in the driving direction.
     """
     (
@@ -82,6 +88,7 @@ def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[st
         _actual_speed,
         _actual_steering_angle,
         _lap,
+        *objects,
     ) = row
     heading_deg = heading * DEGREES
     if not -180.0 <= heading_deg <= 180.0:
@@ -114,7 +121,33 @@ def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[st
     params["is_crashed"] = is_crashed != 0.0
     params["is_offtrack"] = is_offtrack != 0.0
     params["sim_time"] = time
+    if objects:
+        tell_objects(params, objects)
     return params
+
+
+def tell_objects(params: dict[str, Any], columns: Sequence[float]) -> None:
+    """The keys about objects, from the columns behind a row's own."""
+    prev, following, in_camera = columns[:3]
+    offsets = columns[OBJECT_HEADER_SIZE + 5 :: OBJECT_SIZE]
+    kinds = columns[OBJECT_HEADER_SIZE::OBJECT_SIZE]
+    headings = columns[OBJECT_HEADER_SIZE + 3 :: OBJECT_SIZE]
+    params["closest_objects"] = [int(prev), int(following)]
+    params["object_in_camera"] = in_camera != 0.0
+    params["objects_location"] = list(
+        zip(
+            columns[OBJECT_HEADER_SIZE + 1 :: OBJECT_SIZE],
+            columns[OBJECT_HEADER_SIZE + 2 :: OBJECT_SIZE],
+            strict=True,
+        )
+    )
+    params["objects_left_of_center"] = [offset > 0.0 for offset in offsets]
+    params["objects_speed"] = list(columns[OBJECT_HEADER_SIZE + 4 :: OBJECT_SIZE])
+    params["objects_heading"] = [
+        heading if kind >= FIRST_MOVING_KIND else 0.0 for heading, kind in zip(headings, kinds, strict=True)
+    ]
+    params["objects_distance_from_center"] = [abs(offset) for offset in offsets]
+    params["objects_distance"] = list(columns[OBJECT_HEADER_SIZE + 6 :: OBJECT_SIZE])
 
 
 def format_params(params: dict[str, Any]) -> str:

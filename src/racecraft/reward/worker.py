@@ -30,7 +30,7 @@ from racecraft.errors import ConfigError, RewardError, ShapeError
 from racecraft.reward import launch
 from racecraft.reward import worker_process as protocol
 from racecraft.reward.params import format_params, make_params
-from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.columns import ROW_COLUMNS, row_width
 
 if TYPE_CHECKING:
     from racecraft.track.track import Track
@@ -62,6 +62,7 @@ class RewardWorker:
         memory_limit_mb: Address space of the process, MB.
         num_cars: How many copies of the source's globals there are: row i belongs to car i modulo this. One
             is right for functions that keep no state, and loads fastest; see `keeps_state`.
+        num_objects: On the track besides the car; rows then have their columns, as `Simulation.judged` has.
 
     Raises:
         RewardError: The source cannot be loaded.
@@ -77,6 +78,7 @@ class RewardWorker:
         start_timeout_s: float = 30.0,
         memory_limit_mb: int = 2048,
         num_cars: int = 1,
+        num_objects: int = 0,
     ) -> None:
         for name, value in (("timeout_s", timeout_s), ("start_timeout_s", start_timeout_s), ("num_cars", num_cars)):
             if not value > 0:
@@ -89,7 +91,8 @@ class RewardWorker:
         self._failure = ""  # why the process has ended: text, as a kept error would keep this object alive
         self._num_read = 0  # bytes of the log
 
-        rewards_offset = MAX_BATCH * len(ROW_COLUMNS) * 8
+        width = self._width = row_width(num_objects)
+        rewards_offset = MAX_BATCH * width * 8
         text_offset = rewards_offset + MAX_BATCH * 8
         log_offset = text_offset + TEXT_BYTES
         size = log_offset + protocol.SIZE.size + LOG_BYTES
@@ -100,7 +103,7 @@ class RewardWorker:
         finally:
             os.close(descriptor)
         self._finalizer = weakref.finalize(self, _kill, self._process, os.getpid())
-        self._rows = np.frombuffer(memory, np.float64, MAX_BATCH * len(ROW_COLUMNS)).reshape(MAX_BATCH, -1)
+        self._rows = np.frombuffer(memory, np.float64, MAX_BATCH * width).reshape(MAX_BATCH, -1)
         self._rewards = np.frombuffer(memory, np.float64, MAX_BATCH, rewards_offset)
         self._text = memoryview(memory)[text_offset:log_offset]
         self._log = memoryview(memory)[log_offset:]
@@ -115,7 +118,7 @@ class RewardWorker:
             "source": source,
             "seed": seed % 2**32,
             "waypoints": self._waypoints,
-            "num_columns": len(ROW_COLUMNS),
+            "num_columns": width,
             "num_cars": num_cars,
             "timeout_s": timeout_s,
             "memory": descriptor,
@@ -145,7 +148,8 @@ class RewardWorker:
         """The rewards of a batch of rows.
 
         Args:
-            rows: Rows of the simulation, columns in the order of ``ROW_COLUMNS``  (N, columns).
+            rows: Rows of the simulation, columns in the order of ``ROW_COLUMNS``, then those of objects if
+                there are any  (N, columns).
 
         Returns:
             One reward per row, finite and within ±1e5  (N,).
@@ -159,10 +163,8 @@ class RewardWorker:
                 hint="Correct the reward function and make a new RewardWorker.",
             )
         rows = np.asarray(rows, np.float64)
-        if rows.ndim != 2 or rows.shape[1] != len(ROW_COLUMNS):
-            raise ShapeError(
-                f"rows has shape {rows.shape}, expected (N, {len(ROW_COLUMNS)}): one row of sim.rows per car."
-            )
+        if rows.ndim != 2 or rows.shape[1] != self._width:
+            raise ShapeError(f"rows has shape {rows.shape}, expected (N, {self._width}): one row of sim.rows per car.")
         if not np.isfinite(rows).all():
             raise ShapeError("rows holds NaN or infinity; every value of a judged step is finite.")
         track_index = rows[:, _TRACK_COLUMN]

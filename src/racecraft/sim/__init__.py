@@ -1,20 +1,28 @@
 """Simulation: the Python face of the native core. It owns the batch's buffers and hands them out as NumPy views."""
 
 from racecraft.sim.camera import CameraSpec
-from racecraft.sim.columns import ROW_COLUMNS, STATE_COLUMNS, STATUS_NAMES
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATE_COLUMNS, STATUS_NAMES
+from racecraft.sim.objects import Bots, Objects, Obstacles, objects_for_race, objects_from_drfc
 from racecraft.sim.simulation import CONTROL_DT, MAX_STEERING, Simulation, Start, instruction_set
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 
 __all__ = [
     "CONTROL_DT",
     "MAX_STEERING",
+    "OBJECT_COLUMNS",
+    "OBJECT_HEADER",
     "ROW_COLUMNS",
     "STATE_COLUMNS",
     "STATUS_NAMES",
+    "Bots",
     "CameraSpec",
+    "Objects",
+    "Obstacles",
     "Simulation",
     "Start",
     "Vehicle",
     "instruction_set",
     "load_vehicle",
+    "objects_for_race",
+    "objects_from_drfc",
 ]

@@ -35,6 +35,25 @@ ROW_COLUMNS: Final = (
     "lap",  # completed laps
 )
 
+OBJECT_HEADER: Final = (
+    "closest_object_prev",  # index of the object behind, along the track
+    "closest_object_next",  # and of the one ahead
+    "object_in_camera",  # 0 or 1
+    "crashed_object",  # index of the object that the car ran into in this step, or -1
+)
+"""Columns that follow a row's own where there are objects."""
+
+OBJECT_COLUMNS: Final = (
+    "object_kind",  # index into racecraft.sim.objects.OBJECT_KINDS
+    "object_x",  # m
+    "object_y",  # m
+    "object_heading",  # rad
+    "object_speed",  # m/s
+    "object_offset",  # m, from the centre line, left of the driving direction positive
+    "object_distance",  # m along the centre line
+)
+"""Columns of every object, behind those of `OBJECT_HEADER`."""
+
 STATE_COLUMNS: Final = (
     "speed",  # over 4 m/s
     "lateral_speed",  # m/s
@@ -54,6 +73,17 @@ STATE_COLUMNS: Final = (
     "curvature_7",
 )
 
+OBJECT_STATE_COLUMNS: Final = tuple(
+    f"{name}_{i}"
+    for i in range(2)
+    for name in (
+        "object_closeness",  # of the next object ahead along the track and the one after: 1 / (1 + m ahead), 0 if none
+        "object_offset",  # from the centre line over half the track width there
+        "object_speed",  # over 4 m/s
+    )
+)
+"""Columns that follow the state's own where there are objects."""
+
 CURVATURE_AHEAD: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 """m ahead of the car where the curvature columns of the state look."""
 
@@ -69,3 +99,14 @@ STATUS_NAMES: Final = (
     "pause",
     "park",
 )
+
+
+def row_width(num_objects: int) -> int:
+    """Columns of a judged row with so many objects."""
+    more = len(OBJECT_HEADER) + num_objects * len(OBJECT_COLUMNS) if num_objects else 0
+    return len(ROW_COLUMNS) + more
+
+
+def state_width(num_objects: int) -> int:
+    """Columns of the state with so many objects."""
+    return len(STATE_COLUMNS) + (len(OBJECT_STATE_COLUMNS) if num_objects else 0)

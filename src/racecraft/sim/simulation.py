@@ -22,7 +22,8 @@ from racecraft import _native
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError, did_you_mean
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.checks import check_number, check_type, check_whole
-from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
+from racecraft.sim.objects import NO_OBJECTS, Objects, native_objects
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track.track import Track
 
@@ -89,12 +90,14 @@ class Simulation:
         time_limit: Seconds that truncate an episode; 0 for none.
         max_steps: Steps that truncate an episode.
         substeps: Physics steps to a control step.
+        objects: Boxes and cars on the track, around every car of its own.
         num_threads: 0 takes one per core.
 
     Attributes:
         frames: What the cameras see now, uint8 (N, height, width); empty without a camera.
         rows: The last step as the rules judged it, float64 (N, len(ROW_COLUMNS)).
-        state: Privileged state now, scaled to about unit size, float32 (N, len(STATE_COLUMNS)).
+        judged: The same with the columns of objects behind, float64 (N, row_width(objects.count)).
+        state: Privileged state now, scaled to about unit size, float32 (N, state_width(objects.count)).
         terminated: The episode ended by its rules, bool (N,).
         truncated: The episode was cut by a limit, bool (N,).
         vehicles: x, y, heading, speed, lateral_speed, yaw_rate, steering (SI), float32 (7, N).
@@ -120,6 +123,7 @@ class Simulation:
         time_limit: float = 0.0,
         max_steps: int = 100_000,
         substeps: int = 8,
+        objects: Objects = NO_OBJECTS,
         num_threads: int = 0,
     ) -> None:
         if isinstance(tracks, Track):
@@ -134,6 +138,7 @@ class Simulation:
         if camera is not None:
             check_type("camera", camera, CameraSpec, "use racecraft.CameraSpec(...), or None")
         check_type("vehicle", vehicle, (Vehicle, str, Path), "use a preset's name, a file or racecraft.Vehicle(...)")
+        check_type("objects", objects, Objects, "use racecraft.sim.Objects(...)")
         if direction not in DIRECTIONS:
             raise ConfigError(f"direction is {direction!r}; allowed are {', '.join(DIRECTIONS)}.")
         check_whole("num_envs", num_envs, 1, 1_000_000)
@@ -151,6 +156,7 @@ class Simulation:
         self.start = start
         self.direction = direction
         self.laps = laps
+        self.objects = objects
         self._everyone = np.ones(num_envs, dtype=np.bool_)
         self._engine = _native.Engine(
             tracks=[native_track(track) for track in self.tracks],
@@ -172,9 +178,11 @@ class Simulation:
             lateral_jitter=start.lateral_jitter,
             heading_jitter=start.heading_jitter,
             direction=DIRECTIONS.index(direction),
+            objects=native_objects(objects),
         )
         self.frames: NDArray[np.uint8] = self._engine.frames
-        self.rows: NDArray[np.float64] = self._engine.rows
+        self.judged: NDArray[np.float64] = self._engine.rows
+        self.rows: NDArray[np.float64] = self.judged[:, : len(ROW_COLUMNS)]
         self.state: NDArray[np.float32] = self._engine.state
         self.terminated: NDArray[np.bool_] = self._engine.terminated
         self.truncated: NDArray[np.bool_] = self._engine.truncated
@@ -195,6 +203,20 @@ class Simulation:
     def column(self, name: str) -> NDArray[np.float64]:
         """One column of `rows` by name, a view (N,)."""
         return self.rows[:, ROW_COLUMNS.index(name)]
+
+    def object_column(self, name: str) -> NDArray[np.float64]:
+        """One column of the objects, a view: (N, objects.count), or (N,) for those of `OBJECT_HEADER`.
+
+        Raises:
+            ConfigError: There are no objects, or no such column.
+        """
+        if not self.objects.count or name not in (*OBJECT_HEADER, *OBJECT_COLUMNS):
+            allowed = ", ".join((*OBJECT_HEADER, *OBJECT_COLUMNS)) if self.objects.count else "none without objects"
+            raise ConfigError(f"There is no object column {name!r}; allowed: {allowed}.")
+        begin = len(ROW_COLUMNS)
+        if name in OBJECT_HEADER:
+            return self.judged[:, begin + OBJECT_HEADER.index(name)]
+        return self.judged[:, begin + len(OBJECT_HEADER) + OBJECT_COLUMNS.index(name) :: len(OBJECT_COLUMNS)]
 
     def reset(self, mask: NDArray[np.bool_] | None = None, *, seeds: NDArray[np.uint64] | None = None) -> None:
         """Put the masked cars (all without a mask) at the start of their next episode.

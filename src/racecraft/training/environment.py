@@ -66,7 +66,7 @@ class TrainingEnvironment:
         simulation = self.simulation
         simulation.step(self.action_space.to_commands(actions))
         moved = time.perf_counter()
-        rewards = self.worker(simulation.rows)
+        rewards = self.worker(simulation.judged)
         paid = time.perf_counter()
         terminated, truncated = simulation.terminated.copy(), simulation.truncated.copy()
         done = (terminated | truncated) & self._is_driving
