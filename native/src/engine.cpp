@@ -5,6 +5,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "object_painter.hpp"
 #include "vehicle_kernel.hpp"
 
 namespace racecraft {
@@ -137,6 +138,12 @@ void Engine::look(size_t env) {
         const size_t pixels = frames_.size() / num_envs();
         render_grey(*camera_, *grounds_[ground], palettes_[env], state.x, state.y, state.heading,
                     &frames_[env * pixels]);
+        if (objects_.count() > 0) {
+            const LensPose lens =
+                place_lens(camera_->view(), grounds_[ground]->view(), state.x, state.y, state.heading);
+            draw_objects(camera_->spec(), lens, objects_.objects_of(env), objects_.count(),
+                         &frames_[env * pixels]);
+        }
     }
 }
 

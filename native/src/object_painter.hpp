@@ -1,0 +1,15 @@
+// Objects in a driver's grey frame, drawn over the room: convex solids, far to near, with exact coverage.
+#pragma once
+
+#include "camera_model.hpp"
+#include "racecraft/object_look.hpp"
+
+namespace racecraft {
+
+// Draws over `out` (height, width), which shows the room from the same lens. Objects are convex in plan and
+// stand apart, so far to near is their right order; the room is convex, so no wall hides one. Allocates
+// nothing.
+void draw_objects(const CameraSpec& spec, const LensPose& lens, const ObjectState* objects, int32_t count,
+                  uint8_t* out);
+
+}  // namespace racecraft
