@@ -29,7 +29,17 @@ void judge_log(const TrackGeometry& track, bool is_reversed, const LoggedRow* lo
         const float speed = static_cast<float>(logged.speed);
         double* row = rows + i * kNumRowColumns;
         if (logged.is_first == 0.0) {
+            const int32_t laps = episode.laps;
             judge(track, kNoLimits, state, steering, speed, is_reversed, false, episode, row);
+            if (logged.is_paused != 0.0) {
+                // A car that stands is only looked at: no lap, and nothing counts against it afterwards.
+                if (episode.laps > laps) episode.progress += 1.0;
+                episode.laps = laps;
+                episode.falling_steps = 0;
+                episode.still_steps = 0;
+                row[kRow_status] = static_cast<int32_t>(Status::pause);
+                row[kRow_lap] = laps;
+            }
             continue;
         }
         // As the engine begins an episode, but the log tells the progress.

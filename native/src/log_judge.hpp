@@ -13,6 +13,7 @@ struct LoggedRow {
     double steering_angle, speed;
     double progress;  // fraction of a lap, read in the first row of an episode: it tells where the lap began
     double is_first;  // 1 in the first row of an episode
+    double is_paused;  // 1 while the car stands for a penalty
 };
 
 // Writes a row of the simulation, (kNumRowColumns,) each, for every logged one. An episode goes on as long as

@@ -21,6 +21,9 @@ def replay(
     picture: Annotated[
         Path | None, typer.Option("--picture", "-o", help="Draw the median and the worst window to this file.")
     ] = None,
+    rows: Annotated[
+        Path | None, typer.Option("--rows", help="CSV file for every row that comes out otherwise, with both values.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Compare logs of the original with the simulator."""
@@ -28,7 +31,8 @@ def replay(
     from racecraft.replay import replay as compare
     from racecraft.reward import load_reward
 
-    result = compare(logs, track=track, vehicle=vehicle, reward=load_reward(reward) if reward else None)
+    source = load_reward(reward) if reward else None
+    result = compare(logs, track=track, vehicle=vehicle, reward=source, rows=rows)
     if picture is None and not as_json and result.examples:
         picture = Path("replay.png")
     if picture is not None:

@@ -164,7 +164,7 @@ def say_replayed(result: Comparison, picture: Path | None) -> None:
     console.print(table)
     if result.examples:
         _say_errors(console, {"median": _medians(found), "90 %": _medians(found, "_p90")})
-    for note in (*result.rules.differences[:5], *result.reward_differences[:5], *result.faults.notes[:5]):
+    for note in (*result.differences.shown(10), *result.faults.notes[:5]):
         _say(console, (f"  {note}", "dim"))
     if result.faults.count:
         _say(console, (f"{result.faults.count:,} rows could not be read.", "bold yellow"))

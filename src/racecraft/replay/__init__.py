@@ -6,8 +6,20 @@ log -> *calibrate* -> vehicle file
 
 from racecraft.replay.calibrate import Calibration, calibrate
 from racecraft.replay.comparison import Comparison, replay
+from racecraft.replay.differences import Difference, Differences
 from racecraft.replay.logs import Log, read_logs
 from racecraft.replay.picture import draw_comparison
 from racecraft.replay.rules import TrackRules
 
-__all__ = ["Calibration", "Comparison", "Log", "TrackRules", "calibrate", "draw_comparison", "read_logs", "replay"]
+__all__ = [
+    "Calibration",
+    "Comparison",
+    "Difference",
+    "Differences",
+    "Log",
+    "TrackRules",
+    "calibrate",
+    "draw_comparison",
+    "read_logs",
+    "replay",
+]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from racecraft.errors import ConfigError, RunError
 from racecraft.replay.dynamics import REPORTED_STEPS, Windows, reported_errors, windows_of
 from racecraft.replay.logs import Faults, Log, read_logs
-from racecraft.replay.rules import require_track
+from racecraft.replay.rules import require_length
 from racecraft.sim.vehicle import LIMITS, Vehicle, load_vehicle
 from racecraft.track import load_track
 
@@ -117,7 +117,7 @@ def _load(paths: Sequence[str | Path], track: Track | None) -> Windows:
     rows = 0
     for log in read_logs(paths, Faults()):
         if track is not None:
-            require_track(track, log)
+            require_length(track, log)
         read.append(log)
         rows += len(log)
         if rows >= MAX_ROWS:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import RunError
+from racecraft.replay.differences import Differences
 from racecraft.replay.dynamics import KNOWN_ROWS, REPORTED_STEPS, Windows, errors_of, reported_errors, windows_of
 from racecraft.replay.logs import Faults, Log, read_logs
-from racecraft.replay.rules import RulesAgreement, TrackRules, require_track
+from racecraft.replay.rules import RulesAgreement, TrackRules, require_agreement, require_length
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import load_track
 
@@ -44,15 +44,19 @@ class Comparison:
 
     track: Track
     vehicle: Vehicle
-    reversed: bool
     rules: RulesAgreement
     faults: Faults
+    differences: Differences
     errors: NDArray[np.float64]  # m and rad after REPORTED_STEPS   (W, 3, 2)
     clocks: tuple[str, ...]  # readings of the time stamps that were met
     rewards: int = 0  # rows whose reward was compared
     good_rewards: int = 0
     examples: tuple[Example, ...] = ()  # the median and the worst window
-    reward_differences: list[str] = field(default_factory=list)
+
+    @property
+    def reversed(self) -> bool:
+        """Whether most of the driving was against the route's direction."""
+        return 2 * self.rules.reversed > self.rules.rows
 
     def to_dict(self) -> dict[str, Any]:
         """What ``racecraft replay --json`` prints."""
@@ -71,6 +75,7 @@ class Comparison:
             "heading_error_deg": self._quantile(1, 0.5),
             "heading_error_p90_deg": self._quantile(1, 0.9),
             "reward_agreement": _share(self.good_rewards, self.rewards),
+            "differences": [asdict(difference) for difference in self.differences.kept],
         }
 
     def _quantile(self, quantity: int, share: float) -> dict[str, float] | None:
@@ -87,14 +92,16 @@ def replay(
     track: str | Track,
     vehicle: str | Vehicle = "v5",
     reward: str | None = None,
+    rows: str | Path | None = None,
 ) -> Comparison:
     """Compare logs that the original (or this simulator) wrote with what the simulator makes of them.
 
     Args:
         logs: Sim-traces: CSV, or logs with SIM_TRACE_LOG lines; gzip or not. Several are taken together.
-        track: The track they were driven on: a name, a file or a `Track`. Its direction is found by itself.
+        track: The track they were driven on: a name, a file or a `Track`. Each episode's direction is found by itself.
         vehicle: The car to compare with: a preset, a vehicle file or a `Vehicle`.
         reward: Source of the reward function that was in force, to compare rewards too.
+        rows: CSV file for every row that comes out otherwise, with both values.
 
     Raises:
         RunError: A log cannot be read, or was not driven on this track.
@@ -103,31 +110,32 @@ def replay(
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
     road = load_track(track) if isinstance(track, str) else track
     car = load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
-    judges: tuple[TrackRules, ...] = (TrackRules(road), TrackRules(road, reversed=True))
-    rules: TrackRules | None = None
-    agreement, faults = RulesAgreement(), Faults()
-    result = Comparison(road, car, False, agreement, faults, np.zeros((0, len(REPORTED_STEPS), 2)), ())
+    rules, agreement, faults, differences = TrackRules(road), RulesAgreement(), Faults(), Differences(rows)
+    result = Comparison(road, car, agreement, faults, differences, np.zeros((0, len(REPORTED_STEPS), 2)), ())
+    checked: set[str] = set()
     errors: list[NDArray[np.float64]] = []
     clocks: set[str] = set()
     typical: list[Example] = []
     worst: Example | None = None
     stride = 1
     with ExitStack() as stack:
+        stack.enter_context(differences)
         worker = None
         if reward is not None:
             from racecraft.reward.worker import RewardWorker
 
             worker = stack.enter_context(RewardWorker(reward, road))
         for log in read_logs(paths, faults):
-            if rules is None:
-                rules = max(judges, key=lambda judge: _num_agreeing(judge, log))
-                result.reversed = rules.reversed
-                require_track(rules.track, log)
-                _require_agreement(rules, log)
-            rows = rules.judge(log)
-            agreement.add(rules, log, rows)
+            judged = rules.judge(log)
+            if log.source not in checked:
+                checked.add(log.source)
+                require_length(road, log)
+                first = RulesAgreement()
+                first.add(rules, log, judged, Differences())
+                require_agreement(rules, log, first)
+            agreement.add(rules, log, judged, differences)
             if worker is not None:
-                _compare_rewards(result, log, worker(rows[~log.is_prepare]))
+                _compare_rewards(result, log, worker(judged[~log.is_prepare & ~log.is_paused]))
             windows = windows_of([log], stride=stride)
             if windows is not None:
                 errors.append(reported_errors(windows, car).astype(np.float32))
@@ -146,33 +154,15 @@ def replay(
     return result
 
 
-def _num_agreeing(judge: TrackRules, log: Log) -> int:
-    agreement = RulesAgreement()
-    agreement.add(judge, log, judge.judge(log))
-    return agreement.progress + agreement.closest_waypoint
-
-
-def _require_agreement(rules: TrackRules, log: Log) -> None:
-    agreement = RulesAgreement()
-    agreement.add(rules, log, rules.judge(log))
-    if agreement.progress < 0.5 * agreement.rows:
-        raise RunError(
-            f"{log.source} was not driven on {rules.track.name}: the progress of only "
-            f"{100 * agreement.progress / agreement.rows:.0f} % of the first rows fits its poses.",
-            hint="Give the log's own track with --track: a name of 'racecraft tracks', or a .npy file.",
-        )
-
-
 def _compare_rewards(result: Comparison, log: Log, rewards: NDArray[np.float64]) -> None:
-    logged = log.reward[~log.is_prepare]
+    rows = np.flatnonzero(~log.is_prepare & ~log.is_paused)  # of a car that stands no reward is asked
+    logged = log.reward[rows]
     good = np.abs(rewards - logged) <= REWARD_TOLERANCE
     result.rewards += len(logged)
     result.good_rewards += int(good.sum())
-    lines = log.lines[~log.is_prepare]
-    for row in np.flatnonzero(~good)[: 10 - len(result.reward_differences)]:
-        result.reward_differences.append(
-            f"{log.source}, line {lines[row]}: reward {logged[row]:.6g}, here {rewards[row]:.6g}"
-        )
+    if len(bad := np.flatnonzero(~good)):
+        values = logged[bad].tolist(), rewards[bad].tolist()
+        result.differences.add(log, "reward", rows[bad], *values, [""] * len(bad))
 
 
 def _example(windows: Windows, number: int, car: Vehicle) -> Example:

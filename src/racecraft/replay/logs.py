@@ -8,13 +8,14 @@ Memory does not grow with the file. Rows that cannot be read are counted and nam
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import io
-import math
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
 from pathlib import Path
 from typing import BinaryIO, Final, TextIO
 
@@ -28,11 +29,23 @@ MARK: Final = "SIM_TRACE_LOG:"
 BATCH_ROWS: Final = 20_000
 MAX_EPISODE_ROWS: Final = 100_000
 """Rows of an episode kept together; a longer one is continued as another."""
-MAX_LINE: Final = 1_000_000  # characters
+MAX_LINE: Final = 10_000  # characters; a row has 300
+MAX_STATUS: Final = 20  # characters
+MAX_NUMBER: Final = 1e12
 MAX_NOTES: Final = 20
 _NEEDED: Final = COLUMNS[:14]  # up to track_len; tstamp is the fifteenth of all eras
 _NUMBERS: Final = ("episode", "steps", "X", "Y", "yaw", "steer", "throttle", "reward", "progress", "tstamp")
 _BRACKETS: Final = re.compile(r"\[[^\]]*\]")
+_AFTER_TRACE: Final = re.compile(r"[\t\"\\].*")
+"""What may follow a row where logs were exported: other columns, or the end of a JSON string."""
+_SYNONYMS: Final = {
+    "x": "X",
+    "y": "Y",
+    "steering_angle": "steer",
+    "speed": "throttle",
+    "on_track": "all_wheels_on_track",
+}
+"""Names of deepracer-utils for AWS's."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +56,8 @@ class Log:
     lines: NDArray[np.int64]  # of the file, from 1
     is_first: NDArray[np.bool_]  # the row begins an episode
     is_prepare: NDArray[np.bool_]
+    is_paused: NDArray[np.bool_]  # the car stands for a penalty
+    episode: NDArray[np.int64]
     x: NDArray[np.float64]  # 0.14 m ahead of the car's origin
     y: NDArray[np.float64]
     heading: NDArray[np.float64]
@@ -78,7 +93,7 @@ class Faults:
         """Count a row, and remember the first few."""
         self.count += 1
         if len(self.notes) < MAX_NOTES:
-            self.notes.append(f"{source}, line {line}: {text}")
+            self.notes.append(f"{source}, line {line}: {text[:200]}")
 
 
 def read_logs(paths: Iterable[str | Path], faults: Faults) -> Iterator[Log]:
@@ -92,7 +107,7 @@ def read_logs(paths: Iterable[str | Path], faults: Faults) -> Iterator[Log]:
 
 
 def _read_file(path: Path, faults: Faults) -> Iterator[Log]:
-    rows: list[tuple[int, list[str]]] = []
+    rows: list[tuple[int, Sequence[str]]] = []
     good, broken_before = 0, faults.count
     try:
         with path.open("rb") as raw, _decoded(raw) as file:
@@ -115,49 +130,67 @@ def _read_file(path: Path, faults: Faults) -> Iterator[Log]:
 def _decoded(raw: BinaryIO) -> TextIO:
     is_gzip = raw.read(2) == b"\x1f\x8b"
     raw.seek(0)
-    stream = gzip.GzipFile(fileobj=raw) if is_gzip else raw
-    return io.TextIOWrapper(stream, encoding="utf-8-sig", errors="replace")
+    stream: BinaryIO = io.BufferedReader(gzip.GzipFile(fileobj=raw)) if is_gzip else raw
+    mark = stream.peek(2)[:2] if hasattr(stream, "peek") else b""
+    encoding = "utf-16" if mark in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig"
+    return io.TextIOWrapper(stream, encoding=encoding, errors="replace")
 
 
-def _batches(source: str, file: TextIO, rows: list[tuple[int, list[str]]], faults: Faults) -> Iterator[Log]:
+def _batches(source: str, file: TextIO, rows: list[tuple[int, Sequence[str]]], faults: Faults) -> Iterator[Log]:
     """Fields of every trace row, handed on whenever enough whole episodes are there."""
-    names: Sequence[str] | None = None
+    names: Sequence[str] | None = None  # of a CSV file
+    order = _ORDERS[READABLE[-1]]
     episode = ""
-    number = 0
-    while line := file.readline(MAX_LINE):
-        number += 1
+    for number, line in enumerate(_lines(file), start=1):
         marked = line.find(MARK)
         if marked >= 0:
-            fields = _split(line[marked + len(MARK) :])
-            now: Sequence[str] | None = COLUMNS[: len(fields)] if len(fields) in READABLE else None
-            if now is None:
+            fields = _split(_AFTER_TRACE.sub("", line[marked + len(MARK) :].rstrip()))
+            if len(fields) not in READABLE:
                 faults.add(source, number, f"{len(fields)} columns, a sim-trace has 15, 17, 18 or 19")
                 continue
-        elif line.startswith("episode,"):
-            names = [name.strip() for name in line.split(",")]
+            pick = _ORDERS[len(fields)]
+        elif "episode" in line and {"episode", "steps"} <= set(header := _header(line)):
+            names = header
             missing = [name for name in (*_NEEDED, "tstamp") if name not in names]
             if missing:
-                raise RunError(f"{source} lacks the column {missing[0]!r}; it has {', '.join(names)}.")
+                raise RunError(f"{source} lacks the column {missing[0]!r}; it has {', '.join(names)[:400]}.")
+            order = _order(names)
             continue
         else:
+            if names is None and number > 1:
+                continue  # some other line of a larger log
             fields = _split(line)
             if names is None:
-                if number > 1 or len(fields) not in READABLE or not fields[0].strip().isdecimal():
-                    continue  # some other line of a larger log
-                names = COLUMNS[: len(fields)]
-            now = names
-            if len(fields) != len(now):
+                if len(fields) not in READABLE or not fields[0].strip().isdecimal():
+                    continue
+                names, order = COLUMNS[: len(fields)], _ORDERS[len(fields)]
+            if len(fields) != len(names):
                 if line.strip():
-                    faults.add(source, number, f"{len(fields)} columns, expected {len(now)}")
+                    faults.add(source, number, f"{len(fields)} columns, expected {len(names)}")
                 continue
-        if fields[0] != episode:
+            pick = order
+        picked = pick(fields)
+        if picked[0] != episode:
             if len(rows) >= BATCH_ROWS:
                 yield from _convert(source, rows, faults)
-            episode = fields[0]
+            episode = picked[0]
         elif len(rows) >= MAX_EPISODE_ROWS:
             yield from _convert(source, rows, faults)
-        rows.append((number, _ordered(fields, now)))
+        rows.append((number, picked))
     yield from _convert(source, rows, faults)
+
+
+def _lines(file: TextIO) -> Iterator[str]:
+    """Lines, of which a longer one than any row is only the beginning."""
+    while line := file.readline(MAX_LINE):
+        yield line
+        while len(line) == MAX_LINE and not line.endswith("\n"):
+            line = file.readline(MAX_LINE)
+
+
+def _header(line: str) -> list[str]:
+    names = [name.strip(' "') for name in line.strip().split(",")]
+    return [_SYNONYMS.get(name, name) for name in names]
 
 
 def _split(line: str) -> list[str]:
@@ -167,41 +200,34 @@ def _split(line: str) -> list[str]:
     return line.split(",")
 
 
-_ORDER: Final = (
-    *_NUMBERS,
-    "all_wheels_on_track",
-    "closest_waypoint",
-    "track_len",
-    "done",
-    "episode_status",
-)
+_ORDER: Final = (*_NUMBERS, "all_wheels_on_track", "closest_waypoint", "track_len", "done", "episode_status")
 
 
-def _ordered(fields: list[str], names: Sequence[str]) -> list[str]:
-    if names[: len(COLUMNS)] == COLUMNS[: len(names)]:
-        return [fields[i] if i < len(fields) else "" for i in _INDICES]
-    place = {name: i for i, name in enumerate(names)}
-    return [fields[place[name]] if name in place else "" for name in _ORDER]
+def _order(names: Sequence[str]) -> Callable[[list[str]], tuple[str, ...]]:
+    """Picks the fields of _ORDER, the last of which the oldest logs do not have."""
+    places = [list(names).index(name) for name in _ORDER if name in names]
+    pick = itemgetter(*places)
+    return pick if len(places) == len(_ORDER) else lambda fields: (*pick(fields), "")
 
 
-_INDICES: Final = tuple(COLUMNS.index(name) for name in _ORDER)
+_ORDERS: Final = {count: _order(COLUMNS[:count]) for count in READABLE}
 
 
-def _convert(source: str, rows: list[tuple[int, list[str]]], faults: Faults) -> Iterator[Log]:
+def _convert(source: str, rows: list[tuple[int, Sequence[str]]], faults: Faults) -> Iterator[Log]:
     """The rows as arrays; empties the list."""
     taken, rows[:] = rows[:], []
     if not taken:
         return
     try:
         table = _numbers(taken)
-        if not np.isfinite(table).all():
+        if not (np.abs(table) < MAX_NUMBER).all():
             raise ValueError
     except ValueError:
         good = []
         for line, fields in taken:
             try:
-                if not all(map(math.isfinite, _numbers([(line, fields)])[0])):
-                    raise ValueError("not finite")
+                if not (np.abs(_numbers([(line, fields)])) < MAX_NUMBER).all():
+                    raise ValueError("a number is not finite, or absurd")
                 good.append((line, fields))
             except ValueError as error:
                 faults.add(source, line, str(error))
@@ -213,13 +239,15 @@ def _convert(source: str, rows: list[tuple[int, list[str]]], faults: Faults) -> 
     number, steps, x, y, yaw, steer, throttle, reward, progress, time, closest, length = table.T
     new = np.ones(len(taken), dtype=np.bool_)
     new[1:] = (np.diff(number) != 0) | (np.diff(steps) != 1)
-    status = [fields[14].strip() for _, fields in taken]
+    status = [fields[14].strip()[:MAX_STATUS] for _, fields in taken]
     is_prepare = np.array([s == "prepare" if s else n == 1 for s, n in zip(status, steps.tolist(), strict=True)])
     yield Log(
         source=source,
         lines=lines,
         is_first=new | is_prepare,
         is_prepare=is_prepare,
+        is_paused=np.array([s in ("pause", "park") for s in status], dtype=np.bool_),
+        episode=number.astype(np.int64),
         x=x,
         y=y,
         heading=np.radians(yaw),
@@ -237,6 +265,6 @@ def _convert(source: str, rows: list[tuple[int, list[str]]], faults: Faults) -> 
     )
 
 
-def _numbers(taken: list[tuple[int, list[str]]]) -> NDArray[np.float64]:
+def _numbers(taken: list[tuple[int, Sequence[str]]]) -> NDArray[np.float64]:
     """Numeric fields   (R, 12); a ValueError names the text that is none."""
     return np.array([[*map(float, fields[:10]), float(fields[11]), float(fields[12])] for _, fields in taken])

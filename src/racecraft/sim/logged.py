@@ -32,6 +32,7 @@ class LogJudge:
         *,
         progress: NDArray[np.float64],
         is_first: NDArray[np.bool_],
+        is_paused: NDArray[np.bool_],
     ) -> NDArray[np.float64]:
         """What the simulation would have written of each row   (R, len(ROW_COLUMNS)).
 
@@ -40,8 +41,9 @@ class LogJudge:
             commands: Steering angle in rad and speed in m/s   (R, 2).
             progress: Fraction of a lap; read in first rows only, where it tells where the lap began   (R,).
             is_first: The row begins an episode   (R,).
+            is_paused: The car stands for a penalty in this row   (R,).
         """
-        log = np.ascontiguousarray(np.column_stack([poses, commands, progress, is_first]), dtype=np.float64)
+        log = np.ascontiguousarray(np.column_stack([poses, commands, progress, is_first, is_paused]), dtype=np.float64)
         return _native.judge_log(self._track, self.reversed, log)
 
 
