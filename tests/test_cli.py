@@ -315,6 +315,20 @@ def test_a_good_reward_is_fit_for_training(racecraft: Run, tmp_path: Path) -> No
     assert {"start", "finish"} <= {situation["name"] for situation in document["situations"]}
 
 
+def test_a_reward_check_shows_what_was_printed(racecraft: Run, tmp_path: Path) -> None:
+    source = (
+        "def reward_function(params):\n    for i in range(9): print('\\x1b[2J', params['steps'], i)\n    return 1.0\n"
+    )
+    (tmp_path / "reward_function.py").write_text(source)
+    shown = racecraft("reward", "check", "reward_function.py").out
+    assert "Printed at 'finish':" in shown
+    assert "200.0 0" in shown
+    assert "5 lines more" in shown
+    assert "\x1b[2J" not in shown
+    situations = racecraft("reward", "check", "reward_function.py", "--json").document["situations"]
+    assert all(situation["printed"].count("\n") == 9 for situation in situations)
+
+
 def test_a_bad_reward_is_told_with_line_and_column(racecraft: Run, tmp_path: Path) -> None:
     (tmp_path / "reward_function.py").write_text(BAD)
     outcome = racecraft("reward", "check", "reward_function.py")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -31,7 +33,6 @@ ERRORS = [
     ("x = " + "-" * 100_000 + "1", 1, None, ""),
     ("x = 1", 1, 1, "no function 'reward_function'"),
     ("x = 1\ndef reward_fuction(params):\n    return 1.0", 2, 1, "Did you mean 'reward_fuction'?"),
-    ("if True:\n    def reward_function(params):\n        return 1.0", 1, 1, "top level"),
     ("class A:\n    def reward_function(self, params):\n        return 1.0", 1, 1, "top level"),
     (body(RETURN) + body(RETURN), 3, 1, "defined again"),
     ("async " + body(RETURN), 1, 1, "async"),
@@ -87,6 +88,19 @@ ERRORS = [
     (body("return math.pi"), 2, 12, "'math' is not defined"),
     (body("return [y for x in range(3)][0]"), 2, 13, "'y' is not defined"),
     ("x = undefined_thing\n" + body(RETURN), 1, 5, "'undefined_thing' is not defined"),
+    ("def outer():\n    reward_function = 1\nx = outer()", 1, 1, "top level"),
+    ("import logging\n" + body(RETURN), 1, 1, "'import logging'"),
+    ("import requests\n" + body(RETURN), 1, 1, "'import requests'"),
+    ("import pickle\n" + body(RETURN), 1, 1, "'import pickle'"),
+    ("import io\n" + body(RETURN), 1, 1, "'import io'"),
+    ("from pathlib import Path\n" + body(RETURN), 1, 1, "'import pathlib'"),
+    ("import sys\n" + body("print('x', file=sys.stderr)", RETURN), 1, 1, "'import sys'"),
+    ("from numpy import save as payload\n" + body(RETURN), 1, 1, "'numpy.save'"),
+    ("import numpy as load\nx = load.loadtxt('x')\n" + body(RETURN), 2, 5, "'numpy.loadtxt'"),
+    ("import numpy as np\nx = np.memmap('x')\n" + body(RETURN), 2, 5, "'numpy.memmap'"),
+    ("import numpy as np\nx = np.fromfile\n" + body(RETURN), 2, 5, "'numpy.fromfile'"),
+    ("import numpy as np\nx = np.genfromtxt('x')\n" + body(RETURN), 2, 5, "'numpy.genfromtxt'"),
+    ("import numpy as np\nnp.savez('x')\n" + body(RETURN), 2, 1, "'numpy.savez'"),
 ]
 
 
@@ -174,12 +188,47 @@ FINE = [
     "# -*- coding: utf-8 -*-\n'''Grüße'''\n" + body(RETURN) + "print(reward_function({}))\n",
     body(RETURN).replace("\n", "\r\n"),
     body(RETURN).replace("    ", "\t"),
+    "if True:\n    def reward_function(params):\n        return 1.0",
+    "reward_function = lambda params: params['speed']",
+    "class Reward:\n    def __call__(self, params):\n        return 1.0\nreward_function = Reward()",
+    "from functools import partial\ndef f(k, params):\n    return k\nreward_function = partial(f, 1.0)",
+    body(
+        "download = upload = reload = autosave = 1.0", "loader = {'save': load_factor}", RETURN, top="load_factor = 2\n"
+    ),
+    body("return self_load(params)", top="def self_load(params):\n    return 1.0\n"),
+    body("loads = [1]", "return max(loads)"),
+    body("return Loader().load()", top="class Loader:\n    def load(self): return 1.0\n    def save(self): pass\n"),
+    body("opened = evaluate = executed = compiled = 1.0", "return opened + evaluate + executed + compiled"),
+    body("globals()['last'] = 1.0", "return last"),
+    body("import pprint, textwrap, contextlib, traceback", RETURN),
+    body("with contextlib.suppress(KeyError): return 1.0", RETURN, top="import contextlib\n"),
+    body("x = params.copy()", "return x.pop('speed')"),
+    "import numpy as np, scipy.spatial as sp, shapely\nfrom shapely.geometry import Point\n" + body(RETURN),
 ]
 
 
 @pytest.mark.parametrize("source", FINE, ids=range(len(FINE)))
 def test_no_false_alarms(source):
     assert check_reward(source) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "severity"),
+    [
+        ("import shapely.geometry\n" + body(RETURN), "error"),
+        (body("from scipy import interpolate", RETURN), "error"),
+        ("try:\n    import scipy\nexcept ImportError:\n    scipy = None\n" + body(RETURN), "warning"),
+    ],
+)
+def test_a_package_that_is_allowed_but_missing_says_how_to_get_it(monkeypatch, source, severity):
+    installed = importlib.util.find_spec
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name: None if name in ("scipy", "shapely") else installed(name)
+    )
+    (problem,) = check_reward(source)
+    assert problem.severity == severity
+    assert "not installed" in problem.message
+    assert problem.hint in ("Install it: pip install scipy", "Install it: pip install shapely")
 
 
 @pytest.mark.parametrize("name", preset_names())

@@ -194,6 +194,36 @@ def test_huge_prints_keep_the_end(track, rows):
     assert LOG_BYTES - 2 <= len(log.encode()) <= LOG_BYTES + 2
 
 
+def test_what_was_too_much_at_once_is_counted(track, rows):
+    source = function("print('x' * 999)", "return 0.0")  # 1,000 bytes with the line's end
+    with running(source, track) as worker:
+        worker(rows)
+        assert (len(worker.read_log()), worker.num_lost) == (10_000, 0)
+        for _ in range(7):
+            worker(rows)
+        assert (len(worker.read_log()), worker.num_lost) == (LOG_BYTES, 70_000 - LOG_BYTES)
+        assert (worker.read_log(), worker.num_lost) == ("", 0)
+
+
+def test_an_error_shows_what_was_printed_last(track, rows):
+    source = function(
+        "print('call', params['steps'], '\\x1b[31m' + 'y' * 300)", "print()", "return 1.0 if params['x'] < 7 else None"
+    )
+    with running(source, track) as worker:
+        with pytest.raises(RewardError) as caught:
+            worker(rows)
+        lines = str(caught.value).partition("It printed last:\n")[2].splitlines()
+        assert [line.split()[:2] for line in lines] == [["call", f"{step}.0"] for step in (5, 6, 7, 8, 9)]
+        assert all(line.isprintable() and 200 <= len(line) < 220 for line in lines)
+        assert worker.read_log().count("call") == 8  # it is still there to be kept
+
+
+def test_an_error_of_a_silent_function_does_not_speak_of_prints(track, rows):
+    with running(function("return None"), track) as worker, pytest.raises(RewardError) as caught:
+        worker(rows)
+    assert "printed" not in str(caught.value)
+
+
 # --- errors in the function
 
 FAULTS = [
@@ -225,7 +255,12 @@ FAULTS = [
     (function("raise SystemExit"), 2, "called sys.exit()"),
     (function("return [0] * 10**11"), 2, "MemoryError"),
     (function("x = bytearray(3 * 10**9)", "return 1.0"), 2, "MemoryError"),
-    (function("open('/tmp/racecraft-test', 'w').write('x' * 10000)", "return 1.0"), 2, "OSError"),
+    (function("open('/tmp/racecraft-test', 'w').write('x' * 10000)", "return 1.0"), 2, "may not write files"),
+    (function("open('/dev/null', 'r+b')", "return 1.0"), 2, "may not write files"),
+    (function("import os", "os.open('/dev/null', os.O_WRONLY)", "return 1.0"), 3, "may not write files"),
+    (function("import os", "os.remove('/racecraft-test')", "return 1.0"), 3, "may not use os.remove"),
+    (function("import os", "os.rename('/racecraft-test', '/x')", "return 1.0"), 3, "may not use os.rename"),
+    (function("import os", "os.mkdir('/racecraft-test')", "return 1.0"), 3, "may not use os.mkdir"),
     (function("import os", "os.fork()", "return 1.0"), 3, "may not use os.fork"),
     (function("import subprocess", "subprocess.run(['true'])", "return 1.0"), 3, "may not use"),
     (function("import os", "os.kill(os.getppid(), 9)", "return 1.0"), 3, "may not use os.kill"),
@@ -390,6 +425,13 @@ def test_a_source_that_does_not_load(track, source, line, text):
     assert caught.value.line == line
     assert caught.value.row_index is None
     assert caught.value.params is None
+
+
+def test_a_missing_package_says_how_to_get_it(track, monkeypatch):
+    monkeypatch.setattr("racecraft.reward.launch.package_paths", list)
+    with pytest.raises(RewardError, match=r"needs shapely, which is not installed here: pip install shapely") as caught:
+        RewardWorker("import math\nimport shapely\n" + function("return 1.0"), track)
+    assert caught.value.line == 2
 
 
 def test_a_source_that_hangs_while_it_loads(track):

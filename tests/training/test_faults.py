@@ -87,6 +87,39 @@ def test_a_reward_that_fails_before_the_first_checkpoint_says_how_to_go_on(tiny:
     assert resume(tmp_path / "runs" / "mine").steps == 512
 
 
+PRINTS = """\
+count = 0
+print("loaded")
+def reward_function(params):
+    global count
+    count += 1
+    print("call", count, "of step", params["steps"])
+    return 1.0 if count != {last} else "no number"
+"""
+
+
+def test_prints_are_kept_up_to_the_one_before_the_error(tiny: Train, tmp_path: Path) -> None:
+    source, recorder = tmp_path / "reward_function.py", Recorder()
+    source.write_text(PRINTS.format(last=40))
+    with pytest.raises(RewardError, match="no number") as caught:
+        tiny(reward=source, name="mine", until="2048 steps", evaluate_every=64)
+    assert "It printed last:" in str(caught.value)
+    assert "call 40 of step" in str(caught.value)
+    run = tmp_path / "runs" / "mine"
+    lines = RunFolder.open(run).reward_log.read_text().splitlines()
+    assert lines[:8] == ["loaded"] * 8  # once for each car, which has its own memory
+    assert lines[8:16] == ["call 1 of step 2.0"] * 8
+    assert lines[-1].startswith("call 40 of step")
+
+    (run / "reward_function.py").write_text(PRINTS.format(last=-1))
+    resume(run, until="512 steps", reporter=recorder)
+    assert "what the reward function remembered begins anew" in recorder.notes[0]
+    more = RunFolder.open(run).reward_log.read_text().splitlines()
+    assert more[: len(lines)] == lines
+    assert more[len(lines) : len(lines) + 9] == ["loaded"] * 8 + [more[len(lines) + 8]]
+    assert "call 1 of step" in more[len(lines) + 8]
+
+
 def test_a_reward_edited_badly_is_refused_on_resume(tiny: Train) -> None:
     run = tiny(until="128 steps").run
     (run / "reward_function.py").write_text("def reward_function(params):\n    return params['sped']\n")

@@ -36,7 +36,12 @@ def check(
                     for p in problems
                 ],
                 "situations": [
-                    {"name": o.situation.name, "reward": o.reward, "error": str(o.error) if o.error else None}
+                    {
+                        "name": o.situation.name,
+                        "reward": o.reward,
+                        "error": str(o.error) if o.error else None,
+                        "printed": o.printed,
+                    }
                     for o in outcomes
                 ],
             }

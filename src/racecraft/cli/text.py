@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from racecraft.track import Track
     from racecraft.training import TrainResult
 
+SHOWN_LINES = 4  # of what a reward function prints in one situation
+SHOWN_WIDTH = 200  # characters of such a line
 ENDED = {
     "laps": "Learned it",
     "seconds": "Time is up",
@@ -44,6 +46,8 @@ def say_progress(text: str) -> None:
 
 def say_trained(result: TrainResult) -> None:
     """How a training ended, where its time went and where its files are."""
+    from racecraft.run import RunFolder
+
     console = Console()
     lap = f", best lap {result.best_lap_seconds:.2f} s" if result.best_lap_seconds is not None else ""
     _say(
@@ -56,6 +60,8 @@ def say_trained(result: TrainResult) -> None:
     if parts:
         _say(console, (f"Seconds: {parts}.", "dim"))
     _say(console, "Run folder: ", (str(result.run), "bold"))
+    if (prints := RunFolder(result.run).reward_log).exists():
+        _say(console, "Prints:     ", (str(prints), "bold"))
     if result.reason != "laps":
         _say(console, "Continue:   ", (f"racecraft train --resume {result.run}", "bold"))
     if result.reason != "interrupted":
@@ -127,6 +133,13 @@ def say_checked(problems: list[Problem], outcomes: list[Outcome], *, failed: boo
             reward = Text("error", "bold red") if outcome.reward is None else Text(f"{outcome.reward:.4g}")
             table.add_row(outcome.situation.description, reward)
         console.print(table)
+    for outcome in outcomes:
+        if lines := outcome.printed.splitlines():
+            _say(console, (f"Printed at {outcome.situation.name!r}:", "bold"))
+            for line in lines[:SHOWN_LINES]:
+                _say(console, (f"    {_harmless(line)}", "dim"))
+            if len(lines) > SHOWN_LINES:
+                _say(console, (f"    and {len(lines) - SHOWN_LINES:,} lines more", "dim"))
     error = next((outcome.error for outcome in outcomes if outcome.error is not None), None)
     if error is not None:
         _say(console, ("error: ", "bold red"), str(error))
@@ -179,6 +192,12 @@ def say_calibrated(result: Calibration, output: Path) -> None:
     _say_errors(console, {"started from": found["preset"], "fitted": found["held_out"]})
     _say(console, "Vehicle file: ", (str(output), "bold"))
     _say(console, "Drive it:     ", (f"racecraft train --vehicle {output}", "bold"))
+
+
+def _harmless(line: str) -> str:
+    """A line of somebody else's text, short, and without what could drive a terminal."""
+    line = line[:SHOWN_WIDTH] + "…" * (len(line) > SHOWN_WIDTH)
+    return "".join(mark if mark.isprintable() else "�" for mark in line)
 
 
 def _medians(found: dict[str, Any], kind: str = "") -> dict[str, dict[str, float]]:

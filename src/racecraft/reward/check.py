@@ -15,7 +15,7 @@ from typing import Literal
 
 from racecraft.errors import RewardError, did_you_mean
 from racecraft.reward.imports import ImportRules
-from racecraft.reward.names import undefined_names
+from racecraft.reward.names import bound_names, undefined_names
 from racecraft.reward.params import TEMPLATE
 from racecraft.reward.source import MAX_CHARACTERS
 from racecraft.reward.worker_process import FILENAME
@@ -108,6 +108,8 @@ def _parse(source: str) -> tuple[ast.Module | None, list[Problem]]:
 def _check_reward_function(tree: ast.Module) -> Iterator[Problem]:
     functions = [node for node in tree.body if isinstance(node, Function)]
     found = [function for function in functions if function.name == "reward_function"]
+    if not found and "reward_function" in _names_at_top(tree):
+        return  # assigned, imported or defined in a branch: the dry run calls whatever it is
     if not found:
         names = [function.name for function in functions]
         close = did_you_mean("reward_function", names)
@@ -125,6 +127,13 @@ def _check_reward_function(tree: ast.Module) -> Iterator[Problem]:
     yield from _check_signature(function)
     yield from _check_returns(function)
     yield from _check_keys(tree, function)
+
+
+def _names_at_top(tree: ast.Module) -> set[str]:
+    """What the file itself defines when it is loaded, branches included."""
+    names = bound_names(tree, into_functions=False)
+    arguments = {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}  # of lambdas
+    return names - arguments
 
 
 def _check_signature(function: Function) -> Iterator[Problem]:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
 from collections.abc import Iterator
 from typing import Final, Literal
 
 from racecraft.errors import did_you_mean
 from racecraft.reward.names import bound_names
+from racecraft.reward.worker_process import PACKAGES
 
 Severity = Literal["error", "warning"]
 Finding = tuple[ast.expr | ast.stmt, str, str, Severity]  # where, message, hint, severity
 
-AWS_MODULES: Final = ("math", "random", "numpy", "scipy", "shapely")
+AWS_MODULES: Final = ("math", "random", *PACKAGES)
 PLAIN_MODULES: Final = (  # of the standard library: they compute and reach no files, network or processes
     *(
         "__future__",
@@ -38,7 +40,7 @@ PLAIN_MODULES: Final = (  # of the standard library: they compute and reach no f
         "re",
         "statistics",
     ),
-    *("string", "time", "types", "typing", "warnings"),
+    *("contextlib", "pprint", "string", "textwrap", "time", "traceback", "types", "typing", "warnings"),
 )
 FORBIDDEN_MODULES: Final = (  # parts of allowed packages that read or write files, or load foreign code
     *(
@@ -99,12 +101,15 @@ class ImportRules:
 
     def findings(self) -> Iterator[Finding]:
         """Everything imported, called or reached that is not allowed."""
+        guarded = {id(inner) for node in ast.walk(self._tree) if isinstance(node, ast.Try) for inner in ast.walk(node)}
         for node in ast.walk(self._tree):
             if isinstance(node, ast.Import):
                 for alias in node.names:
                     yield from _check_module(node, alias.name)
+                    yield from _check_installed(node, alias.name, is_guarded=id(node) in guarded)
             elif isinstance(node, ast.ImportFrom):
                 yield from _check_import_from(node)
+                yield from _check_installed(node, node.module or "", is_guarded=id(node) in guarded)
             elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
                 yield from self._check_name(node)
             elif isinstance(node, ast.Attribute):
@@ -185,6 +190,14 @@ def _check_module(node: ast.stmt, module: str) -> Iterator[Finding]:
         yield node, f"'import {module}' is not allowed in a reward function.", hint or allowed, "error"
     elif any(f"{module}.".startswith(f"{forbidden}.") for forbidden in FORBIDDEN_MODULES):
         yield node, f"'import {module}' is not allowed: it reads or writes files.", "", "error"
+
+
+def _check_installed(node: ast.stmt, module: str, *, is_guarded: bool) -> Iterator[Finding]:
+    """A package that is allowed but missing; an error, unless the import stands in a ``try``."""
+    top = module.split(".")[0]
+    if top in PACKAGES and importlib.util.find_spec(top) is None:
+        message = f"'import {module}' is allowed, but {top} is not installed here."
+        yield node, message, f"Install it: pip install {top}", "warning" if is_guarded else "error"
 
 
 def _is_file_function(meaning: str) -> bool:

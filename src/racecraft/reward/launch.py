@@ -14,12 +14,12 @@ import sys
 import tempfile
 from pathlib import Path
 
+from racecraft.reward.worker_process import PACKAGES
+
 PROGRAM = Path(__file__).with_name("worker_process.py")
 
 # No user or site packages, no folder of the script, no bytecode files: the packages below are added by path.
 INTERPRETER_OPTIONS = ("-s", "-S", "-P", "-B", "-X", "utf8")
-
-PACKAGES = ("numpy", "scipy", "shapely")  # what a reward function may import beside the standard library
 
 
 def start_process(shared_memory: int) -> subprocess.Popen[bytes]:

@@ -38,7 +38,10 @@ def bound_names(tree: ast.AST, *, into_functions: bool = True) -> set[str]:
 
 def undefined_names(source: str, tree: ast.Module) -> Iterator[tuple[ast.Name, str, list[str]]]:
     """Names that no scope binds: where each is used first, the name, and what it could mean."""
-    if any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in ast.walk(tree)):
+    nodes = list(ast.walk(tree))
+    if any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in nodes):
+        return
+    if any(isinstance(node, ast.Name) and node.id == "globals" for node in nodes):  # binds names that are not seen
         return
     scopes = list(_scopes(symtable.symtable(source, "reward_function.py", "exec")))
     module, *inner = scopes

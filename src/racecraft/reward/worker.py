@@ -39,6 +39,8 @@ Rows = npt.NDArray[np.float64]
 
 TEXT_BYTES = 8 * 1024  # longest description of a failure
 LOG_BYTES = 64 * 1024  # how much of the last printed text is kept
+SHOWN_LINES = 5  # of what was printed, in an error
+SHOWN_WIDTH = 200  # characters of such a line
 MAX_BATCH = 4096  # rows per doorbell; larger arrays go over in parts
 
 _TRACK_COLUMN = ROW_COLUMNS.index("track_index")
@@ -90,6 +92,8 @@ class RewardWorker:
         self._timeout_s = timeout_s
         self._failure = ""  # why the process has ended: text, as a kept error would keep this object alive
         self._num_read = 0  # bytes of the log
+        self.num_lost = 0
+        """Bytes printed before what `read_log` last returned, and after what it returned before: too many at once."""
 
         width = self._width = row_width(num_objects)
         rewards_offset = MAX_BATCH * width * 8
@@ -253,6 +257,8 @@ class RewardWorker:
         elif row < len(rows):
             params = make_params(rows[row].tolist(), self._waypoints)
             message += f"\nIt was called with params = {format_params(params)}"
+        if lines := self._last_lines():
+            message += "\nIt printed last:" + "".join(f"\n    {line}" for line in lines)
         return RewardError(
             message,
             line=line if line > 0 else None,
@@ -280,12 +286,27 @@ class RewardWorker:
     def read_log(self) -> str:
         """What the user's function printed since the last call of this, or the last 64 KB of it."""
         (written,) = protocol.SIZE.unpack_from(self._log)
-        ring = bytes(self._log[protocol.SIZE.size :])
-        count = max(min(written - self._num_read, LOG_BYTES), 0)
+        since = max(written - self._num_read, 0)
         self._num_read = written
+        self.num_lost = max(since - LOG_BYTES, 0)
+        return self._printed(written, since)
+
+    def _printed(self, written: int, count: int) -> str:
+        """The last ``count`` bytes of all that was printed, as far as they are kept."""
+        count = min(count, written, LOG_BYTES)
+        if not count:
+            return ""
+        ring = bytes(self._log[protocol.SIZE.size :])
         end = written % LOG_BYTES
         data = ring[end - count : end] if count <= end else ring[LOG_BYTES - (count - end) :] + ring[:end]
         return data.decode("utf-8", "replace")
+
+    def _last_lines(self) -> list[str]:
+        """The last lines that were printed, for an error: short, and without what could drive a terminal."""
+        (written,) = protocol.SIZE.unpack_from(self._log)
+        lines = [line for line in self._printed(written, 4 * SHOWN_LINES * SHOWN_WIDTH).splitlines() if line.strip()]
+        shown = (line[:SHOWN_WIDTH] + "…" * (len(line) > SHOWN_WIDTH) for line in lines[-SHOWN_LINES:])
+        return ["".join(mark if mark.isprintable() else "�" for mark in line) for line in shown]
 
     @property
     def process_id(self) -> int:

@@ -47,8 +47,12 @@ FORBIDDEN_EVENTS = frozenset(
         *("os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "os.system", "pty.spawn"),
         *("subprocess.Popen", "os.kill", "os.killpg", "ctypes.dlopen"),
         *("socket.__new__", "socket.bind", "socket.connect", "socket.getaddrinfo"),
+        *("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "os.utime"),
+        *("os.chmod", "os.chown", "os.setxattr", "os.removexattr", "sqlite3.connect"),
     )
 )
+WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND  # flags of an open file
+PACKAGES = ("numpy", "scipy", "shapely")  # that a reward function may import where they are installed
 
 
 class BadRewardError(Exception):
@@ -197,10 +201,13 @@ def load_functions(setup: dict[str, Any]) -> list[Reward]:
         import random
 
         random.seed(setup["seed"])
-    if any(name in source for name in ("numpy", "scipy", "shapely")):
-        import numpy.random
+    if any(name in source for name in PACKAGES):
+        try:
+            import numpy.random
 
-        numpy.random.seed(setup["seed"])  # noqa: NPY002 - what users call is the global generator
+            numpy.random.seed(setup["seed"])  # noqa: NPY002 - what users call is the global generator
+        except ImportError:  # the source says itself what it misses
+            pass
     sys.addaudithook(guard)
 
     functions = []
@@ -219,6 +226,8 @@ def guard(event: str, arguments: tuple[object, ...]) -> None:
     """Refuse what a reward function has no use for, at the line that tries it."""
     if event in FORBIDDEN_EVENTS and arguments[:1] != (None,):
         raise PermissionError(f"a reward function may not use {event}")
+    if event == "open" and isinstance(arguments[2], int) and arguments[2] & WRITING:
+        raise PermissionError("a reward function may not write files")
 
 
 def limit_resources(memory_limit: int) -> None:
@@ -278,6 +287,8 @@ def line_of_return(reward_function: Reward, params: dict[str, Any]) -> int:
             line = frame.f_lineno  # the outermost frame returns last
         return trace
 
+    shown = sys.stdout, sys.stderr
+    sys.stdout = sys.stderr = io.StringIO()  # it has printed this once
     sys.settrace(trace)
     try:
         returned = reward_function(params)
@@ -285,6 +296,7 @@ def line_of_return(reward_function: Reward, params: dict[str, Any]) -> int:
         return -1
     finally:
         sys.settrace(None)
+        sys.stdout, sys.stderr = shown
     try:
         is_good = abs(to_float(returned)) <= REWARD_LIMIT
     except BadRewardError:
@@ -301,6 +313,8 @@ def describe(error: BaseException) -> bytes:
         text = ""
     if isinstance(error, BadRewardError):
         message = text
+    elif isinstance(error, ModuleNotFoundError) and error.name in PACKAGES:
+        message = f"needs {error.name}, which is not installed here: pip install {error.name}"
     elif isinstance(error, SystemExit):
         message = f"called sys.exit({text})"
     elif isinstance(error, MemoryError) and not text:

@@ -5,6 +5,7 @@ from racecraft.run.episodes import Episode, EpisodeCounter
 from racecraft.run.events import EventWriter
 from racecraft.run.folder import RunFolder, RunInfo, list_runs
 from racecraft.run.metrics import TrainingMetrics, Trial, read_metrics, write_evaluation_metrics
+from racecraft.run.print_log import PrintLog
 from racecraft.run.simtrace import SimTraceWriter, read_simtrace
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "Episode",
     "EpisodeCounter",
     "EventWriter",
+    "PrintLog",
     "RunFolder",
     "RunInfo",
     "SimTraceWriter",

@@ -7,6 +7,7 @@ runs/<name>/run.json                      what is needed to repeat the run
             evaluation-<time>/            evaluation-simtrace/, pictures
             mp4/  model/  events/         videos, AWS's index of checkpoints, TensorBoard
             checkpoints/                  weights, see racecraft.run.checkpoint
+            logs/                         reward.log: what the reward function printed
 """
 
 from __future__ import annotations
@@ -158,6 +159,11 @@ class RunFolder:
     def events(self) -> Path:
         """TensorBoard's files."""
         return self.path / "events"
+
+    @property
+    def reward_log(self) -> Path:
+        """What the reward function printed; made with the first of it."""
+        return self.path / "logs" / "reward.log"
 
     @property
     def checkpoints(self) -> CheckpointStore:

@@ -7,14 +7,16 @@ actions -> *action space* -> commands -> *simulation* -> rows -> *reward worker*
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.action_space import ActionSpace
+from racecraft.errors import RewardError, RunError
 from racecraft.reward.worker import RewardWorker
-from racecraft.run import Episode, EpisodeCounter, SimTraceWriter
+from racecraft.run import Episode, EpisodeCounter, PrintLog, SimTraceWriter
 from racecraft.sim.simulation import Simulation
 
 
@@ -27,6 +29,7 @@ class TrainingEnvironment:
         action_space: Turns the policy's actions into commands.
         counter: Numbers the episodes.
         trace: Logs every step; None for no log.
+        prints: Keeps what the reward function prints; None drops it.
     """
 
     def __init__(
@@ -37,12 +40,14 @@ class TrainingEnvironment:
         *,
         counter: EpisodeCounter,
         trace: SimTraceWriter | None = None,
+        prints: PrintLog | None = None,
     ) -> None:
         self.simulation = simulation
         self.worker = worker
         self.action_space = action_space
         self.counter = counter
         self.trace = trace
+        self.prints = prints
         self.reward_seconds = 0.0
         self.trace_seconds = 0.0
         self._finished: list[Episode] = []
@@ -66,7 +71,13 @@ class TrainingEnvironment:
         simulation = self.simulation
         simulation.step(self.action_space.to_commands(actions))
         moved = time.perf_counter()
-        rewards = self.worker(simulation.judged)
+        try:
+            rewards = self.worker(simulation.judged)
+        except RewardError:
+            with suppress(RunError):  # the first error is the one to tell
+                self._keep_prints()
+            raise
+        self._keep_prints()
         paid = time.perf_counter()
         terminated, truncated = simulation.terminated.copy(), simulation.truncated.copy()
         done = (terminated | truncated) & self._is_driving
@@ -78,6 +89,10 @@ class TrainingEnvironment:
         self.reward_seconds += paid - moved
         self.trace_seconds += time.perf_counter() - paid
         return rewards, terminated, truncated
+
+    def _keep_prints(self) -> None:
+        if self.prints is not None and (text := self.worker.read_log()):
+            self.prints.write(text, lost=self.worker.num_lost)
 
     def reset(self, mask: NDArray[np.bool_]) -> None:
         """Put the cars of the mask (N,) at their next start; what they were driving does not count."""

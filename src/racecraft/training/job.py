@@ -32,6 +32,7 @@ from racecraft.run import (
     CheckpointWarning,
     EpisodeCounter,
     EventWriter,
+    PrintLog,
     RunFolder,
     SimTraceWriter,
     TrainingMetrics,
@@ -166,7 +167,10 @@ class Training:
                 episodes_per_iteration=ppo_config.episodes_per_iteration or AWS_EPISODES,
                 episodes=episodes,
             )
-            environment = TrainingEnvironment(simulation, worker, metadata.action_space, counter=counter, trace=trace)
+            prints = stack.enter_context(PrintLog(folder.reward_log))
+            environment = TrainingEnvironment(
+                simulation, worker, metadata.action_space, counter=counter, trace=trace, prints=prints
+            )
             session = _Session(
                 environment=environment,
                 ppo=PPO(ppo_config, learner, environment, seed=settings.seed),
@@ -179,7 +183,8 @@ class Training:
             )
             if saved is not None:
                 self._load_state(session, saved)
-                self.reporter.note(f"Resumed at step {session.ppo.total_steps:,}.")
+                forgotten = "; what the reward function remembered begins anew" if copies > 1 else ""
+                self.reporter.note(f"Resumed at step {session.ppo.total_steps:,}{forgotten}.")
             try:
                 yield session
             except BaseException:
