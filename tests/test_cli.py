@@ -391,6 +391,26 @@ def test_train_tells_people_how_it_goes_and_how_to_go_on(racecraft: Run) -> None
     assert "--resume" in taken.document["error"]["hint"]
 
 
+def test_the_log_of_aws_on_stdout_is_all_there_is_on_stdout(racecraft: Run, trained: Path) -> None:
+    outcome = racecraft("train", *SMALL, "--until", "512 steps", "--name", "mine", "--aws-log", "-")
+    assert outcome.status == 0
+    marks = ("SIM_TRACE_LOG:", "Training> Name=main_level/agent, ", "Policy training> Surrogate loss=", "Sensor list ")
+    for mark in marks:
+        assert any(line.startswith(mark) for line in outcome.out.splitlines()), mark
+    assert "Learned" not in outcome.out
+    assert outcome.err == ""
+    racecraft("train", "--resume", "runs/mine", "--until", "1024 steps", "--aws-log", "later/mine.log", "--json")
+    assert "SIM_TRACE_LOG:" in Path("later/mine.log").read_text()
+    outcome = racecraft(
+        "evaluate", str(trained), "--laps", "1", "--trials", "1", "--no-video", "--max-resets", "2", "--aws-log", "-"
+    )
+    assert outcome.out.splitlines()[-1].startswith("Testing> Name=main_level/agent")
+    for verb in ("train", "evaluate runs/mine"):
+        outcome = racecraft(*verb.split(), "--aws-log", "-", "--json")
+        assert outcome.status == 2
+        assert "both want stdout" in outcome.err
+
+
 def test_train_with_a_video_evaluates_in_the_same_object(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     from racecraft.race import run_evaluation
 

@@ -35,6 +35,22 @@ def test_tensorboard_reads_what_was_written(tmp_path):
     assert math.isnan(last[2])
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_what_a_killed_run_wrote_after_its_checkpoint_is_forgotten(tmp_path):
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    with EventWriter(tmp_path) as writer:
+        for step in (64, 128, 192, 256):
+            writer.add_scalars({"training/reward": step}, step=step)
+    with EventWriter(tmp_path, after_step=128) as writer:
+        for step in (192, 256, 320):
+            writer.add_scalars({"training/reward": step + 1}, step=step)
+    accumulator = EventAccumulator(str(tmp_path))
+    accumulator.Reload()
+    found = [(event.step, event.value) for event in accumulator.Scalars("training/reward")]
+    assert found == [(64, 64), (128, 128), (192, 193), (256, 257), (320, 321)]
+
+
 def test_close_twice_and_numbers_appear_after_a_flush(tmp_path):
     writer = EventWriter(tmp_path / "events")
     size = writer.path.stat().st_size

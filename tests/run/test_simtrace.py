@@ -57,7 +57,7 @@ def test_real_episodes_come_out_as_aws_wrote_them(tmp_path):
     for line in lines:
         episodes.setdefault(int(line[0]), []).append(dict(zip(header, line, strict=True)))
     space = ModelMetadata.load(DRFC / "model_metadata.json").action_space
-    writer = SimTraceWriter(tmp_path, num_envs=len(episodes), tracks=[track], action_space=space, iteration=20)
+    writer = SimTraceWriter(tmp_path, num_envs=len(episodes), tracks=[track], action_space=space)
     longest = max(map(len, episodes.values()))
     for step in range(1, longest):  # all cars side by side, each one episode
         rows, actions, rewards, ended = make_rows(len(episodes)), np.zeros(len(episodes), int), [], []
@@ -137,13 +137,14 @@ def test_number_formats_are_those_of_real_files(tmp_path, ring):
 
 def test_episodes_are_whole_in_sequence_and_agree_with_the_counter(tmp_path, ring):
     counter, rng = EpisodeCounter(4, number=40, clock=100.0), np.random.default_rng(1)
-    writer = SimTraceWriter(tmp_path, num_envs=4, tracks=[ring], action_space=action_space("default"), iteration=2)
+    writer = SimTraceWriter(tmp_path, num_envs=4, tracks=[ring], action_space=action_space("default"), episodes=40)
     lengths, step = np.array([7, 11, 13, 50]), np.full(4, 2)
     ended = drive(writer, counter, lengths, rng, steps=70, step=step)
-    writer.next_iteration()
     ended += drive(writer, counter, lengths, rng, steps=70, step=step)
     writer.close()
-    files = [read_simtrace(tmp_path / f"{iteration}-iteration.csv") for iteration in (2, 3)]
+    assert 60 > len(ended) > 41
+    files = [read_simtrace(tmp_path / f"{iteration}-iteration.csv") for iteration in (2, 3, 4)]
+    assert [set(file["episode"] // 20) for file in files] == [{2}, {3}, {4}]
     table = {name: np.concatenate([file[name] for file in files]) for name in WRITTEN}
     numbers = table["episode"]
     assert np.array_equal(np.unique(numbers), np.arange(40, 40 + len(ended)))
@@ -197,7 +198,9 @@ def test_continuous_actions_are_bracketed(tmp_path, ring):
 
 def test_very_long_episodes_are_bounded(tmp_path, ring, monkeypatch):
     monkeypatch.setattr("racecraft.run.simtrace.MAX_EPISODE_ROWS", 1000)
-    writer = SimTraceWriter(tmp_path, num_envs=2, tracks=[ring], action_space=action_space("default"))
+    writer = SimTraceWriter(
+        tmp_path, num_envs=2, tracks=[ring], action_space=action_space("default"), episodes_per_iteration=0
+    )
     drive(writer, EpisodeCounter(2), np.array([5000, 10]), np.random.default_rng(0), steps=5001)
     writer.close()
     steps = read_simtrace(tmp_path / "0-iteration.csv")["steps"]
@@ -216,12 +219,49 @@ def test_files_stay_within_their_budget_and_cover_the_run(tmp_path, ring):
     counter, rng = EpisodeCounter(2), np.random.default_rng(0)
     for _ in range(64):
         drive(writer, counter, np.array([7, 11]), rng)
-        writer.next_iteration()
+    writer.close()
     files = sorted(int(path.name.split("-")[0]) for path in tmp_path.iterdir())
     assert sum(path.stat().st_size for path in tmp_path.iterdir()) < 130_000
     assert files[0] == 0
-    assert files[-1] >= 48
+    assert files[-1] >= 0.9 * (counter.number // 20)
     assert len(set(np.diff(files))) == 1
+
+
+@pytest.mark.parametrize("kept", [0, 13, 20, 47, 60])
+def test_a_resumed_run_goes_on_where_its_checkpoint_was(tmp_path, ring, kept):
+    def log(folder, rows, **options):
+        """Writes some of the same episodes, one after the other."""
+        writer = SimTraceWriter(folder, num_envs=1, tracks=[ring], action_space=action_space("default"), **options)
+        for number in rows:
+            last = make_rows(1, steps=2, progress=number / 100)
+            episode = Episode(number, 0, 2, 0, 0, "off_track", float(number), 1 / 15)
+            writer.write(last, actions=[0], rewards=[number], ended=[episode])
+        return writer
+
+    log(tmp_path / "whole", range(70)).close()
+    log(tmp_path / "killed", range(65)).close()
+    with (tmp_path / "killed" / "3-iteration.csv").open("a") as file:
+        file.write("65,1.0,0.")  # in the middle of a row
+    if not kept:
+        (tmp_path / "killed" / "0-iteration.csv").write_text("episode,st")
+    log(tmp_path / "killed", range(kept, 70), episodes=kept).close()
+    whole, killed = (
+        {path.name: path.read_text() for path in (tmp_path / name).iterdir()} for name in ("whole", "killed")
+    )
+    assert whole == killed
+    assert len(whole) == 4
+
+
+def test_pause_duration_counts_down_the_penalty(tmp_path, ring):
+    writer = SimTraceWriter(tmp_path, num_envs=1, tracks=[ring], action_space=action_space("default"))
+    statuses = ["in_progress", "off_track", "pause", "pause", "pause", "in_progress", "lap_complete"]
+    for step, status in enumerate(statuses):
+        rows = make_rows(1, steps=step + 2, status=STATUS_NAMES.index(status))
+        ended = [Episode(0, 0, 8, 0, 1, status, 0.0, 0.5)] if step == len(statuses) - 1 else []
+        writer.write(rows, actions=[0], rewards=[0], ended=ended)
+    writer.close()
+    pauses = read_simtrace(tmp_path / "0-iteration.csv")["pause_duration"]
+    assert pauses == pytest.approx([0, 0, 3 / 15, 2 / 15, 1 / 15, 0, 0, 0], abs=1e-3)
 
 
 def test_nothing_is_written_before_an_episode_ends(tmp_path, ring):

@@ -38,6 +38,8 @@ def test_the_run_folder_has_everything_where_aws_has_it(tiny: Train, tmp_path: P
         "training_params.yaml",
         "metrics/TrainingMetrics.json",
         "training-simtrace/0-iteration.csv",
+        "model/model_metadata.json",
+        "ip/hyperparameters.json",
         "model/deepracer_checkpoints.json",
         "checkpoints/manifest.json",
     } <= files

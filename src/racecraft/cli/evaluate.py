@@ -12,6 +12,7 @@ from racecraft.cli.app import Json, app, print_json, text
 
 @app.command()
 def evaluate(
+    context: typer.Context,
     run: Annotated[Path, typer.Argument(help="Run folder.")],
     track: Annotated[str, typer.Option("--track", "-t", help="Track; by default the one it was trained on.")] = "",
     laps: Annotated[int, typer.Option("--laps", "-l", help="Laps to a trial.")] = 3,
@@ -30,9 +31,14 @@ def evaluate(
     max_resets: Annotated[int | None, typer.Option("--max-resets", help="Resets to a trial.")] = None,
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of the starts.")] = 0,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of the best trial.")] = True,
+    aws_log: Annotated[
+        str, typer.Option("--aws-log", help="File for the log lines that AWS's tools read; - for stdout.")
+    ] = "",
     as_json: Json = False,
 ) -> None:
     """Race a run's policy against the clock and film it."""
+    if as_json and aws_log == "-":
+        context.fail("--json and --aws-log - both want stdout; give the log a file.")
     from racecraft.race.run_evaluation import evaluate_run
 
     outcome = evaluate_run(
@@ -48,8 +54,9 @@ def evaluate(
         max_resets=max_resets,
         seed=seed,
         video=video,
+        aws_log=aws_log or None,
     )
     if as_json:
         print_json(outcome.to_dict())
-    else:
+    elif aws_log != "-":
         text().say_evaluated(outcome)

@@ -45,10 +45,16 @@ def train(
     video: Annotated[
         bool, typer.Option("--video", help="Afterwards evaluate the best checkpoint and film it.")
     ] = False,
+    aws_log: Annotated[
+        str, typer.Option("--aws-log", help="File for the log lines that AWS's tools read; - for stdout.")
+    ] = "",
     as_json: Json = False,
 ) -> None:
     """Train a car from camera pixels with a reward function."""
     started = process_start()
+    is_quiet = as_json or aws_log == "-"
+    if as_json and aws_log == "-":
+        context.fail("--json and --aws-log - both want stdout; give the log a file.")
     if resume is not None:
         _refuse_beside_resume(context)
     from racecraft import training
@@ -56,9 +62,11 @@ def train(
     from racecraft.training.terminal import TerminalReporter
 
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {Path(track).stem} · {Path(reward).stem}"
-    with SilentReporter() if as_json else TerminalReporter(title=title) as reporter:
+    with SilentReporter() if is_quiet else TerminalReporter(title=title) as reporter:
         if resume is not None:
-            result = training.resume(resume, until=until or None, reporter=reporter, started=started)
+            result = training.resume(
+                resume, until=until or None, reporter=reporter, aws_log=aws_log or None, started=started
+            )
         else:
             result = training.train(
                 track,
@@ -78,16 +86,17 @@ def train(
                 root=runs,
                 name=name,
                 reporter=reporter,
+                aws_log=aws_log or None,
                 started=started,
             )
     outcome = None
-    if not as_json:
+    if not is_quiet:
         text().say_trained(result)
     if video and result.reason != "interrupted":
         from racecraft.race.run_evaluation import evaluate_run
 
         outcome = evaluate_run(result.run)
-        if not as_json:
+        if not is_quiet:
             text().say_evaluated(outcome)
     if as_json:
         print_json({**result.to_dict(), **({"evaluation": outcome.to_dict()} if outcome is not None else {})})
@@ -100,7 +109,7 @@ def _refuse_beside_resume(context: typer.Context) -> None:
     for option in context.command.params:
         source = context.get_parameter_source(str(option.name))
         is_given = source is not None and source.name == "COMMANDLINE"
-        if is_given and option.name not in ("resume", "until", "video", "as_json"):
+        if is_given and option.name not in ("resume", "until", "video", "aws_log", "as_json"):
             context.fail(f"{option.opts[0]} does not go with --resume: a run keeps the settings it was started with.")
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from racecraft.agent.action_space import ActionSpace, DiscreteActionSpace
 from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.results import Evaluation, Lap, Trial
+from racecraft.run.aws_log import AwsLog
 from racecraft.run.episodes import Episode
 from racecraft.run.metrics import STATUS_LABELS, write_evaluation_metrics
 from racecraft.run.metrics import Trial as MetricsTrial
@@ -45,18 +46,28 @@ def write_metrics(evaluation: Evaluation, path: Path) -> None:
     write_evaluation_metrics(path, metrics_of(evaluation))
 
 
-def write_simtrace(evaluation: Evaluation, folder: Path, *, action_space: ActionSpace) -> None:
+def write_simtrace(
+    evaluation: Evaluation, folder: Path, *, action_space: ActionSpace, log: AwsLog | None = None
+) -> None:
     """Write ``0-iteration.csv`` with every step; rewards are AWS's default ones, 0 while a car stands.
 
     Args:
         evaluation: What to write.
         folder: Where to, usually ``evaluation-<time>/evaluation-simtrace``.
         action_space: That of the policy, to number its actions.
+        log: Is told every step, too.
 
     Raises:
         RunError: The file cannot be written.
     """
-    writer = SimTraceWriter(folder, num_envs=1, tracks=[evaluation.track], action_space=action_space)
+    writer = SimTraceWriter(
+        folder,
+        num_envs=1,
+        tracks=[evaluation.track],
+        action_space=action_space,
+        episodes_per_iteration=0,
+        log=log,
+    )
     number = 0
     for trial, began in _on_one_clock(evaluation):
         for lap in trial.laps:

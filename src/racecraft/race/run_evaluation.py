@@ -9,6 +9,7 @@ mp4/camera-pip/<n>-video.mp4                             the best trial, filmed
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -25,6 +26,7 @@ from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.race.video import film
 from racecraft.race.yardstick import Placing, placings
 from racecraft.run.atomic import write_json
+from racecraft.run.aws_log import AwsLog
 from racecraft.run.folder import RunFolder, RunInfo
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import Track, load_track
@@ -85,6 +87,7 @@ def evaluate_run(
     max_resets: int | None = None,
     seed: int = 0,
     video: bool = True,
+    aws_log: str | Path | None = None,
     num_threads: int = 0,
 ) -> RunEvaluation:
     """Race a run's policy against the clock.
@@ -102,6 +105,7 @@ def evaluate_run(
         max_resets: By default the rules'.
         seed: Of the starts.
         video: Whether to film the best trial.
+        aws_log: File for the log lines that AWS's tools read, ``-`` for stdout.
         num_threads: 0 takes one per core.
 
     Raises:
@@ -122,7 +126,7 @@ def evaluate_run(
         policy, where, rules=rules, num_trials=num_trials, seed=seed, vehicle=vehicle, num_threads=num_threads
     )
     try:
-        files = _write(folder, evaluation, policy.action_space, is_filmed=video)
+        files = _write(folder, evaluation, policy.action_space, is_filmed=video, aws_log=aws_log)
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
     return RunEvaluation(run=folder.path, step=step, evaluation=evaluation, files=files)
@@ -156,12 +160,27 @@ def _trained_track(info: RunInfo) -> Track:
     return track
 
 
-def _write(folder: RunFolder, evaluation: Evaluation, action_space: ActionSpace, *, is_filmed: bool) -> dict[str, Path]:
+def _write(
+    folder: RunFolder,
+    evaluation: Evaluation,
+    action_space: ActionSpace,
+    *,
+    is_filmed: bool,
+    aws_log: str | Path | None,
+) -> dict[str, Path]:
     stamp, inside = _new_folder(folder)
     metrics = folder.evaluation_metrics(stamp)
     metrics.parent.mkdir(exist_ok=True)
     write_metrics(evaluation, metrics)
-    write_simtrace(evaluation, inside / "evaluation-simtrace", action_space=action_space)
+    with ExitStack() as stack:
+        log = None if aws_log is None else stack.enter_context(AwsLog(aws_log, phase="Testing"))
+        if log is not None:
+            log.write_settings(
+                world=evaluation.track.name,
+                metadata=folder.read_model_metadata(),
+                hyperparameters=folder.read_aws_hyperparameters(),
+            )
+        write_simtrace(evaluation, inside / "evaluation-simtrace", action_space=action_space, log=log)
     write_json(inside / "evaluation.json", evaluation.summary())
     best = evaluation.best_trial
     files = {

@@ -1,5 +1,6 @@
 """The run folder: what a run is made from, its checkpoints, logs and metrics, all safe against a kill."""
 
+from racecraft.run.aws_log import AwsLog
 from racecraft.run.checkpoint import Checkpoint, CheckpointStore, CheckpointWarning
 from racecraft.run.episodes import Episode, EpisodeCounter
 from racecraft.run.events import EventWriter
@@ -9,6 +10,7 @@ from racecraft.run.print_log import PrintLog
 from racecraft.run.simtrace import SimTraceWriter, read_simtrace
 
 __all__ = [
+    "AwsLog",
     "Checkpoint",
     "CheckpointStore",
     "CheckpointWarning",

@@ -4,6 +4,7 @@ A file is a sequence of records: length (uint64), its checksum, a protobuf ``Eve
 little-endian. TensorBoard's own writer takes 0.3 s to import, and this is all it would encode:
 
     Event    1: wall_time (double)  2: step (varint)  3: file_version (string)  5: summary (Summary)
+             7: session_log (SessionLog; one that starts makes a reader drop what it has of this step and later)
     Summary  1: value (Value, repeated)
     Value    1: tag (string)  2: simple_value (float)
 """
@@ -22,6 +23,7 @@ from typing import Self
 
 from racecraft.errors import RunError
 
+_SESSION_START = b"\x08\x01"  # SessionLog  1: status (varint) = START
 FLUSH_SECONDS = 2.0  # how late TensorBoard may see a number
 
 
@@ -30,9 +32,10 @@ class EventWriter:
 
     Args:
         folder: Made when missing. A resumed run adds a file, and TensorBoard joins them.
+        after_step: The step a resumed run goes on from: TensorBoard forgets what older files say of later ones.
     """
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: str | Path, *, after_step: int = -1) -> None:
         now = time.time()
         name = f"events.out.tfevents.{int(now)}.{socket.gethostname()}.{os.getpid()}.{time.monotonic_ns()}"
         self.path = Path(folder) / name
@@ -43,6 +46,8 @@ class EventWriter:
             raise RunError(f"{self.path} cannot be written: {error.strerror or error}.") from error
         self._flushed = now
         self._write(_double(1, now) + _bytes(3, b"brain.Event:2"))
+        if after_step >= 0:
+            self._write(_double(1, now) + _varint(2 << 3) + _varint(after_step + 1) + _bytes(7, _SESSION_START))
         self.flush()
 
     def add_scalars(self, scalars: Mapping[str, float], *, step: int) -> None:

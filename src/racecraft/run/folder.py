@@ -5,7 +5,8 @@ runs/<name>/run.json                      what is needed to repeat the run
             metrics/                      TrainingMetrics.json, EvaluationMetrics-<time>.json, history.jsonl
             training-simtrace/            <iteration>-iteration.csv
             evaluation-<time>/            evaluation-simtrace/, pictures
-            mp4/  model/  events/         videos, AWS's index of checkpoints, TensorBoard
+            mp4/  events/                 videos, TensorBoard
+            model/  ip/                   for AWS's tools: index of checkpoints, metadata; hyperparameters
             checkpoints/                  weights, see racecraft.run.checkpoint
             logs/                         reward.log: what the reward function printed
 """
@@ -15,6 +16,7 @@ from __future__ import annotations
 import platform
 import re
 import time
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
@@ -131,6 +133,16 @@ class RunFolder:
         return self.path / "hyperparameters.json"
 
     @property
+    def aws_model_metadata(self) -> Path:
+        """Where AWS's tools look for action space, sensors, network."""
+        return self.path / "model" / "model_metadata.json"
+
+    @property
+    def aws_hyperparameters(self) -> Path:
+        """Where AWS's tools look for hyperparameters; here also those of a run that does not follow AWS."""
+        return self.path / "ip" / "hyperparameters.json"
+
+    @property
     def training_params(self) -> Path:
         """AWS's settings of the training job."""
         return self.path / "training_params.yaml"
@@ -214,12 +226,22 @@ class RunFolder:
         model_metadata: ModelMetadata,
         hyperparameters: Hyperparameters | None = None,
         training_params: TrainingParams | None = None,
+        equivalent: Mapping[str, Any] | None = None,
     ) -> None:
-        """Write what the run is made from, each in AWS's file."""
+        """Write what the run is made from, each in AWS's file, and once more where AWS's tools look for it.
+
+        `equivalent` are the settings of a run without hyperparameters, by AWS's names: for tools, never read back.
+        """
         self._write(self.reward_function, reward_function)
         self._write(self.model_metadata, model_metadata.to_dict())
         if hyperparameters is not None:
             self._write(self.hyperparameters, hyperparameters.to_dict())
+        for folder in (self.aws_model_metadata.parent, self.aws_hyperparameters.parent):
+            folder.mkdir(exist_ok=True)
+        self._write(self.aws_model_metadata, model_metadata.to_dict())
+        for_tools = equivalent if hyperparameters is None else hyperparameters.to_dict()
+        if for_tools is not None:
+            self._write(self.aws_hyperparameters, dict(for_tools))
         if training_params is not None:
             self._write(self.training_params, training_params.to_yaml())
 
@@ -247,6 +269,15 @@ class RunFolder:
         from racecraft.agent import Hyperparameters
 
         return Hyperparameters.load(self.hyperparameters) if self.hyperparameters.exists() else None
+
+    def read_aws_hyperparameters(self) -> dict[str, Any]:
+        """How the run learned, by AWS's names, of whatever range; empty where the run does not say."""
+        from racecraft.agent.aws_file import read_json_object
+
+        try:
+            return read_json_object(self.aws_hyperparameters) if self.aws_hyperparameters.exists() else {}
+        except ConfigError as error:
+            raise RunError(str(error)) from error
 
     def read_training_params(self) -> TrainingParams | None:
         """AWS's training settings, or None where the run has no such file."""

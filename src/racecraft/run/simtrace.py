@@ -20,6 +20,7 @@ from racecraft.run.episodes import STEP_SECONDS, Episode
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 
 if TYPE_CHECKING:
+    from racecraft.run.aws_log import AwsLog
     from racecraft.track.track import Track
 
 COLUMNS = (
@@ -47,6 +48,8 @@ WRITTEN = COLUMNS[:18]  # what simulator versions from 5.3 to 5 write; version 6
 READABLE = (15, 17, 18, 19)  # columns of the four eras
 MAX_EPISODE_ROWS = 20_000  # 22 simulated minutes; the middle of a longer episode is left out
 MAX_BYTES = 1 << 31  # of all files of a run; beyond it every other iteration is removed
+MAX_FILES = 4096  # the same for their number
+EPISODES_PER_ITERATION = 20  # of AWS, unless hyperparameters say otherwise
 MAX_READ_ROWS = 2_000_000
 
 _KEPT = (
@@ -71,14 +74,16 @@ _COMPACT_EVERY = 512  # steps after which running episodes are packed
 
 
 class SimTraceWriter:
-    """Writes ``<iteration>-iteration.csv`` files into a folder.
+    """Writes ``<iteration>-iteration.csv`` files into a folder, so many episodes to each, as AWS's tools count them.
 
     Args:
         folder: Made when the first episode is written.
         num_envs: N, the number of cars.
         tracks: The simulation's tracks, in its order; they tell which waypoint is the closest.
         action_space: What the actions mean.
-        iteration: Number of the first file.
+        episodes_per_iteration: Episodes to a file; 0 for all in one.
+        episodes: Continue after so many episodes: whatever files hold of later ones is removed.
+        log: Is told every row, too.
         max_bytes: Of all files together. When they grow past it, every other iteration is removed and not
             written any more, so that what remains still covers the whole run.
     """
@@ -90,19 +95,24 @@ class SimTraceWriter:
         num_envs: int,
         tracks: Sequence[Track],
         action_space: ActionSpace,
-        iteration: int = 0,
+        episodes_per_iteration: int = EPISODES_PER_ITERATION,
+        episodes: int = 0,
+        log: AwsLog | None = None,
         max_bytes: int = MAX_BYTES,
     ) -> None:
         self.folder = folder
-        self.iteration = iteration
+        self.episodes_per_iteration = episodes_per_iteration
+        self.iteration = self._iteration_of(episodes)
         self.max_bytes = max_bytes
         self._action_space = action_space
         self._waypoints = [track.waypoints for track in (*tracks, *(track.reversed() for track in tracks))]
+        self._log = log
         self._stride = 1
         self._file: TextIO | None = None
         self._steps: list[NDArray[np.float64]] = []  # (N, _WIDTH) each
         self._first = [0] * num_envs  # index into _steps where a car's episode begins
         self._packed: list[list[NDArray[np.float64]]] = [[] for _ in range(num_envs)]  # its steps before _steps
+        self._sizes = self._cut(episodes)  # bytes of the files there are, by iteration
 
     def write(
         self,
@@ -128,8 +138,15 @@ class SimTraceWriter:
         self._steps.append(step)
         for episode in ended:
             table = self._take(episode.env)
-            if self.iteration % self._stride == 0:
-                self._write(self._lines(table, episode))
+            iteration = self._iteration_of(episode.number)
+            if iteration != self.iteration:
+                self.close()
+                self.iteration = iteration
+            lines = self._lines(table, episode)
+            if iteration % self._stride == 0:
+                self._write("".join(f"{','.join(line)}\n" for line in lines))
+            if self._log is not None:
+                self._log.write_episode(lines, episode, iteration=iteration)
         if len(self._steps) >= _COMPACT_EVERY:
             self._compact()
 
@@ -166,10 +183,13 @@ class SimTraceWriter:
         self._first = [0] * len(lengths)
         self._packed = [[table] if len(table) else [] for table in np.split(steps, np.cumsum(lengths)[:-1])]
 
-    def next_iteration(self) -> None:
-        """Begin the next file; episodes go to the file of the iteration in which they end."""
-        self.close()
-        self.iteration += 1
+    def flush(self) -> None:
+        """Hand every episode that has ended to the system."""
+        try:
+            if self._file is not None:
+                self._file.flush()
+        except OSError as error:
+            raise RunError(f"{self.folder} cannot be written: {error.strerror or error}.") from error
 
     def close(self) -> None:
         """Finish the current file. Episodes that have not ended are not written."""
@@ -177,6 +197,7 @@ class SimTraceWriter:
             return
         try:
             self._file.close()
+            self._sizes[self.iteration] = self._path(self.iteration).stat().st_size
             self._thin()
         except OSError as error:
             raise RunError(f"{self.folder} cannot be written: {error.strerror or error}.") from error
@@ -200,8 +221,33 @@ class SimTraceWriter:
             self._first[env] = 0
         self._steps.clear()
 
-    def _lines(self, table: NDArray[np.float64], episode: Episode) -> str:
-        """An episode's rows as text, with AWS's ``prepare`` row before the first."""
+    def _iteration_of(self, episode: int) -> int:
+        return episode // self.episodes_per_iteration if self.episodes_per_iteration else 0
+
+    def _path(self, iteration: int) -> Path:
+        return self.folder / f"{iteration}-iteration.csv"
+
+    def _cut(self, episodes: int) -> dict[int, int]:
+        """Remove what a killed run has logged after its last checkpoint; sizes of what remains, by iteration."""
+        sizes: dict[int, int] = {}
+        try:
+            for path in self.folder.glob("*-iteration.csv"):
+                iteration = path.name.removesuffix("-iteration.csv")
+                if not iteration.isdecimal():
+                    continue
+                if int(iteration) > self.iteration:
+                    path.unlink()
+                    continue
+                if int(iteration) == self.iteration:
+                    _cut_file(path, episodes)
+                if size := path.stat().st_size:
+                    sizes[int(iteration)] = size
+        except OSError as error:
+            raise RunError(f"{self.folder} cannot be written: {error.strerror or error}.") from error
+        return sizes
+
+    def _lines(self, table: NDArray[np.float64], episode: Episode) -> list[tuple[str, ...]]:
+        """An episode's rows, their fields as text, with AWS's ``prepare`` row before the first."""
         column = dict(zip(_KEPT, table.T, strict=False))
         if isinstance(self._action_space, DiscreteActionSpace):
             indices = table[:, -2].astype(int)
@@ -245,7 +291,8 @@ class SimTraceWriter:
         )
         if column["steps"][0] == 2.0:  # a flying lap has nothing to prepare
             rows.insert(0, prepare)
-        return "".join(f"{episode.number},{','.join(row)},0.0,0\n" for row in rows)
+        number, pauses = str(episode.number), _pauses([row[-1] for row in rows])
+        return [(number, *row, repr(pause), "0") for row, pause in zip(rows, pauses, strict=True)]
 
     def _closest(self, column: dict[str, NDArray[np.float64]]) -> NDArray[np.int64]:
         """Index of the closest waypoint: the nearer of the one behind and the one ahead   (T,)."""
@@ -259,24 +306,46 @@ class SimTraceWriter:
         try:
             if self._file is None:
                 self.folder.mkdir(parents=True, exist_ok=True)
-                path = self.folder / f"{self.iteration}-iteration.csv"
-                self._file = path.open("w", encoding="utf-8", newline="", buffering=1 << 16)
-                self._file.write(",".join(WRITTEN) + "\n")
+                path, is_begun = self._path(self.iteration), self.iteration in self._sizes
+                self._file = path.open("a" if is_begun else "w", encoding="utf-8", newline="", buffering=1 << 16)
+                if not is_begun:
+                    self._file.write(",".join(WRITTEN) + "\n")
             self._file.write(text)
         except OSError as error:
             raise RunError(f"{self.folder} cannot be written: {error.strerror or error}.") from error
 
     def _thin(self) -> None:
-        """Remove every other iteration while the files are larger than allowed."""
-        sizes = {path: path.stat().st_size for path in self.folder.glob("*-iteration.csv")}
-        while sum(sizes.values()) > self.max_bytes and len(sizes) > 1:
+        """Remove every other iteration while the files are larger or more than allowed."""
+        while (sum(self._sizes.values()) > self.max_bytes or len(self._sizes) > MAX_FILES) and len(self._sizes) > 1:
             self._stride *= 2
-            for path in list(sizes):
-                number = path.name.removesuffix("-iteration.csv")
-                if number.isdecimal() and int(number) % self._stride:
-                    path.unlink()
-                    del sizes[path]
+            for iteration in [iteration for iteration in self._sizes if iteration % self._stride]:
+                self._path(iteration).unlink(missing_ok=True)
+                del self._sizes[iteration]
             if self._stride > max(1, self.iteration):
+                return
+
+
+def _pauses(statuses: Sequence[str]) -> list[float]:
+    """Seconds that the car still stands after each row: AWS's ``pause_duration``.
+
+    It counts down the penalty after a mistake; where mistakes end the episode, as in training, it is 0.
+    """
+    left, pauses = 0, []
+    for status in reversed(statuses):
+        pauses.append(round(left * STEP_SECONDS, 3))
+        left = left + 1 if status == "pause" else 0
+    return pauses[::-1]
+
+
+def _cut_file(path: Path, episodes: int) -> None:
+    """Keep the header and the rows of the first so many episodes of a run."""
+    with path.open("rb+") as file:
+        if not file.readline().endswith(b"\n"):
+            file.truncate(0)  # killed before even the header was out
+        while line := file.readline():
+            number = line.split(b",", 1)[0]
+            if not line.endswith(b"\n") or not number.isdigit() or int(number) >= episodes:
+                file.truncate(file.tell() - len(line))
                 return
 
 

@@ -41,6 +41,7 @@ def train(
     root: str | Path = "runs",
     name: str | None = None,
     reporter: Reporter | None = None,
+    aws_log: str | Path | None = None,
     started: float | None = None,
     **settings: Any,
 ) -> TrainResult:
@@ -57,6 +58,7 @@ def train(
         root: Where run folders lie.
         name: Name of the run; by default a new one.
         reporter: Is told how it goes.
+        aws_log: File for the log lines that AWS's tools read, ``-`` for stdout.
         started: `time.monotonic()` of when the clock began to run; by default now.
         settings: Other fields of `racecraft.training.settings.TrainSettings`, and ``num_envs``.
 
@@ -88,7 +90,7 @@ def train(
     if reporter is not None:
         for note in (*metadata.notes, *(parameters.notes if parameters is not None else ())):
             reporter.note(note)
-    return Training(run, reporter=reporter, started=started).run()
+    return Training(run, reporter=reporter, aws_log=aws_log, started=started).run()
 
 
 def resume(
@@ -96,6 +98,7 @@ def resume(
     *,
     until: str | Until | None = None,
     reporter: Reporter | None = None,
+    aws_log: str | Path | None = None,
     started: float | None = None,
 ) -> TrainResult:
     """Continue a run from its last checkpoint, as if it had never stopped.
@@ -104,6 +107,7 @@ def resume(
         run: The run folder.
         until: A new limit; by default the one it was started with. Seconds count from the run's first start.
         reporter: Is told how it goes.
+        aws_log: File for the log lines that AWS's tools read, ``-`` for stdout.
         started: `time.monotonic()` of when the clock began to run; by default now.
 
     Raises:
@@ -114,4 +118,4 @@ def resume(
 
     if isinstance(until, str):
         until = Until.parse(until)
-    return Training(RunFolder.open(run), until=until, reporter=reporter, started=started).run()
+    return Training(RunFolder.open(run), until=until, reporter=reporter, aws_log=aws_log, started=started).run()

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from types import FrameType
 
 import numpy as np
@@ -28,6 +29,7 @@ from racecraft.learn import PPO, make_learner
 from racecraft.race.policy import NetworkPolicy
 from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import (
+    AwsLog,
     Checkpoint,
     CheckpointWarning,
     EpisodeCounter,
@@ -44,10 +46,10 @@ from racecraft.training.environment import TrainingEnvironment
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
 from racecraft.training.progress import EvaluationReport, IterationReport, Reporter, SilentReporter, TrainResult
-from racecraft.training.start import read_settings, require_trainable, require_valid_reward
+from racecraft.training.start import aws_hyperparameters, read_settings, require_trainable, require_valid_reward
 from racecraft.training.stop import Until
 
-AWS_EPISODES = 20  # between two trainings at AWS; its metrics number trials by it
+AWS_EPISODES = 20  # between two trainings at AWS; its metrics and sim-traces are numbered by it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,6 +64,7 @@ class _Session:
     events: EventWriter
     history: HistoryWriter
     hyperparameters: Hyperparameters | None
+    aws_log: AwsLog | None
 
     @property
     def counter(self) -> EpisodeCounter:
@@ -75,6 +78,7 @@ class Training:
         folder: The run.
         until: When to stop; by default what the run was started with.
         reporter: Is told how it goes.
+        aws_log: File for the log lines that AWS's tools read, ``-`` for stdout; none without it.
         started: When this training began, in `time.monotonic()` seconds; a command gives its process's start.
     """
 
@@ -84,8 +88,10 @@ class Training:
         *,
         until: Until | None = None,
         reporter: Reporter | None = None,
+        aws_log: str | Path | None = None,
         started: float | None = None,
     ) -> None:
+        self.aws_log = aws_log
         self.folder = folder
         self.reporter = reporter or SilentReporter()
         settings = read_settings(folder)
@@ -150,21 +156,34 @@ class Training:
             # A function that remembers something gets a memory for each car: on AWS one process drove one car.
             copies = ppo_config.num_envs if keeps_state(source) else 1
             worker = stack.enter_context(RewardWorker(source, [track], seed=settings.seed, num_cars=copies))
-            events = stack.enter_context(EventWriter(folder.events))
             kept = saved.step if saved is not None else 0
+            after = kept if saved is not None else -1
+            events = stack.enter_context(EventWriter(folder.events, after_step=after))
             history = stack.enter_context(HistoryWriter(folder.history, step=kept))
             episodes = int(resumed.get("episodes", 0))
             counter = EpisodeCounter(ppo_config.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0)))
+            hyperparameters = folder.read_hyperparameters()
+            log = None
+            if self.aws_log is not None:
+                log = stack.enter_context(AwsLog(self.aws_log, steps=kept))
+                log.write_settings(
+                    world=track.name,
+                    metadata=metadata,
+                    hyperparameters=aws_hyperparameters(ppo_config, hyperparameters),
+                )
+            per_iteration = ppo_config.episodes_per_iteration or AWS_EPISODES
             trace = SimTraceWriter(
                 folder.training_simtrace,
                 num_envs=ppo_config.num_envs,
                 tracks=[track],
                 action_space=metadata.action_space,
-                iteration=int(resumed.get("trace_iteration", 0)),
+                episodes_per_iteration=per_iteration,
+                episodes=episodes,
+                log=log,
             )
             metrics = TrainingMetrics(
                 folder.training_metrics,
-                episodes_per_iteration=ppo_config.episodes_per_iteration or AWS_EPISODES,
+                episodes_per_iteration=per_iteration,
                 episodes=episodes,
             )
             prints = stack.enter_context(PrintLog(folder.reward_log))
@@ -179,7 +198,8 @@ class Training:
                 metrics=metrics,
                 events=events,
                 history=history,
-                hyperparameters=folder.read_hyperparameters(),
+                hyperparameters=hyperparameters,
+                aws_log=log,
             )
             if saved is not None:
                 self._load_state(session, saved)
@@ -213,6 +233,15 @@ class Training:
             self.reporter.iteration(report)
             session.events.add_scalars(_iteration_scalars(report), step=ppo.total_steps)
             session.history.add_iteration(report.point())
+            if session.aws_log is not None:
+                session.aws_log.write_policy(
+                    surrogate_loss=stats.losses.policy_loss,
+                    kl_divergence=stats.losses.approx_kl,
+                    entropy=stats.losses.entropy,
+                    epoch=self.settings.ppo.update_epochs - 1,
+                    learning_rate=self.settings.ppo.learning_rate,
+                )
+                session.aws_log.flush()
 
             reason = self._limit_reached(session)
             is_due = ppo.total_steps - session.evaluator.evaluated_at >= self.settings.evaluate_every
@@ -270,7 +299,7 @@ class Training:
         """Logs first: what a checkpoint counts is then on disk, whatever happens in between."""
         begun = time.perf_counter()
         ppo, evaluator, counter = session.ppo, session.evaluator, session.counter
-        session.trace.next_iteration()
+        session.trace.flush()
         session.metrics.write()
         last = evaluator.last
         is_judged = last is not None and last.step == ppo.total_steps
@@ -288,7 +317,6 @@ class Training:
                 "network": asdict(ppo.learner.spec),
                 "episodes": counter.number,
                 "clock": counter.clock,
-                "trace_iteration": session.trace.iteration,
                 "seconds": self.meter.seconds,
                 "evaluator": evaluator.state(),
             },

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from racecraft.agent import Hyperparameters, ModelMetadata, check_simulated
 from racecraft.errors import ConfigError
+from racecraft.learn import PPOConfig
 from racecraft.reward import dry_run, validate_reward
 from racecraft.run import RunFolder, RunInfo
 from racecraft.run.training_params import TrainingParams
@@ -46,6 +48,7 @@ def start_run(
         reward_function=reward,
         model_metadata=metadata,
         hyperparameters=hyperparameters,
+        equivalent=aws_hyperparameters(settings.ppo, hyperparameters),
         training_params=TrainingParams(
             world_name=track.name,
             reverse_dir=settings.direction == "reverse",
@@ -60,6 +63,27 @@ def start_run(
     del document["seed"], document["track"]  # they have places of their own
     folder.write_info(RunInfo(seed=settings.seed, track=settings.track, track_digest=track.digest, settings=document))
     return folder
+
+
+def aws_hyperparameters(ppo: PPOConfig, given: Hyperparameters | None = None) -> dict[str, Any]:
+    """How a run learns by AWS's names, for its tools; ours may lie outside of AWS's ranges."""
+    if given is not None:
+        return given.to_dict()
+    return {
+        "batch_size": ppo.minibatch_size,
+        "beta_entropy": ppo.ent_coef,
+        "discount_factor": ppo.gamma,
+        "e_greedy_value": ppo.epsilon_end,
+        "epsilon_steps": ppo.epsilon_steps,
+        "exploration_type": ppo.exploration,
+        "loss_type": "huber" if ppo.value_loss == "huber" else "mean squared error",
+        "lr": ppo.learning_rate,
+        "num_episodes_between_training": ppo.episodes_per_iteration or Hyperparameters.num_episodes_between_training,
+        "num_epochs": ppo.update_epochs,
+        "stack_size": 1,
+        "term_cond_avg_score": Hyperparameters.term_cond_avg_score,
+        "term_cond_max_episodes": Hyperparameters.term_cond_max_episodes,
+    }
 
 
 def read_settings(folder: RunFolder) -> TrainSettings:
