@@ -13,6 +13,7 @@ LAYERS = (
     "errors",
     "track",
     "sim",
+    "limits",
     "reward",
     "agent",
     "env",

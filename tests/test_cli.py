@@ -84,6 +84,7 @@ VERBS = (
     "tracks",
     "tracks show",
     "tracks sheet",
+    "tracks limit",
     "reward",
     "reward check",
     "reward list",
@@ -200,6 +201,9 @@ def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str
         (["tracks", "show", "oval", "--width", "-5"], "TrackError", "-5"),
         (["tracks", "show", "oval", "-o", "nowhere/oval.png"], "", "nowhere"),
         (["tracks", "show", "oval", "-o", "oval.txt"], "TrackError", "txt"),
+        (["tracks", "limit", "straight"], "TrackError", "open"),
+        (["tracks", "limit", "oval", "--vehicle", "v7"], "ConfigError", "v7"),
+        (["tracks", "limit", "oval", "--direction", "up"], "ConfigError", "up"),
         (["tracks", "sheet", "oval", "ovla"], "TrackNotFound", "Did you mean 'oval'?"),
         (["tracks", "sheet", "oval", "--columns", "0"], "TrackError", "0"),
         (["tracks", "sheet", "oval", "-o", "oval.txt"], "TrackError", "txt"),
@@ -265,6 +269,20 @@ def test_tracks_are_listed(racecraft: Run) -> None:
     (line,) = (line for line in lines if "reinvent_2018" in line)
     assert "17.7 m" in line
     assert "0.76 m" in line
+
+
+def test_the_limit_of_a_track(racecraft: Run) -> None:
+    outcome = racecraft("tracks", "limit", "oval")
+    assert outcome.status == 0
+    assert "no lap under" in outcome.out
+    document = racecraft("tracks", "limit", "oval", "--json").document
+    medals = document["medals"]
+    assert document["ideal_seconds"] < document["driven_seconds"] < 1.1 * document["ideal_seconds"]
+    assert medals["author"] < medals["gold"] < medals["silver"] < medals["bronze"]
+    listed = {track["name"]: track for track in racecraft("tracks", "--json").document["tracks"]}
+    assert listed["oval"]["limit"]["ideal_seconds"] == document["ideal_seconds"]
+    assert listed["straight"]["limit"] is None
+    assert "Medals: author" in racecraft("tracks", "show", "oval", "--width", "400").out
 
 
 def test_a_sheet_of_tracks(racecraft: Run) -> None:
@@ -477,6 +495,7 @@ def test_evaluate_as_json_names_files_that_can_be_read(racecraft: Run, trained: 
         document.keys()
     )
     assert document["official_races"] == []  # our own tracks have none
+    assert document["limit"]["ideal_seconds"] < document["limit"]["medals"]["author"]
     files = {name: Path(path) for name, path in document["files"].items()}
     assert len(read_metrics(files["metrics"])["metrics"]) >= 2
     assert len(read_simtrace(files["sim-trace"])["steps"]) > 2

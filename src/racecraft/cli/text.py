@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from racecraft.bench.doctor import Finding
+    from racecraft.limits import TrackLimit
     from racecraft.race.run_evaluation import RunEvaluation
     from racecraft.replay import Calibration, Comparison
     from racecraft.reward import Outcome, Problem
@@ -87,23 +88,38 @@ def say_evaluated(outcome: RunEvaluation) -> None:
         )
     console.print(table)
     _say(console, outcome.summary)
+    if outcome.limit is not None and evaluation.best_lap is not None:
+        _say(console, f"Best lap: {outcome.limit.sentence(evaluation.best_lap)}")
     for placing in outcome.placings[:1]:
         _say(console, placing.sentence)
     for what, path in outcome.files.items():
         _say(console, f"  {what:<12} ", (str(path), "bold"))
 
 
-def say_tracks(listed: list[tuple[Track, Any]]) -> None:
-    """The library, a line for each track."""
+def say_limit(name: str, limit: TrackLimit) -> None:
+    """The minimum lap time and the medals."""
+    console, medals = Console(), limit.medals
+    _say(console, f"{name}: no lap under ", (f"{limit.ideal:.2f} s", "bold"), ", all wheels on the road.")
+    _say(
+        console,
+        f"Medals: author {medals.author:.2f} s (driven by our line driver), gold {medals.gold:.2f} s, "
+        f"silver {medals.silver:.2f} s, bronze {medals.bronze:.2f} s.",
+    )
+
+
+def say_tracks(listed: list[tuple[Track, Any]], limits: list[TrackLimit | None]) -> None:
+    """The library, a line for each track; the limit is that of the default car."""
     console, table = Console(), _table()
     table.expand = True
     table.add_column("track", style="bold", no_wrap=True)
-    for heading in ("length", "width", "radius"):
+    for heading in ("length", "width", "radius", "limit"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True, overflow="ellipsis", ratio=1)
-    for track, design in listed:
+    for (track, design), known in zip(listed, limits, strict=True):
         radius = f"{track.min_radius:.2f} m" if track.min_radius < 1000 else "–"
-        table.add_row(track.name, f"{track.length:.1f} m", f"{track.mean_width:.2f} m", radius, design.description)
+        limit = f"{known.ideal:.2f} s" if known else "–"
+        facts = (f"{track.length:.1f} m", f"{track.mean_width:.2f} m", radius, limit)
+        table.add_row(track.name, *facts, design.description)
     console.print(table)
     _say(console, "Draw one with ", ("racecraft tracks show NAME", "bold"), "; files and 'generated:7' work too.")
 

@@ -107,7 +107,7 @@ def _drawn(recording: Recording, *, title: str, subtitle: str, width_px: int) ->
         picture.canvas.disc(place, MISTAKE, radius_px=0.95 * width)
     name, description = describe(recording.track)
     picture.caption(title=title or name, subtitle=subtitle or description, figures=_figures(recording))
-    _color_bar(picture.canvas, unit, low, high)
+    color_bar(picture.canvas, unit, low, high)
     return picture
 
 
@@ -157,7 +157,7 @@ def _figures(recording: Recording) -> list[tuple[str, str]]:
     return figures
 
 
-def _color_bar(canvas: Canvas, unit: float, low: float, high: float) -> None:
+def color_bar(canvas: Canvas, unit: float, low: float, high: float) -> None:
     """The colours from slow to fast in the upper right corner, with their speeds."""
     right, top, width, height, pieces = 95.0 * unit, 5.0 * unit, 20.0 * unit, 1.0 * unit, 100
     left = right - width

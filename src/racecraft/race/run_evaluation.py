@@ -17,8 +17,10 @@ from typing import Any
 
 from racecraft.agent import ActionSpace
 from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.limits import TrackLimit, known_limit
 from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.evaluation import evaluate
+from racecraft.race.placement import driven_track
 from racecraft.race.policy import load_policy
 from racecraft.race.racing_line import draw_racing_line
 from racecraft.race.results import Evaluation
@@ -44,6 +46,8 @@ class RunEvaluation:
     """Laps, trials, statistics."""
     files: dict[str, Path]
     """What was written, by what it is."""
+    limit: TrackLimit | None = None
+    """The least a lap takes with this vehicle, where that is known without computing it."""
 
     @property
     def summary(self) -> str:
@@ -68,8 +72,19 @@ class RunEvaluation:
             "step": self.step,
             **self.evaluation.summary(),
             "lap_seconds": [list(trial.lap_times) for trial in self.evaluation.trials],
+            "limit": self._against_limit(),
             "official_races": [placing.to_dict() for placing in self.placings],
             "files": {name: str(path) for name, path in self.files.items()},
+        }
+
+    def _against_limit(self) -> dict[str, Any] | None:
+        if self.limit is None:
+            return None
+        best = self.evaluation.best_lap
+        return {
+            **self.limit.to_dict(),
+            "best_lap_above_limit": self.limit.above(best) if best is not None else None,
+            "medal": self.limit.medals.won_by(best) if best is not None else "",
         }
 
 
@@ -129,7 +144,8 @@ def evaluate_run(
         files = _write(folder, evaluation, policy.action_space, is_filmed=video, aws_log=aws_log)
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
-    return RunEvaluation(run=folder.path, step=step, evaluation=evaluation, files=files)
+    limit = known_limit(driven_track(where, rules), vehicle)
+    return RunEvaluation(run=folder.path, step=step, evaluation=evaluation, files=files, limit=limit)
 
 
 def _rules(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
