@@ -137,7 +137,7 @@ HEAVY = ("torch", "gymnasium", "scipy", "shapely", "PIL", "av", "tensorboard")
     [
         (["--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
         (["train", "--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
-        (["tracks"], ("torch", "av", "PIL", "gymnasium")),
+        (["tracks"], ("torch", "av", "PIL", "gymnasium", "scipy", "casadi")),
         (["reward", "check", "centerline"], ("torch", "av", "PIL", "gymnasium")),
     ],
 )

@@ -12,17 +12,18 @@ import os
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from racecraft.errors import TrackError
-from racecraft.limits.driver import DrivenLap, drive_line
-from racecraft.limits.ideal import IdealLap, ideal_lap, smooth_lap
 from racecraft.limits.medals import Medals
-from racecraft.limits.road import smooth_road
 from racecraft.sim.vehicle import Vehicle
 from racecraft.track.track import Track
+
+if TYPE_CHECKING:
+    from racecraft.limits.driver import DrivenLap
+    from racecraft.limits.ideal import IdealLap
 
 SPACING: Final = 0.05
 """m between samples of the road."""
@@ -101,6 +102,11 @@ def compute_limit(track: Track, vehicle: Vehicle) -> TrackLimit:
         TrackError: The track is open, or no lap was found or could be driven.
         ConfigError: casadi is not installed.
     """
+    # what solves and drives is imported late: every training imports this file, and SciPy takes its time
+    from racecraft.limits.driver import drive_line
+    from racecraft.limits.ideal import ideal_lap, smooth_lap
+    from racecraft.limits.road import smooth_road
+
     road = smooth_road(track, spacing=SPACING)
     ideal = ideal_lap(road, vehicle)
     smooth: IdealLap | None = None
