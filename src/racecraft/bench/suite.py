@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
 from statistics import median
 from typing import Any
 
@@ -117,15 +118,36 @@ def measure_reward(seconds: float, seeds: int) -> dict[str, Any]:
             return len(rows)
 
         calls = _rate(work, seconds)
+    compiled = _compiled_rate(source, track, batches, seconds)
     function = import_module(f"racecraft.reward.presets.{REWARD}").reward_function
     params = _example_params(rows, track)
     bare = _rate(lambda: _call_many(function, params), min(seconds, 1.0))
     return {
         "calls_per_second": round(calls),
         "microseconds_per_call": round(1e6 / calls, 3),
+        **({"compiled_calls_per_second": round(compiled)} if compiled else {}),
         "batch": REWARD_BATCH,
         "limits": {"calls_per_second": _limit(bare, "the same function called on ready params, in one process")},
     }
+
+
+def _compiled_rate(source: str, track: Track, batches: list[Any], seconds: float) -> float:
+    """The same through a worker that compiled the function; 0 where numba is not installed."""
+    if not has_numba():
+        return 0.0
+    with RewardWorker(source, track, compiled=True, start_timeout_s=120.0) as worker:
+
+        def work() -> int:
+            for batch in batches:
+                worker(batch)
+            return sum(map(len, batches))
+
+        return _rate(work, seconds)
+
+
+def has_numba() -> bool:
+    """Whether rewards can be compiled here."""
+    return find_spec("numba") is not None
 
 
 def measure_training(seconds: float, seeds: int) -> dict[str, Any]:

@@ -54,10 +54,10 @@ def _environment() -> dict[str, str]:
     return environment
 
 
-def package_paths() -> list[str]:
-    """The folders that hold the packages a reward function may import."""
+def package_paths(*more: str) -> list[str]:
+    """The folders that hold the packages a reward function may import, and more."""
     paths = []
-    for name in PACKAGES:
+    for name in (*PACKAGES, *more):
         spec = importlib.util.find_spec(name)
         if spec is not None and spec.origin is not None:
             path = str(Path(spec.origin).parent.parent)
