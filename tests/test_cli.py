@@ -80,6 +80,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 VERBS = (
     "train",
+    "import",
     "evaluate",
     "tracks",
     "tracks show",
@@ -197,6 +198,8 @@ def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str
         (["train", "--hyperparameters", "none.json"], "ConfigError", "none.json"),
         (["train", "--resume", "runs/none"], "RunError", "none"),
         (["evaluate", "runs/none"], "RunError", "none"),
+        (["import", "none"], "SourceError", "none"),
+        (["import", "."], "SourceError", "reward_function.py"),
         (["tracks", "show", "ovla"], "TrackNotFound", "Did you mean 'oval'?"),
         (["tracks", "show", "oval", "--width", "-5"], "TrackError", "-5"),
         (["tracks", "show", "oval", "-o", "nowhere/oval.png"], "", "nowhere"),

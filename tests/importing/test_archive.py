@@ -433,7 +433,7 @@ BASES = [
 ]
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=200)
 @given(data=st.data(), base=st.sampled_from(BASES))
 def test_damage_is_an_error_or_changes_nothing(
     data: st.DataObject, base: bytes, tmp_path_factory: pytest.TempPathFactory
@@ -457,7 +457,7 @@ def test_damage_is_an_error_or_changes_nothing(
         assert len(content) <= 1 << 20
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=60)
 @given(files=st.dictionaries(st.from_regex(r"[a-z]{1,8}(/[a-z]{1,8}){0,3}", fullmatch=True), st.binary(max_size=3000)))
 def test_any_content_comes_back(files: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory) -> None:
     clashes = any(other.startswith(f"{name}/") for name in files for other in files)

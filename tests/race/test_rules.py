@@ -69,3 +69,13 @@ def test_rules_are_frozen_and_plain():
     with pytest.raises(dataclasses.FrozenInstanceError):
         rules.laps = 3
     assert RaceRules(**json.loads(json.dumps(rules.to_dict()))) == rules
+
+
+def test_rules_go_through_plain_values():
+    for rules in RULE_SETS.values():
+        assert RaceRules.from_dict(rules.to_dict()) == rules
+    assert RaceRules.from_dict({"laps": 2}) == RaceRules(laps=2)
+    with pytest.raises(ConfigError, match=r"no race rule 'lapps'\. Did you mean 'laps'"):
+        RaceRules.from_dict({"lapps": 2})
+    with pytest.raises(ConfigError, match="laps is 'many'"):
+        RaceRules.from_dict({"laps": "many"})

@@ -15,11 +15,13 @@ def evaluate(
     context: typer.Context,
     run: Annotated[Path, typer.Argument(help="Run folder.")],
     track: Annotated[str, typer.Option("--track", "-t", help="Track; by default the one it was trained on.")] = "",
-    laps: Annotated[int, typer.Option("--laps", "-l", help="Laps to a trial.")] = 3,
+    laps: Annotated[int | None, typer.Option("--laps", "-l", help="Laps to a trial; by default the rules'.")] = None,
     trials: Annotated[
         int, typer.Option("--trials", help="Cars that start side by side, each a little differently.")
     ] = 5,
-    rules: Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")] = "drfc",
+    rules: Annotated[
+        str, typer.Option("--rules", help="drfc, worker, droa or live; by default the run's own, else drfc.")
+    ] = "",
     checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
     direction: Annotated[
@@ -46,7 +48,7 @@ def evaluate(
         track=track or None,
         laps=laps,
         num_trials=trials,
-        rules=rules,
+        rules=rules or None,
         checkpoint=int(checkpoint) if checkpoint.isdigit() else checkpoint,
         vehicle=vehicle or None,
         direction=direction or None,

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from racecraft.bench.doctor import Finding
+    from racecraft.importing import ImportedRun
     from racecraft.limits import TrackLimit
     from racecraft.race.run_evaluation import RunEvaluation
     from racecraft.replay import Calibration, Comparison
@@ -67,6 +68,32 @@ def say_trained(result: TrainResult) -> None:
         _say(console, "Continue:   ", (f"racecraft train --resume {result.run}", "bold"))
     if result.reason != "interrupted":
         _say(console, "Race it:    ", (f"racecraft evaluate {result.run}", "bold"))
+
+
+def say_imported(result: ImportedRun) -> None:
+    """What was understood, what was not, and how to go on."""
+    console = Console()
+    _say(console, ("Imported ", "bold"), f"{result.kind}, to drive on {result.track}.")
+    for what, becomes in result.used.items():
+        _say(console, ("  + ", "bold green"), f"{what}  ", (becomes, "dim"))
+    reasons: dict[str, list[str]] = {}
+    for what, why in result.unused.items():
+        reasons.setdefault(why, []).append(what)
+    for why, names in reasons.items():
+        _say(console, ("  - ", "bold yellow"), f"{', '.join(names)}  ", (why, "dim"))
+    for what, suggestion in result.unknown.items():
+        _say(console, ("  ? ", "bold red"), f"{what}  ", (f"unknown, has no effect. {suggestion}".rstrip(), "dim"))
+    if result.kept:
+        _say(
+            console,
+            ("  = ", "bold green"),
+            f"{len(result.kept)} metrics, sim-traces and logs  ",
+            ("in original/", "dim"),
+        )
+    for note in result.notes:
+        _say(console, ("note: ", "bold"), note)
+    _say(console, "Run folder: ", (str(result.run), "bold"))
+    _say(console, "Train it:   ", (result.next_command, "bold"))
 
 
 def say_evaluated(outcome: RunEvaluation) -> None:

@@ -52,9 +52,9 @@ def read_archive(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> Iterat
             raise ArchiveError(f"{path.name} cannot be read: {error.strerror or error}.") from error
 
 
-def is_archive(path: Path) -> bool:
+def is_archive_name(name: str) -> bool:
     """Whether a file's name says that it is an archive, of whatever kind."""
-    return path.name.lower().endswith((".tar", ".gz", ".tgz", ".zip", ".bz2", ".xz", ".zst", ".7z", ".rar"))
+    return name.lower().endswith((".tar", ".gz", ".tgz", ".zip", ".bz2", ".xz", ".zst", ".7z", ".rar"))
 
 
 def _opened(path: Path, limits: Limits) -> BinaryIO:

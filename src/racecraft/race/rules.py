@@ -7,7 +7,8 @@ these rules say what follows from it. Defaults are deepracer-for-cloud's; `RULE_
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Final
 
 from racecraft.errors import ConfigError, did_you_mean
@@ -91,6 +92,19 @@ class RaceRules:
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for a run folder or the command line."""
         return asdict(self)
+
+    @classmethod
+    def from_dict(cls, document: Mapping[str, Any]) -> RaceRules:
+        """From what `to_dict` gave; what is missing has its default.
+
+        Raises:
+            ConfigError: There is no such rule, or a value is outside its range.
+        """
+        known = [rule.name for rule in fields(cls)]
+        for name in document:
+            if name not in known:
+                raise ConfigError(f"There is no race rule {name!r}. {did_you_mean(name, known)}".rstrip())
+        return cls(**document)
 
 
 RULE_SETS: Final[dict[str, RaceRules]] = {

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.agent import ActionSpace
+from racecraft.agent.aws_file import read_json_object
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.limits import TrackLimit, known_limit
 from racecraft.race.artifacts import write_metrics, write_simtrace
@@ -92,9 +93,9 @@ def evaluate_run(
     run: str | Path,
     *,
     track: str | Track | None = None,
-    laps: int = 3,
+    laps: int | None = None,
     num_trials: int = 5,
-    rules: str | RaceRules = "drfc",
+    rules: str | RaceRules | None = None,
     checkpoint: str | int = "best",
     vehicle: str | Vehicle | None = None,
     direction: str | None = None,
@@ -110,12 +111,13 @@ def evaluate_run(
     Args:
         run: The run folder.
         track: Where; by default where it was trained.
-        laps: Laps to a trial.
+        laps: Laps to a trial; by default the rules'.
         num_trials: Cars that start side by side, each a little differently.
-        rules: A name of `RULE_SETS`, or rules.
+        rules: A name of `RULE_SETS`, or rules; by default the run's own, where it has some, else ``drfc``.
         checkpoint: ``best``, ``last`` or a number of steps.
         vehicle: By default the one it was trained with.
-        direction: ``forward`` or ``reverse``; by default the one it was trained in, ``forward`` if in both.
+        direction: ``forward`` or ``reverse``; by default that of the run's own rules, else the one it was trained in,
+            ``forward`` if in both.
         offtrack_penalty: Seconds; by default the rules'.
         max_resets: By default the rules'.
         seed: Of the starts.
@@ -128,10 +130,12 @@ def evaluate_run(
     """
     folder = RunFolder.open(run)
     info = folder.read_info()
-    if direction is None:
+    if rules is None and folder.race_rules.exists():
+        rules = _own_rules(folder)
+    elif direction is None:
         direction = "reverse" if info.settings.get("direction") == "reverse" else "forward"
     changes = {"laps": laps, "direction": direction, "offtrack_penalty": offtrack_penalty, "max_resets": max_resets}
-    rules = _rules(rules, {name: value for name, value in changes.items() if value is not None})
+    rules = _rules(rules or "drfc", {name: value for name, value in changes.items() if value is not None})
     if not isinstance(vehicle, Vehicle):
         vehicle = load_vehicle(vehicle) if vehicle else _trained_vehicle(info)
     where = track if isinstance(track, Track) else load_track(track) if track else _trained_track(info)
@@ -157,6 +161,13 @@ def _rules(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
             )
         rules = RULE_SETS[rules]
     return replace(rules, **changes)
+
+
+def _own_rules(folder: RunFolder) -> RaceRules:
+    try:
+        return RaceRules.from_dict(read_json_object(folder.race_rules))
+    except ConfigError as error:
+        raise ConfigError(f"{folder.race_rules.name}: {error}", hint=error.hint) from error
 
 
 def _trained_vehicle(info: RunInfo) -> Vehicle:

@@ -2,6 +2,7 @@
 
 runs/<name>/run.json                      what is needed to repeat the run
             reward_function.py  model_metadata.json  hyperparameters.json  training_params.yaml
+            race_rules.json               rules of its evaluations, where it has its own
             metrics/                      TrainingMetrics.json, EvaluationMetrics-<time>.json, history.jsonl
             training-simtrace/            <iteration>-iteration.csv
             evaluation-<time>/            evaluation-simtrace/, pictures
@@ -146,6 +147,11 @@ class RunFolder:
     def training_params(self) -> Path:
         """AWS's settings of the training job."""
         return self.path / "training_params.yaml"
+
+    @property
+    def race_rules(self) -> Path:
+        """The rules of its evaluations, where it has its own."""
+        return self.path / "race_rules.json"
 
     @property
     def training_metrics(self) -> Path:

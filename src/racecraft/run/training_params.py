@@ -50,6 +50,9 @@ class TrainingParams:
     extra: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Keys of the file that mean nothing here; kept and written back."""
 
+    given: frozenset[str] = field(default=frozenset(), compare=False, repr=False)
+    """Fields that the file really had; the others have their defaults."""
+
     @classmethod
     def load(cls, path: str | Path) -> TrainingParams:
         """From AWS's file.
@@ -88,13 +91,14 @@ class TrainingParams:
         known = {key: single[key] for key in _file().model_fields if key in single}
         checked = validate(_file(), known, name=name)
         values = {key.lower(): getattr(checked, key) for key in _file().model_fields}
-        return cls(**values, extra={key: value for key, value in document.items() if key not in known})
+        extra = {key: value for key, value in document.items() if key not in known}
+        return cls(**values, extra=extra, given=frozenset(key.lower() for key in known))
 
     def to_yaml(self) -> str:
         """The text of AWS's file."""
         import yaml
 
-        own = {f.name.upper(): getattr(self, f.name) for f in fields(self) if f.name != "extra"}
+        own = {f.name.upper(): getattr(self, f.name) for f in fields(self) if f.name not in ("extra", "given")}
         return str(yaml.safe_dump({**own, **self.extra}, sort_keys=False))
 
     def save(self, path: str | Path) -> None:

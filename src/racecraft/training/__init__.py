@@ -90,7 +90,7 @@ def train(
     if reporter is not None:
         for note in (*metadata.notes, *(parameters.notes if parameters is not None else ())):
             reporter.note(note)
-    return Training(run, reporter=reporter, aws_log=aws_log, started=started).run()
+    return Training(run, reporter=reporter, aws_log=aws_log, started=started, is_checked=True).run()
 
 
 def resume(

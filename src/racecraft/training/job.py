@@ -80,6 +80,8 @@ class Training:
         reporter: Is told how it goes.
         aws_log: File for the log lines that AWS's tools read, ``-`` for stdout; none without it.
         started: When this training began, in `time.monotonic()` seconds; a command gives its process's start.
+        is_checked: The reward function has just been checked and tried; otherwise that comes first, as the user may
+            have edited it, or the run was imported.
     """
 
     def __init__(
@@ -90,9 +92,11 @@ class Training:
         reporter: Reporter | None = None,
         aws_log: str | Path | None = None,
         started: float | None = None,
+        is_checked: bool = False,
     ) -> None:
         self.aws_log = aws_log
         self.folder = folder
+        self.is_checked = is_checked
         self.reporter = reporter or SilentReporter()
         settings = read_settings(folder)
         self.settings = settings if until is None else replace(settings, until=until)
@@ -148,7 +152,7 @@ class Training:
                 direction=settings.direction,
                 num_threads=settings.num_threads,
             )
-            if saved is not None:  # the user may have edited it; that of a fresh run has just been checked
+            if not self.is_checked:
                 require_valid_reward(source, track)
             learner = future.result()
 

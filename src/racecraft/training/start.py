@@ -44,25 +44,39 @@ def start_run(
     track = load_track(settings.track)
     require_valid_reward(reward, track)
     folder = RunFolder.create(root, name=name, prefix=track.name)
+    params = TrainingParams(
+        world_name=track.name,
+        reverse_dir=settings.direction == "reverse",
+        alternate_driving_direction=settings.direction == "alternate",
+        change_start_position=settings.start.mode != "fixed",
+        round_robin_advance_dist=settings.start.advance % 1.0,
+        start_position_offset=settings.start.offset % 1.0,
+        min_eval_trials=settings.evaluation_trials,
+    )
+    write_run(folder, settings, track, reward, metadata, hyperparameters, params)
+    return folder
+
+
+def write_run(
+    folder: RunFolder,
+    settings: TrainSettings,
+    track: Track,
+    reward: str,
+    metadata: ModelMetadata,
+    hyperparameters: Hyperparameters | None,
+    params: TrainingParams,
+) -> None:
+    """Write everything that a run starts from; ``run.json``, which makes the folder a run, comes last."""
     folder.write_inputs(
         reward_function=reward,
         model_metadata=metadata,
         hyperparameters=hyperparameters,
         equivalent=aws_hyperparameters(settings.ppo, hyperparameters),
-        training_params=TrainingParams(
-            world_name=track.name,
-            reverse_dir=settings.direction == "reverse",
-            alternate_driving_direction=settings.direction == "alternate",
-            change_start_position=settings.start.mode != "fixed",
-            round_robin_advance_dist=settings.start.advance % 1.0,
-            start_position_offset=settings.start.offset % 1.0,
-            min_eval_trials=settings.evaluation_trials,
-        ),
+        training_params=params,
     )
     document = settings.to_dict()
     del document["seed"], document["track"]  # they have places of their own
     folder.write_info(RunInfo(seed=settings.seed, track=settings.track, track_digest=track.digest, settings=document))
-    return folder
 
 
 def aws_hyperparameters(ppo: PPOConfig, given: Hyperparameters | None = None) -> dict[str, Any]:

@@ -1,0 +1,296 @@
+"""`import_run`: from a folder, archive or file of the original to a run folder that can be trained.
+
+Nothing foreign is run: the reward function is parsed and checked as text, and tried where it will be trained, in the
+worker process. The new run folder appears whole or not at all.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final
+
+from racecraft.agent import Hyperparameters, ModelMetadata, action_space
+from racecraft.agent.aws_file import parse_json_object
+from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean
+from racecraft.importing.drfc import DrfcSettings, read_drfc
+from racecraft.importing.env_file import EnvFile, parse_env
+from racecraft.importing.history import History, keep_history
+from racecraft.importing.job import job_settings
+from racecraft.importing.layout import (
+    CUSTOM_FILES,
+    HYPERPARAMETERS,
+    METADATA,
+    PLACES,
+    REWARD,
+    RUN_ENV,
+    SYSTEM_ENV,
+    TRAINING_PARAMS,
+    find_root,
+)
+from racecraft.importing.report import ImportedRun, unused_files
+from racecraft.importing.source import Source, SourceFile, open_source
+from racecraft.race.rules import RaceRules
+from racecraft.reward import check_reward, load_reward, validate_reward
+from racecraft.run import RunFolder
+from racecraft.run.atomic import write_json
+from racecraft.run.training_params import TrainingParams
+from racecraft.track import Track, load_track, track_names
+from racecraft.training.settings import DEFAULT_TRACK, make_settings
+from racecraft.training.start import require_trainable, write_run
+
+ORIGINAL: Final = "original"
+"""Folder of a run for what came with it."""
+BUCKET: Final = "data/minio/bucket"
+"""Where deepracer-for-cloud's own storage keeps models."""
+_WORLD: Final = re.compile(r"[A-Za-z0-9_-]{1,100}")
+_ALIKE: Final = ("reinvent_base", "reinvent_carpet", "reinvent_concrete", "reinvent_wood")  # the route of 2018
+
+
+@dataclass
+class _Model:
+    """What was read so far."""
+
+    source: Source
+    root: str
+    kind: str = "folder of a model"
+    drfc: DrfcSettings | None = None
+    used: dict[str, str] = field(default_factory=dict)
+    unused: dict[str, str] = field(default_factory=dict)
+    unknown: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def find(self, name: str) -> str:
+        """Path of a settings file, or an empty string."""
+        places = PLACES[name]
+        if self.drfc is not None and name in self.drfc.files:
+            places = (f"{CUSTOM_FILES}/{self.drfc.files[name]}", *places)
+        found = [self.root + place for place in places if self.root + place in self.source.files]
+        return found[0] if found else ""
+
+    def shown(self, name: str) -> str:
+        """A path below the model's root."""
+        return name.removeprefix(self.root)
+
+
+def import_run(
+    path: str | Path,
+    *,
+    root: str | Path = "runs",
+    name: str | None = None,
+    track: str = "",
+    reward: str | Path = "",
+    network: str = "",
+) -> ImportedRun:
+    """Make a run from files of the original.
+
+    Args:
+        path: A deepracer-for-cloud folder, a model's folder or archive, or a ``reward_function.py``.
+        root: Where runs lie.
+        name: Name of the run; by default made from the model's.
+        track: Name or file of a track, instead of the world that the files name.
+        reward: Preset or file, instead of the reward function among the files.
+        network: Instead of the network that the files name.
+
+    Raises:
+        RacecraftError: Nothing is understood, something is wrong in the files, or hostile. No run was made.
+    """
+    with open_source(path) as source:
+        model = _Model(source, "" if source.reward else find_root(source.files, source=source.title))
+        params, given = _read_params(model)
+        text = _read_reward(model, reward)
+        metadata = _read_metadata(model)
+        hyperparameters = _read_hyperparameters(model)
+        if hyperparameters is not None:
+            hyperparameters.check_algorithm(metadata.training_algorithm)
+        where, label = _find_track(model, params, given, track)
+        job = job_settings(params, given)
+        model.used.update(job.used)
+        model.unused.update(job.unused)
+        settings = make_settings(
+            metadata=metadata, hyperparameters=hyperparameters, network=network, track=label, **job.values
+        )
+        require_trainable(settings, metadata)
+        if network:
+            model.used[f"--network {network}"] = "network"
+        rules = _race_rules(model, settings.direction)
+
+        folder = RunFolder.create(root, name=name, prefix=_prefix(model))
+        try:
+            history = keep_history(_history_files(model), _history_root(model), folder.path / ORIGINAL)
+            report = _report(model, folder, where, history)
+            if rules is not None:
+                write_json(folder.race_rules, rules.to_dict())
+            (folder.path / ORIGINAL).mkdir(exist_ok=True)
+            write_json(folder.path / ORIGINAL / "import.json", {**report.to_dict(), "source": source.title})
+            params = replace(params, world_name=where.name)
+            write_run(folder, settings, where, text, metadata, hyperparameters, params)
+        except BaseException as error:
+            shutil.rmtree(folder.path, ignore_errors=True)
+            if isinstance(error, OSError):
+                raise RunError(f"{folder.path} cannot be written: {error.strerror or error}.") from error
+            raise
+        return report
+
+
+def _read_params(model: _Model) -> tuple[TrainingParams, dict[str, str]]:
+    """The job's settings, and which of them were given; says what kind of model it is."""
+    source = model.source
+    if source.reward:
+        model.kind = "reward function"
+    envs = [name for name in (model.find(SYSTEM_ENV), model.find(RUN_ENV)) if name]
+    if envs or any(name.startswith(f"{model.root}{CUSTOM_FILES}/") for name in source.files):
+        model.kind = "deepracer-for-cloud folder"
+        read = [parse_env(source.text(name), name=model.shown(name)) for name in envs]
+        env = EnvFile(
+            {key: setting for file in read for key, setting in file.settings.items()},
+            tuple(note for file in read for note in file.notes),
+        )
+        drfc = model.drfc = read_drfc(env, name=RUN_ENV)
+        for aws, place in drfc.files.items():
+            if place != aws and f"{model.root}{CUSTOM_FILES}/{place}" not in source.files:
+                raise SourceError(f"run.env names {place!r} as the {aws}, but {CUSTOM_FILES}/{place} is not there.")
+        model.used.update(drfc.used)
+        model.unused.update(drfc.without_effect)
+        model.unknown.update(drfc.unknown)
+        model.notes += drfc.notes
+        if drfc.is_pretrained:
+            model.notes.append("The model was to go on from another one's weights; this run begins with fresh ones.")
+        return drfc.params, drfc.given
+    place = model.find(TRAINING_PARAMS)
+    if not place:
+        return TrainingParams(), {}
+    params = TrainingParams.from_yaml(source.text(place), name=model.shown(place))
+    given = {key: f"{key.upper()}: {getattr(params, key)}" for key in params.given}
+    model.used[model.shown(place)] = "settings of the training"
+    model.unused.update(dict.fromkeys(map(str, params.extra), "kept in training_params.yaml, means nothing here"))
+    return params, given
+
+
+def _read_reward(model: _Model, reward: str | Path) -> str:
+    name = model.source.reward or model.find(REWARD)
+    if reward:
+        text = load_reward(reward)
+        model.used[f"--reward {reward}"] = REWARD
+        if name:
+            model.unused[model.shown(name)] = "--reward was given"
+    elif not name:
+        raise SourceError(
+            f"{model.source.title} has no {REWARD}, without which nothing can be trained.",
+            hint="Give one with --reward: a file, or a preset such as centerline; 'racecraft reward list' lists them.",
+        )
+    else:
+        text = model.source.text(name)
+        model.used[model.shown(name)] = REWARD
+    validate_reward(text)
+    model.notes += [f"warning: {problem}" for problem in check_reward(text)[:3]]
+    return text
+
+
+def _read_metadata(model: _Model) -> ModelMetadata:
+    name = model.find(METADATA)
+    if not name:
+        model.notes.append(f"There is no {METADATA}: Racecraft's own actions and network were chosen.")
+        return ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
+    shown = model.shown(name)
+    metadata = ModelMetadata.from_dict(parse_json_object(model.source.text(name), name=shown), name=shown)
+    model.used[shown] = f"{_actions(metadata)}, {metadata.neural_network}, version {metadata.version}"
+    model.notes += metadata.notes
+    return metadata
+
+
+def _actions(metadata: ModelMetadata) -> str:
+    space = metadata.action_space
+    return f"{space.size} actions" if space.kind == "discrete" else "continuous actions"
+
+
+def _read_hyperparameters(model: _Model) -> Hyperparameters | None:
+    name = model.find(HYPERPARAMETERS)
+    if not name:
+        model.notes.append(f"There is no {HYPERPARAMETERS}: it trains with Racecraft's own settings.")
+        return None
+    shown = model.shown(name)
+    hyperparameters = Hyperparameters.from_dict(parse_json_object(model.source.text(name), name=shown), name=shown)
+    episodes = hyperparameters.num_episodes_between_training
+    model.used[shown] = f"PPO as AWS's, {episodes} episodes to an iteration"
+    model.notes += hyperparameters.notes
+    return hyperparameters
+
+
+def _find_track(model: _Model, params: TrainingParams, given: dict[str, str], chosen: str) -> tuple[Track, str]:
+    """The track, and what run.json calls it."""
+    label = given.get("world_name", "")
+    if chosen:
+        track = load_track(chosen)
+        if label:
+            model.used[label] = f"track {track.name}, as --track says"
+        return track, chosen
+    if not label:
+        model.notes.append(f"No file names a track: {DEFAULT_TRACK} was chosen. --track chooses another.")
+        return load_track(DEFAULT_TRACK), DEFAULT_TRACK
+    world = params.world_name
+    try:
+        if not _WORLD.fullmatch(world):  # a name from a stranger must not become a path
+            raise TrackNotFound("not a name")
+        track = load_track(world)
+    except TrackNotFound as error:
+        alike = f"--track {DEFAULT_TRACK} is much like it." if world in _ALIKE else did_you_mean(world, track_names())
+        raise TrackNotFound(
+            f"The model drives on {world[:80]!r}, which is not among Racecraft's tracks.",
+            hint=f"Give its route with --track FILE.npy, or another track with --track NAME. {alike}".rstrip(),
+        ) from error
+    model.used[label] = f"track {track.name}"
+    return track, world
+
+
+def _race_rules(model: _Model, direction: str) -> RaceRules | None:
+    drfc = model.drfc
+    if drfc is None or drfc.rules is None:
+        return None
+    rules = drfc.rules
+    if "is_reverse" not in drfc.rules_given:
+        rules = replace(rules, direction="reverse" if direction == "reverse" else "forward")
+    for rule, label in drfc.rules_given.items():
+        value = rules.direction if rule == "is_reverse" else getattr(rules, rule)
+        model.used[label] = f"race_rules.json: {'direction' if rule == 'is_reverse' else rule} {value}"
+    if not rules.is_continuous and "max_resets" in drfc.rules_given:
+        model.notes.append("DR_EVAL_MAX_RESETS has no effect: without DR_EVAL_IS_CONTINUOUS a mistake ends the trial.")
+    return rules
+
+
+def _prefix(model: _Model) -> str:
+    if model.drfc is not None and model.drfc.prefix:
+        return model.drfc.prefix
+    return model.root.rstrip("/").rpartition("/")[2] or model.source.stem
+
+
+def _history_root(model: _Model) -> str:
+    """The folder that the history's paths are kept below."""
+    if model.drfc is None:
+        return model.root
+    return f"{model.root}{BUCKET}/{model.drfc.prefix or 'rl-deepracer-sagemaker'}/"
+
+
+def _history_files(model: _Model) -> list[SourceFile]:
+    root = _history_root(model)
+    reward = model.source.reward
+    return [file for name, file in model.source.files.items() if name.startswith(root) and name != reward]
+
+
+def _report(model: _Model, folder: RunFolder, track: Track, history: History) -> ImportedRun:
+    model.unused.update(unused_files(_history_files(model), _history_root(model)))
+    model.unused.update({name: f"left out: {why}" for name, why in history.refused.items()})
+    if model.source.num_links:
+        model.unused[f"{model.source.num_links} links"] = "links are not followed"
+    return ImportedRun(
+        run=folder.path,
+        kind=f"{model.kind}, {model.source.title}",
+        track=track.name,
+        used=model.used,
+        unused=model.unused,
+        unknown=model.unknown,
+        kept=history.files,
+        notes=model.notes,
+    )

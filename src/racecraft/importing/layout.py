@@ -1,0 +1,102 @@
+"""Where things lie in the folders of the original, and what each file is for.
+
+Layouts: deepracer-for-cloud's working folder, the folder of a model (its S3 prefix), the console's downloads of models
+and logs, DeepRacer on AWS. All of them differ only in where the same few files lie.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Final, Literal
+
+from racecraft.errors import SourceError
+from racecraft.importing.archive import is_archive_name
+
+Role = Literal["settings", "trace", "metrics", "log", "weights", "video", "code", "archive", "other"]
+
+REWARD: Final = "reward_function.py"
+METADATA: Final = "model_metadata.json"
+HYPERPARAMETERS: Final = "hyperparameters.json"
+TRAINING_PARAMS: Final = "training_params.yaml"
+RUN_ENV: Final = "run.env"
+SYSTEM_ENV: Final = "system.env"
+CUSTOM_FILES: Final = "custom_files"
+
+PLACES: Final[Mapping[str, tuple[str, ...]]] = {
+    REWARD: (f"{CUSTOM_FILES}/{REWARD}", REWARD),
+    METADATA: (f"{CUSTOM_FILES}/{METADATA}", METADATA, f"model/{METADATA}"),
+    HYPERPARAMETERS: (f"{CUSTOM_FILES}/{HYPERPARAMETERS}", HYPERPARAMETERS, f"ip/{HYPERPARAMETERS}"),
+    TRAINING_PARAMS: (TRAINING_PARAMS,),
+    RUN_ENV: (RUN_ENV,),
+    SYSTEM_ENV: (SYSTEM_ENV,),
+}
+"""Where a settings file may lie below a model's root, the first one counts."""
+
+_MARKS: Final = sorted({place for places in PLACES.values() for place in places}, key=lambda place: -place.count("/"))
+_PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}")
+_BOOKKEEPING: Final = (".coach_checkpoint", "checkpoint", "deepracer_checkpoints.json", ".ready", ".lock", ".finished")
+_WEIGHTS: Final = re.compile(r".*\.(ckpt\..*|ckpt|index|meta|data-\d+-of-\d+|pb|pbtxt|h5|tflite|onnx|pt|pth)")
+_FOLDERS_OF_OTHERS: Final = ("defaults", "data", "experiments")  # of deepracer-for-cloud, beside the model's own files
+
+
+def role(name: str) -> Role:
+    """What a file is for, by its path."""
+    parts = name.split("/")
+    base, parent = parts[-1], parts[-2] if len(parts) > 1 else ""
+    if base in PLACES or (parent == CUSTOM_FILES and base.endswith(".json")):
+        return "settings"
+    if base.endswith("-iteration.csv") and parent in ("training-simtrace", "evaluation-simtrace"):
+        return "trace"
+    if base in _BOOKKEEPING or _WEIGHTS.fullmatch(base):
+        return "weights"
+    if base.endswith(".json") and ("metrics" in parts[:-1] or re.match(r"(Training|Evaluation)Metrics", base)):
+        return "metrics"
+    if base.endswith(".log"):
+        return "log"
+    if base.endswith((".mp4", ".png", ".jpg", ".jpeg")):
+        return "video"
+    if base.endswith(".py"):
+        return "code"
+    return "archive" if is_archive_name(base) else "other"
+
+
+def is_plain(name: str) -> bool:
+    """Whether a path can be kept as it is: no odd characters, no hidden files."""
+    return all(_PLAIN.fullmatch(part) and not part.endswith(".") for part in name.split("/"))
+
+
+def find_root(names: Iterable[str], *, source: str) -> str:
+    """The folder of the model among all files: ``""``, or a path that ends in ``/``.
+
+    Args:
+        names: Relative paths of all files.
+        source: What messages call it.
+
+    Raises:
+        SourceError: There are several models, or nothing that is understood.
+    """
+    roots: dict[str, bool] = {}  # folder -> is there a reward function
+    has_history = False
+    for name in names:
+        has_history = has_history or role(name) in ("trace", "metrics", "weights", "log")
+        for mark in _MARKS:
+            if name == mark or name.endswith(f"/{mark}"):
+                root = name[: -len(mark)]
+                roots[root] = roots.get(root, False) or mark.endswith(REWARD)
+                break
+    if not roots:
+        if has_history:
+            return ""
+        raise SourceError(
+            f"{source} holds nothing that is understood: neither {REWARD} nor {METADATA} nor {RUN_ENV}.",
+            hint="Name a deepracer-for-cloud folder, a model's folder or archive, or a reward function's file.",
+        )
+    own = {root: has for root, has in roots.items() if not set(root.split("/")) & set(_FOLDERS_OF_OTHERS)} or roots
+    candidates = [root for root, has_reward in own.items() if has_reward] or list(own)
+    outer = min(root.count("/") for root in candidates)
+    found = sorted(root for root in candidates if root.count("/") == outer)
+    if len(found) > 1:
+        listed = ", ".join(ascii(root.rstrip("/"))[:80] for root in found[:5])
+        raise SourceError(f"{source} holds {len(found)} models: {listed}.", hint="Import the folder of one of them.")
+    return found[0]

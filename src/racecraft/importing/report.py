@@ -1,0 +1,84 @@
+"""What an import found: what was understood and became what, what was not, and how to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from racecraft.importing.layout import Role, role
+from racecraft.importing.source import SourceFile
+
+_WHY: dict[Role, str] = {
+    "weights": "TensorFlow's weights: Racecraft reads none of its files, so training begins with fresh weights",
+    "video": "videos and pictures are not needed",
+    "code": "code besides the reward function is neither run nor kept",
+    "archive": "archives inside are not opened; import one by itself",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportedRun:
+    """A run made from files of the original, ready to be trained."""
+
+    run: Path
+    """Its folder."""
+    kind: str
+    """What was imported."""
+    track: str
+    """Where it drives."""
+    used: dict[str, str] = field(default_factory=dict)
+    """Files and settings that were understood, and what each became."""
+    unused: dict[str, str] = field(default_factory=dict)
+    """Files and settings that have no effect, and why."""
+    unknown: dict[str, str] = field(default_factory=dict)
+    """Settings that nobody here knows, and a suggestion or an empty string."""
+    kept: list[str] = field(default_factory=list)
+    """Metrics, sim-traces and logs of the original, below ``original/``."""
+    notes: list[str] = field(default_factory=list)
+    """Sentences for the user."""
+
+    @property
+    def next_command(self) -> str:
+        """What trains it."""
+        return f"racecraft train --resume {_quoted(self.run)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        return {
+            "run": str(self.run),
+            "kind": self.kind,
+            "track": self.track,
+            "used": self.used,
+            "unused": self.unused,
+            "unknown": self.unknown,
+            "kept": self.kept,
+            "notes": self.notes,
+            "next": self.next_command,
+        }
+
+
+def unused_files(files: Iterable[SourceFile], root: str) -> dict[str, str]:
+    """Files that are not taken over for what they are: a line for each kind, with the number and size."""
+    found: dict[Role, list[SourceFile]] = {}
+    for file in files:
+        found.setdefault(role(file.name), []).append(file)
+    lines = {}
+    for kind, why in _WHY.items():
+        if kind in found:
+            names = sorted(file.name.removeprefix(root) for file in found[kind])
+            size = sum(file.size for file in found[kind])
+            more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+            lines[f"{names[0]}{more} ({_size(size)})"] = why
+    return lines
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:,.1f} MB" if count >= 100_000 else f"{count:,} bytes"
+
+
+def _quoted(path: Path) -> str:
+    import shlex
+
+    return shlex.quote(str(path))

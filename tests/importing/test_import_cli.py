@@ -1,0 +1,60 @@
+"""`racecraft import`, as a user types it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import models
+import pytest
+
+from racecraft import cli
+from racecraft.run import RunFolder
+
+
+def racecraft(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: str) -> tuple[int, str]:
+    monkeypatch.setattr(sys, "argv", ["racecraft", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    printed = capsys.readouterr()
+    assert isinstance(ended.value.code, int)
+    return ended.value.code, printed.out
+
+
+def test_it_says_what_it_did_and_how_to_go_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    env = models.DRFC["run.env"] + "DR_WORLD_NAM=x\nDR_LOCAL_S3_PRETRAINED=True\n"
+    folder = models.as_folder({**models.DRFC, "run.env": env}, tmp_path / "drfc")
+    status, out = racecraft(capsys, monkeypatch, "import", str(folder), "--name", "mine", "--track", "kidney")
+    assert status == 0
+    for words in (
+        "deepracer-for-cloud folder, folder drfc, to drive on kidney",
+        "DR_WORLD_NAME=oval  track kidney, as --track says",
+        "DR_WORKERS  cars drive side by side",
+        "DR_WORLD_NAM  unknown, has no effect. Did you mean 'DR_WORLD_NAME'?",
+        "2 metrics, sim-traces and logs",
+        "TensorFlow's weights",
+        "begins with fresh ones",
+        "racecraft train --resume runs/mine",
+    ):
+        assert words in out, words
+    status, out = racecraft(capsys, monkeypatch, "import", str(folder), "--runs", "other", "--json")
+    document = json.loads(out)
+    assert status == 0
+    assert Path(document["run"]).parent == Path("other")
+    assert RunFolder.open(document["run"]).name in document["next"]
+    assert document["unknown"] == {"DR_WORLD_NAM": "Did you mean 'DR_WORLD_NAME'?"}
+
+
+def test_a_refusal_is_one_json_object(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.tar.gz").write_bytes(b"\x1f\x8bnonsense")
+    status, out = racecraft(capsys, monkeypatch, "import", "model.tar.gz", "--json")
+    assert status == 1
+    assert json.loads(out)["error"]["code"] == "ArchiveError"
+    assert not Path("runs").exists()
