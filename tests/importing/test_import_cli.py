@@ -32,7 +32,7 @@ def test_it_says_what_it_did_and_how_to_go_on(
     assert status == 0
     for words in (
         "deepracer-for-cloud folder, folder drfc, to drive on kidney",
-        "DR_WORLD_NAME=oval  track kidney, as --track says",
+        "DR_WORLD_NAME=oval  --track was given",
         "DR_WORKERS  cars drive side by side",
         "DR_WORLD_NAM  unknown, has no effect. Did you mean 'DR_WORLD_NAME'?",
         "2 metrics, sim-traces and logs",

@@ -235,7 +235,7 @@ def test_options_go_before_files(tmp_path: Path) -> None:
     )
     assert found.track == "route"
     assert found.unused["reward_function.py"] == "--reward was given"
-    assert found.used["WORLD_NAME: oval"] == "track route, as --track says"
+    assert found.unused["WORLD_NAME: oval"] == "--track was given"
     folder = RunFolder.open(found.run)
     assert (folder.path / "training_params.yaml").read_text().startswith("WORLD_NAME: route\n")
     assert folder.read_reward_function() != models.REWARD

@@ -224,8 +224,9 @@ def _find_track(model: _Model, params: TrainingParams, given: dict[str, str], ch
     label = given.get("world_name", "")
     if chosen:
         track = load_track(chosen)
+        model.used[f"--track {chosen}"] = f"track {track.name}"
         if label:
-            model.used[label] = f"track {track.name}, as --track says"
+            model.unused[label] = "--track was given"
         return track, chosen
     if not label:
         model.notes.append(f"No file names a track: {DEFAULT_TRACK} was chosen. --track chooses another.")
