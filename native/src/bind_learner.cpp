@@ -10,6 +10,7 @@
 #include <string>
 #include <tuple>
 
+#include "distributions.hpp"
 #include "learner.hpp"
 #include "learner_profile.hpp"
 
@@ -56,26 +57,33 @@ void check_states(const Network& network, const In<float, 2>& states, size_t cou
 std::tuple<double, double, double, double, double, double> update(
     Learner& self, const In<uint8_t, 4>& observations, const In<float, 2>& states,
     const In<int64_t, 1>& action_indices, const In<float, 2>& actions, const In<float, 1>& log_probs,
-    const In<float, 1>& advantages, const In<float, 1>& returns, const Objective& objective) {
+    const In<float, 1>& advantages, const In<float, 1>& returns, const In<int64_t, 1>& rows,
+    const Objective& objective) {
     const Network& network = self.network();
     const size_t num_actions = static_cast<size_t>(network.spec.num_actions);
-    const size_t size = checked_count(network, observations);
-    check_states(network, states, size);
-    require(size > 0, "A minibatch needs at least one sample.");
-    require(log_probs.shape(0) == size && advantages.shape(0) == size && returns.shape(0) == size,
+    const size_t count = checked_count(network, observations);
+    check_states(network, states, count);
+    require(rows.shape(0) > 0, "A minibatch needs at least one sample.");
+    require(log_probs.shape(0) == count && advantages.shape(0) == count && returns.shape(0) == count,
             "The arrays of a minibatch differ in length.");
+    for (size_t i = 0; i < rows.shape(0); ++i) {
+        require(rows(i) >= 0 && static_cast<size_t>(rows(i)) < count,
+                "A row of the minibatch is not one of its arrays'.");
+    }
     if (network.spec.is_discrete) {
-        require(action_indices.shape(0) == size, "The arrays of a minibatch differ in length.");
-        for (size_t i = 0; i < size; ++i) {
-            require(action_indices(i) >= 0 && static_cast<size_t>(action_indices(i)) < num_actions,
+        require(action_indices.shape(0) == count, "The arrays of a minibatch differ in length.");
+        for (size_t i = 0; i < rows.shape(0); ++i) {
+            const int64_t action = action_indices(static_cast<size_t>(rows(i)));
+            require(action >= 0 && static_cast<size_t>(action) < num_actions,
                     "An action of the minibatch is not one of this network's.");
         }
     } else {
-        require(actions.shape(0) == size && actions.shape(1) == num_actions,
+        require(actions.shape(0) == count && actions.shape(1) == num_actions,
                 "The actions of a minibatch are not of this network's shape.");
     }
-    const Minibatch minibatch{size,           observations.data(), states.data(),     action_indices.data(),
-                              actions.data(), log_probs.data(),    advantages.data(), returns.data()};
+    const Minibatch minibatch{rows.shape(0),    rows.data(),           observations.data(),
+                              states.data(),    action_indices.data(), actions.data(),
+                              log_probs.data(), advantages.data(),     returns.data()};
     nb::gil_scoped_release release;
     const UpdateStats s = self.update(minibatch, objective);
     return {s.policy_loss, s.value_loss, s.entropy, s.approx_kl, s.clip_fraction, s.grad_norm};
@@ -106,19 +114,19 @@ void bind_learner(nb::module_& m) {
     nb::class_<Learner>(m, "Learner", "A network that learns; see racecraft.learn.native_learner.")
         .def(
             "__init__",
-            [](Learner* self, int height, int width, int pool, int block,
+            [](Learner* self, int height, int width, int top, int pool, int block,
                const std::vector<std::tuple<int, int, int>>& convs, const std::vector<int>& dense,
                int num_actions, bool is_discrete, int state_size, const std::vector<int>& critic_units,
                int num_threads) {
-                NetworkSpec spec{height, width,       pool,        block,      {},
-                                 dense,  num_actions, is_discrete, state_size, critic_units};
+                NetworkSpec spec{height,      width,       pool,       block,        {}, dense,
+                                 num_actions, is_discrete, state_size, critic_units, top};
                 for (const auto& [filters, kernel, stride] : convs) {
                     spec.convs.push_back({filters, kernel, stride});
                 }
                 new (self) Learner(spec, num_threads);
             },
-            nb::kw_only(), "height"_a, "width"_a, "pool"_a, "block"_a, "convs"_a, "dense"_a, "num_actions"_a,
-            "is_discrete"_a, "state_size"_a, "critic_units"_a, "num_threads"_a)
+            nb::kw_only(), "height"_a, "width"_a, "top"_a, "pool"_a, "block"_a, "convs"_a, "dense"_a,
+            "num_actions"_a, "is_discrete"_a, "state_size"_a, "critic_units"_a, "num_threads"_a)
         .def(
             "encode",
             [](Learner& self, In<uint8_t, 3> frames) {
@@ -164,7 +172,7 @@ void bind_learner(nb::module_& m) {
             },
             "observations"_a, "states"_a)
         .def("update", &update, "observations"_a, "states"_a, "action_indices"_a, "actions"_a, "log_probs"_a,
-             "advantages"_a, "returns"_a, "objective"_a)
+             "advantages"_a, "returns"_a, "rows"_a, "objective"_a)
         .def(
             "read",
             [](Learner& self, const std::string& part) {
@@ -199,6 +207,71 @@ void bind_learner(nb::module_& m) {
         .def_ro("seconds", &LayerTime::seconds);
     m.def("peak_operations_per_second", &peak_operations_per_second,
           "Fused multiply-adds on registers alone, counted as two operations each, on one thread.");
+
+    m.def(
+        "sample_categorical",
+        [](In<float, 2> logits, In<double, 1> uniforms) {
+            require(logits.shape(1) > 0 && uniforms.shape(0) == logits.shape(0),
+                    "Sampling needs one uniform number for each row of logits.");
+            auto actions = new_array<int64_t, 1>({logits.shape(0)});
+            sample_categorical(logits.data(), uniforms.data(), logits.shape(0), logits.shape(1),
+                               actions.data());
+            return actions;
+        },
+        "logits"_a, "uniforms"_a, "Indices drawn from a categorical policy.");
+    m.def(
+        "categorical_log_probs",
+        [](In<float, 2> logits, In<int64_t, 1> actions) {
+            require(actions.shape(0) == logits.shape(0), "Each row of logits needs one action.");
+            for (size_t i = 0; i < actions.shape(0); ++i) {
+                require(actions(i) >= 0 && static_cast<size_t>(actions(i)) < logits.shape(1),
+                        "An action is not one of the policy's.");
+            }
+            auto log_probs = new_array<float, 1>({logits.shape(0)});
+            categorical_log_probs(logits.data(), actions.data(), logits.shape(0), logits.shape(1),
+                                  log_probs.data());
+            return log_probs;
+        },
+        "logits"_a, "actions"_a, "Log-probability of each action.");
+    m.def(
+        "sample_gaussian",
+        [](In<float, 2> outputs, In<double, 2> normals) {
+            const size_t rows = outputs.shape(0), num_actions = normals.shape(1);
+            require(outputs.shape(1) == 2 * num_actions && normals.shape(0) == rows,
+                    "Sampling needs one normal number for each mean.");
+            auto actions = new_array<float, 2>({rows, num_actions});
+            sample_gaussian(outputs.data(), normals.data(), rows, num_actions, actions.data());
+            return actions;
+        },
+        "outputs"_a, "normals"_a, "Actions drawn from a Gaussian policy, not clipped.");
+    m.def(
+        "gaussian_log_probs",
+        [](In<float, 2> outputs, In<float, 2> actions) {
+            const size_t rows = outputs.shape(0), num_actions = actions.shape(1);
+            require(outputs.shape(1) == 2 * num_actions && actions.shape(0) == rows,
+                    "Each mean needs one action.");
+            auto log_probs = new_array<float, 1>({rows});
+            gaussian_log_probs(outputs.data(), actions.data(), rows, num_actions, log_probs.data());
+            return log_probs;
+        },
+        "outputs"_a, "actions"_a, "Log-density of each action.");
+    m.def(
+        "standard_normals",
+        [](In<double, 1> uniforms) {
+            require(uniforms.shape(0) % 2 == 0, "Normal numbers are made in pairs.");
+            auto normals = new_array<double, 1>({uniforms.shape(0)});
+            standard_normals(uniforms.data(), uniforms.shape(0) / 2, normals.data());
+            return normals;
+        },
+        "uniforms"_a, "Standard normal numbers from as many uniform ones in [0, 1).");
+    m.def(
+        "moments",
+        [](In<float, 1> values) {
+            require(values.shape(0) > 0, "No numbers have no mean.");
+            const Moments moments = moments_of(values.data(), values.shape(0));
+            return std::make_tuple(moments.mean, moments.spread);
+        },
+        "values"_a, "Mean and standard deviation, summed up from first to last.");
 
     m.def(
         "orthonormalize",

@@ -132,14 +132,14 @@ UpdateStats Learner::update(const Minibatch& minibatch, const Objective& objecti
     const std::lock_guard lock(mutex_);
     const size_t size = minibatch.size;
     prepare_training(size);
+    gather_states(minibatch);
     transpose();
     const size_t num_groups = std::clamp((size + kMinGroupSize - 1) / kMinGroupSize, size_t{1}, kMaxGroups);
     for_each_task(num_groups, [&](Worker& worker, size_t group) {
         run_group(worker, minibatch, objective, group, num_groups);
     });
     // as a float, so that a norm whose squares Adam could not hold counts as infinite
-    const double norm =
-        std::sqrt(static_cast<double>(static_cast<float>(sum_over_tasks(num_groups, minibatch))));
+    const double norm = std::sqrt(static_cast<double>(static_cast<float>(sum_over_tasks(num_groups, size))));
 
     LossTerms sum;
     for (size_t i = 0; i < size; ++i) {
@@ -239,6 +239,16 @@ void Learner::backward(const Tower& tower, const float* in, size_t samples, cons
     }
 }
 
+// Dense layers sum up over the whole minibatch, so its states must lie side by side.
+void Learner::gather_states(const Minibatch& minibatch) {
+    const size_t width = static_cast<size_t>(network_.spec.state_size);
+    if (width == 0) return;
+    kept_states_.resize(minibatch.size * width);
+    for (size_t i = 0; i < minibatch.size; ++i) {
+        std::copy_n(minibatch.states + minibatch.row(i) * width, width, kept_states_.data() + i * width);
+    }
+}
+
 void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
                         size_t num_groups) {
     const NetworkSpec& spec = network_.spec;
@@ -253,10 +263,12 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
     const size_t end = (group + 1) * minibatch.size / num_groups;
     for (size_t first = group * minibatch.size / num_groups; first < end; first += kChunk) {
         const size_t samples = std::min(kChunk, end - first);
-        RC_DISPATCH(bytes_to_unit, minibatch.observations + first * observation_size,
-                    samples * observation_size, worker.input.data());
+        for (size_t i = 0; i < samples; ++i) {
+            RC_DISPATCH(bytes_to_unit, minibatch.observations + minibatch.row(first + i) * observation_size,
+                        observation_size, worker.input.data() + i * observation_size);
+        }
         const float* critic_input =
-            network_.critic.sees_camera ? worker.input.data() : minibatch.states + first * spec.state_size;
+            network_.critic.sees_camera ? worker.input.data() : kept_states_.data() + first * spec.state_size;
         TowerPointers &policy = worker.policy_at, &critic = worker.critic_at;
         point(network_.policy, worker.policy, &kept_policy_, first, policy);
         point(network_.critic, worker.critic, &kept_critic_, first, critic);
@@ -266,8 +278,8 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
         std::fill_n(policy.grad.back(), samples * policy_stride, 0.0f);  // padding included
         std::fill_n(critic.grad.back(), samples * critic_stride, 0.0f);
         for (size_t i = 0; i < samples; ++i) {
-            const size_t row = first + i;
-            LossTerms& terms = terms_[row];
+            const size_t row = minibatch.row(first + i);
+            LossTerms& terms = terms_[first + i];
             const PolicySample sample{minibatch.log_probs[row], minibatch.advantages[row], weight};
             const float* outputs = policy.out.back() + i * policy_stride;
             float* slope = policy.grad.back() + i * policy_stride;
@@ -287,25 +299,25 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
     }
 }
 
-void Learner::sum_dense(const DenseTask& task, const Minibatch& minibatch) {
+void Learner::sum_dense(const DenseTask& task, size_t size) {
     const Layer& layer = task.tower->layers[task.layer];
     TowerBuffers& kept = task.tower == &network_.policy ? kept_policy_ : kept_critic_;
-    const float* in = task.layer > 0 ? kept.out[task.layer - 1].data() : minibatch.states;
+    const float* in = task.layer > 0 ? kept.out[task.layer - 1].data() : kept_states_.data();
     const size_t width = std::min(kPanel, layer.shape.out_channels - task.panel * kPanel);
     float* rows = gradient_.data() + layer.weights +
                   static_cast<size_t>(task.panel) * kPanel * layer.shape.num_inputs() + task.first * width;
     std::fill_n(rows, (task.last - task.first) * width, 0.0f);
     RC_DISPATCH(layer_weight_gradient, layer.shape, task.panel, task.first, task.last, in,
-                kept.grad[task.layer].data(), minibatch.size, gradient_.data() + layer.weights);
+                kept.grad[task.layer].data(), size, gradient_.data() + layer.weights);
     squares_[static_cast<size_t>(&task - dense_tasks_.data()) + num_blocks(network_.num_grouped)] =
         RC_DISPATCH(sum_of_squares, rows, (task.last - task.first) * width);
 }
 
 // Completes the gradient; returns the sum of its squares.
-double Learner::sum_over_tasks(size_t num_groups, const Minibatch& minibatch) {
+double Learner::sum_over_tasks(size_t num_groups, size_t size) {
     const size_t blocks = num_blocks(network_.num_grouped);
     for_each_task(dense_tasks_.size() + blocks, [&](Worker&, size_t task) {
-        if (task < dense_tasks_.size()) return sum_dense(dense_tasks_[task], minibatch);
+        if (task < dense_tasks_.size()) return sum_dense(dense_tasks_[task], size);
         const size_t block = task - dense_tasks_.size();
         const size_t first = block * kBlock, count = std::min(kBlock, network_.num_grouped - first);
         RC_DISPATCH(sum_gradients, group_gradients_.data() + first, num_groups, network_.num_grouped, count,

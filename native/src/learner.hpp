@@ -21,16 +21,19 @@
 
 namespace racecraft {
 
-// Samples of one gradient step, B of them.
+// Samples of one gradient step: B rows of arrays that may hold more.
 struct Minibatch {
-    size_t size;
-    const uint8_t* observations;    // (B, observation_size)
-    const float* states;            // (B, state_size)
-    const int64_t* action_indices;  // (B,), discrete; each within [0, num_actions)
-    const float* actions;           // (B, num_actions), continuous
-    const float* log_probs;         // (B,)
-    const float* advantages;        // (B,)
-    const float* returns;           // (B,)
+    size_t size;                    // B
+    const int64_t* rows;            // (B,), null for the first B
+    const uint8_t* observations;    // (M, observation_size)
+    const float* states;            // (M, state_size)
+    const int64_t* action_indices;  // (M,), discrete; each within [0, num_actions)
+    const float* actions;           // (M, num_actions), continuous
+    const float* log_probs;         // (M,)
+    const float* advantages;        // (M,)
+    const float* returns;           // (M,)
+
+    size_t row(size_t sample) const { return rows == nullptr ? sample : static_cast<size_t>(rows[sample]); }
 };
 
 struct UpdateStats {
@@ -101,8 +104,9 @@ class Learner {
                   float* gradient) const;
     void run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
                    size_t num_groups);
-    void sum_dense(const DenseTask& task, const Minibatch& minibatch);
-    double sum_over_tasks(size_t num_groups, const Minibatch& minibatch);
+    void sum_dense(const DenseTask& task, size_t size);
+    double sum_over_tasks(size_t num_groups, size_t size);
+    void gather_states(const Minibatch& minibatch);
     void step(const Objective& objective, double norm);
     void transpose();
 
@@ -117,8 +121,9 @@ class Learner {
     TowerBuffers kept_policy_,
         kept_critic_;  // of the whole minibatch: what dense layers saw, and their gradients
     size_t kept_size_ = 0;
-    std::vector<LossTerms> terms_;  // (B,)
-    std::vector<double> squares_;   // of the gradient, one sum per task
+    std::vector<float> kept_states_;  // (B, state_size)
+    std::vector<LossTerms> terms_;    // (B,)
+    std::vector<double> squares_;     // of the gradient, one sum per task
     std::vector<DenseTask> dense_tasks_;
     std::vector<TransposeTask> transpose_tasks_;
 };

@@ -1,14 +1,13 @@
 #include "learner_loss.hpp"
 
+#include "distributions.hpp"
 #include "network_math.hpp"
 #include "racecraft/math.hpp"
 
 namespace racecraft {
 namespace {
 
-constexpr double kHalfLogTwoPi = 0.9189385332046727;
 constexpr double kEntropyOfUnitGaussian = 1.4189385332046727;
-constexpr float kLogStdMin = -20.0f, kLogStdMax = 3.0f;  // as in racecraft.learn.distributions
 
 // The policy's part of the loss; returns its derivative by the action's log-probability.
 double surrogate_loss(double log_prob, const PolicySample& sample, const Objective& objective,

@@ -93,7 +93,9 @@ Network::Network(const NetworkSpec& description) : spec(description) {
             "The network's image needs 1 to 4096 columns and at least one row, its pool and block at least 1 "
             "pixel.");
     require(spec.pool <= 2, "The network's pool is " + std::to_string(spec.pool) + ", expected 1 or 2.");
-    require(spec.height % (spec.pool * spec.block) == 0 && spec.width % (spec.pool * spec.block) == 0,
+    require(spec.top >= 0 && spec.top < spec.height, "The network sees no row of its image.");
+    require((spec.height - spec.top) % (spec.pool * spec.block) == 0 &&
+                spec.width % (spec.pool * spec.block) == 0,
             "The network's image does not divide into squares of " + std::to_string(spec.pool * spec.block) +
                 " pixels.");
     require(spec.num_actions > 0 && spec.state_size >= 0,

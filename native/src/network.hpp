@@ -44,8 +44,9 @@ struct NetworkSpec {
     bool is_discrete;
     int state_size;                 // 0: the critic sees the camera
     std::vector<int> critic_units;  // of the critic that sees the state
+    int top = 0;                    // rows of the image, from its top, that the network does not see
 
-    int rows() const { return height / (pool * block); }
+    int rows() const { return (height - top) / (pool * block); }
     int columns() const { return width / (pool * block); }
     int channels() const { return block * block; }
     size_t observation_size() const { return static_cast<size_t>(rows()) * columns() * channels(); }

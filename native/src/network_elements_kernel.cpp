@@ -86,6 +86,7 @@ void fold_frame(const NetworkSpec& spec, const uint8_t* frame, uint8_t* out) {
     const size_t width = static_cast<size_t>(spec.width), columns = static_cast<size_t>(spec.columns());
     const size_t block = static_cast<size_t>(spec.block), channels = block * block;
     const size_t line_width = width / static_cast<size_t>(spec.pool);
+    frame += static_cast<size_t>(spec.top) * width;
     uint8_t line[4096];
     for (size_t row = 0; row < static_cast<size_t>(spec.rows()); ++row) {
         for (size_t y = 0; y < block; ++y) {

@@ -28,7 +28,8 @@ struct AdamStep {
 // layer_weight_gradient: adds to rows [first, last) of one panel of `gradient`; rows are the layer's inputs.
 // activation_gradient: multiplies grad by the activation's slope at `out`, and adds the positions' sum to
 // bias_gradient. transpose_weights: one panel of one run; panels of run_length lanes, (out_channels, lanes of
-// the panel) within each, run by run. fold_frame: pools one image and folds blocks of pixels into channels.
+// the panel) within each, run by run. fold_frame: pools the rows of an image that are seen and folds blocks
+// of pixels into channels.
 // sum_gradients: out = parts[0] + parts[1] + ..., each `stride` apart.
 // sum_of_squares: in double.
 // orthonormalize: makes `count` independent vectors orthonormal, each from itself and those before it (Gram

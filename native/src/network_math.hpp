@@ -1,5 +1,5 @@
-// exp, log and tanh of the network and its loss: the same bits everywhere, like racecraft/math.hpp, in
-// double.
+// exp, log, tanh, sine and cosine of the network, its loss and its policy: the same bits everywhere, like
+// racecraft/math.hpp, in double.
 #pragma once
 
 #include <bit>
@@ -60,6 +60,33 @@ RC_HD double log_of(double x) {
     sum = sum * s2 + 1.0 / 3.0;
     sum = sum * s2 + 1.0;
     return x == x ? k * 0.69314718055994530942 + 2.0 * s * sum : x;
+}
+
+// Sine and cosine of 2 pi * turn, for turn in [0, 1); absolute error below 1e-15.
+RC_HD void sincos_of_turn(double turn, double& sine, double& cosine) {
+    const int64_t quadrant = static_cast<int64_t>(4.0 * turn + 0.5);  // 0 to 4
+    const double r = (turn - 0.25 * static_cast<double>(quadrant)) * 6.28318530717958647692;
+    const double r2 = r * r;  // Taylor's series; |r| <= pi/4, so what follows is below 1e-17
+    double s = -1.0 / 1307674368000.0;
+    s = s * r2 + 1.0 / 6227020800.0;
+    s = s * r2 - 1.0 / 39916800.0;
+    s = s * r2 + 1.0 / 362880.0;
+    s = s * r2 - 1.0 / 5040.0;
+    s = s * r2 + 1.0 / 120.0;
+    s = s * r2 - 1.0 / 6.0;
+    s = r + r * r2 * s;
+    double c = 1.0 / 20922789888000.0;
+    c = c * r2 - 1.0 / 87178291200.0;
+    c = c * r2 + 1.0 / 479001600.0;
+    c = c * r2 - 1.0 / 3628800.0;
+    c = c * r2 + 1.0 / 40320.0;
+    c = c * r2 - 1.0 / 720.0;
+    c = c * r2 + 1.0 / 24.0;
+    c = 1.0 - 0.5 * r2 + r2 * r2 * c;
+    const bool swap = (quadrant & 1) != 0;
+    const double sine_of_r = swap ? c : s, cosine_of_r = swap ? s : c;
+    sine = (quadrant & 2) != 0 ? -sine_of_r : sine_of_r;
+    cosine = ((quadrant + 1) & 2) != 0 ? -cosine_of_r : cosine_of_r;
 }
 
 RC_HD float tanh_of(float x) {

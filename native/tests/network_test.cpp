@@ -41,8 +41,8 @@ struct Samples {
     }
 
     Minibatch minibatch() const {
-        return {size,           observations.data(), states.data(),     indices.data(),
-                actions.data(), log_probs.data(),    advantages.data(), returns.data()};
+        return {size,           nullptr,          observations.data(), states.data(), indices.data(),
+                actions.data(), log_probs.data(), advantages.data(),   returns.data()};
     }
 };
 
@@ -187,6 +187,7 @@ std::vector<NetworkSpec> odd_networks() {
         {9, 11, 1, 1, {{3, 3, 2}, {33, 2, 1}, {4, 2, 2}}, {9, 5}, 1, false, 1, {}},
         {7, 7, 1, 1, {{18, 7, 3}}, {34}, 19, true, 0, {}},  // a kernel as large as the image
         {6, 13, 1, 1, {{2, 3, 3}, {1, 1, 2}}, {1}, 2, true, 35, {33}},
+        {26, 16, 2, 4, {{6, 4, 4}}, {5}, 3, true, 2, {4}, 10},  // its upper rows are not seen
     };
 }
 

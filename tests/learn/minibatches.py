@@ -32,7 +32,8 @@ def minibatch_for(learner: Learner, size: int = 192, *, seed: int = 0) -> Miniba
 def reference_tower(spec: NetworkSpec, weights, frames, tower: str) -> np.ndarray:
     """The camera tower in float64."""
     arch = networks.architecture(spec.name)
-    height, width = (side // arch.pool for side in spec.frame_shape)
+    height, width = networks.pooled_shape(spec)
+    frames = frames[:, networks.sky_rows(spec) :]
     pooled = frames.reshape(len(frames), height, arch.pool, width, arch.pool).mean((2, 4))
     x = (np.floor(pooled + 0.5) / 255)[:, None]
     for i, conv in enumerate(arch.convs, 1):
@@ -56,7 +57,8 @@ def reference_gradient(spec: NetworkSpec, weights, frames, minibatch: Minibatch,
     arch = networks.architecture(spec.name)
 
     def camera(tower: str) -> torch.Tensor:
-        x = functional.avg_pool2d(torch.from_numpy(frames).double()[:, None], arch.pool)
+        seen = torch.from_numpy(frames[:, networks.sky_rows(spec) :]).double()[:, None]
+        x = functional.avg_pool2d(seen, arch.pool)
         x = torch.floor(x + 0.5) / 255
         for i, conv in enumerate(arch.convs, 1):
             x = functional.conv2d(x, p[f"{tower}.conv{i}.weight"], p[f"{tower}.conv{i}.bias"], conv.stride).relu()

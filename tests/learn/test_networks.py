@@ -40,13 +40,13 @@ def test_misspelt_network_gets_a_suggestion():
     assert "RACECRAFT_SMALL" in caught.value.hint
 
 
-def test_encode_averages_squares_and_folds_blocks():
+def test_encode_cuts_the_sky_averages_squares_and_folds_blocks():
     spec = NetworkSpec(num_actions=2)
     frames = np.random.default_rng(0).integers(0, 256, (3, 120, 160), dtype=np.uint8)
     observations = networks.encode(spec, frames)
-    assert observations.shape == (3, *networks.observation_shape(spec)) == (3, 15, 20, 16)
-    pooled = np.floor(frames.reshape(3, 60, 2, 80, 2).mean((2, 4)) + 0.5)
-    for row, column, pixel in [(0, 0, 0), (14, 19, 15), (7, 3, 6)]:
+    assert observations.shape == (3, *networks.observation_shape(spec)) == (3, 12, 20, 16)
+    pooled = np.floor(frames[:, 24:].reshape(3, 48, 2, 80, 2).mean((2, 4)) + 0.5)
+    for row, column, pixel in [(0, 0, 0), (11, 19, 15), (7, 3, 6)]:
         y, x = 4 * row + pixel // 4, 4 * column + pixel % 4
         np.testing.assert_array_equal(observations[:, row, column, pixel], pooled[:, y, x])
 

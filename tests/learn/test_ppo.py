@@ -16,9 +16,15 @@ def ppo_for(config: PPOConfig, *, seed: int = 0, spec: NetworkSpec | None = None
     return PPO(config, learner, StripeWorld(config.num_envs, seed=seed, **world), seed=seed)
 
 
+def assert_equal(weights: dict[str, np.ndarray], others: dict[str, np.ndarray]) -> None:
+    assert weights.keys() == others.keys()
+    for name, array in weights.items():
+        np.testing.assert_array_equal(array, others[name], err_msg=name)
+
+
 def assert_same_weights(a: PPO, b: PPO) -> None:
-    for name, array in a.learner.weights().items():
-        np.testing.assert_array_equal(array, b.learner.weights()[name], err_msg=name)
+    assert_equal(a.learner.weights(), b.learner.weights())
+    assert_equal(dict(a.driving_weights), dict(b.driving_weights))
 
 
 @pytest.mark.parametrize("backend", ["native", "torch"])
@@ -63,6 +69,7 @@ def test_the_same_seed_gives_the_same_bits(config):
 
 def test_saved_and_loaded_training_continues_to_the_bit(config):
     straight, resumed = ppo_for(config, seed=3, time_limit=5), ppo_for(config, seed=8, time_limit=5)
+    straight.prefers_average = resumed.prefers_average = True
     for _ in range(2):
         straight.iterate()
     resumed.load_state({name: array.copy() for name, array in straight.state().items()})
@@ -75,9 +82,19 @@ def test_saved_and_loaded_training_continues_to_the_bit(config):
     assert_same_weights(straight, resumed)
 
 
-@pytest.mark.parametrize("missing", ["ppo/counters", "weights/policy.head.bias", "optimizer/step"])
+@pytest.mark.parametrize(
+    "missing",
+    [
+        "ppo/counters",
+        "weights/policy.head.bias",
+        "learning/policy.head.bias",
+        "average/policy.head.bias",
+        "optimizer/step",
+    ],
+)
 def test_damaged_state_is_refused(config, missing):
     ppo = ppo_for(config)
+    ppo.iterate()
     state = ppo.state()
     del state[missing]
     with pytest.raises(CheckpointError):
@@ -88,6 +105,36 @@ def test_state_of_another_number_of_cars_is_refused(config):
     state = ppo_for(dataclasses.replace(config, num_envs=8)).state()
     with pytest.raises(CheckpointError, match="8 cars"):
         ppo_for(config).load_state(state)
+
+
+def test_what_drives_is_the_mean_of_the_weights_once_that_is_preferred(config):
+    ppo = ppo_for(dataclasses.replace(config, average_share=0.5))
+    mean: dict[str, np.ndarray] = {}
+    for iteration in range(1, 6):
+        ppo.iterate()
+        for name, array in ppo.learner.weights().items():
+            part = 1 / (1 + 0.5 * (iteration - 1))
+            mean[name] = array if iteration == 1 else mean[name] + part * (array.astype(float) - mean[name])
+    own = ppo.learner.weights()
+    with ppo.driving():
+        assert_equal(ppo.learner.weights(), own)
+    ppo.prefers_average = True
+    with ppo.driving():
+        inside = ppo.learner.weights()
+    for name, array in mean.items():
+        np.testing.assert_allclose(inside[name], array, atol=1e-6)
+    assert_equal(ppo.learner.weights(), own)
+    assert_equal({key.removeprefix("weights/"): a for key, a in ppo.state().items() if "weights/" in key}, inside)
+
+
+def test_without_averaging_the_last_weights_drive(config):
+    ppo = ppo_for(dataclasses.replace(config, average_share=0.0))
+    ppo.prefers_average = True
+    ppo.iterate()
+    own = ppo.learner.weights()
+    with ppo.driving():
+        assert_equal(ppo.learner.weights(), own)
+    assert not any(name.startswith(("average/", "learning/")) for name in ppo.state())
 
 
 def test_learning_rate_zero_leaves_the_weights(config):
@@ -168,7 +215,7 @@ def test_a_partial_minibatch_is_dropped(config):
     sizes = []
     update = ppo.learner.update
     ppo.learner.update = lambda minibatch, objective: (
-        sizes.append(len(minibatch.returns)),
+        sizes.append(len(minibatch.rows)),
         update(minibatch, objective),
     )[1]
     ppo.iterate()
@@ -180,7 +227,7 @@ def test_advantages_are_normalized_over_the_rollout(config):
     seen = []
     update = ppo.learner.update
     ppo.learner.update = lambda minibatch, objective: (
-        seen.append(minibatch.advantages),
+        seen.append(minibatch.advantages[minibatch.rows]),
         update(minibatch, objective),
     )[1]
     ppo.iterate()
@@ -253,6 +300,16 @@ def test_continuous_commands_stay_within_bounds(config):
         ("update_epochs", 0),
         ("epsilon_end", -0.1),
         ("max_grad_norm", -1.0),
+        ("max_grad_norm", float("inf")),
+        ("num_envs", 64.0),
+        ("num_steps", 7.5),
+        ("minibatch_size", True),
+        ("update_epochs", "3"),
+        ("episodes_per_iteration", 0.5),
+        ("epsilon_steps", -1),
+        ("gamma", "0.9"),
+        ("clip_coef", None),
+        ("average_share", 1.5),
     ],
 )
 def test_impossible_settings_name_themselves(field, value):

@@ -104,6 +104,21 @@ def test_racing_pays_for_metres_along_the_track():
     assert reward("racing", speed=3.0, is_crashed=True) == -1.0
 
 
+def test_lap_time_pays_for_the_metres_gained_since_the_last_step_of_the_same_episode():
+    namespace: dict = {}
+    exec(compile(load_preset("lap_time"), "lap_time", "exec"), namespace)
+    rewards = [
+        namespace["reward_function"](
+            TEMPLATE | ROAD | {"steps": steps, "progress": progress, "track_length": 20.0, "is_offtrack": off}
+        )
+        for steps, progress, off in [
+            *((2.0, 0.5, False), (3.0, 1.5, False), (4.0, 1.0, False)),
+            *((5.0, 3.0, True), (2.0, 0.0, False), (3.0, 0.0, False), (90.0, 50.0, False)),
+        ]
+    ]
+    assert rewards == pytest.approx([0, 0.2, -0.1, -1, 0, 0, 0])
+
+
 @pytest.mark.parametrize("name", preset_names())
 def test_every_preset_is_small_and_finite(name):
     for speed in (0.1, 4.0):

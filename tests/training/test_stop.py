@@ -31,6 +31,9 @@ from racecraft.training import Until
         ("5 laps or 10 minutes", Until(laps=5, seconds=600)),
         ("10 min or 5 laps or 3 steps", Until(laps=5, seconds=600, steps=3)),
         ("0 laps or 9 steps", Until(steps=9)),
+        ("8.8 s lap", Until(lap_time=8.8)),
+        ("9 seconds  lap or 90 s", Until(lap_time=9, seconds=90)),
+        ("5 laps or 8.25s lap", Until(laps=5, lap_time=8.25)),
     ],
 )
 def test_a_text_is_read(text: str, limits: Until) -> None:
@@ -48,6 +51,10 @@ def test_a_text_is_read(text: str, limits: Until) -> None:
         "five laps",
         "5 lap s",
         "5 lapss",
+        "8.8 lap",
+        "9 steps lap",
+        "9 s lap or 8 s lap",
+        "3601 s lap",
         "5 rounds",
         "-5 laps",
         "+5 laps",

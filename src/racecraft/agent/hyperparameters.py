@@ -142,6 +142,7 @@ class Hyperparameters:
             "ent_coef": self.beta_entropy,
             "vf_coef": 0.5,
             "max_grad_norm": 0.0,
+            "average_share": 0.0,
             "update_epochs": self.num_epochs,
             "minibatch_size": self.batch_size,
             "episodes_per_iteration": self.num_episodes_between_training,

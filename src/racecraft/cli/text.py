@@ -25,6 +25,7 @@ SHOWN_LINES = 4  # of what a reward function prints in one situation
 SHOWN_WIDTH = 200  # characters of such a line
 ENDED = {
     "laps": "Learned it",
+    "lap_time": "The lap time is reached",
     "seconds": "Time is up",
     "steps": "All steps are done",
     "episodes": "All episodes are done",

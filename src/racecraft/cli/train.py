@@ -18,7 +18,10 @@ def train(
     track: TrackOption = "reinvent_2018",
     reward: Annotated[str, typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py.")] = "racing",
     until: Annotated[
-        str, typer.Option("--until", "-u", help="When to stop: '5 laps', '10 minutes', '200000 steps', 'A or B'.")
+        str,
+        typer.Option(
+            "--until", "-u", help="When to stop: '5 laps', '8.8 s lap', '10 minutes', '90000 steps', 'A or B'."
+        ),
     ] = "",
     actions: Annotated[
         str, typer.Option("--actions", help="Action space: default, aws, fast or continuous.")

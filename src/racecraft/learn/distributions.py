@@ -1,6 +1,7 @@
-"""Actions from policy outputs, from given noise, in NumPy: categorical, or Gaussian in [-1, 1].
+"""Actions from policy outputs, from given noise: categorical, or Gaussian in [-1, 1].
 
-Pure functions of their arguments, so the seed of the noise decides a run, not the backend.
+Pure functions of their arguments, computed in the native core, so the seed of the noise decides a run: neither the
+backend nor the machine.
 """
 
 from __future__ import annotations
@@ -10,22 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.learn import native_distributions
+
 LOG_STD_MIN = -20.0
 """Lower bound of a Gaussian's log standard deviation, as in AWS's trainer."""
 LOG_STD_MAX = 3.0
 """Upper bound of the same."""
-_HALF_LOG_TWO_PI = 0.9189385332046727
-
-
-def log_softmax(logits: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Log-probabilities of a categorical policy  (N, P) -> (N, P)."""
-    shifted = logits.astype(np.float64) - logits.max(axis=1, keepdims=True)
-    return np.asarray(shifted - np.log(np.exp(shifted).sum(axis=1, keepdims=True)))
 
 
 def noise_for(num_cars: int, *, num_actions: int, is_discrete: bool, rng: np.random.Generator) -> NDArray[np.float64]:
     """The random numbers one step of acting uses: uniforms (N,), or standard normals (N, A)."""
-    return rng.random(num_cars) if is_discrete else rng.standard_normal((num_cars, num_actions))
+    if is_discrete:
+        return rng.random(num_cars)
+    return native_distributions.normals(rng, num_cars * num_actions).reshape(num_cars, num_actions)
 
 
 def sample(outputs: NDArray[np.float32], noise: NDArray[np.float64], *, is_discrete: bool) -> NDArray[Any]:
@@ -39,12 +37,7 @@ def sample(outputs: NDArray[np.float32], noise: NDArray[np.float64], *, is_discr
     Returns:
         Indices int64 (N,), or float32 (N, A), which the caller clips to [-1, 1] before driving.
     """
-    if is_discrete:
-        # invert the cumulative distribution; the last column is open-ended, so rounding cannot run past it
-        cumulative = np.exp(log_softmax(outputs)).cumsum(axis=1)[:, :-1]
-        return np.asarray((noise[:, None] >= cumulative).sum(axis=1), dtype=np.int64)
-    mean, log_std = np.split(outputs.astype(np.float64), 2, axis=1)
-    return np.asarray(mean + np.exp(log_std.clip(LOG_STD_MIN, LOG_STD_MAX)) * noise, dtype=np.float32)
+    return native_distributions.sample(outputs, noise, is_discrete=is_discrete)
 
 
 def most_likely(outputs: NDArray[np.float32], *, is_discrete: bool) -> NDArray[Any]:
@@ -56,9 +49,9 @@ def most_likely(outputs: NDArray[np.float32], *, is_discrete: bool) -> NDArray[A
 
 def log_prob(outputs: NDArray[np.float32], actions: NDArray[Any], *, is_discrete: bool) -> NDArray[np.float32]:
     """Log-probability, or log-density, of actions  (N,)."""
-    if is_discrete:
-        return np.take_along_axis(log_softmax(outputs), actions[:, None], axis=1)[:, 0].astype(np.float32)
-    mean, log_std = np.split(outputs.astype(np.float64), 2, axis=1)
-    log_std = log_std.clip(LOG_STD_MIN, LOG_STD_MAX)
-    z = (actions - mean) * np.exp(-log_std)
-    return np.asarray((-0.5 * z * z - log_std - _HALF_LOG_TWO_PI).sum(axis=1), dtype=np.float32)
+    return native_distributions.log_prob(outputs, actions, is_discrete=is_discrete)
+
+
+def moments(values: NDArray[np.float32]) -> tuple[float, float]:
+    """Mean and standard deviation, in double and in a fixed order."""
+    return native_distributions.moments(values)

@@ -2,12 +2,12 @@
 
 Only NumPy arrays and plain numbers cross it. A backend owns the weights, the forward passes, the gradient of
 the loss and the optimiser; sampling, log-probabilities of what was sampled, advantages and shuffling stay
-outside, in NumPy, so that a run depends on its seed alone, whichever backend trains it.
+outside, so that a run depends on its seed alone, whichever backend trains it.
 
     frames ──encode──▶ observations ──policy──▶ policy outputs ──(racecraft.learn.distributions)──▶ actions
                             └────────values──▶ values ──(GAE)──▶ minibatches ──update──▶ new weights
 
-Shape letters: N cars, B minibatch, A action dimensions, S privileged state, P policy outputs.
+Shape letters: N cars, M samples, B of them in a minibatch, A action dimensions, S privileged state, P policy outputs.
 """
 
 from __future__ import annotations
@@ -65,20 +65,22 @@ class Objective:
 
 @dataclass(frozen=True, kw_only=True)
 class Minibatch:
-    """Samples for one gradient step, all of them C-contiguous."""
+    """Samples for one gradient step: all of M, or those of `rows`. Arrays are C-contiguous."""
 
     observations: NDArray[np.uint8]
-    """Encoded frames  (B, *observation_shape)."""
+    """Encoded frames  (M, *observation_shape)."""
     states: NDArray[np.float32]
-    """Privileged state  (B, S)."""
+    """Privileged state  (M, S)."""
     actions: NDArray[Any]
-    """Indices int64 (B,), or float32 (B, A) before clipping to [-1, 1]."""
+    """Indices int64 (M,), or float32 (M, A) before clipping to [-1, 1]."""
     log_probs: NDArray[np.float32]
-    """Log-probability of each action under the policy that took it  (B,)."""
+    """Log-probability of each action under the policy that took it  (M,)."""
     advantages: NDArray[np.float32]
-    """Already normalised, if they are to be  (B,)."""
+    """Already normalised, if they are to be  (M,)."""
     returns: NDArray[np.float32]
-    """Value targets  (B,)."""
+    """Value targets  (M,)."""
+    rows: NDArray[np.int64] | None = None
+    """Which samples make up the minibatch, in this order  (B,); saves copying them out of a rollout. None: all."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,6 +45,7 @@ class NativeLearner:
             self._native = _native.Learner(
                 height=height,
                 width=width,
+                top=networks.sky_rows(spec),
                 pool=arch.pool,
                 block=networks.block_size(spec),
                 convs=[(conv.filters, conv.kernel, conv.stride) for conv in arch.convs],
@@ -57,6 +58,7 @@ class NativeLearner:
             )
         except ValueError as error:
             raise ConfigError(str(error)) from None
+        self._objective: tuple[Objective | None, Any] = (None, None)  # the last one, and as the core knows it
         if seed is not None:
             self.load_weights(networks.initial_weights(spec, seed=seed, orthonormalize=_native.orthonormalize))
 
@@ -83,16 +85,22 @@ class NativeLearner:
     def update(self, minibatch: Minibatch, objective: Objective) -> UpdateStats:
         """Take one gradient step; leave everything as it is when loss or gradient is not finite."""
         spec, size = self.spec, len(minibatch.advantages)
+        rows = np.arange(size) if minibatch.rows is None else minibatch.rows
+        rows = self._column("rows", rows, (len(rows),), np.int64)
+        if len(rows) and not 0 <= rows.min() <= rows.max() < size:
+            raise ShapeError(f"rows are from {rows.min()} to {rows.max()}, expected 0 to {size - 1}.")
         indices, actions = _NO_INDICES, _NO_ACTIONS
         if spec.is_discrete:
             indices = self._column("actions", minibatch.actions, (size,), np.int64)
-            if size and not 0 <= indices.min() <= indices.max() < spec.num_actions:
+            taken = indices[rows]
+            if len(taken) and not 0 <= taken.min() <= taken.max() < spec.num_actions:
                 raise ShapeError(
-                    f"actions are indices from {indices.min()} to {indices.max()}, "
-                    f"expected 0 to {spec.num_actions - 1}."
+                    f"actions are indices from {taken.min()} to {taken.max()}, expected 0 to {spec.num_actions - 1}."
                 )
         else:
             actions = self._column("actions", minibatch.actions, (size, spec.num_actions))
+        if objective is not self._objective[0]:
+            self._objective = objective, _native_objective(objective)
         terms = self._native.update(
             self._observations(minibatch.observations, size),
             self._column("states", minibatch.states, (size, spec.state_size)),
@@ -101,15 +109,8 @@ class NativeLearner:
             self._column("log_probs", minibatch.log_probs, (size,)),
             self._column("advantages", minibatch.advantages, (size,)),
             self._column("returns", minibatch.returns, (size,)),
-            _native.Objective(
-                learning_rate=objective.learning_rate,
-                clip_coef=objective.clip_coef,
-                ent_coef=objective.ent_coef,
-                vf_coef=objective.vf_coef,
-                is_huber=objective.value_loss == "huber",
-                max_grad_norm=objective.max_grad_norm,
-                adam_eps=objective.adam_eps,
-            ),
+            rows,
+            self._objective[1],
         )
         policy_loss, value_loss, entropy, approx_kl, clip_fraction, grad_norm = terms
         return UpdateStats(
@@ -175,3 +176,15 @@ class NativeLearner:
         if array.shape != shape:
             raise ShapeError(f"{name} has shape {array.shape}, expected {shape}.")
         return np.ascontiguousarray(array, dtype)
+
+
+def _native_objective(objective: Objective) -> Any:
+    return _native.Objective(
+        learning_rate=objective.learning_rate,
+        clip_coef=objective.clip_coef,
+        ent_coef=objective.ent_coef,
+        vf_coef=objective.vf_coef,
+        is_huber=objective.value_loss == "huber",
+        max_grad_norm=objective.max_grad_norm,
+        adam_eps=objective.adam_eps,
+    )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, ShapeError, did_you_mean
 from racecraft.learn.learner import NetworkSpec, Weights
+from racecraft.learn.native_distributions import normals
 
 
 @dataclass(frozen=True)
@@ -33,17 +34,23 @@ class Conv:
 
 @dataclass(frozen=True)
 class Architecture:
-    """A camera tower: average pooling, convolutions, dense layers with ReLU."""
+    """A camera tower: the image without its sky, average pooling, convolutions, dense layers with ReLU."""
 
     convs: tuple[Conv, ...]
     dense: tuple[int, ...]
     """Units of each dense layer."""
     pool: int = 1
     """Side of the squares of pixels averaged before the first convolution; 1 or 2."""
+    sky: float = 0.0
+    """Share of the image's rows, from the top, that the tower does not see."""
+    log_std: float = 0.0
+    """Log standard deviation that a Gaussian policy begins with; 0 as AWS's."""
 
 
 ARCHITECTURES: dict[str, Architecture] = {
-    "RACECRAFT_SMALL": Architecture((Conv(16, 8, 4), Conv(32, 4, 2), Conv(32, 3, 2)), (128,), pool=2),
+    "RACECRAFT_SMALL": Architecture(
+        (Conv(16, 8, 4), Conv(32, 4, 2), Conv(32, 3, 2)), (128,), pool=2, sky=0.2, log_std=-1.0
+    ),
     "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW": Architecture((Conv(32, 8, 4), Conv(64, 4, 2), Conv(64, 3, 1)), (512,)),
     "DEEP_CONVOLUTIONAL_NETWORK": Architecture(
         (Conv(32, 5, 2), Conv(32, 3, 1), Conv(64, 3, 2), Conv(64, 3, 1)), (64, 512)
@@ -75,15 +82,29 @@ def architecture(name: str) -> Architecture:
         raise ConfigError(f"Network {name!r} does not exist, expected one of {known}.", hint=hint) from None
 
 
+def sky_rows(spec: NetworkSpec) -> int:
+    """Rows at the top of a camera image that the network does not see.
+
+    The default camera looks 15 degrees down and has its horizon in row 29 of 120. What is above it tells nothing of
+    the road but differs from track to track, and a third of the network's arithmetic would go there.
+    """
+    return int(architecture(spec.name).sky * spec.frame_shape[0])
+
+
+def pooled_shape(spec: NetworkSpec) -> tuple[int, int]:
+    """Height and width of what the first convolution sees, pixels."""
+    pool = architecture(spec.name).pool
+    return (spec.frame_shape[0] - sky_rows(spec)) // pool, spec.frame_shape[1] // pool
+
+
 def block_size(spec: NetworkSpec) -> int:
     """Side of the squares of pixels that ``encode`` turns into channels; 1 where the first layer forbids it.
 
     A convolution whose stride divides its kernel and the image equals one of stride 1 over squares of
     `stride` pixels, `stride`² channels each. On a CPU that is twice as fast as one channel of grey.
     """
-    arch = architecture(spec.name)
-    first = arch.convs[0]
-    height, width = (side // arch.pool for side in spec.frame_shape)
+    first = architecture(spec.name).convs[0]
+    height, width = pooled_shape(spec)
     divides = first.kernel % first.stride == 0 and height % first.stride == 0 and width % first.stride == 0
     return first.stride if divides else 1
 
@@ -91,12 +112,12 @@ def block_size(spec: NetworkSpec) -> int:
 def observation_shape(spec: NetworkSpec) -> tuple[int, int, int]:
     """Rows, columns and channels of an encoded frame."""
     block = block_size(spec)
-    side = block * architecture(spec.name).pool
-    return spec.frame_shape[0] // side, spec.frame_shape[1] // side, block * block
+    height, width = pooled_shape(spec)
+    return height // block, width // block, block * block
 
 
 def encode(spec: NetworkSpec, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Pool frames (mean of each square, halves rounded up) and fold blocks of pixels into channels.
+    """Cut off the sky, pool (mean of each square, halves rounded up) and fold blocks of pixels into channels.
 
     Args:
         spec: The network the frames are for.
@@ -113,7 +134,7 @@ def encode(spec: NetworkSpec, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
         raise ShapeError(
             f"frames are {frames.dtype} of shape {frames.shape}, expected uint8 of (N, {height}, {width})."
         )
-    pixels = np.ascontiguousarray(frames)
+    pixels = np.ascontiguousarray(frames[:, sky_rows(spec) :])
     if architecture(spec.name).pool == 2:
         pairs = pixels.view(np.uint16)  # two neighbours in one word: sums of whole rows at SIMD speed
         sums = (pairs & 255) + (pairs >> 8)
@@ -128,7 +149,7 @@ def encode(spec: NetworkSpec, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def flat_size(spec: NetworkSpec) -> int:
     """Inputs of the first dense layer after the camera's convolutions."""
     arch = architecture(spec.name)
-    height, width = (side // arch.pool for side in spec.frame_shape)
+    height, width = pooled_shape(spec)
     for conv in arch.convs:
         height = (height - conv.kernel) // conv.stride + 1
         width = (width - conv.kernel) // conv.stride + 1
@@ -175,7 +196,7 @@ def orthonormalize_by_qr(vectors: NDArray[np.float64]) -> None:
 def initial_weights(
     spec: NetworkSpec, *, seed: int, orthonormalize: Callable[[NDArray[np.float64]], None] = orthonormalize_by_qr
 ) -> Weights:
-    """Orthogonal weights (gain √2 inside, 0.01 before the policy, 1 before the value), all else zero.
+    """Orthogonal weights (gain √2 inside, 0.01 before the policy, 1 before the value), biases zero.
 
     Args:
         spec: The network.
@@ -186,11 +207,12 @@ def initial_weights(
     weights: Weights = {}
     for name, shape in weight_shapes(spec).items():
         if not name.endswith(".weight"):
-            weights[name] = np.zeros(shape, np.float32)
+            begin = architecture(spec.name).log_std if name == "policy.log_std" else 0.0
+            weights[name] = np.full(shape, begin, np.float32)
             continue
         gain = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}.get(name, 2.0**0.5)
         rows, columns = shape[0], int(np.prod(shape[1:]))
-        vectors = np.ascontiguousarray(rng.standard_normal((max(rows, columns), min(rows, columns))).T)
+        vectors = np.ascontiguousarray(normals(rng, rows * columns).reshape(max(rows, columns), -1).T)
         orthonormalize(vectors)
         matrix = vectors if rows < columns else vectors.T
         weights[name] = (gain * matrix).reshape(shape).astype(np.float32)
@@ -211,7 +233,7 @@ def forward_operations(spec: NetworkSpec) -> int:
             continue
         places = 1
         if ".conv" in name:
-            height, width = (side // arch.pool for side in spec.frame_shape)
+            height, width = pooled_shape(spec)
             for conv in arch.convs[: int(name.split(".conv")[1].split(".")[0])]:
                 height, width = (height - conv.kernel) // conv.stride + 1, (width - conv.kernel) // conv.stride + 1
             places = height * width

@@ -10,7 +10,10 @@ from; a `Learner` holds the network.
 from __future__ import annotations
 
 import dataclasses
+import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -19,10 +22,12 @@ from numpy.typing import NDArray
 
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import distributions
-from racecraft.learn.learner import Learner, Minibatch, Objective, UpdateStats
+from racecraft.learn.average import WeightAverage
+from racecraft.learn.learner import Learner, Minibatch, Objective, UpdateStats, Weights
 from racecraft.learn.rollout import Rollout
 
 _VALUE_BATCH = 4096  # observations whose values are computed at once
+_MAX_COUNT = 10**9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +61,10 @@ class PPOConfig:
     value_loss: str = "mse"
     """``"mse"`` or ``"huber"``."""
     max_grad_norm: float = 0.5
-    """Global gradient norm is scaled down to this; 0 or infinity leaves it alone, as AWS does."""
+    """Global gradient norm is scaled down to this; 0 leaves it alone, as AWS does."""
+    average_share: float = 0.06
+    """About which share of the training so far the weights are averaged over that drive evaluations and are saved;
+    0 takes the last weights, as AWS does."""
     normalize_returns: bool = True
     """Let the critic predict in units of the returns' running spread, so that rewards may have any scale."""
     exploration: str = "categorical"
@@ -70,15 +78,24 @@ class PPOConfig:
 
     def __post_init__(self) -> None:
         """Refuse what cannot work, naming the field."""
-        for name in ("num_envs", "num_steps", "max_steps_per_iteration", "minibatch_size", "update_epochs"):
-            _require(self, name, getattr(self, name) >= 1, "at least 1")
-        for name in ("gamma", "gae_lambda", "epsilon_start", "epsilon_end"):
-            _require(self, name, 0 <= getattr(self, name) <= 1, "from 0 to 1")
-        for name in ("learning_rate", "ent_coef", "vf_coef"):
-            _require(self, name, 0 <= getattr(self, name) < float("inf"), "a finite number, 0 or more")
-        for name in ("episodes_per_iteration", "epsilon_steps", "max_grad_norm"):
-            _require(self, name, getattr(self, name) >= 0, "0 or more")
-        _require(self, "clip_coef", 0 < self.clip_coef < 1, "between 0 and 1")
+        for name, least in (
+            ("num_envs", 1),
+            ("num_steps", 1),
+            ("max_steps_per_iteration", 1),
+            ("minibatch_size", 1),
+            ("update_epochs", 1),
+            ("episodes_per_iteration", 0),
+            ("epsilon_steps", 0),
+        ):
+            value = getattr(self, name)
+            is_whole = isinstance(value, int) and not isinstance(value, bool)
+            _require(self, name, is_whole and least <= value <= _MAX_COUNT, f"a whole number, {least} or more")
+        for name in ("gamma", "gae_lambda", "epsilon_start", "epsilon_end", "average_share"):
+            _require(self, name, _is_number(getattr(self, name), 0.0, 1.0), "a number from 0 to 1")
+        for name in ("learning_rate", "ent_coef", "vf_coef", "max_grad_norm"):
+            _require(self, name, _is_number(getattr(self, name), 0.0), "a finite number, 0 or more")
+        is_open = _is_number(self.clip_coef, 0.0, 1.0) and 0 < self.clip_coef < 1
+        _require(self, "clip_coef", is_open, "between 0 and 1")
         _require(self, "value_loss", self.value_loss in ("mse", "huber"), "'mse' or 'huber'")
         _require(
             self,
@@ -195,13 +212,16 @@ class PPO:
         self._episode_returns = np.zeros(config.num_envs)
         self._episode_lengths = np.zeros(config.num_envs, np.int64)
         self._return_scale = np.array([0.0, 1.0])  # running mean and spread of the returns, in units of reward
+        self.prefers_average = False
+        """Whether the averaged weights drive. The mean of beginners is none: set it once the policy drives well."""
+        self._average = WeightAverage(config.average_share)
         self._clocks = {"environment": 0.0, "policy": 0.0, "update": 0.0}
 
     def iterate(self) -> IterationStats:
         """Collect one rollout and improve the policy on it.
 
         Raises:
-            TrainingError: Loss or gradient is not finite; the weights are those of before the iteration.
+            TrainingError: Loss or gradient is not finite; the weights are those of before that gradient step.
         """
         rng = np.random.default_rng([self.seed, self.iteration])
         self._clocks = dict.fromkeys(self._clocks, 0.0)
@@ -210,6 +230,8 @@ class PPO:
         started = time.perf_counter()
         advantages, returns = self._estimate()
         losses = self._update(advantages, returns, rng)
+        if self.config.average_share > 0:
+            self._average.add(self.learner.weights(), iteration=self.iteration + 1)
         self._clocks["update"] += time.perf_counter() - started
 
         rollout = self._rollout
@@ -229,6 +251,21 @@ class PPO:
             policy_seconds=self._clocks["policy"],
             update_seconds=self._clocks["update"],
         )
+
+    @property
+    def driving_weights(self) -> Weights:
+        """The weights to judge and to save; not to be changed."""
+        return (self._average.weights() if self.prefers_average else {}) or self.learner.weights()
+
+    @contextmanager
+    def driving(self) -> Iterator[None]:
+        """Within, the learner holds the weights that are to drive; afterwards those it learns with."""
+        own = self.learner.weights()
+        self.learner.load_weights(self.driving_weights)
+        try:
+            yield
+        finally:
+            self.learner.load_weights(own)
 
     # ---- collect: drive until the rollout is full
 
@@ -354,31 +391,30 @@ class PPO:
         b_log_probs = rollout.log_probs.reshape(-1)
         b_returns = ((returns - mean) / spread).astype(np.float32).reshape(-1)
         b_advantages = advantages.reshape(-1)
-        b_advantages = (b_advantages - b_advantages[used].mean()) / (b_advantages[used].std() + 1e-8)
+        centre, scale = distributions.moments(b_advantages[used])
+        b_advantages = ((b_advantages - centre) / (scale + 1e-8)).astype(np.float32)
 
-        before = self.learner.weights(), self.learner.optimizer_state()
+        everything = len(b_advantages)
+        minibatch = Minibatch(
+            observations=b_observations[:everything],
+            states=b_states[:everything],
+            actions=b_actions[:everything],
+            log_probs=b_log_probs[:everything],
+            advantages=b_advantages,
+            returns=b_returns,
+        )
         minibatch_size = min(config.minibatch_size, len(used))
         objective = config.objective
         stats: list[UpdateStats] = []
         for _ in range(config.update_epochs):
             order = rng.permutation(used)
             for start in range(0, len(used) - minibatch_size + 1, minibatch_size):  # a last partial one is dropped
-                mb = order[start : start + minibatch_size]
-                minibatch = Minibatch(
-                    observations=b_observations[mb],
-                    states=b_states[mb],
-                    actions=b_actions[mb],
-                    log_probs=b_log_probs[mb],
-                    advantages=b_advantages[mb],
-                    returns=b_returns[mb],
-                )
-                stats.append(self.learner.update(minibatch, objective))
+                rows = order[start : start + minibatch_size]
+                stats.append(self.learner.update(dataclasses.replace(minibatch, rows=rows), objective))
                 if not stats[-1].is_finite:
-                    self.learner.load_weights(before[0])
-                    self.learner.load_optimizer_state(before[1])
                     raise TrainingError(
                         f"The loss is {stats[-1].policy_loss + stats[-1].value_loss} with gradient norm "
-                        f"{stats[-1].grad_norm} in iteration {self.iteration + 1}; its weights are discarded.",
+                        f"{stats[-1].grad_norm} in iteration {self.iteration + 1}; its step was not taken.",
                         hint="Lower learning_rate, set max_grad_norm, or look for huge rewards.",
                     )
         names = [field.name for field in dataclasses.fields(UpdateStats)]
@@ -388,20 +424,27 @@ class PPO:
         """Move the critic's unit towards the returns seen lately; the first rollout sets it."""
         if not self.config.normalize_returns:
             return
-        seen = np.array([returns.mean(), max(float(returns.std()), 1e-6)], np.float64)
+        mean, spread = distributions.moments(returns)
+        seen = np.array([mean, max(spread, 1e-6)])
         self._return_scale = seen if self.iteration == 0 else 0.9 * self._return_scale + 0.1 * seen
 
     # ---- resume
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Everything needed to continue, except where the cars are: plain arrays by name."""
+        """Everything needed to continue, except where the cars are: plain arrays by name.
+
+        ``weights/`` holds what is to drive; where weights are averaged, ``learning/`` what goes on learning.
+        """
         arrays: dict[str, NDArray[Any]] = {
             "ppo/counters": np.array([self.seed, self.iteration, self.total_steps], np.int64),
             "ppo/episode_returns": self._episode_returns.copy(),
             "ppo/episode_lengths": self._episode_lengths.copy(),
             "ppo/return_scale": self._return_scale.copy(),
         }
-        arrays |= {f"weights/{name}": array for name, array in self.learner.weights().items()}
+        arrays |= {f"weights/{name}": array.copy() for name, array in self.driving_weights.items()}
+        if self.config.average_share > 0:
+            arrays |= {f"learning/{name}": array for name, array in self.learner.weights().items()}
+            arrays |= {f"average/{name}": array.copy() for name, array in self._average.weights().items()}
         arrays |= {f"optimizer/{name}": array for name, array in self.learner.optimizer_state().items()}
         return arrays
 
@@ -423,6 +466,9 @@ class PPO:
                 hint=f"Resume with num_envs = {len(returns)}.",
             )
         self.learner.load_weights(_below("weights/", state))
+        if self.config.average_share > 0:
+            self._average.load(_below("average/", state), like=self.learner.weights())
+            self.learner.load_weights(_below("learning/", state))
         self.learner.load_optimizer_state(_below("optimizer/", state))
         self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
         self._episode_returns, self._episode_lengths = returns.copy(), lengths.copy()
@@ -431,6 +477,10 @@ class PPO:
 
 def _below(prefix: str, arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def _is_number(value: object, low: float, high: float = sys.float_info.max) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high
 
 
 def _require(config: PPOConfig, name: str, is_met: bool, allowed: str) -> None:

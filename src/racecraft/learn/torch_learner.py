@@ -85,7 +85,8 @@ class TorchLearner:
 
     def update(self, minibatch: Minibatch, objective: Objective) -> UpdateStats:
         """Take one gradient step; leave everything as it is when loss or gradient is not finite."""
-        size = len(minibatch.advantages)
+        samples = minibatch.rows if minibatch.rows is not None else np.arange(len(minibatch.advantages))
+        size = len(samples)
         shard_size = min(max(-(-size // 2), _SHARD_SIZES[0]), _SHARD_SIZES[1])
         starts = range(0, size, shard_size)
         while len(self._shards) < len(starts):
@@ -98,7 +99,7 @@ class TorchLearner:
         def run(shard: int) -> Tensor:
             gradient, parameters = self._shards[shard]
             gradient.zero_()
-            rows = slice(starts[shard], starts[shard] + shard_size)
+            rows = samples[starts[shard] : starts[shard] + shard_size]
             loss, terms = self._loss(parameters, minibatch, rows, objective)
             (loss / size).backward()  # type: ignore[no-untyped-call]
             return terms
@@ -148,7 +149,7 @@ class TorchLearner:
         self._num_updates = int(state["step"][0])
 
     def _loss(
-        self, parameters: torch_networks.Parameters, minibatch: Minibatch, rows: slice, objective: Objective
+        self, parameters: torch_networks.Parameters, minibatch: Minibatch, rows: NDArray[np.int64], objective: Objective
     ) -> tuple[Tensor, Tensor]:
         """Sum over samples of the PPO loss, and of the terms of ``UpdateStats`` (5,)."""
         observations, states, actions, old_log_probs, advantages, returns = (

@@ -50,7 +50,8 @@ def train(
     Args:
         track: Name of a track, or path of a track file.
         reward: Name of a preset, or path of a ``reward_function.py``.
-        until: When to stop: ``"5 laps"``, ``"10 minutes"``, ``"200000 steps"``, or several joined by ``or``.
+        until: When to stop: ``"5 laps"``, ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or several joined by
+            ``or``.
         actions: Action space or name of a preset, where no `model_metadata` is given.
         model_metadata: AWS's file: action space, network, version.
         hyperparameters: AWS's file; by default Racecraft's own settings, tuned for speed.

@@ -63,6 +63,11 @@ class Evaluator:
             return None
         return self.last.completion, -(self.last.best_lap or NO_LAP)
 
+    @property
+    def was_perfect(self) -> bool:
+        """Whether some evaluation so far completed every lap."""
+        return self.best_score is not None and self.best_score[0] >= 1.0
+
     def evaluate(self, *, step: int, seconds: float, counter: EpisodeCounter) -> list[Episode]:
         """Drive the trials; the outcome is in `last`.
 

@@ -225,7 +225,7 @@ class Training:
         meter.begin(steps=ppo.total_steps)
         self.reporter.begin(session.environment.simulation, session.evaluator.policy)
         reason = self._limit_reached(session)
-        if reason in ("laps", "seconds", "steps"):
+        if reason in ("laps", "lap_time", "seconds", "steps"):
             self.reporter.note(f"The limit of {self.settings.until} was reached before; --until sets another.")
         while not reason:
             stats = ppo.iterate()
@@ -263,6 +263,8 @@ class Training:
             return "interrupted"
         if until.laps and last is not None and last.laps_completed >= until.laps:
             return "laps"
+        if until.lap_time and last is not None and last.best_lap is not None and last.best_lap <= until.lap_time:
+            return "lap_time"
         if until.steps and steps >= until.steps:
             return "steps"
         if until.seconds and self.meter.seconds >= until.seconds:
@@ -290,7 +292,10 @@ class Training:
     def _evaluate(self, session: _Session) -> None:
         begun = time.perf_counter()
         evaluator = session.evaluator
-        trials = evaluator.evaluate(step=session.ppo.total_steps, seconds=self.meter.seconds, counter=session.counter)
+        ppo, counter = session.ppo, session.counter
+        ppo.prefers_average = evaluator.was_perfect
+        with ppo.driving():
+            trials = evaluator.evaluate(step=ppo.total_steps, seconds=self.meter.seconds, counter=counter)
         for trial in trials:
             session.metrics.add(trial, phase="evaluation")
         assert evaluator.last is not None
@@ -353,6 +358,7 @@ class Training:
             session.counter.rewards[:] = arrays["episode_rewards"]
             session.trace.load_state(arrays)
             session.evaluator.load_state(metadata["evaluator"])
+            session.ppo.prefers_average = session.evaluator.was_perfect
             self.meter.load_state(arrays["recent_episodes"], seconds=float(metadata["seconds"]))
         except RacecraftError:
             raise

@@ -100,7 +100,7 @@ class TrainResult:
     run: Path
     """The run folder."""
     reason: str
-    """``laps``, ``seconds``, ``steps``, ``episodes``, ``score`` or ``interrupted``."""
+    """``laps``, ``lap_time``, ``seconds``, ``steps``, ``episodes``, ``score`` or ``interrupted``."""
     wall_seconds: float
     """From the start of the process (or call) to the end."""
     steps: int

@@ -147,11 +147,11 @@ def make_settings(
             raise ConfigError("ppo and hyperparameters both say how the policy improves; give one of them.")
         learning: dict[str, Any] = hyperparameters.to_ppo()
         ppo = PPOConfig(**learning, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
-    elif num_envs:
-        ppo = _with_num_envs(ppo or PPOConfig(), num_envs)
-    return TrainSettings(
-        vehicle=vehicle, network=network or metadata.neural_network, ppo=ppo or PPOConfig(), **settings
-    )
+    else:
+        # A Gaussian keeps its spread by itself; a bonus for entropy would make it grow and the car restless.
+        ppo = ppo or PPOConfig(**({} if metadata.action_space.kind == "discrete" else {"ent_coef": 0.0}))
+        ppo = _with_num_envs(ppo, num_envs) if num_envs else ppo
+    return TrainSettings(vehicle=vehicle, network=network or metadata.neural_network, ppo=ppo, **settings)
 
 
 def _with_num_envs(ppo: PPOConfig, num_envs: int) -> PPOConfig:

@@ -1,4 +1,4 @@
-"""When training ends: a number of laps driven in evaluation, minutes of wall clock, or camera steps."""
+"""When training ends: laps driven in evaluation, a lap time, minutes of wall clock, or camera steps."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ _UNITS: Final = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), ("seconds", 1)),
     **dict.fromkeys(("min", "mins", "minute", "minutes"), ("seconds", 60)),
     **dict.fromkeys(("h", "hour", "hours"), ("seconds", 3600)),
+    **dict.fromkeys(("s lap", "sec lap", "second lap", "seconds lap"), ("lap_time", 1)),
 }
-_LIMIT: Final = re.compile(r"\s*(\d{1,3}(?:[,_]\d{3})+|\d+)(\.\d+)?\s*([a-z]+)\s*", re.ASCII | re.IGNORECASE)
-_EXAMPLES: Final = "'5 laps', '10 minutes', '90 s' or '200,000 steps'"
+_LIMIT: Final = re.compile(r"\s*(\d{1,3}(?:[,_]\d{3})+|\d+)(\.\d+)?\s*([a-z]+(?:\s+lap)?)\s*", re.ASCII | re.IGNORECASE)
+_EXAMPLES: Final = "'5 laps', '8.8 s lap', '10 minutes', '90 s' or '200,000 steps'"
 _MAX_TEXT: Final = 400  # characters
 
 
@@ -27,6 +28,8 @@ class Until:
 
     laps: int = 0
     """Trials of one evaluation that complete their lap."""
+    lap_time: float = 0.0
+    """s; some lap of an evaluation takes no longer."""
     seconds: float = 0.0
     """Wall clock since the run was started; when it is resumed, the time before counts."""
     steps: int = 0
@@ -34,7 +37,7 @@ class Until:
 
     @classmethod
     def parse(cls, text: str) -> Until:
-        """Read ``"5 laps"``, ``"10 minutes"``, ``"200,000 steps"`` or several of them joined by ``or``.
+        """Read ``"5 laps"``, ``"8.8 s lap"``, ``"10 minutes"``, ``"200,000 steps"`` or several joined by ``or``.
 
         Raises:
             ConfigError: The text has another form, names a limit twice, or a number is out of range.
@@ -42,19 +45,20 @@ class Until:
         limits: dict[str, Decimal] = {}
         for part in re.split(r"\bor\b", text) if isinstance(text, str) and len(text) <= _MAX_TEXT else [""]:
             match = _LIMIT.fullmatch(part)
-            unit = _UNITS.get(match[3].lower()) if match else None
+            unit = _UNITS.get(" ".join(match[3].lower().split())) if match else None
             if match is None or unit is None:
                 said = repr(text)[:_MAX_TEXT]
                 raise ConfigError(f"until is {said}; write it like {_EXAMPLES}, or join several with 'or'.")
             name, factor = unit
             value = Decimal(re.sub("[,_]", "", match[1]) + (match[2] or "")) * factor
-            if name != "seconds" and value != value.to_integral_value():
+            if name in ("laps", "steps") and value != value.to_integral_value():
                 raise ConfigError(f"until is {text!r}; the number of {name} must be whole.")
             if name in limits:
                 raise ConfigError(f"until is {text!r}; it limits {name} twice.")
             limits[name] = value
         return cls(
             laps=int(limits.get("laps", 0)),
+            lap_time=float(limits.get("lap_time", 0)),
             seconds=float(limits.get("seconds", 0)),
             steps=int(limits.get("steps", 0)),
         )
@@ -65,11 +69,13 @@ class Until:
                 raise ConfigError(f"until asks for {value!r} {name}; allowed is a whole number.")
         if not 0 <= self.laps <= 100:
             raise ConfigError(f"until asks for {self.laps} laps; allowed is 1 to 100.")
+        if not 0 <= self.lap_time <= 3600:
+            raise ConfigError(f"until asks for a lap of {self.lap_time} s; allowed is up to an hour.")
         if not 0 <= self.seconds <= 30 * 86400:
             raise ConfigError(f"until asks for {self.seconds} s; allowed is up to 30 days.")
         if not 0 <= self.steps <= 10**12:
             raise ConfigError(f"until asks for {self.steps} steps; allowed is up to 10^12.")
-        if not (self.laps or self.seconds or self.steps):
+        if not (self.laps or self.lap_time or self.seconds or self.steps):
             raise ConfigError(f"until sets no limit; write it like {_EXAMPLES}.")
 
     def __str__(self) -> str:
@@ -77,6 +83,8 @@ class Until:
         parts = []
         if self.laps:
             parts.append(f"{self.laps} laps")
+        if self.lap_time:
+            parts.append(f"{Decimal(repr(float(self.lap_time))):f} s lap")
         if self.seconds:
             seconds = Decimal(repr(float(self.seconds)))  # exact, and never in powers of ten as floats are
             parts.append(f"{int(seconds // 60)} minutes" if seconds % 60 == 0 else f"{seconds:f} s")
