@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from racecraft.bench import BENCHMARKS, run_benchmarks, suite
+from racecraft.bench import BENCHMARKS, learning, run_benchmarks, suite
 from racecraft.errors import ConfigError, RacecraftError
 
 FIGURES = {
@@ -96,3 +97,24 @@ def test_a_near_miss_is_recognised() -> None:
         run_benchmarks(only=["simulatr"])
     assert caught.value.hint == "Did you mean 'simulator'?"
     assert all(name in str(caught.value) for name in BENCHMARKS)
+
+
+def test_what_takes_minutes_runs_only_when_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[str] = []
+    measures = {name: lambda seconds, seeds, name=name: ran.append(name) or {} for name in BENCHMARKS}
+    monkeypatch.setattr(suite, "BENCHMARKS", measures)
+    run_benchmarks(only=[])
+    assert ran == [name for name in BENCHMARKS if name not in suite.ON_REQUEST]
+    run_benchmarks(only=["learn"])
+    assert ran[-1] == "learn"
+
+
+def test_a_learning_command_gives_its_time_and_its_memory(tmp_path: Path) -> None:
+    result, wall, peak = learning._command(
+        ["--track", "oval", "--until", "512 steps", "--num-threads", "1"], str(tmp_path)
+    )
+    assert result["reason"] == "steps"
+    assert wall > 0
+    assert 30 < peak < 500
+    with pytest.raises(RacecraftError, match="there_is_none"):
+        learning._command(["--track", "there_is_none"], str(tmp_path))

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tiny_runs import Recorder
 
 from racecraft import evaluate, train
 from racecraft.learn import PPOConfig
+from racecraft.learn.native_learner import NativeLearner
 
 BUDGET = 60_000  # camera steps; about 8,000 are usual
 
@@ -28,6 +30,25 @@ def test_a_car_learns_five_of_five_laps_of_the_oval(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_without_learning_it_does_not(tmp_path: Path) -> None:
-    blind = replace(PPOConfig(), learning_rate=0.0)
-    result = train("oval", until="5 laps or 20000 steps", ppo=blind, seed=1, root=tmp_path)
+    idle = replace(PPOConfig(), learning_rate=0.0)
+    result = train("oval", until="5 laps or 20000 steps", ppo=idle, seed=1, root=tmp_path)
     assert (result.reason, result.laps_completed) == ("steps", 0)
+
+
+@pytest.mark.slow
+def test_a_blind_car_does_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The control of the control: what it learns, it learns from what it sees."""
+    encode = NativeLearner.encode
+    monkeypatch.setattr(NativeLearner, "encode", lambda learner, frames: encode(learner, np.zeros_like(frames)))
+    result = train("oval", until="5 laps or 30000 steps", seed=1, root=tmp_path)
+    assert (result.reason, result.laps_completed) == ("steps", 0)
+
+
+@pytest.mark.slow
+def test_paid_for_lap_time_a_continuous_car_beats_one_that_keeps_to_two_metres_a_second(tmp_path: Path) -> None:
+    """A lap of the oval takes 8.4 s at 2 m/s along its middle."""
+    until = "7.6 s lap or 120000 steps"
+    result = train("oval", reward="lap_time", actions="continuous", until=until, seed=1, root=tmp_path)
+    assert result.reason == "lap_time"
+    assert result.best_lap_seconds is not None
+    assert 4 < result.best_lap_seconds <= 7.6

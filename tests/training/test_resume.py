@@ -41,28 +41,26 @@ def test_a_run_killed_at_any_iteration_resumes_as_if_it_never_was(tiny: Train, t
 
 
 @pytest.mark.slow
-def test_kill_9_loses_at_most_one_checkpoint_interval(tiny: Train, tmp_path: Path) -> None:
-    undisturbed = tiny(until="4096 steps", name="undisturbed")
-    program = (
+def test_a_run_killed_20_times_ends_as_if_it_never_was(tiny: Train, tmp_path: Path) -> None:
+    undisturbed = tiny(until="16384 steps", name="undisturbed")
+    start = (
         "from racecraft import train; from racecraft.learn import PPOConfig; train('oval', reward='centerline', "
-        "ppo=PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1), until='4096 steps', "
+        "ppo=PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1), until='16384 steps', "
         "evaluate_every=128, evaluation_trials=2, num_threads=1, root='.', name='killed')"
     )
-    run = tmp_path / "killed"
-    process = subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path)
-    try:
-        deadline = time.monotonic() + 60
-        while not (run / "checkpoints" / "manifest.json").exists() and time.monotonic() < deadline:
-            time.sleep(0.01)
-        time.sleep(float(np.random.default_rng().uniform(0, 1)))
-    finally:
+    go_on = "from racecraft.training import resume; resume('killed')"
+    run, rng = tmp_path / "killed", np.random.default_rng()
+    for _ in range(20):
+        program = go_on if (run / "checkpoints" / "manifest.json").exists() else start
+        if program == start:
+            shutil.rmtree(run, ignore_errors=True)  # killed before there was anything to go on from
+        process = subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path)
+        time.sleep(float(rng.uniform(0.5, 1.5)))
         process.kill()
         process.wait()
-    folder = RunFolder.open(run)
-    assert folder.checkpoints.last is not None
     recorder = Recorder()
     resume(run, reporter=recorder)
-    assert recorder.notes[0].startswith("Resumed at step")
+    assert any(note.startswith(("Resumed at step", "The limit")) for note in recorder.notes), recorder.notes
     assert_same(run, undisturbed.run)
     assert logs(run) == logs(undisturbed.run)
 

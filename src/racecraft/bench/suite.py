@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from racecraft.agent import action_space
+from racecraft.bench.learning import measure_learning
 from racecraft.bench.machine import copy_bandwidth, describe_machine, matrix_flops
 from racecraft.bench.rivals import measure_rivals
 from racecraft.errors import ConfigError, RacecraftError, did_you_mean
@@ -40,7 +41,7 @@ def run_benchmarks(*, only: list[str], seconds: float = 3.0, seeds: int = 5, say
     """Run the benchmarks and return one JSON-able document.
 
     Args:
-        only: Names of `BENCHMARKS`; empty runs all.
+        only: Names of `BENCHMARKS`; empty runs all but those of `ON_REQUEST`.
         seconds: Time of each throughput measurement.
         seeds: Trainings of the skill benchmark.
         say: Is told what is being measured.
@@ -60,7 +61,7 @@ def run_benchmarks(*, only: list[str], seconds: float = 3.0, seeds: int = 5, say
         raise ConfigError(f"seeds is {seeds!r}; allowed is 1 to 100.")
     results: dict[str, Any] = {"machine": describe_machine()}
     for name, measure in BENCHMARKS.items():
-        if not only or name in only:
+        if name in only or (not only and name not in ON_REQUEST):
             if say is not None:
                 say(f"measuring {name} …")
             results[name] = measure(seconds, seeds)
@@ -204,7 +205,10 @@ BENCHMARKS: dict[str, Callable[[float, int], dict[str, Any]]] = {
     "train": measure_training,
     "skill": measure_skill,
     "rivals": lambda seconds, seeds: measure_rivals(seconds),
+    "learn": lambda seconds, seeds: measure_learning(seeds),
 }
+ON_REQUEST = ("learn",)
+"""Those that take many minutes, and run only when they are named."""
 
 
 def _of_run(result: dict[str, Any]) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
     while not done:  iterate (PPO) -> every few thousand steps: evaluate -> checkpoint
 
-Given the same settings, seed and number of threads a run repeats exactly on the same machine: nothing but the
-limits of wall clock depends on time. A checkpoint holds all that the next step depends on, cars included, so a
+Given the same settings and seed a run repeats to the bit, for any number of threads: nothing but the limits of
+wall clock depends on time. A checkpoint holds all that the next step depends on, cars included, so a
 run that was killed and resumed ends in the same weights and logs. (Only what a reward function remembers between
 calls, or draws at random, begins anew.)
 """

@@ -149,7 +149,8 @@ def make_settings(
         ppo = PPOConfig(**learning, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
     else:
         # A Gaussian keeps its spread by itself; a bonus for entropy would make it grow and the car restless.
-        ppo = ppo or PPOConfig(**({} if metadata.action_space.kind == "discrete" else {"ent_coef": 0.0}))
+        own = PPOConfig() if metadata.action_space.kind == "discrete" else PPOConfig(ent_coef=0.0)
+        ppo = ppo or own
         ppo = _with_num_envs(ppo, num_envs) if num_envs else ppo
     return TrainSettings(vehicle=vehicle, network=network or metadata.neural_network, ppo=ppo, **settings)
 
