@@ -42,6 +42,8 @@ class TrainingMetrics:
         episodes_per_iteration: After how many episodes AWS's trial counter begins again.
         episodes: Keep this many training episodes of an old file, and the evaluations among them, as a
             resumed run does from its checkpoint on. 0 starts anew.
+        clock: Simulated s; nothing of an old file is kept that ended later. An evaluation before the first training
+            episode can only be told by it.
         interval_s: Seconds between two writings, at least.
     """
 
@@ -52,15 +54,19 @@ class TrainingMetrics:
         best_model_metric: str = "progress",
         episodes_per_iteration: int = 20,
         episodes: int = 0,
+        clock: float | None = None,
         interval_s: float = 1.0,
     ) -> None:
         self.path = path
         self.best_model_metric = best_model_metric
         self.episodes_per_iteration = episodes_per_iteration
         self.interval_s = interval_s
-        kept = read_metrics(path)["metrics"] if episodes and path.exists() else []
+        kept = read_metrics(path)["metrics"] if (episodes or clock) and path.exists() else []
+        end = float("inf") if clock is None else 1000 * clock
         self._lines = [
-            (line["episode"], line["phase"], json.dumps(line)) for line in kept if line["episode"] <= episodes
+            (line["episode"], line["phase"], json.dumps(line))
+            for line in kept
+            if line["episode"] <= episodes and line["metric_time"] <= end
         ]
         self._stride = 1
         self._episodes = episodes

@@ -189,6 +189,7 @@ class Training:
                 folder.training_metrics,
                 episodes_per_iteration=per_iteration,
                 episodes=episodes,
+                clock=counter.clock,
             )
             prints = stack.enter_context(PrintLog(folder.reward_log))
             environment = TrainingEnvironment(
