@@ -133,9 +133,30 @@ void bind_views(nb::module_& m) {
     constexpr int kNumCarFields = 8;  // x, y, heading, steering, red, green, blue, alpha
     using Cars = nb::ndarray<const float, nb::shape<-1, kNumCarFields>, nb::c_contig, nb::device::cpu>;
     using Picture = nb::ndarray<uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+    using Poses = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+    using Frames = nb::ndarray<uint8_t, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
     nb::class_<CameraModel>(m, "CameraModel", "A camera that is ready to draw pictures for people.")
         .def(nb::init<const CameraSpec&>(), "spec"_a);
+    m.def(
+        "render_grey",
+        [](const CameraModel& camera, const GroundMap& ground, const GreyPalette& palette, Poses poses,
+           Frames out) {
+            const CameraSpec& spec = camera.spec();
+            const size_t size = static_cast<size_t>(spec.height) * static_cast<size_t>(spec.width);
+            if (out.shape(0) != poses.shape(0) || out.shape(1) != static_cast<size_t>(spec.height) ||
+                out.shape(2) != static_cast<size_t>(spec.width)) {
+                throw std::invalid_argument(
+                    "The frames do not have the poses' number and the camera's size.");
+            }
+            const size_t count = poses.shape(0);
+            const float* pose = poses.data();
+            uint8_t* pixels = out.data();
+            nb::gil_scoped_release release;
+            for (size_t i = 0; i < count; ++i, pose += 3, pixels += size)
+                render_grey(camera, ground, palette, pose[0], pose[1], pose[2], pixels);
+        },
+        "camera"_a, "ground"_a, "palette"_a, "poses"_a, "out"_a);
     m.def("chase_camera", &chase_camera, "width"_a, "height"_a);
     m.def(
         "top_down_camera",
@@ -147,7 +168,7 @@ void bind_views(nb::module_& m) {
     m.def(
         "render_rgb",
         [](const CameraModel& camera, const GroundMap& ground, const std::string& palette, float x, float y,
-           float heading, Cars cars, Picture out) {
+           float heading, Cars cars, bool lit_walls, Picture out) {
             const CameraSpec& spec = camera.spec();
             if (out.shape(0) != static_cast<size_t>(spec.height) ||
                 out.shape(1) != static_cast<size_t>(spec.width)) {
@@ -161,13 +182,14 @@ void bind_views(nb::module_& m) {
                 };
                 pictures.push_back({car[0], car[1], car[2], car[3], {byte(4), byte(5), byte(6)}, car[7]});
             }
-            const RgbPalette& colours = rgb_palette(palette);
+            const RgbPalette& world = rgb_palette(palette);
+            const RgbPalette colours = lit_walls ? with_lit_walls(world) : world;
             uint8_t* pixels = out.data();
             nb::gil_scoped_release release;
             render_rgb(camera, ground, colours, x, y, heading, pictures.data(),
                        static_cast<int>(pictures.size()), pixels);
         },
-        "camera"_a, "ground"_a, "palette"_a, "x"_a, "y"_a, "heading"_a, "cars"_a, "out"_a);
+        "camera"_a, "ground"_a, "palette"_a, "x"_a, "y"_a, "heading"_a, "cars"_a, "lit_walls"_a, "out"_a);
 }
 
 ObjectGroup group_of(int kind, int count, int placement, double min_distance,

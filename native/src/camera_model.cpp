@@ -39,7 +39,7 @@ void check(const CameraSpec& spec) {
     }
     if (!(abs_of(spec.pitch) <= 1.5708f)) {
         fail("pitch = " + std::to_string(spec.pitch) +
-             " rad must lie between -pi/2 and pi/2; the car's is 0.2618.");
+             " rad must lie between -pi/2 and pi/2; the car's is 0.2385.");
     }
     if (!(spec.above > 0.001f && spec.above < 100.0f)) {
         fail("height above the ground = " + std::to_string(spec.above) +

@@ -8,8 +8,11 @@
 namespace racecraft {
 namespace {
 
-constexpr double kDashLength = 0.05;  // m
-constexpr double kDashPeriod = 0.10;  // m, stretched so that a closed track has a whole number of dashes
+// As measured in frames of the original: 2 inches of dash, 2 inches of gap, counted from the first waypoint.
+constexpr double kDashLength = 0.0508;  // m
+constexpr double kDashPeriod = 0.1016;  // m
+constexpr double kFirstDash = 0.058;    // m along the centre line
+constexpr double kShortestDash = 0.01;  // m, of the one that the end of the line cuts off
 
 std::vector<Point> read_points(const double* values, int count, const char* name) {
     std::vector<Point> points;
@@ -44,8 +47,8 @@ std::vector<Dash> place_dashes(std::vector<Point> line, bool is_closed) {
         arc_length.push_back(arc_length.back() + std::sqrt(dx * dx + dy * dy));
     }
     const double length = arc_length.back();
-    const int count = static_cast<int>(std::min(std::max(1.0, std::floor(length / kDashPeriod + 0.5)), 1e6));
-    const double period = length / count;
+    const int count =
+        static_cast<int>(std::min(std::ceil((length - kFirstDash - kShortestDash) / kDashPeriod), 1e6));
     size_t segment = 0;
     const auto point_at = [&](double s) {
         while (segment > 0 && arc_length[segment] > s) --segment;
@@ -56,8 +59,9 @@ std::vector<Dash> place_dashes(std::vector<Point> line, bool is_closed) {
     };
     std::vector<Dash> dashes;
     for (int i = 0; i < count; ++i) {
-        const Point a = point_at(i * period);
-        const Point b = point_at(std::min(i * period + kDashLength, length));
+        const double begin = kFirstDash + i * kDashPeriod;
+        const Point a = point_at(begin);
+        const Point b = point_at(std::min(begin + kDashLength, length));
         const double dx = b.x - a.x;
         const double dy = b.y - a.y;
         const double chord = std::sqrt(dx * dx + dy * dy);

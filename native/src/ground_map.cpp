@@ -37,24 +37,30 @@ int rounded(double value) {
 constexpr int kPairOfBand[2] = {0, 1};  // field to edge line, edge line to road
 constexpr int kPairOfDash = 2;          // road to centre line
 
-uint32_t pure_texel(Material material) {
-    switch (material) {
-        case kEdgeLine:
-            return pack(0, 0, 127, 0);
-        case kRoad:
-            return pack(0, 0, 127, 1);
-        case kCenterLine:
-            return pack(0, 0, 127, 2);
-        default:
-            return pack(0, 0, -127, 0);
-    }
+// A texel of one material: its two shades, parted by a line of random direction near the texel's centre.
+// Every line is as likely as its mirror image, so the shades are even on average. All in integers: the same
+// ground everywhere.
+uint32_t grain_texel(Material material, int column, int row) {
+    constexpr int kDirections[16][2] = {{64, 0},   {59, 24},  {45, 45},  {24, 59},   {0, 64},    {-24, 59},
+                                        {-45, 45}, {-59, 24}, {-64, 0},  {-59, -24}, {-45, -45}, {-24, -59},
+                                        {0, -64},  {24, -59}, {45, -45}, {59, -24}};
+    constexpr int kSpread = 4000;  // of the line about the centre, in 1/16384 texel
+    uint32_t hash = static_cast<uint32_t>(column) * 0x8da6b343u ^ static_cast<uint32_t>(row) * 0xd8163841u;
+    hash = (hash ^ hash >> 15) * 0x2c1b3c6du;
+    hash = (hash ^ hash >> 12) * 0x297a2d39u;
+    hash ^= hash >> 15;
+    const int* normal = kDirections[hash & 15];
+    const int distance = (2 * static_cast<int>(hash >> 8 & 255) - 255) * kSpread / 255;
+    const int offset = (2 * distance - 255 * (normal[0] + normal[1])) / (2 * kEdgeOffsetScale);
+    return pack(normal[0], normal[1], offset, kGrainPairs + material);
 }
 
-uint32_t edge_texel(const Border& border, double texel) {
+// The texel in this column and row, whose centre is as far from the border as said.
+uint32_t edge_texel(const Border& border, double texel, int column, int row) {
     const double distance = border.distance / texel;
     if (std::fabs(distance) > kReach) {
         const MaterialPair pair = kMaterialPairs[border.pair];
-        return pure_texel(static_cast<Material>(distance > 0.0 ? pair.above : pair.below));
+        return grain_texel(static_cast<Material>(distance > 0.0 ? pair.above : pair.below), column, row);
     }
     const int x = rounded(kEdgeNormalScale * border.normal.x);
     const int y = rounded(kEdgeNormalScale * border.normal.y);
@@ -222,10 +228,9 @@ class Painter {
                         const bool is_road =
                             (std::upper_bound(line.begin(), line.end(), p.x) - line.begin()) % 2 == 1;
                         if (segments.empty() && dashes.empty()) {
-                            const uint32_t texel = pure_texel(is_road ? kRoad : kField);
-                            for (; x < x1; ++x) store(x, y, texel);
+                            for (; x < x1; ++x) store(x, y, grain_texel(is_road ? kRoad : kField, x, y));
                         } else {
-                            store(x, y, texel_at(p, is_road, segments, dashes));
+                            store(x, y, edge_texel(border_at(p, is_road, segments, dashes), texel_, x, y));
                         }
                     }
                 }
@@ -268,8 +273,8 @@ class Painter {
         return inside;
     }
 
-    uint32_t texel_at(Point p, bool is_road, const std::vector<uint32_t>& segments,
-                      const std::vector<uint32_t>& dashes) const {
+    Border border_at(Point p, bool is_road, const std::vector<uint32_t>& segments,
+                     const std::vector<uint32_t>& dashes) const {
         double nearest = 1e300;
         Point away{};
         const BorderSegment* border = nullptr;
@@ -314,7 +319,7 @@ class Painter {
                 }
             }
         }
-        return edge_texel(best, texel_);
+        return best;
     }
 
     std::vector<BorderSegment> borders_;
@@ -373,7 +378,7 @@ GroundMap::GroundMap(const TrackOutline& outline, const GroundOptions& options) 
     // Ring and padding are field; coverage bytes and edge texels say so differently.
     texels_.assign(total, kCoverageUnit << (8 * kField));
     std::fill(texels_.begin(), texels_.begin() + (view_.num_levels > 1 ? view_.levels[1].offset : total),
-              pure_texel(kField));
+              pack(0, 0, -127, 0));
     view_.texels = texels_.data();
 
     const auto index = [](const GroundLevel& level, int column, int row) {

@@ -281,6 +281,7 @@ GreyPalette channel_of(const RgbPalette& colours, int channel) {
     for (int i = 0; i < kNumWalls; ++i) grey.wall[i] = colours.wall[i][channel];
     grey.sky = colours.sky[channel];
     grey.outside = colours.outside[channel];
+    for (int i = 0; i < kNumMaterials; ++i) grey.grain[i] = colours.grain[i];
     return grey;
 }
 

@@ -90,7 +90,7 @@ TEST(coverage_sums_to_the_unit_and_keeps_its_area) {
             if (m != kCenterLine || level.texels_per_metre > 10.0f) CHECK_NEAR(area[m] / first[m], 1.0, 0.05);
         }
     }
-    // Lines of 3 inches on both sides, dashes of 5 by 2.54 cm every 10 cm.
+    // Lines of 3 inches on both sides, dashes of 2 by 1 inches every 4 inches.
     double length = 0.0;
     for (size_t i = 1; i < road.num_waypoints(); ++i) {
         const double dx = road.center[2 * i] - road.center[2 * i - 2];
@@ -100,6 +100,41 @@ TEST(coverage_sums_to_the_unit_and_keeps_its_area) {
     CHECK_NEAR(first[kEdgeLine] / (2.0 * 0.0762 * length), 1.0, 0.02);
     CHECK_NEAR(first[kCenterLine] / (0.5 * 0.0254 * length), 1.0, 0.02);
     CHECK_NEAR((first[kRoad] + first[kEdgeLine] + first[kCenterLine]) / (0.8 * length), 1.0, 0.02);
+}
+
+// Every texel of one material has two shades, parted anywhere; altogether as much of the darker as of the
+// lighter one, in every direction, and the same on every map of the same ground.
+TEST(grain_is_even_and_always_the_same) {
+    const Outline road = test::circuit();
+    const GroundMap ground(road.view());
+    const GroundMap again(road.view());
+    const GroundView& view = ground.view();
+    const GroundLevel& level = view.levels[0];
+    double lighter[kNumMaterials] = {}, count[kNumMaterials] = {}, along_x = 0.0, along_y = 0.0;
+    for (int row = 0; row < level.rows; ++row) {
+        for (int column = 0; column < level.columns; ++column) {
+            const uint32_t u = static_cast<uint32_t>(column + 1) << 16;
+            const uint32_t v = static_cast<uint32_t>(row + 1) << 16;
+            const uint32_t index = texel_index(level, u, v);
+            const uint32_t texel = view.texels[index];
+            CHECK_EQUAL(texel, again.view().texels[index]);
+            const MaterialPair pair = kMaterialPairs[texel >> 24];
+            if (pair.below != pair.above) continue;
+            for (int k = 0; k < 16; ++k) {  // rays into the texel
+                const uint32_t x = u + static_cast<uint32_t>(k % 4) * 16384 + 8192;
+                const uint32_t y = v + static_cast<uint32_t>(k / 4) * 16384 + 8192;
+                lighter[pair.above] += edge_distance(texel, x, y) > 0;
+                count[pair.above] += 1.0;
+            }
+            along_x += static_cast<int8_t>(texel & 255) / 64.0;
+            along_y += static_cast<int8_t>(texel >> 8 & 255) / 64.0;
+        }
+    }
+    const double texels = (count[kField] + count[kRoad] + count[kEdgeLine]) / 16.0;
+    CHECK(texels > 0.8 * level.rows * level.columns);
+    for (const Material m : {kField, kRoad, kEdgeLine}) CHECK_NEAR(lighter[m] / count[m], 0.5, 0.01);
+    CHECK_NEAR(along_x / texels, 0.0, 0.01);
+    CHECK_NEAR(along_y / texels, 0.0, 0.01);
 }
 
 TEST(memory_limit_coarsens_the_texel) {

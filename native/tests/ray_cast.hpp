@@ -23,9 +23,6 @@ class RayCaster {
                 max_y_ = std::max(max_y_, line[2 * i + 1] + kRoomMargin);
             }
         }
-        for (int i = 0; i + 1 < outline.count; ++i)
-            length_ += std::sqrt(squared_length(outline.center, i, i + 1));
-        period_ = length_ / std::max(1.0, std::floor(length_ / 0.10 + 0.5));
         add_border(outline.outer, false);
         add_border(outline.inner, true);
         if (!outline.is_closed) {
@@ -102,7 +99,8 @@ class RayCaster {
         return ox * ox + oy * oy;
     }
 
-    // Dashes are 0.0254 m wide and 0.05 m long, from the start of every period along the centre line.
+    // Dashes are 1 inch wide and 2 inches long, every 4 inches along the centre line; the first begins 5.8 cm
+    // after the first waypoint.
     bool is_on_dash(double x, double y) const {
         double travelled = 0.0;
         for (int i = 0; i + 1 < outline_.count; ++i) {
@@ -110,7 +108,8 @@ class RayCaster {
             const double size = std::sqrt(squared_length(outline_.center, i, i + 1));
             double share;
             const double distance = squared_distance(p[0], p[1], p[2], p[3], x, y, &share);
-            if (distance < 0.0127 * 0.0127 && std::fmod(travelled + share * size, period_) < 0.05)
+            const double from_first = travelled + share * size - 0.058;
+            if (distance < 0.0127 * 0.0127 && from_first >= 0.0 && std::fmod(from_first, 0.1016) < 0.0508)
                 return true;
             travelled += size;
         }
@@ -129,7 +128,6 @@ class RayCaster {
     TrackOutline outline_;
     GreyPalette palette_;
     double min_x_ = 1e300, max_x_ = -1e300, min_y_ = 1e300, max_y_ = -1e300;
-    double length_ = 0.0, period_ = 0.0;
     std::vector<Border> borders_;
 };
 

@@ -5,7 +5,7 @@ import pytest
 
 from racecraft.errors import ConfigError
 from racecraft.sim import CameraSpec, Simulation, Start
-from racecraft.sim.views import CarView, Scene
+from racecraft.sim.views import CarView, Scene, driver_frames
 from racecraft.track import load_track
 
 OVAL = load_track("oval")
@@ -18,10 +18,50 @@ def grey(picture):
 
 def test_the_drivers_view_is_what_the_policy_sees_in_colour():
     simulation = Simulation(OVAL, start=Start(mode="fixed"))
-    picture = Scene(OVAL).driver_view().draw(*START)
+    picture = Scene(OVAL).driver_view(lit_walls=False).draw(*START)
     assert picture.shape == (120, 160, 3)
-    differs = np.abs(grey(picture) - simulation.frames[0]) > 2.0
-    assert differs.mean() < 0.01  # a few edges, where colours are mixed in another order
+    apart = np.abs(grey(picture) - simulation.frames[0])
+    assert apart.mean() < 1.0
+    assert (apart > 8.0).mean() < 0.01  # a few edges, where colours are mixed in another order; shades are 8 apart
+
+
+def test_frames_from_anywhere_are_those_of_a_simulation():
+    simulation = Simulation(OVAL, num_envs=3, start=Start(mode="random", heading_jitter=0.5))
+    np.testing.assert_array_equal(driver_frames(OVAL, simulation.vehicles[:3].T), simulation.frames)
+
+
+def test_people_see_lighter_walls_and_the_same_ground():
+    scene = Scene(OVAL)
+    lit, true = (scene.driver_view(lit_walls=lit_walls).draw(*START) for lit_walls in (True, False))
+    assert (lit[:20] > true[:20]).any(axis=2).mean() > 0.9
+    np.testing.assert_array_equal(lit[60:], true[60:])
+
+
+def test_walls_are_as_bright_as_their_direction_and_sky_is_above_them():
+    """From the middle of the room: walls in the order of brightness that frames of the original show."""
+    middle = np.mean([OVAL.outer.min(axis=0), OVAL.outer.max(axis=0)], axis=0)
+    poses = [(*middle, heading) for heading in np.arange(4) * math.pi / 2]  # +x, +y, -x, -y
+    walls = driver_frames(OVAL, poses, CameraSpec(pitch=0.0, horizontal_fov=0.2))[:, 40:60, 70:90]
+    assert [int(wall.min()) for wall in walls] == [int(wall.max()) for wall in walls] == [25, 15, 6, 2]
+    sky = driver_frames(OVAL, poses, CameraSpec(pitch=0.0, horizontal_fov=2.0))[:, 0]
+    assert (sky == 180).all()
+
+
+def test_grain_is_part_of_the_ground():
+    """It fades with distance, and a step sideways shows the same strokes elsewhere, not others."""
+    x, y, heading = START
+    frame = driver_frames(OVAL, [START])[0].astype(float)
+    road = frame[110:118, 90:110]
+    assert 2.0 < road.std() < 5.0
+    assert np.abs(road - np.median(road)).max() < 10.0
+    small = CameraSpec(horizontal_fov=0.3, pitch=1.5, above_ground=0.5, forward=0.0)  # like a map of the road
+    shift = 32 * 2 * 0.5 * math.tan(0.15) / 160  # m of 32 pixels
+    left = (x - 0.1 - shift * math.sin(heading), y + shift * math.cos(heading), heading)
+    one, other = driver_frames(OVAL, [(x - 0.1, y, heading), left], small).astype(float)
+    same = np.corrcoef(one[20:100, :120].ravel(), other[20:100, 32:152].ravel())[0, 1]
+    stays = np.corrcoef(one[20:100, :120].ravel(), other[20:100, :120].ravel())[0, 1]
+    assert same > 0.95
+    assert stays < 0.6
 
 
 def test_the_chase_camera_sees_the_car_it_follows():

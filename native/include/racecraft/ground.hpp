@@ -9,6 +9,10 @@
 //   each.
 //                                Texel size doubles with every level.
 //
+// Grain: a texel of level 0 with one material has a border, too, at random, between a darker and a lighter
+// shade of it. That costs no drawing time, looks like short strokes close to the lens, and fades with
+// distance by itself: the filter widens, and coverage texels know of no shades.
+//
 // Colours are no part of it: a car's palette is applied after the fetch, so domain randomisation is free.
 // Everything after the row set-up is integer arithmetic, hence the same bits on every instruction set.
 #pragma once
@@ -19,7 +23,7 @@ namespace racecraft {
 
 enum Material : int32_t { kField = 0, kRoad = 1, kEdgeLine = 2, kCenterLine = 3, kNumMaterials = 4 };
 
-constexpr float kRoomMargin = 0.91f;       // m from the track's bounding box to the walls
+constexpr float kRoomMargin = 0.86f;       // m from the track's bounding box to the walls
 constexpr float kWallHeight = 1.0f;        // m
 constexpr float kEdgeLineWidth = 0.0762f;  // m, white, inside the road's border
 
@@ -36,8 +40,9 @@ struct MaterialPair {
     uint8_t above;
 };
 constexpr MaterialPair kMaterialPairs[kNumMaterialPairs] = {
-    {kField, kEdgeLine},   {kEdgeLine, kRoad},       {kRoad, kCenterLine}, {kField, kRoad},
-    {kField, kCenterLine}, {kEdgeLine, kCenterLine}, {kField, kField},     {kField, kField}};
+    {kField, kEdgeLine}, {kEdgeLine, kRoad},     {kRoad, kCenterLine},       {kField, kField},
+    {kRoad, kRoad},      {kEdgeLine, kEdgeLine}, {kCenterLine, kCenterLine}, {kField, kRoad}};
+constexpr int32_t kGrainPairs = 3;  // the pair of a material's two shades is this and the material
 
 struct GroundLevel {
     uint32_t offset;         // of the level's first texel

@@ -12,7 +12,8 @@ struct GreyPalette {
     uint8_t ground[kNumMaterials];  // by Material
     uint8_t wall[kNumWalls];
     uint8_t sky;
-    uint8_t outside;  // the floor beyond the walls, seen only from above them
+    uint8_t outside;               // the floor beyond the walls, seen only from above them
+    uint8_t grain[kNumMaterials];  // contrast: a material's two shades are so many 256ths of it off its mean
 };
 
 struct RgbPalette {
@@ -20,19 +21,32 @@ struct RgbPalette {
     uint8_t wall[kNumWalls][3];
     uint8_t sky[3];
     uint8_t outside[3];
+    uint8_t grain[kNumMaterials];
 };
 
-// The 2018 world (re:Invent 2018). Walls differ in brightness by direction, as its lamps left them.
-constexpr RgbPalette kPalette2018 = {{{95, 136, 104}, {36, 49, 64}, {194, 194, 190}, {194, 117, 0}},
-                                     {{16, 29, 34}, {9, 17, 20}, {4, 7, 8}, {2, 3, 4}},
+// The 2018 world (re:Invent 2018), as two frames of the original show it. Walls differ in brightness by
+// direction, as its lamps left them.
+constexpr RgbPalette kPalette2018 = {{{106, 152, 116}, {42, 56, 73}, {218, 217, 212}, {219, 131, 1}},
+                                     {{15, 29, 33}, {9, 17, 20}, {4, 7, 8}, {1, 3, 3}},
                                      {178, 180, 182},
-                                     {58, 64, 66}};
+                                     {58, 64, 66},
+                                     {7, 18, 6, 0}};
 
 // The world of the later tracks.
 constexpr RgbPalette kPalette2020 = {{{126, 133, 65}, {64, 63, 61}, {223, 223, 222}, {225, 143, 0}},
                                      {{16, 29, 34}, {9, 17, 20}, {4, 7, 8}, {2, 3, 4}},
                                      {178, 180, 182},
-                                     {58, 64, 66}};
+                                     {58, 64, 66},
+                                     {7, 18, 6, 0}};
+
+// The same world with walls that look well to people; the driver's are almost black.
+RC_HD RgbPalette with_lit_walls(RgbPalette colours) {
+    constexpr uint8_t walls[kNumWalls][3] = {{62, 104, 116}, {54, 92, 103}, {47, 81, 91}, {40, 70, 80}};
+    for (int32_t i = 0; i < kNumWalls; ++i) {
+        for (int32_t c = 0; c < 3; ++c) colours.wall[i][c] = walls[i][c];
+    }
+    return colours;
+}
 
 // Luma of ITU-R BT.601 with the original's weights 0.2989, 0.587, 0.114, rounded to nearest.
 RC_HD uint8_t grey_of(const uint8_t* rgb) {
@@ -45,6 +59,7 @@ RC_HD GreyPalette grey_palette(const RgbPalette& colours) {
     for (int32_t i = 0; i < kNumWalls; ++i) grey.wall[i] = grey_of(colours.wall[i]);
     grey.sky = grey_of(colours.sky);
     grey.outside = grey_of(colours.outside);
+    for (int32_t i = 0; i < kNumMaterials; ++i) grey.grain[i] = colours.grain[i];
     return grey;
 }
 
@@ -60,8 +75,15 @@ struct ShadeTable {
 RC_HD ShadeTable shade_table(const GreyPalette& palette) {
     ShadeTable table{};
     for (int32_t i = 0; i < kNumMaterialPairs; ++i) {
-        const int32_t below = palette.ground[kMaterialPairs[i].below];
-        const int32_t above = palette.ground[kMaterialPairs[i].above];
+        const MaterialPair pair = kMaterialPairs[i];
+        int32_t below = palette.ground[pair.below];
+        int32_t above = palette.ground[pair.above];
+        if (pair.below == pair.above) {
+            const int32_t wanted = (below * palette.grain[pair.below] + 128) >> 8;
+            const int32_t contrast = clamp(wanted, 0, 255 - above);
+            below -= contrast;
+            above += contrast;
+        }
         table.blend[i] = static_cast<int32_t>(static_cast<uint32_t>(above - below) << 16) | below;
     }
     for (int32_t i = 0; i < kNumMaterials; ++i) {

@@ -8,31 +8,45 @@ from typing import Annotated
 import typer
 
 from racecraft.cli.app import Json, TrackOption, app, print_json, text
+from racecraft.errors import ConfigError
 
 
 @app.command()
 def replay(
-    logs: Annotated[list[Path], typer.Argument(help="Sim-traces: CSV or logs with SIM_TRACE_LOG lines, gzip or not.")],
+    logs: Annotated[
+        list[Path] | None, typer.Argument(help="Sim-traces: CSV or logs with SIM_TRACE_LOG lines, gzip or not.")
+    ] = None,
     track: TrackOption = "reinvent_2018",
     reward: Annotated[
         str, typer.Option("--reward", "-r", help="Preset or file: compare its rewards with the logged ones.")
     ] = "",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "v5",
     picture: Annotated[
-        Path | None, typer.Option("--picture", "-o", help="Draw the median and the worst window to this file.")
+        Path | None,
+        typer.Option("--picture", "-o", help="Draw the median and the worst window, or the two frames, to this file."),
     ] = None,
     rows: Annotated[
         Path | None, typer.Option("--rows", help="CSV file for every row that comes out otherwise, with both values.")
     ] = None,
+    frame: Annotated[
+        Path | None,
+        typer.Option("--frame", help="Instead of logs: a camera frame of the original; find where it was taken."),
+    ] = None,
+    palette: Annotated[str, typer.Option("--palette", help="Colours of the frame's world: 2018 or 2020.")] = "2018",
     as_json: Json = False,
 ) -> None:
-    """Compare logs of the original with the simulator."""
+    """Compare logs of the original, or one of its camera frames, with the simulator."""
+    if (frame is None) == (not logs):
+        raise ConfigError("Nothing to replay, or too much: give either logs or one --frame FILE.")
+    if frame is not None:
+        _replay_frame(frame, track, palette, picture, as_json)
+        return
     from racecraft.replay import draw_comparison
     from racecraft.replay import replay as compare
     from racecraft.reward import load_reward
 
     source = load_reward(reward) if reward else None
-    result = compare(logs, track=track, vehicle=vehicle, reward=source, rows=rows)
+    result = compare(logs or [], track=track, vehicle=vehicle, reward=source, rows=rows)
     if picture is None and not as_json and result.examples:
         picture = Path("replay.png")
     if picture is not None:
@@ -41,6 +55,18 @@ def replay(
         print_json({**result.to_dict(), **({"picture": str(picture)} if picture is not None else {})})
     else:
         text().say_replayed(result, picture)
+
+
+def _replay_frame(frame: Path, track: str, palette: str, picture: Path | None, as_json: bool) -> None:
+    from racecraft.replay import draw_frame, fit_frame
+
+    fit = fit_frame(frame, track=track, palette=palette)
+    if picture is not None:
+        draw_frame(fit, picture)
+    if as_json:
+        print_json({**fit.to_dict(), **({"picture": str(picture)} if picture is not None else {})})
+    else:
+        text().say_frame(fit, picture)
 
 
 @app.command()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING, Any, Final
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from racecraft.importing import ImportedRun
     from racecraft.limits import TrackLimit
     from racecraft.race.run_evaluation import RunEvaluation
-    from racecraft.replay import Calibration, Comparison
+    from racecraft.replay import Calibration, Comparison, FrameFit
     from racecraft.reward import Outcome, Problem
     from racecraft.track import Track
     from racecraft.training import TrainResult
@@ -32,6 +33,9 @@ ENDED = {
     "score": "The score is reached",
     "interrupted": "Stopped",
 }
+
+SAME_PLACE: Final = 0.7
+"""Structural similarity under which a frame was hardly taken there."""
 
 
 def say_error(name: str, message: str, hint: str) -> None:
@@ -227,6 +231,31 @@ def say_replayed(result: Comparison, picture: Path | None) -> None:
         _say(console, (f"{result.faults.count:,} rows could not be read.", "bold yellow"))
     if picture is not None:
         _say(console, "Median and worst window: ", (str(picture), "bold"))
+
+
+def say_frame(fit: FrameFit, picture: Path | None) -> None:
+    """Where a frame was taken, and how much ours from there looks like it."""
+    console, found = Console(), fit.to_dict()
+    lens, offsets = found["lens"], found["edge_offsets_px"]
+    _say(
+        console,
+        f"Taken on {found['track']} with the lens at x = {lens['x']:.3f} m, y = {lens['y']:.3f} m, "
+        f"{math.degrees(found['pose']['heading']):.1f}° from the x axis,",
+    )
+    _say(console, f"{100 * lens['above_ground']:.1f} cm above the road, {math.degrees(lens['pitch']):.1f}° down.")
+    table = _table()
+    for heading, justify in (("our frame from there", "left"), ("", "right")):
+        table.add_column(heading, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    table.add_row("mean absolute difference", f"{found['mean_absolute_difference']:.2f} of 255")
+    table.add_row("structural similarity", f"{found['structural_similarity']:.3f}")
+    for name in ("horizon", "lines", "dashes"):
+        if offsets[name] is not None:
+            table.add_row(f"{name}, 95 % within", f"{offsets[name]:.2f} px")
+    console.print(table)
+    if found["structural_similarity"] < SAME_PLACE:
+        _say(console, ("That is not alike: is it this track, and its front camera?", "bold yellow"))
+    if picture is not None:
+        _say(console, "Frame, ours and the difference: ", (str(picture), "bold"))
 
 
 def say_calibrated(result: Calibration, output: Path) -> None:

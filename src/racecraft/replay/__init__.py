@@ -2,11 +2,13 @@
 
 log -> *replay* -> rules (agreement), dynamics (error), rewards (agreement)
 log -> *calibrate* -> vehicle file
+camera frame -> *fit_frame* -> pose of the lens, likeness of our frame from there
 """
 
 from racecraft.replay.calibrate import Calibration, calibrate
 from racecraft.replay.comparison import Comparison, replay
 from racecraft.replay.differences import Difference, Differences
+from racecraft.replay.frame import FrameFit, draw_frame, fit_frame
 from racecraft.replay.logs import Log, read_logs
 from racecraft.replay.picture import draw_comparison
 from racecraft.replay.rules import TrackRules
@@ -16,10 +18,13 @@ __all__ = [
     "Comparison",
     "Difference",
     "Differences",
+    "FrameFit",
     "Log",
     "TrackRules",
     "calibrate",
     "draw_comparison",
+    "draw_frame",
+    "fit_frame",
     "read_logs",
     "replay",
 ]

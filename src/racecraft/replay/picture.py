@@ -14,6 +14,8 @@ from racecraft.sim.simulation import CONTROL_DT
 from racecraft.track.canvas import Canvas, Color
 
 if TYPE_CHECKING:
+    from PIL import Image
+
     from racecraft.replay.comparison import Comparison, Example
     from racecraft.track.track import Track
 
@@ -41,9 +43,7 @@ def draw_comparison(comparison: Comparison, path: str | Path) -> Path:
     """
     from PIL import Image
 
-    path = Path(path)
-    if path.suffix.lower() not in ENDINGS:
-        raise ConfigError(f"{path} ends in {path.suffix!r}; a picture's name ends in {', '.join(ENDINGS)}.")
+    path = check_ending(path)
     if not comparison.examples:
         raise ConfigError("The log holds no 21 steps in a row: there is nothing to draw.")
     names = ("Median window", "Worst window")
@@ -51,9 +51,22 @@ def draw_comparison(comparison: Comparison, path: str | Path) -> Path:
     sheet = Image.new("RGB", (PANEL * len(panels), PANEL + HEAD), PAPER)
     for number, panel in enumerate(panels):
         sheet.paste(panel.finish(), (PANEL * number, 0))
+    return save_picture(sheet, path)
+
+
+def check_ending(path: str | Path) -> Path:
+    """The path of a picture, refused with a ConfigError where its ending is unknown."""
+    path = Path(path)
+    if path.suffix.lower() not in ENDINGS:
+        raise ConfigError(f"{path} ends in {path.suffix!r}; a picture's name ends in {', '.join(ENDINGS)}.")
+    return path
+
+
+def save_picture(picture: Image.Image, path: Path) -> Path:
+    """Write a picture, and its folder; a ConfigError where that fails."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        sheet.save(path)
+        picture.save(path)
     except OSError as error:
         raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
     return path

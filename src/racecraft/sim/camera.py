@@ -22,10 +22,10 @@ class CameraSpec:
     """m, lens ahead of the car's origin."""
     left: float = 0.0
     """m, lens to the left of the car's centre plane."""
-    above_ground: float = 0.127
-    """m, lens above the road."""
-    pitch: float = 0.2618
-    """rad, downwards; 15 degrees."""
+    above_ground: float = 0.1314
+    """m, lens above the road, as fitted to frames of the original."""
+    pitch: float = 0.2385
+    """rad, downwards, as fitted; the original's drawing says 0.2618, but its car squats a little."""
     palette: str = "2018"
     """Colours of the world: ``2018`` or ``2020``."""
 

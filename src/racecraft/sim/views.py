@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from racecraft import _native
 from racecraft.errors import ConfigError
@@ -20,6 +20,21 @@ CHASE_DISTANCE: Final = 1.5
 
 TEXEL: Final = 0.005
 """m of a ground texel in pictures for people; the driver's camera makes do with twice that."""
+
+
+def driver_frames(track: Track, poses: ArrayLike, camera: CameraSpec = CameraSpec()) -> NDArray[np.uint8]:
+    """What the driver's camera sees from many places, exactly as in a simulation: grey (N, height, width).
+
+    Args:
+        track: Where.
+        poses: x [m], y [m] and heading [rad] of the car's origin, (N, 3).
+        camera: Of the driver.
+    """
+    table = np.ascontiguousarray(poses, dtype=np.float32)
+    out = np.empty((len(table), camera.height, camera.width), dtype=np.uint8)
+    model = _native.CameraModel(native_camera(camera))
+    _native.render_grey(model, ground_map(track), _native.grey_palette(camera.palette), table, out)
+    return out
 
 
 class CarView(NamedTuple):
@@ -57,9 +72,14 @@ class Scene:
         """The camera that follows a car from behind and above."""
         return View(self._fine_ground(), self.palette, _native.chase_camera(width, height))
 
-    def driver_view(self, camera: CameraSpec = CameraSpec()) -> View:
-        """The driver's camera in colour, on the ground the driver sees; leave the own car out of its pictures."""
-        return View(ground_map(self._track), self.palette, native_camera(camera))
+    def driver_view(self, camera: CameraSpec = CameraSpec(), *, lit_walls: bool = True) -> View:
+        """The driver's camera in colour, on the ground the driver sees; leave the own car out of its pictures.
+
+        Args:
+            camera: Of the driver.
+            lit_walls: Show walls as people like them; without, they are as dark as the driver sees them.
+        """
+        return View(ground_map(self._track), self.palette, native_camera(camera), lit_walls=lit_walls)
 
     def top_view(self, *, width: int = 640, height: int = 480) -> View:
         """The whole track from above; its camera stands still, so the pose it is given does not matter."""
@@ -81,6 +101,7 @@ class View:
         spec: _native.CameraSpec,
         *,
         fixed: tuple[float, float, float] | None = None,
+        lit_walls: bool = True,
     ) -> None:
         self.width = spec.width
         self.height = spec.height
@@ -88,6 +109,7 @@ class View:
         self._palette = palette
         self._camera = _native.CameraModel(spec)
         self._fixed = fixed
+        self._lit_walls = lit_walls
 
     def draw(
         self,
@@ -111,5 +133,7 @@ class View:
             out = np.empty((self.height, self.width, 3), dtype=np.uint8)
         table = np.array([(*car[:4], *car.color, car.alpha) for car in cars], dtype=np.float32).reshape(-1, 8)
         x, y, heading = self._fixed or (x, y, heading)
-        _native.render_rgb(self._camera, self._ground, self._palette, x, y, heading, table, out)
+        _native.render_rgb(
+            self._camera, self._ground, self._palette, x, y, heading, table, lit_walls=self._lit_walls, out=out
+        )
         return out
