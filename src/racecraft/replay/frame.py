@@ -8,13 +8,13 @@ Every candidate is drawn by the camera that trains, so what fits is what a polic
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from racecraft.errors import ConfigError
 from racecraft.replay.likeness import LUMA, edge_offsets, mean_difference, structural_similarity
@@ -34,6 +34,8 @@ CHUNK: Final = 2048  # candidates that are drawn together
 LENS_RANGE: Final = 0.2  # share by which the lens may be higher or look further down than the car's
 POSE_STEPS: Final = np.array([0.01, 0.01, 0.01])  # m, m, rad, of derivatives at full size
 LENS_STEPS: Final = np.array([0.003, 0.002])  # rad, m
+ITERATIONS: Final = 20
+LONGEST: Final = 10.0  # steps that a candidate may move at once
 OUTLIER: Final = 12.0  # difference in brightness from which a pixel counts less
 
 Grey = NDArray[np.uint8]
@@ -207,44 +209,81 @@ def _distinct(poses: list[Numbers] | Numbers, count: int) -> list[Numbers]:
 
 
 def _refine(track: Track, camera: CameraSpec, target: Numbers, pose: Numbers, divisor: int) -> tuple[float, Numbers]:
-    """Least squares on the brightness of all pixels; the score is the mean absolute difference."""
-    steps = POSE_STEPS * divisor
+    """The pose near this one that fits best, and its mean absolute difference."""
 
-    def residuals(at: Numbers) -> Numbers:
-        return np.asarray(driver_frames(track, [at], camera)[0] - target).ravel()
+    def draw(candidates: Numbers) -> Numbers:
+        return driver_frames(track, candidates, camera).astype(np.float64)
 
-    def jacobian(at: Numbers) -> Numbers:
-        poses = np.concatenate([at + np.diag(steps), at - np.diag(steps)])
-        drawn = driver_frames(track, poses, camera).astype(float).reshape(2, 3, -1)
-        return np.asarray(((drawn[0] - drawn[1]) / (2 * steps[:, None])).T)
+    found, drawn = _descend(draw, target, pose, POSE_STEPS * divisor)
+    return float(np.abs(drawn - target).mean()), found
 
-    found = least_squares(
-        residuals, pose, jac=jacobian, x_scale=[0.1, 0.1, 0.1], loss="soft_l1", f_scale=OUTLIER, max_nfev=25
-    )
-    return float(np.abs(residuals(found.x)).mean()), found.x
+
+def _descend(
+    draw: Callable[[Numbers], Numbers], target: Numbers, start: Numbers, steps: Numbers
+) -> tuple[Numbers, Numbers]:
+    """Levenberg-Marquardt on the brightness of all pixels; those far off count less, by a pseudo-Huber loss.
+
+    Args:
+        draw: Pictures (N, H, W) of candidates (N, P).
+        target: What they should look like, (H, W).
+        start: The first candidate, (P,).
+        steps: Of the derivatives, (P,).
+
+    Returns:
+        The best candidate (P,) and its picture (H, W).
+    """
+
+    def loss_of(drawn: Numbers) -> float:
+        return float(np.sqrt(1 + ((drawn - target) / OUTLIER) ** 2).sum())
+
+    at, drawn, damping = start, draw(start[None])[0], 1e-2
+    loss = loss_of(drawn)
+    for _ in range(ITERATIONS):
+        around = draw(np.concatenate([at + np.diag(steps), at - np.diag(steps)])).reshape(2, len(steps), -1)
+        slope = (around[0] - around[1]) / 2  # per step
+        apart = (drawn - target).ravel()
+        weighted = slope / np.sqrt(1 + (apart / OUTLIER) ** 2)
+        curvature, descent = weighted @ slope.T, -weighted @ apart
+        while damping < 1e3:
+            system = curvature + (1e-6 + damping * np.diag(curvature)) * np.eye(len(steps))
+            change = np.clip(np.linalg.solve(system, descent), -LONGEST, LONGEST)
+            trial = at + change * steps
+            picture = draw(trial[None])[0]
+            if loss_of(picture) < loss:
+                break
+            damping *= 10
+        else:
+            break
+        at, drawn, gain = trial, picture, loss - loss_of(picture)
+        loss, damping = loss - gain, damping / 10
+        if gain < 1e-5 * loss:
+            break
+    return at, drawn
 
 
 def _next_dashes(track: Track, camera: CameraSpec, seen: Grey, pose: Numbers) -> Numbers:
-    """The same look one or two dashes on or back, as long as it fits better: dashes are all alike."""
-    target, best = seen.astype(float), pose
-    score = float("inf")
-    for _ in range(10):
-        fits = [_refine(track, camera, target, start, 1) for start in _shifted(track, camera, best)]
-        found, nearest = min(fits, key=lambda fit: fit[0])
-        if found >= score - 1e-3:
+    """The same look up to two dashes on or back, as long as it fits better: dashes are all alike."""
+    half, target = _resized(camera, 2), _shrunk(seen, 2)
+    best, score = pose, float("inf")
+    for _ in range(5):
+        rough = [_refine(track, half, target, start, 2) for start in _shifted(track, camera, best)]
+        nearest = _distinct([pose for _, pose in sorted(rough, key=lambda fit: fit[0])], 4)
+        fits = [_refine(track, camera, seen.astype(np.float64), start, 1) for start in (best, *nearest)]
+        lowest, found = min(fits, key=lambda fit: fit[0])
+        if lowest >= score - 1e-3:
             break
-        score, best = found, nearest
+        score, best = lowest, found
     return best
 
 
 def _shifted(track: Track, camera: CameraSpec, pose: Numbers) -> list[Numbers]:
-    """Poses whose lens is some dashes further along the track, as far from its middle and as oblique as before."""
+    """Poses whose lens is some quarters of a dash further along the track, as far from its middle and as oblique as before."""
     ahead = camera.forward * np.array([np.cos(pose[2]), np.sin(pose[2])])
     lens = pose[:2] + ahead
     s, offset = track.project(lens)
     oblique = pose[2] - track.heading_at(s)
     poses = []
-    for dashes in (0, 1, -1, 2, -2):
+    for dashes in np.arange(-2.0, 2.1, 0.25):
         at = s + dashes * DASH_PERIOD
         along = float(track.heading_at(at))
         heading = along + oblique
@@ -257,34 +296,18 @@ def _shifted(track: Track, camera: CameraSpec, pose: Numbers) -> list[Numbers]:
 def _refine_lens(track: Track, camera: CameraSpec, seen: Grey, pose: Numbers) -> tuple[CameraSpec, Numbers]:
     """Pose, pitch and height of the lens together."""
     lens = np.array([camera.pitch, camera.above_ground])
-    steps = np.concatenate([POSE_STEPS, LENS_STEPS])
 
     def with_lens(values: Numbers) -> CameraSpec:
-        return replace(camera, pitch=float(values[3]), above_ground=float(values[4]))
+        pitch, above = np.clip(values[3:], lens * (1 - LENS_RANGE), lens * (1 + LENS_RANGE)).tolist()
+        return replace(camera, pitch=pitch, above_ground=above)
 
-    def draw(values: Numbers) -> Numbers:
-        return np.asarray(driver_frames(track, [values[:3]], with_lens(values))[0].ravel(), dtype=np.float64)
+    def draw(candidates: Numbers) -> Numbers:
+        frames = [driver_frames(track, values[None, :3], with_lens(values))[0] for values in candidates]
+        return np.asarray(frames, dtype=np.float64)
 
-    def residuals(at: Numbers) -> Numbers:
-        return draw(at) - seen.ravel()
-
-    def jacobian(at: Numbers) -> Numbers:
-        pairs = [(draw(at + step) - draw(at - step)) / (2 * step.sum()) for step in np.diag(steps)]
-        return np.stack(pairs, axis=1)
-
-    start = np.concatenate([pose, lens])
-    reach = np.concatenate([[0.5, 0.5, 0.5], LENS_RANGE * lens])
-    found = least_squares(
-        residuals,
-        start,
-        jac=jacobian,
-        bounds=(start - reach, start + reach),
-        x_scale=[0.1, 0.1, 0.1, 0.03, 0.02],
-        loss="soft_l1",
-        f_scale=OUTLIER,
-        max_nfev=60,
-    )
-    return with_lens(found.x), found.x[:3].copy()
+    steps = np.concatenate([POSE_STEPS, LENS_STEPS])
+    found, _ = _descend(draw, seen.astype(np.float64), np.concatenate([pose, lens]), steps)
+    return with_lens(found), found[:3].copy()
 
 
 def draw_frame(fit: FrameFit, path: str | Path) -> Path:
