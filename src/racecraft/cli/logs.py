@@ -35,7 +35,7 @@ def replay(
     palette: Annotated[str, typer.Option("--palette", help="Colours of the frame's world: 2018 or 2020.")] = "2018",
     as_json: Json = False,
 ) -> None:
-    """Compare logs of the original, or one of its camera frames, with the simulator."""
+    """Compare logs or a frame of the original with ours."""
     if (frame is None) == (not logs):
         raise ConfigError("Nothing to replay, or too much: give either logs or one --frame FILE.")
     if frame is not None:
