@@ -277,7 +277,7 @@ def _next_dashes(track: Track, camera: CameraSpec, seen: Grey, pose: Numbers) ->
 
 
 def _shifted(track: Track, camera: CameraSpec, pose: Numbers) -> list[Numbers]:
-    """Poses whose lens is some quarters of a dash further along the track, as far from its middle and as oblique as before."""
+    """Poses with the lens some quarters of a dash further along the track, as far from its middle and as oblique."""
     ahead = camera.forward * np.array([np.cos(pose[2]), np.sin(pose[2])])
     lens = pose[:2] + ahead
     s, offset = track.project(lens)
