@@ -94,7 +94,8 @@ def test_the_command_prints_and_draws(tmp_path):
     assert found["structural_similarity"] > 0.9
     assert set(found["edge_offsets_px"]) == {"horizon", "lines", "dashes"}
     said = CliRunner().invoke(app, [*command, "-o", str(sheet)], catch_exceptions=False).stdout
-    assert Image.open(sheet).size == (1920, 960)
+    with Image.open(sheet) as picture:
+        assert picture.size == (1920, 960)
     assert "Taken on oval" in said
     assert "structural similarity" in said
 
