@@ -9,13 +9,16 @@ from typing import Annotated
 
 import typer
 
-from racecraft.cli.app import INTERRUPTED, Json, TrackOption, app, print_json, text
+from racecraft.cli.app import INTERRUPTED, Json, app, print_json, text
 
 
 @app.command()
 def train(
     context: typer.Context,
-    track: TrackOption = "reinvent_2018",
+    track: Annotated[
+        list[str] | None,
+        typer.Option("--track", "-t", help="Track, file, folder, library or generated:0..99; several by repeating it."),
+    ] = None,
     reward: Annotated[str, typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py.")] = "racing",
     until: Annotated[
         str,
@@ -36,6 +39,10 @@ def train(
     critic: Annotated[str, typer.Option("--critic", help="What the critic sees: privileged or camera.")] = "privileged",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
     direction: Annotated[str, typer.Option("--direction", help="forward, reverse or alternate.")] = "forward",
+    randomize: Annotated[
+        str,
+        typer.Option("--randomize", help="What differs between episodes: light, strong, aws or a JSON file."),
+    ] = "none",
     num_envs: Annotated[int, typer.Option("--num-envs", help="Cars driven at once; 0 decides by itself.")] = 0,
     seed: Annotated[int, typer.Option("--seed", "-s", help="The same seed repeats a run on the same machine.")] = 0,
     evaluate_every: Annotated[
@@ -64,7 +71,9 @@ def train(
     from racecraft.training.progress import SilentReporter
     from racecraft.training.terminal import TerminalReporter
 
-    title = f"Racecraft · {resume}" if resume else f"Racecraft · {Path(track).stem} · {Path(reward).stem}"
+    tracks = track or ["reinvent_2018"]
+    where = Path(tracks[0]).stem if len(tracks) == 1 else f"{len(tracks)} tracks"
+    title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
     with SilentReporter() if is_quiet else TerminalReporter(title=title) as reporter:
         if resume is not None:
             result = training.resume(
@@ -72,7 +81,7 @@ def train(
             )
         else:
             result = training.train(
-                track,
+                tracks,
                 reward=reward,
                 until=until or "5 laps",
                 actions=actions,
@@ -82,6 +91,7 @@ def train(
                 critic=critic,
                 vehicle=vehicle,
                 direction=direction,
+                randomize=randomize,
                 num_envs=num_envs,
                 seed=seed,
                 evaluate_every=evaluate_every,

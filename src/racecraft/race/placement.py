@@ -73,8 +73,13 @@ def reset_pose(track: Track, previous: NDArray[np.float64]) -> Pose:
     return Pose(x, y, float(track.heading_at(s)))
 
 
-def line_up(simulation: Simulation, track: Track, rules: RaceRules, *, seed: int) -> None:
-    """Put every car of a simulation at the start of its trial."""
-    simulation.reset()
+def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
+    """Put every car of a simulation at the start of its trial; equal seeds mean equal starts and conditions."""
+    if simulation.randomize.is_off:
+        simulation.reset()
+    else:
+        trials = np.arange(simulation.num_envs, dtype=np.uint64)
+        simulation.reset(seeds=trials + np.uint64((seed % 2**32) << 20))
+    tracks = [track.reversed() if rules.direction == "reverse" else track for track in simulation.tracks]
     for trial in range(1, simulation.num_envs):  # trial 0 already stands where it should
-        simulation.set_pose(trial, *start_pose(track, rules, seed=seed, trial=trial))
+        simulation.set_pose(trial, *start_pose(tracks[trial % len(tracks)], rules, seed=seed, trial=trial))
