@@ -9,6 +9,7 @@ from typing import Annotated, Final
 
 import typer
 
+from racecraft.cli import race_options
 from racecraft.cli.app import INTERRUPTED, Json, app, print_json, text
 
 DEFAULT_TRACK: Final = "reinvent_2018"
@@ -45,6 +46,14 @@ def train(
         str,
         typer.Option("--randomize", help="What differs between episodes: light, strong, aws or a JSON file."),
     ] = "none",
+    race: race_options.Race = "time-trial",
+    objects: race_options.NumObjects = 0,
+    bots: race_options.NumBots = 0,
+    bot_speed: race_options.BotSpeed = None,
+    lane_changes: race_options.LaneChanges = False,
+    parked_cars: race_options.ParkedCars = False,
+    placement: race_options.Placement = "",
+    positions: race_options.Positions = "",
     num_envs: Annotated[int, typer.Option("--num-envs", help="Cars driven at once; 0 decides by itself.")] = 0,
     seed: Annotated[int, typer.Option("--seed", "-s", help="The same seed repeats a run on the same machine.")] = 0,
     evaluate_every: Annotated[
@@ -93,6 +102,16 @@ def train(
                 vehicle=vehicle,
                 direction=direction,
                 randomize=randomize,
+                objects=race_options.objects_of(
+                    race,
+                    objects=objects,
+                    bots=bots,
+                    bot_speed=bot_speed,
+                    lane_changes=lane_changes,
+                    parked_cars=parked_cars,
+                    placement=placement,
+                    positions=positions,
+                ),
                 num_envs=num_envs,
                 seed=seed,
                 evaluate_every=evaluate_every if _is_given(context, "evaluate_every") else 0,

@@ -48,6 +48,7 @@ class Evaluator:
             num_trials=settings.evaluation_trials,
             vehicle=settings.vehicle,
             randomize=settings.randomize,
+            objects=settings.objects,
             num_threads=settings.num_threads,
         )
         self.last: EvaluationReport | None = None

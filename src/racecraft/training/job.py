@@ -152,6 +152,7 @@ class Training:
                 direction=settings.direction,
                 track_order="random" if len(tracks) > 1 else "fixed",
                 randomize=settings.randomize,
+                objects=settings.objects,
                 num_threads=settings.num_threads,
             )
             if not self.is_checked:
@@ -161,7 +162,11 @@ class Training:
         with ExitStack() as stack:
             # A function that remembers something gets a memory for each car: on AWS one process drove one car.
             copies = ppo_config.num_envs if keeps_state(source) else 1
-            worker = stack.enter_context(RewardWorker(source, list(tracks), seed=settings.seed, num_cars=copies))
+            worker = stack.enter_context(
+                RewardWorker(
+                    source, list(tracks), seed=settings.seed, num_cars=copies, num_objects=settings.objects.count
+                )
+            )
             kept = saved.step if saved is not None else 0
             after = kept if saved is not None else -1
             events = stack.enter_context(EventWriter(folder.events, after_step=after))
