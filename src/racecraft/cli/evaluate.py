@@ -59,9 +59,9 @@ def evaluate(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Race a run's policy against the clock and film it, among the objects it was trained with.
+    """Race a run's policy against the clock and film it.
 
-    With --tracks it tries one lap on each of many tracks, both ways.
+    By default among the objects it was trained with. With --tracks it tries one lap on each of many tracks, both ways.
     """
     if tracks:
         _generalize(
