@@ -92,6 +92,7 @@ VERBS = (
     "reward show",
     "replay",
     "calibrate",
+    "serve",
 )
 
 

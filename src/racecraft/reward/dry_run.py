@@ -102,65 +102,65 @@ def situations(track: Track) -> list[Situation]:
         Situation(
             "start",
             "First step of an episode, on the start line.",
-            _row(track, FRONT, steps=2, progress=FRONT / track.length),
+            moment(track, FRONT, steps=2, progress=FRONT / track.length),
         ),
-        Situation("straight", "Straight ahead on the centre line.", _row(track, straight, steps=40)),
+        Situation("straight", "Straight ahead on the centre line.", moment(track, straight, steps=40)),
         Situation(
             "bend left",
             "In the tightest bend to the left, steering into it.",
-            _row(track, left, steps=60, steering_angle=math.radians(20)),
+            moment(track, left, steps=60, steering_angle=math.radians(20)),
         ),
         Situation(
             "bend right",
             "In the tightest bend to the right, steering into it.",
-            _row(track, right, steps=80, steering_angle=math.radians(-20)),
+            moment(track, right, steps=80, steering_angle=math.radians(-20)),
         ),
-        Situation("slow", "On the centre line at half a metre a second.", _row(track, straight, speed=0.5)),
-        Situation("fast", "On the centre line at four metres a second.", _row(track, straight, speed=4.0)),
+        Situation("slow", "On the centre line at half a metre a second.", moment(track, straight, speed=0.5)),
+        Situation("fast", "On the centre line at four metres a second.", moment(track, straight, speed=4.0)),
         Situation(
             "left edge",
             "Two wheels over the left border.",
-            _row(track, straight, steps=90, offset=half, wheels_on_track=False),
+            moment(track, straight, steps=90, offset=half, wheels_on_track=False),
         ),
         Situation(
             "right edge",
             "Inside the right border, by a wheel's width.",
-            _row(track, straight, steps=90, offset=-(half - HALF_CAR - 0.03)),
+            moment(track, straight, steps=90, offset=-(half - HALF_CAR - 0.03)),
         ),
         Situation(
             "sideways",
             "On the centre line, looking across the track.",
-            _row(track, straight, steps=90, heading_error=math.radians(80)),
+            moment(track, straight, steps=90, heading_error=math.radians(80)),
         ),
         Situation(
             "backwards",
             "On the centre line, looking the wrong way.",
-            _row(track, straight, steps=90, heading_error=math.pi),
+            moment(track, straight, steps=90, heading_error=math.pi),
         ),
         Situation(
             "off track",
             "All wheels beyond the right border, end of the episode.",
-            _row(track, straight, steps=95, offset=-(half + 0.2), wheels_on_track=False, status="off_track"),
+            moment(track, straight, steps=95, offset=-(half + 0.2), wheels_on_track=False, status="off_track"),
         ),
         Situation(
             "other way",
             "On the centre line, driving the track in the other direction.",
-            _row(other_way, track.length - straight, steps=40, is_reversed=True),
+            moment(other_way, track.length - straight, steps=40, is_reversed=True),
         ),
         Situation(
             "on pace",
             "After exactly 100 steps, two thirds of the lap done.",
-            _row(track, track.length * 2 / 3, steps=100, progress=2 / 3),
+            moment(track, track.length * 2 / 3, steps=100, progress=2 / 3),
         ),
         Situation(
             "finish",
             "The lap is complete.",
-            _row(track, track.length, steps=200, progress=1.0, status="lap_complete"),
+            moment(track, track.length, steps=200, progress=1.0, status="lap_complete"),
         ),
     ]
 
 
-def _row(
+def moment(
     track: Track,
     s: float,
     *,

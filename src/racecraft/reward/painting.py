@@ -1,0 +1,76 @@
+"""What a reward function pays along a track, as a grid to be painted over its picture.
+
+The car drives ahead at a usual speed at every place, once per place: functions that remember something, or that pay
+for progress between two calls, are painted as they answer to that, place after place along the lap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import RewardError
+from racecraft.reward.dry_run import HALF_CAR, TYPICAL_SPEED, moment
+from racecraft.reward.worker import RewardWorker
+from racecraft.track.track import Track
+
+PLACES: Final = 96
+OFFSETS: Final = (-1.15, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.15)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Painting:
+    """Rewards on a grid of P places along a track and O places across it."""
+
+    places: NDArray[np.float64]
+    """m along the centre line  (P,)."""
+    offsets: NDArray[np.float64]
+    """Share of half the road's width, left positive; beyond 1 is beside the road  (O,)."""
+    points: NDArray[np.float64]
+    """x, y in m  (P, O, 2)."""
+    rewards: NDArray[np.float64]
+    """NaN where the function failed  (P, O)."""
+
+
+def paint_reward(source: str, track: Track, *, timeout_s: float = 0.5) -> Painting:
+    """Ask a reward function what it pays everywhere on a track.
+
+    Args:
+        source: Text of a ``reward_function.py`` that has been checked.
+        track: Where.
+        timeout_s: How long one call may take, s; after a failure the rest stays NaN.
+
+    Raises:
+        RewardError: The source cannot be loaded at all.
+    """
+    places = np.linspace(0.0, track.length, PLACES, endpoint=not track.is_closed)
+    offsets = np.array(OFFSETS)
+    shape = (len(places), len(offsets))
+    points, rewards = np.empty((*shape, 2)), np.full(shape, np.nan)
+    with RewardWorker(source, track, timeout_s=timeout_s) as worker:
+        for column, offset in enumerate(offsets):
+            half = 0.5 * track.width_at(places)
+            rows = np.stack([_row(track, place, offset * width) for place, width in zip(places, half, strict=True)])
+            points[:, column] = rows[:, 2:4]
+            try:
+                rewards[:, column] = worker(rows)
+            except RewardError:
+                break
+    return Painting(places=places, offsets=offsets, points=points, rewards=rewards)
+
+
+def _row(track: Track, place: float, offset: float) -> NDArray[np.float64]:
+    half = 0.5 * float(track.width_at(place))
+    is_off = abs(offset) > half + HALF_CAR
+    return moment(
+        track,
+        float(place),
+        offset=float(offset),
+        speed=TYPICAL_SPEED,
+        steps=2 + int(place / track.length * 150),
+        wheels_on_track=abs(offset) + HALF_CAR <= half,
+        status="off_track" if is_off else "in_progress",
+    )

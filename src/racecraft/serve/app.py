@@ -1,0 +1,107 @@
+"""The console's server: an application that guards its door, answers below /api and hands out the pages."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+from fastapi import FastAPI, Request
+from fastapi.responses import FileResponse, HTMLResponse, Response
+
+from racecraft import __version__
+from racecraft.serve import problems
+from racecraft.serve.context import Context
+from racecraft.serve.courses import Courses
+from racecraft.serve.database import Database
+from racecraft.serve.garage import Garage
+from racecraft.serve.jobs import JobQueue
+from racecraft.serve.routes import console, evaluations, events, jobs, models, rewards, tracks
+from racecraft.serve.schemas import ProblemReply
+from racecraft.serve.security import Guard, content_policy
+from racecraft.serve.settings import ServeSettings
+from racecraft.serve.supervisor import Supervisor
+
+PAGES: Final = Path(__file__).parent / "pages"
+"""The built web client, part of the package."""
+KINDS: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".woff2": "font/woff2"}
+
+
+def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
+    """The application; `app.state.guard.ticket()` opens its door once.
+
+    Args:
+        settings: Of the console.
+        hosts: Names with ports that it may be called by.
+
+    Raises:
+        RunError: A folder or the database cannot be opened.
+    """
+    settings.state.mkdir(parents=True, exist_ok=True)
+    settings.tracks.mkdir(exist_ok=True)
+    database = Database(settings.database_url)
+    database.migrate()
+    queue = JobQueue(database)
+    context = Context(
+        settings=settings,
+        database=database,
+        queue=queue,
+        garage=Garage(settings.runs, settings.state, database),
+        courses=Courses(settings.tracks),
+        supervisor=Supervisor(settings, database, queue),
+    )
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        tending = asyncio.create_task(context.supervisor.run())
+        yield
+        tending.cancel()
+        with suppress(asyncio.CancelledError):
+            await tending
+        await context.supervisor.stop()
+        database.close()
+
+    app = FastAPI(
+        title="Racecraft",
+        version=__version__,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+        responses={422: {"model": ProblemReply}},
+        generate_unique_id_function=lambda route: route.name,
+    )
+    app.state.context = context
+    app.state.guard = guard = Guard(database, hosts)
+    app.add_middleware(guard.middleware)
+    problems.install(app)
+    for part in (console, tracks, rewards, models, evaluations, jobs, events):
+        app.include_router(part.router)
+
+    @app.get("/assets/{name}", include_in_schema=False)
+    def asset(name: str) -> Response:
+        path = PAGES / "assets" / name
+        if "/" in name or path.suffix not in KINDS or not path.is_file():
+            return problems.problem(404, "NotFound", f"There is no file {name[:80]!r}.")
+        return FileResponse(
+            path, media_type=KINDS[path.suffix], headers={"Cache-Control": "public, max-age=31536000, immutable"}
+        )
+
+    @app.get("/{path:path}", include_in_schema=False)
+    def page(path: str, request: Request) -> Response:
+        if path.startswith("api/"):
+            return problems.problem(404, "NotFound", f"There is nothing at /{path[:80]}.")
+        nonce = secrets.token_urlsafe(16)
+        try:
+            text = (PAGES / "index.html").read_text(encoding="utf-8")
+        except OSError:
+            text = "<!doctype html><title>Racecraft</title><p>The pages are not built. Run <code>make console</code>."
+        return HTMLResponse(
+            text.replace("__NONCE__", nonce),
+            headers={"Content-Security-Policy": content_policy(nonce), "Cache-Control": "no-store"},
+        )
+
+    return app

@@ -1,0 +1,36 @@
+"""What every route works with; one per application."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from racecraft.serve.courses import Courses
+from racecraft.serve.database import Database
+from racecraft.serve.garage import Garage
+from racecraft.serve.jobs import JobQueue
+from racecraft.serve.settings import ServeSettings
+from racecraft.serve.supervisor import Supervisor
+
+
+@dataclass(frozen=True)
+class Context:
+    """The parts of a running console."""
+
+    settings: ServeSettings
+    database: Database
+    queue: JobQueue
+    garage: Garage
+    courses: Courses
+    supervisor: Supervisor
+
+
+def _context(request: Request) -> Context:
+    context: Context = request.app.state.context
+    return context
+
+
+InContext = Annotated[Context, Depends(_context)]
+"""A route's parameter of this type is given the console's parts."""

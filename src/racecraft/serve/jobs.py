@@ -1,0 +1,135 @@
+"""The queue of jobs: claimed under a lease, kept alive by heartbeats, taken over when the worker is gone.
+
+    queued ──claim──▶ running ──finish──▶ done | failed | cancelled
+       ▲                 │ lease ran out (killed, machine off)
+       └─────────────────┘ again, at most `MAX_ATTEMPTS` times
+
+Every step is one UPDATE whose WHERE says what it relies on, so two servers or workers never own a job together.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Mapping
+from datetime import timedelta
+from typing import Any, Final
+
+import sqlalchemy as sa
+
+from racecraft.serve.database import Database
+from racecraft.serve.tables import Job, now
+
+LEASE: Final = timedelta(seconds=20)
+"""How long a job without a heartbeat still counts as running."""
+FIRST_LEASE: Final = timedelta(seconds=60)
+"""The same before the first heartbeat: a process needs its time to start."""
+MAX_ATTEMPTS: Final = 5
+KINDS: Final = ("train", "evaluate")
+ENDED: Final = ("done", "failed", "cancelled")
+
+
+class JobQueue:
+    """The jobs of a console's database."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, kind: str, run: str, payload: Mapping[str, Any]) -> Job:
+        """Put a job at the end of the queue."""
+        job = Job(id=secrets.token_hex(8), kind=kind, run=run, payload=dict(payload))
+        with self._database.transaction() as session:
+            session.add(job)
+        return job
+
+    def get(self, job_id: str) -> Job | None:
+        """A job by its id."""
+        with self._database.transaction() as session:
+            return session.get(Job, job_id)
+
+    def list(self, *, run: str | None = None, limit: int = 200) -> list[Job]:
+        """Jobs, newest first."""
+        query = sa.select(Job).order_by(Job.created.desc()).limit(limit)
+        if run is not None:
+            query = query.where(Job.run == run)
+        with self._database.transaction() as session:
+            return list(session.scalars(query))
+
+    def active(self, run: str) -> Job | None:
+        """The training of a run that is queued or running."""
+        query = sa.select(Job).where(Job.run == run, Job.kind == "train", Job.state.in_(("queued", "running")))
+        with self._database.transaction() as session:
+            return session.scalars(query).first()
+
+    def claim(self, kinds: tuple[str, ...], *, owner: str) -> Job | None:
+        """Take the oldest queued job of these kinds, or None."""
+        oldest = (
+            sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds)).order_by(Job.created, Job.id).limit(1)
+        )
+        moment = now()
+        with self._database.transaction() as session:
+            job_id = session.scalar(oldest)
+            taken = sa.update(Job).where(Job.id == job_id, Job.state == "queued")
+            taken = taken.values(
+                state="running",
+                owner=owner,
+                attempts=Job.attempts + 1,
+                lease_until=moment + FIRST_LEASE,
+                started=sa.func.coalesce(Job.started, moment),
+            )
+            if job_id is None or session.execute(taken).rowcount != 1:  # type: ignore[attr-defined]
+                return None
+            session.expire_all()
+            return session.get_one(Job, job_id)
+
+    def heartbeat(self, job_id: str, *, owner: str) -> str:
+        """Keep a job: ``go on``, ``stop`` when somebody cancelled it, or ``lost`` when it is another's now."""
+        kept = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
+        with self._database.transaction() as session:
+            if session.execute(kept.values(lease_until=now() + LEASE)).rowcount != 1:  # type: ignore[attr-defined]
+                return "lost"
+            return "stop" if session.scalar(sa.select(Job.is_cancelled).where(Job.id == job_id)) else "go on"
+
+    def finish(
+        self,
+        job_id: str,
+        *,
+        owner: str,
+        state: str,
+        result: Mapping[str, Any] | None = None,
+        error: Mapping[str, Any] | None = None,
+    ) -> bool:
+        """End a job that this owner holds; False when it is another's now."""
+        ended = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
+        ended = ended.values(
+            state=state,
+            result=None if result is None else dict(result),
+            error=None if error is None else dict(error),
+            finished=now(),
+            lease_until=None,
+        )
+        with self._database.transaction() as session:
+            return session.execute(ended).rowcount == 1  # type: ignore[attr-defined, no-any-return]
+
+    def cancel(self, job_id: str) -> None:
+        """Ask for a job's end: a queued one ends at once, a running one when its worker hears of it."""
+        with self._database.transaction() as session:
+            session.execute(sa.update(Job).where(Job.id == job_id).values(is_cancelled=True))
+            waiting = sa.update(Job).where(Job.id == job_id, Job.state == "queued")
+            session.execute(waiting.values(state="cancelled", finished=now()))
+
+    def release(self, owner: str) -> None:
+        """Put back what an owner holds that has ended without a word."""
+        self._take_back(Job.owner == owner)
+
+    def take_back_expired(self) -> None:
+        """Put back what nobody keeps alive."""
+        self._take_back(Job.lease_until < now())
+
+    def _take_back(self, condition: sa.ColumnElement[bool]) -> None:
+        lost = sa.update(Job).where(Job.state == "running", condition)
+        gone = {"code": "WorkerLost", "message": f"The job's process died {MAX_ATTEMPTS} times.", "hint": ""}
+        with self._database.transaction() as session:
+            session.execute(lost.where(Job.is_cancelled).values(state="cancelled", finished=now(), lease_until=None))
+            tired = lost.where(Job.attempts >= MAX_ATTEMPTS)
+            session.execute(tired.values(state="failed", error=gone, finished=now(), lease_until=None))
+            session.execute(lost.values(state="queued", owner="", lease_until=None))

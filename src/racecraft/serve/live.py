@@ -1,0 +1,176 @@
+"""The cars of a training as they drive: one small file in memory, written by the job, read by the server.
+
+Poses, not video: the browser draws. A writer never waits for readers; a reader that catches it in the middle of a
+writing tries again (a sequence lock: the number is odd while something is written).
+
+    header   int64 (8)            sequence, step, time in ns, N cars, H, W, A actions, kind (0 discrete, 1 continuous)
+    poses    float32 (N, 6)       x, y, heading, speed, steering (SI), share of the lap driven
+    steps    int32 (N)            of the episode: smaller than before means the car was put at a new start
+    policy   float32 (A)          of car 0: probabilities, or mean steering and speed from -1 to 1
+    frame    uint8 (H, W)         what car 0 sees
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.race.policy import NetworkPolicy
+from racecraft.sim import Simulation
+from racecraft.sim.columns import ROW_COLUMNS
+
+NAME: Final = ".live"
+"""Of the file, in the run folder."""
+SPACING: Final = 0.05  # s between two looks, at least
+MAX_CARS: Final = 256  # that are shown
+MAX_BYTES: Final = 1 << 20
+HEADER: Final = 8  # int64
+POSE: Final = 6
+STALE: Final = 3.0  # s after which a training no longer counts as live
+_ROWS: Final = [ROW_COLUMNS.index(name) for name in ("progress", "steps")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """One moment of a training."""
+
+    sequence: int
+    step: int
+    """Camera steps of training so far."""
+    poses: NDArray[np.float32]
+    """(N, 6)"""
+    steps: NDArray[np.int32]
+    """(N,)"""
+    policy: NDArray[np.float32]
+    """(A,)"""
+    is_discrete: bool
+    frame: NDArray[np.uint8]
+    """(H, W)"""
+
+
+class LiveWriter:
+    """Lets others look at a training.
+
+    Args:
+        folder: The run folder; the file is made anew.
+        simulation: The cars, read at every `look`.
+        policy: What drives them.
+    """
+
+    def __init__(self, folder: Path, simulation: Simulation, policy: NetworkPolicy) -> None:
+        self._simulation, self._policy = simulation, policy
+        self._count = min(simulation.num_envs, MAX_CARS)
+        self._is_discrete = policy.learner.spec.is_discrete
+        size = policy.learner.spec.num_actions
+        height, width = simulation.frames.shape[1:3]
+        header = np.array([0, 0, 0, self._count, height, width, size, not self._is_discrete], np.int64)
+        fresh = folder / f"{NAME}.new"
+        length = _length(self._count, height, width, size)
+        np.memmap(fresh, np.uint8, "w+", shape=(length,))[: header.nbytes] = header.view(np.uint8)
+        os.replace(fresh, folder / NAME)  # a reader of the old one keeps it
+        self._memory = np.memmap(folder / NAME, np.uint8, "r+", shape=(length,))
+        self._header, self._poses, self._steps, self._outputs, self._frame = _parts(self._memory, header.tolist())
+        self._next = 0.0
+
+    def look(self, *, step: int) -> None:
+        """Show where everything is now; does nothing when the last look was a moment ago."""
+        if time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + SPACING
+        simulation, count = self._simulation, self._count
+        self._header[0] += 1
+        self._poses[:, :3] = simulation.vehicles[:3, :count].T
+        self._poses[:, 3] = simulation.vehicles[3, :count]
+        self._poses[:, 4] = simulation.vehicles[6, :count]
+        self._poses[:, 5] = simulation.rows[:count, _ROWS[0]]
+        self._steps[:] = simulation.rows[:count, _ROWS[1]]
+        self._outputs[:] = self._decide()
+        self._frame[:] = simulation.frames[0]
+        self._header[1], self._header[2] = step, time.time_ns()
+        self._header[0] += 1
+
+    def _decide(self) -> NDArray[np.float32]:
+        learner = self._policy.learner
+        outputs = learner.policy(learner.encode(self._simulation.frames[:1]))[0]
+        if not self._is_discrete:
+            return np.asarray(outputs[: learner.spec.num_actions].clip(-1.0, 1.0), np.float32)
+        shares = np.exp(outputs - outputs.max())
+        return np.asarray(shares / shares.sum(), np.float32)
+
+
+class LiveReader:
+    """Looks at a training of any process.
+
+    Args:
+        folder: The run folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / NAME
+        self._memory: NDArray[np.uint8] | None = None
+        self._inode = 0
+
+    def look(self, *, after: int = -1) -> Look | None:
+        """The present moment, or None when there is none, it is stale, or it is the one with number `after`."""
+        memory = self._open()
+        if memory is None:
+            return None
+        for _ in range(20):
+            header = memory[: HEADER * 8].view(np.int64).tolist()
+            if header[0] == after or (header[0] == 0) or time.time_ns() - header[2] > STALE * 1e9:
+                return None
+            if header[0] % 2 == 0:
+                _, poses, steps, policy, frame = (part.copy() for part in _parts(memory, header))
+                if int(memory[:8].view(np.int64)[0]) == header[0]:
+                    return Look(
+                        sequence=header[0],
+                        step=header[1],
+                        poses=poses,
+                        steps=steps,
+                        policy=policy,
+                        is_discrete=not header[7],
+                        frame=frame,
+                    )
+            time.sleep(0.0005)
+        return None
+
+    def _open(self) -> NDArray[np.uint8] | None:
+        """The file's memory; opened again when the training was started again."""
+        try:
+            status = self._path.stat()
+            if status.st_ino == self._inode:
+                return self._memory
+            self._inode, self._memory = status.st_ino, None
+            if not HEADER * 8 < status.st_size <= MAX_BYTES:
+                return None
+            memory = np.memmap(self._path, np.uint8, "r")
+            header = memory[: HEADER * 8].view(np.int64).tolist()
+            if min(header[3:7]) >= 0 and max(header[3:7]) <= MAX_BYTES and _length(*header[3:7]) == len(memory):
+                self._memory = memory
+        except (OSError, ValueError):
+            self._inode, self._memory = 0, None
+        return self._memory
+
+
+def _length(count: int, height: int, width: int, size: int) -> int:
+    return HEADER * 8 + count * POSE * 4 + count * 4 + size * 4 + height * width
+
+
+def _parts(memory: NDArray[np.uint8], header: list[int]) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:  # type: ignore[type-arg]
+    """Header, poses, steps, policy and frame as views."""
+    count, height, width, size = header[3:7]
+    ends = np.cumsum([HEADER * 8, count * POSE * 4, count * 4, size * 4, height * width])
+    pieces = [memory[start:end] for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+    return (
+        pieces[0].view(np.int64),
+        pieces[1].view(np.float32).reshape(count, POSE),
+        pieces[2].view(np.int32),
+        pieces[3].view(np.float32),
+        pieces[4].reshape(height, width),
+    )

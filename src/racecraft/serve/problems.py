@@ -1,0 +1,51 @@
+"""Every error of the console's server has one JSON shape: {"error": {code, message, hint, line, field}}."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from racecraft.errors import RacecraftError, RunError, TrackNotFound
+
+
+class NotFound(RunError):
+    """There is no such thing; 404."""
+
+
+class Conflict(RunError):
+    """It exists already, or is in use; 409."""
+
+
+def problem(status: int, code: str, message: str, hint: str = "", **more: Any) -> JSONResponse:
+    """An error reply."""
+    return JSONResponse({"error": {"code": code, "message": message, "hint": hint, **more}}, status_code=status)
+
+
+def install(app: FastAPI) -> None:
+    """Teach the application to tell errors."""
+
+    @app.exception_handler(RacecraftError)
+    async def told(_: Request, error: RacecraftError) -> JSONResponse:
+        status = 404 if isinstance(error, NotFound | TrackNotFound) else 409 if isinstance(error, Conflict) else 422
+        return problem(status, type(error).__name__, str(error), error.hint, line=getattr(error, "line", None))
+
+    @app.exception_handler(RequestValidationError)
+    async def not_valid(_: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"] if part not in ("body", "query", "path"))
+        text = f"{field or 'The request'}: {first['msg']}.".replace("..", ".")
+        return problem(422, "InvalidRequest", text, field=field or None)
+
+    @app.exception_handler(HTTPException)
+    async def refused(_: Request, error: HTTPException) -> JSONResponse:
+        return problem(error.status_code, "Refused", str(error.detail))
+
+    @app.exception_handler(Exception)
+    async def broken(request: Request, error: Exception) -> JSONResponse:
+        logging.getLogger("racecraft.serve").error("%s %s", request.method, request.url.path, exc_info=error)
+        return problem(500, "Bug", "Something broke in the console.", "The server's terminal shows where.")

@@ -1,0 +1,20 @@
+"""The console itself."""
+
+from __future__ import annotations
+
+import os
+
+from fastapi import APIRouter
+
+from racecraft import __version__
+from racecraft.serve.context import InContext
+from racecraft.serve.database import LOCAL_USER
+from racecraft.serve.schemas import Console
+
+router = APIRouter(prefix="/api/console", tags=["console"])
+
+
+@router.get("")
+def get_console(context: InContext) -> Console:
+    """What this console is."""
+    return Console(version=__version__, runs=str(context.settings.runs), cores=os.cpu_count() or 1, user=LOCAL_USER)

@@ -1,0 +1,119 @@
+"""Reward functions and action spaces: presets, the keys of params, and the check that paints a track."""
+
+from __future__ import annotations
+
+import ast
+import math
+from typing import Final
+
+from fastapi import APIRouter
+
+from racecraft.agent import action_space
+from racecraft.agent.action_space import PRESETS, DiscreteActionSpace
+from racecraft.reward import check_reward, dry_run, load_preset, preset_names
+from racecraft.reward.painting import paint_reward
+from racecraft.serve.context import InContext
+from racecraft.serve.schemas import (
+    Action,
+    ActionPreset,
+    RewardCheck,
+    RewardPainting,
+    RewardPreset,
+    RewardProblem,
+    RewardSituation,
+    RewardVerdict,
+)
+
+router = APIRouter(prefix="/api", tags=["rewards"])
+
+DESCRIPTIONS: Final = {
+    "default": "Five steering angles at 1 and 2 m/s: learns in seconds.",
+    "aws": "AWS's own: five steering angles at 0.5 and 1 m/s.",
+    "fast": "Seven steering angles at up to 4 m/s: for records.",
+    "continuous": "Any steering angle, any speed from 0.5 to 4 m/s.",
+}
+
+
+@router.get("/rewards")
+def list_rewards() -> list[RewardPreset]:
+    """The reward functions that ship with Racecraft."""
+    listed = []
+    for name in preset_names():
+        source = load_preset(name)
+        description = (ast.get_docstring(ast.parse(source)) or "").split("\n")[0]
+        listed.append(RewardPreset(name=name, description=description, source=source))
+    return listed
+
+
+@router.get("/actions")
+def list_actions() -> list[ActionPreset]:
+    """The action spaces that ship with Racecraft."""
+    listed = []
+    for name in PRESETS:
+        space = action_space(name)
+        text = DESCRIPTIONS.get(name, "")
+        if isinstance(space, DiscreteActionSpace):
+            actions = [
+                Action(steering_angle=round(math.degrees(angle), 3), speed=round(speed, 3))
+                for angle, speed in space.table.tolist()
+            ]
+            listed.append(ActionPreset(name=name, description=text, kind="discrete", actions=actions))
+        else:
+            limits = space.to_aws()
+            listed.append(
+                ActionPreset(
+                    name=name,
+                    description=text,
+                    kind="continuous",
+                    actions=[],
+                    steering_angle=[limits["steering_angle"]["low"], limits["steering_angle"]["high"]],
+                    speed=[limits["speed"]["low"], limits["speed"]["high"]],
+                )
+            )
+    return listed
+
+
+@router.post("/rewards/check")
+def check(request: RewardCheck, context: InContext) -> RewardVerdict:
+    """Look at a reward function, try it in a car's situations, and paint it along a track."""
+    problems = check_reward(request.source)
+    found = [
+        RewardProblem(line=p.line, column=p.column, severity=p.severity, message=p.message, hint=p.hint)
+        for p in problems
+    ]
+    if any(problem.severity == "error" for problem in problems):
+        return RewardVerdict(ok=False, problems=found, situations=[], painting=None)
+    track = context.courses.load(request.track)
+    outcomes = dry_run(request.source, track)
+    for outcome in outcomes:
+        if outcome.error is not None and outcome.error.line:
+            found.append(
+                RewardProblem(
+                    line=outcome.error.line,
+                    column=outcome.error.column or 1,
+                    severity="error",
+                    message=str(outcome.error),
+                    hint=outcome.error.hint,
+                )
+            )
+            break
+    situations = [
+        RewardSituation(
+            name=outcome.situation.name,
+            description=outcome.situation.description,
+            reward=outcome.reward,
+            error=str(outcome.error) if outcome.error is not None else None,
+            printed=outcome.printed[:4000],
+        )
+        for outcome in outcomes
+    ]
+    if any(outcome.error is not None for outcome in outcomes):
+        return RewardVerdict(ok=False, problems=found, situations=situations, painting=None)
+    painted = paint_reward(request.source, track)
+    painting = RewardPainting(
+        places=painted.places.round(3).tolist(),
+        offsets=painted.offsets.tolist(),
+        points=painted.points.round(3).tolist(),
+        rewards=[[value if math.isfinite(value) else None for value in row] for row in painted.rewards.tolist()],
+    )
+    return RewardVerdict(ok=True, problems=found, situations=situations, painting=painting)

@@ -1,0 +1,56 @@
+"""What a console is started with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from racecraft.errors import ConfigError
+
+STATE_FOLDER: Final = ".racecraft"
+"""Inside the runs folder: the database and the tracks that were drawn or imported."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServeSettings:
+    """Settings of a console; paths are absolute."""
+
+    runs: Path
+    """Folder of the run folders, the same that the command line uses."""
+    port: int = 8321
+    """Of 127.0.0.1; 0 takes a free one."""
+    database: str = ""
+    """SQLAlchemy URL; by default SQLite in the state folder."""
+    training_slots: int = 1
+    """Trainings at the same time."""
+    other_slots: int = 1
+    """Other jobs, such as evaluations, at the same time."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "runs", self.runs.absolute())
+        if not 0 <= self.port <= 65535:
+            raise ConfigError(f"port is {self.port}; allowed is 0 to 65535, where 0 takes a free one.")
+        for name in ("training_slots", "other_slots"):
+            if not 1 <= getattr(self, name) <= 64:
+                raise ConfigError(f"{name} is {getattr(self, name)}; allowed is 1 to 64.")
+        if self.database and not self.database.startswith(("sqlite", "postgresql+psycopg://")):
+            raise ConfigError(
+                f"database is {self.database.split('://')[0]!r}; allowed are sqlite:///FILE and "
+                "postgresql+psycopg://USER@HOST/NAME."
+            )
+
+    @property
+    def state(self) -> Path:
+        """Folder of the console's own files."""
+        return self.runs / STATE_FOLDER
+
+    @property
+    def tracks(self) -> Path:
+        """Folder of the user's own tracks."""
+        return self.state / "tracks"
+
+    @property
+    def database_url(self) -> str:
+        """The database in use."""
+        return self.database or f"sqlite:///{self.state / 'console.db'}"
