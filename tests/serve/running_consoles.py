@@ -1,0 +1,77 @@
+"""A real console in its own process, and a client that came with its link."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+PATIENCE = 120.0  # s; the machine may be busy
+
+
+@dataclass
+class RunningConsole:
+    """A console's process and a signed-in client."""
+
+    process: subprocess.Popen[str]
+    link: str
+    client: httpx.Client
+    runs: Path
+
+    def kill(self) -> None:
+        os.kill(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+
+    def create(self, **settings: Any) -> str:
+        reply = self.client.post("/api/models", json=settings)
+        assert reply.status_code == 201, reply.text
+        return str(reply.json()["name"])
+
+    def wait_for(self, ready: Callable[[], Any]) -> Any:
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            if value := ready():
+                return value
+            time.sleep(0.1)
+        raise AssertionError("waited in vain")
+
+    def job_ended(self, job_id: str) -> Callable[[], Any]:
+        def ended() -> Any:
+            job = self.client.get(f"/api/jobs/{job_id}").json()
+            return job if job["state"] in ("done", "failed", "cancelled") else None
+
+        return ended
+
+
+@contextmanager
+def running_console(runs: Path, *options: str) -> Iterator[RunningConsole]:
+    command = [sys.executable, "-m", "racecraft", "serve", "--json", "--no-browser", "--port", "0", "--runs", str(runs)]
+    process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        document = json.loads(line)
+        link = document["link"]
+        with httpx.Client(base_url=link.split("/?")[0], timeout=PATIENCE) as client:
+            assert client.get(link).status_code == 303
+            yield RunningConsole(process, link, client, runs)
+    finally:
+        if process.poll() is None:
+            process.terminate()
+            try:
+                process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        assert process.stdout is not None
+        process.stdout.close()

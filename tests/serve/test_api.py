@@ -1,0 +1,216 @@
+"""The console's API against a real server, real trainings and real files."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import Any
+
+import httpx
+import pytest
+from running_consoles import RunningConsole
+
+GATE = "def reward_function(params):\n    return 1.0 if params['all_wheels_on_track'] else 0.001\n"
+
+
+def error(reply: httpx.Response, status: int) -> dict[str, Any]:
+    assert reply.status_code == status, reply.text
+    document = reply.json()
+    assert set(document) == {"error"}
+    assert document["error"]["code"]
+    assert document["error"]["message"]
+    return dict(document["error"])
+
+
+def test_what_the_console_offers(console: RunningConsole) -> None:
+    client = console.client
+    assert client.get("/api/console").json()["runs"] == str(console.runs)
+    tracks = client.get("/api/tracks").json()
+    assert {"oval", "reinvent_2018"} <= {track["name"] for track in tracks}
+    assert all(len(track["outline"]) >= 20 for track in tracks)
+    lines = client.get("/api/tracks/oval").json()
+    assert len(lines["center"]) == len(lines["inner"]) == len(lines["outer"])
+    assert "racing" in {reward["name"] for reward in client.get("/api/rewards").json()}
+    kinds = {preset["name"]: preset["kind"] for preset in client.get("/api/actions").json()}
+    assert kinds["continuous"] == "continuous"
+    assert kinds["default"] == "discrete"
+    assert client.get("/api/openapi.json").json()["paths"]["/api/models"]
+
+
+def test_a_reward_is_checked_and_painted(console: RunningConsole) -> None:
+    client = console.client
+    verdict = client.post("/api/rewards/check", json={"source": GATE, "track": "oval"}).json()
+    assert verdict["ok"]
+    rewards = verdict["painting"]["rewards"]
+    middle = [row[len(row) // 2] for row in rewards]
+    assert set(middle) == {1.0}
+    assert {row[0] for row in rewards} == {0.001}
+
+    broken = client.post("/api/rewards/check", json={"source": "def reward_function(p:\n", "track": "oval"}).json()
+    assert not broken["ok"]
+    assert broken["problems"][0]["line"] == 1
+    failing = GATE.replace("1.0 if", "1 / 0 if")
+    verdict = client.post("/api/rewards/check", json={"source": failing, "track": "oval"}).json()
+    assert not verdict["ok"]
+    assert verdict["problems"][-1]["line"] == 2
+
+
+def test_from_a_click_to_a_race(console: RunningConsole) -> None:
+    client = console.client
+    name = console.create(name="first", until="2000 steps", tags=["mine"])
+    job = client.get("/api/jobs", params={"run": name}).json()[0]
+    events: dict[str, list[Any]] = {"points": [], "live": [], "jobs": []}
+    identity = ""
+    with client.stream("GET", f"/api/events/{name}") as stream:
+        kind = ""
+        for line in stream.iter_lines():
+            if line.startswith("event: "):
+                kind = line.removeprefix("event: ")
+            elif line.startswith("id: "):
+                identity = line.removeprefix("id: ")
+            elif line.startswith("data: "):
+                events[kind].append(json.loads(line.removeprefix("data: ")))
+                if kind == "jobs" and events["jobs"][-1][0]["state"] == "done" and events["points"]:
+                    break
+    assert console.wait_for(console.job_ended(job["id"]))["result"]["steps"] >= 2000
+    looks = events["live"]
+    assert looks
+    assert all(len(look["poses"]) == 64 and len(look["policy"]) == 10 for look in looks)
+    assert looks[-1]["step"] > 0
+    assert abs(sum(looks[-1]["policy"]) - 1) < 0.01
+
+    page = client.get(f"/api/models/{name}/history").json()
+    assert {"iteration", "evaluation"} <= {point["kind"] for point in page["points"]}
+    with client.stream("GET", f"/api/events/{name}", headers={"Last-Event-ID": "0"}) as stream:
+        lines = stream.iter_lines()
+        assert next(line for line in lines if line.startswith("id: ")) == f"id: {page['offset']}"
+    assert int(identity) <= page["offset"]
+
+    detail = client.get(f"/api/models/{name}").json()
+    assert detail["status"] == "finished"
+    assert detail["tags"] == ["mine"]
+    assert detail["checkpoints"]
+    raced = client.post(
+        f"/api/models/{name}/evaluations", json={"laps": 1, "num_trials": 2, "rules": "first_lap"}
+    ).json()
+    ended = console.wait_for(console.job_ended(raced["id"]))
+    assert ended["state"] == "done", ended
+    card = client.get(f"/api/models/{name}/evaluations").json()[0]
+    assert len(card["laps"]) >= 2
+    picture = client.get(f"/api/models/{name}/files/{card['picture']}")
+    assert picture.headers["content-type"] == "image/png"
+    telemetry = client.get(f"/api/models/{name}/evaluations/{card['stamp']}/telemetry").json()["columns"]
+    assert len(telemetry["X"]) == len(telemetry["episode_status"]) > 10
+    assert client.get("/api/models").json()[0]["picture"] == card["picture"]
+
+
+def test_a_training_is_stopped_and_goes_on(console: RunningConsole) -> None:
+    client = console.client
+    name = console.create(name="long", until="10 minutes")
+    console.wait_for(lambda: client.get(f"/api/models/{name}/history").json()["points"])
+    error(client.post(f"/api/models/{name}/train", json={}), 409)
+    error(client.delete(f"/api/models/{name}"), 409)
+    job = client.post(f"/api/models/{name}/stop").json()
+    ended = console.wait_for(console.job_ended(job["id"]))
+    assert ended["result"]["reason"] == "interrupted"
+    steps = ended["result"]["steps"]
+    assert client.get(f"/api/models/{name}").json()["status"] == "stopped"
+    again = client.post(f"/api/models/{name}/train", json={"until": f"{steps + 1000} steps", "reward": GATE}).json()
+    ended = console.wait_for(console.job_ended(again["id"]))
+    assert ended["result"]["steps"] >= steps + 1000
+    assert client.get(f"/api/models/{name}").json()["reward"] == GATE
+
+
+def test_models_are_cloned_renamed_tagged_deleted_and_restored(console: RunningConsole) -> None:
+    client = console.client
+    name = console.create(name="a", train=False, track="oval", seed=7)
+    assert client.get(f"/api/models/{name}").json()["status"] == "new"
+    copy = client.post("/api/models/a/clone", json={"name": "b"}).json()
+    assert copy["track"] == "oval"
+    assert client.get("/api/models/b").json()["seed"] == 7
+    error(client.patch("/api/models/a", json={"name": "b"}), 409)
+    assert client.patch("/api/models/a", json={"name": "c", "tags": ["x", "x"]}).json()["tags"] == ["x"]
+    error(client.get("/api/models/a"), 404)
+    assert client.delete("/api/models/c").status_code == 204
+    error(client.get("/api/models/c"), 404)
+    assert client.post("/api/models/c/restore").json()["tags"] == ["x"]
+    error(client.post("/api/models/nothing/restore"), 404)
+
+
+@pytest.mark.parametrize(
+    ("settings", "status", "text"),
+    [
+        ({"track": "nowhere"}, 404, "nowhere"),
+        ({"track": "../../etc/passwd"}, 404, "does not exist"),
+        ({"track": "/etc/hostname.npy"}, 404, "does not exist"),
+        ({"reward": "def reward_function(params): return open('x')"}, 422, "open"),
+        ({"reward": "import os"}, 422, ""),
+        ({"until": "whenever"}, 422, "whenever"),
+        ({"actions": "sideways"}, 422, "sideways"),
+        ({"vehicle": "/etc/passwd"}, 422, "vehicle"),
+        ({"name": "../up"}, 422, "name"),
+        ({"name": "x" * 65}, 422, "name"),
+        ({"name": ".racecraft"}, 422, "name"),
+        ({"seed": -1}, 422, "seed"),
+        ({"colour": "red"}, 422, "colour"),
+        ({"model_metadata": {"action_space": []}}, 422, ""),
+        ({"hyperparameters": {"lr": "fast"}}, 422, "lr"),
+        ({"tags": ["x" * 41]}, 422, "tags"),
+    ],
+)
+def test_bad_settings_are_told_in_one_sentence(
+    console: RunningConsole, settings: dict[str, Any], status: int, text: str
+) -> None:
+    before = {model["name"] for model in console.client.get("/api/models").json()}
+    assert text in error(console.client.post("/api/models", json=settings), status)["message"]
+    assert {model["name"] for model in console.client.get("/api/models").json()} == before
+
+
+def test_only_a_models_own_files_are_handed_out(console: RunningConsole) -> None:
+    name = console.create(name="files", train=False)
+    (console.runs / name / "metrics").mkdir(exist_ok=True)
+    (console.runs / name / "metrics" / "x.json").write_text("{}")
+    (console.runs / name / "metrics" / "link.json").symlink_to("/etc/hostname")
+    client = console.client
+    assert client.get(f"/api/models/{name}/files/metrics/x.json").status_code == 200
+    for path in (
+        "run.json",
+        "checkpoints/manifest.json",
+        "metrics/link.json",
+        "metrics/../run.json",
+        "metrics/%2e%2e/run.json",
+        "%2fetc%2fhostname",
+        "metrics",
+        "metrics/none.json",
+    ):
+        error(client.get(f"/api/models/{name}/files/{path}"), 404)
+
+
+def test_a_damaged_run_folder_hides_only_itself(console: RunningConsole) -> None:
+    damaged = console.runs / "damaged"
+    damaged.mkdir()
+    (damaged / "run.json").write_text("{")
+    names = {model["name"] for model in console.client.get("/api/models").json()}
+    assert "damaged" not in names
+    error(console.client.get("/api/models/damaged"), 404)
+
+
+def test_runs_of_the_command_line_appear(console: RunningConsole) -> None:
+    from racecraft.agent import ModelMetadata, action_space
+    from racecraft.reward import load_preset
+    from racecraft.training.settings import make_settings
+    from racecraft.training.start import start_run
+
+    metadata = ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
+    settings = make_settings(metadata=metadata, track="oval")
+    start_run(settings, reward=load_preset("racing"), metadata=metadata, root=console.runs, name="from-the-shell")
+    assert console.client.get("/api/models/from-the-shell").json()["track"] == "oval"
+
+
+def test_the_garage_of_many_runs_is_read_once(console: RunningConsole) -> None:
+    for number in range(20):
+        console.create(name=f"many-{number}", train=False)
+    first = console.client.get("/api/models").json()
+    assert len([model for model in first if model["name"].startswith("many-")]) == 20
+    assert console.client.get("/api/models").json() == first
+    time.sleep(0.01)

@@ -1,0 +1,148 @@
+"""The queue: one owner to a job, leases, cancelling; and servers and workers that are killed."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+from running_consoles import running_console
+
+from racecraft.errors import RunError
+from racecraft.serve.database import Database
+from racecraft.serve.jobs import MAX_ATTEMPTS, JobQueue
+from racecraft.serve.tables import Job, Table, now
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Iterator[Database]:
+    database = Database(f"sqlite:///{tmp_path / 'console.db'}")
+    database.migrate()
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def queue(database: Database) -> JobQueue:
+    return JobQueue(database)
+
+
+def expire(database: Database) -> None:
+    with database.transaction() as session:
+        session.execute(sa.update(Job).values(lease_until=now() - timedelta(seconds=1)))
+
+
+def state(queue: JobQueue, job_id: str) -> str:
+    job = queue.get(job_id)
+    assert job is not None
+    return job.state
+
+
+def test_the_migrations_make_the_tables_that_the_code_expects(database: Database) -> None:
+    database.migrate()  # a second time changes nothing
+    inspector = sa.inspect(database.engine)
+    for table in Table.metadata.tables.values():
+        columns = {column["name"]: column for column in inspector.get_columns(table.name)}
+        assert set(columns) == set(table.columns.keys())
+        assert all(columns[c.name]["nullable"] == c.nullable for c in table.columns)
+
+
+def test_a_database_that_cannot_be_opened_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file.db").write_bytes(b"not a database, but long enough to be read as one" * 100)
+    with pytest.raises(RunError, match="cannot be opened"):
+        Database(f"sqlite:///{tmp_path / 'file.db'}").migrate()
+
+
+def test_jobs_are_claimed_in_order_by_kind(queue: JobQueue) -> None:
+    first, second = queue.add("train", "a", {}), queue.add("train", "b", {})
+    other = queue.add("evaluate", "a", {})
+    assert queue.claim(("evaluate",), owner="x").id == other.id  # type: ignore[union-attr]
+    assert queue.claim(("train",), owner="x").id == first.id  # type: ignore[union-attr]
+    assert queue.claim(("train",), owner="y").id == second.id  # type: ignore[union-attr]
+    assert queue.claim(("train", "evaluate"), owner="z") is None
+
+
+def test_many_workers_never_own_a_job_together(database: Database) -> None:
+    queue = JobQueue(database)
+    for number in range(30):
+        queue.add("train", f"run-{number}", {})
+    claimed: list[str] = []
+
+    def work(owner: str) -> None:
+        mine = JobQueue(Database(database.url))
+        while (job := mine.claim(("train",), owner=owner)) is not None:
+            claimed.append(job.id)
+
+    threads = [threading.Thread(target=work, args=(str(number),)) for number in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(claimed) == len(set(claimed)) == 30
+
+
+def test_a_job_whose_worker_is_gone_is_another_s(database: Database, queue: JobQueue) -> None:
+    job = queue.add("train", "a", {})
+    queue.claim(("train",), owner="first")
+    assert queue.heartbeat(job.id, owner="first") == "go on"
+    queue.take_back_expired()
+    assert state(queue, job.id) == "running"
+    expire(database)
+    queue.take_back_expired()
+    assert queue.claim(("train",), owner="second") is not None
+    assert queue.heartbeat(job.id, owner="first") == "lost"
+    assert not queue.finish(job.id, owner="first", state="done", result={})
+    assert queue.finish(job.id, owner="second", state="done", result={"x": 1})
+    assert queue.get(job.id).result == {"x": 1}  # type: ignore[union-attr]
+
+
+def test_a_job_that_kills_its_workers_is_given_up(queue: JobQueue) -> None:
+    job = queue.add("train", "a", {})
+    for attempt in range(MAX_ATTEMPTS):
+        assert queue.claim(("train",), owner=str(attempt)) is not None
+        queue.release(str(attempt))
+    assert state(queue, job.id) == "failed"
+    assert queue.claim(("train",), owner="x") is None
+
+
+def test_cancelling(queue: JobQueue) -> None:
+    waiting, running = queue.add("train", "a", {}), queue.add("evaluate", "a", {})
+    queue.cancel(waiting.id)
+    assert state(queue, waiting.id) == "cancelled"
+    queue.claim(("evaluate",), owner="x")
+    queue.cancel(running.id)
+    assert queue.heartbeat(running.id, owner="x") == "stop"
+    queue.release("x")
+    assert state(queue, running.id) == "cancelled"  # not started again
+
+
+@pytest.mark.slow
+def test_a_killed_server_and_a_killed_worker_lose_nothing(tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    with running_console(runs) as console:
+        name = console.create(name="tough", until="20000 steps")
+        console.wait_for(lambda: console.client.get(f"/api/models/{name}").json()["checkpoints"])
+        console.kill()
+    with running_console(runs) as console:
+        job = console.client.get("/api/jobs").json()[0]
+        ended = console.wait_for(console.job_ended(job["id"]))
+        assert ended["state"] == "done"
+        assert ended["result"]["steps"] >= 20_000
+        assert len(console.client.get("/api/jobs").json()) == 1
+
+
+@pytest.mark.slow
+def test_a_stopped_server_hands_its_training_to_the_next(tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    with running_console(runs) as console:
+        name = console.create(name="patient", until="20000 steps")
+        console.wait_for(lambda: console.client.get(f"/api/models/{name}/history").json()["points"])
+    with running_console(runs) as console:
+        job = console.client.get("/api/jobs").json()[0]
+        ended = console.wait_for(console.job_ended(job["id"]))
+        assert ended["state"] == "done"
+        assert ended["result"]["steps"] >= 20_000
+        assert ended["attempts"] == 2
