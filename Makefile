@@ -8,7 +8,10 @@ BIN := $(VENV)/bin
 UV := $(BIN)/uv
 NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/*)
 
-.PHONY: help train test test-fast lint format bench setup build stub clean requirements
+PAGES := src/racecraft/serve/pages/index.html
+WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/*)
+
+.PHONY: help train console test test-fast lint format bench setup build stub clean requirements
 
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | awk -F'\t' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -16,7 +19,10 @@ help:  ## show this list
 train: $(VENV)/.built  ## set up if needed, then train a car from camera pixels until it drives 5 of 5 laps
 	$(BIN)/racecraft train --until "5 laps" --video
 
-test: $(VENV)/.built $(VENV)/.dev  ## set up if needed, then run every test
+console: $(VENV)/.built $(VENV)/.serve $(PAGES)  ## set up if needed, build the console's pages, and open it in a browser
+	$(BIN)/racecraft serve
+
+test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every test
 	$(BIN)/python -m pytest
 
 test-fast: $(VENV)/.built $(VENV)/.dev  ## the tests that take seconds
@@ -49,6 +55,7 @@ clean:  ## remove the environment and everything built
 requirements: $(UV)  ## pin the newest allowed versions again
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header pyproject.toml requirements/build.in -o requirements/train.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/dev.in -o requirements/dev.txt
+	$(UV) pip compile -q --universal --python-version 3.11 --generate-hashes --no-header --extra serve -c requirements/dev.txt pyproject.toml -o requirements/serve.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/uv.in -o requirements/uv.txt
 
 $(UV): requirements/uv.txt
@@ -63,6 +70,15 @@ $(VENV)/.train: $(UV) requirements/train.txt
 
 $(VENV)/.dev: $(UV) $(VENV)/.train requirements/dev.txt
 	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/dev.txt
+	@touch $@
+
+$(VENV)/.serve: $(UV) $(VENV)/.train requirements/serve.txt
+	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/serve.txt
+	@touch $@
+
+$(PAGES): $(WEB)
+	@command -v npm >/dev/null || { echo "The console's pages are built with Node and npm; neither was found on PATH."; exit 1; }
+	cd web && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
 	@touch $@
 
 $(VENV)/.built: $(VENV)/.train $(NATIVE)

@@ -237,7 +237,6 @@ def _write(
                 hyperparameters=folder.read_aws_hyperparameters(),
             )
         write_simtrace(evaluation, inside / "evaluation-simtrace", action_space=action_space, log=log)
-    write_json(inside / "evaluation.json", evaluation.summary())
     best = evaluation.best_trial
     files = {
         "metrics": metrics,
@@ -251,6 +250,8 @@ def _write(
         number = next(n for n in range(10**6) if not (videos / f"{n}-video.mp4").exists())
         path = videos / f"{number}-video.mp4"
         files["video"] = film(best.recording, path, laps=evaluation.rules.laps, name=folder.name)
+    video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
+    write_json(inside / "evaluation.json", {**evaluation.summary(), "video": video})
     return files
 
 

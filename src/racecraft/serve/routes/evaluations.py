@@ -86,7 +86,6 @@ def _card(folder: RunFolder, path: Path) -> EvaluationCard:
     summary = read_json_object(path)
     metrics = folder.evaluation_metrics(stamp)
     laps = read_json_object(metrics)["metrics"] if metrics.is_file() else []
-    video = path.parent / "video.txt"
     picture = path.parent / "racing-line.png"
     trace = path.parent / "evaluation-simtrace" / "0-iteration.csv"
     return EvaluationCard(
@@ -95,6 +94,6 @@ def _card(folder: RunFolder, path: Path) -> EvaluationCard:
         summary=summary,
         laps=laps,
         picture=f"{path.parent.name}/{picture.name}" if picture.is_file() else None,
-        video=video.read_text() if video.is_file() else None,
+        video=summary.get("video"),
         telemetry=stamp if trace.is_file() else None,
     )

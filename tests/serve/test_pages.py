@@ -1,0 +1,159 @@
+"""The console's pages in real headless Chromium, against a real server and a real short training."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from running_consoles import PATIENCE, RunningConsole, running_console
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+ROOT = Path(__file__).parents[2]
+WEB = ROOT / "web"
+BUILT = ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+AXE = WEB / "node_modules" / "axe-core" / "axe.min.js"
+MILLISECONDS = 1000 * PATIENCE
+
+needs_pages = pytest.mark.skipif(not BUILT.exists(), reason="the pages are not built: make console builds them")
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
+
+
+def test_the_committed_openapi_is_the_servers() -> None:
+    """To renew it: python -m racecraft.serve.openapi > web/openapi.json."""
+    from racecraft.serve.openapi import document
+
+    assert json.loads((WEB / "openapi.json").read_text()) == document()
+
+
+def test_the_lock_file_names_no_registry() -> None:
+    assert "resolved" not in (WEB / "package-lock.json").read_text()
+
+
+@needs_pages
+def test_the_first_page_is_light_and_loads_nothing_from_elsewhere() -> None:
+    import gzip
+    import re
+
+    page = BUILT.read_text()
+    scripts = re.findall(r'(?:src|href)="(/assets/[^"]+)"', page)
+    assert scripts
+    assert "http" not in page
+    sizes = [len(gzip.compress((BUILT.parent / name.lstrip("/")).read_bytes())) for name in scripts]
+    assert sum(sizes) < 450_000
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (WEB / "node_modules").exists(), reason="web/node_modules is not installed")
+@pytest.mark.parametrize("script", ["test", "check"])
+def test_the_web_clients_own(script: str) -> None:
+    npm = shutil.which("npm")
+    assert npm is not None
+    done = subprocess.run([npm, "run", "--silent", script], cwd=WEB, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+
+
+@pytest.fixture(scope="module")
+def visited() -> Iterator[tuple[RunningConsole, Page]]:
+    from playwright.sync_api import sync_playwright
+
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        running_console(Path(folder) / "runs") as console,
+        sync_playwright() as playwright,
+    ):
+        arguments = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        page = browser.new_page()
+        page.set_default_timeout(MILLISECONDS)
+        cookie = console.client.cookies["racecraft_session"]
+        page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
+        yield console, page
+        browser.close()
+
+
+@pytest.mark.slow
+@needs_pages
+@needs_browser
+def test_a_newcomers_path_to_a_lap_on_video(visited: tuple[RunningConsole, Any]) -> None:
+    console, page = visited
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: complaints.append(request.url) if not _is_ours(request.url, console) else None)
+    page.goto(str(console.client.base_url))
+    page.get_by_role("link", name="Make the first model").click()
+    page.get_by_text("The function is fine.").wait_for()
+    page.get_by_role("button", name="Train now").first.click()
+    page.get_by_text("64 cars learning at once").wait_for()
+    for drawn in (".scene canvas", "[aria-label='What the car sees']"):
+        assert len(_colours(page.locator(drawn).screenshot())) > 20
+    page.get_by_role("button", name="From above").click()
+    page.locator(".badge.finished").wait_for()
+    page.get_by_role("tab", name="Race").click()
+    page.get_by_role("spinbutton", name="Laps").fill("1")
+    page.get_by_role("button", name="Start a race").click()
+    video = page.locator("video")
+    video.wait_for()
+    assert console.client.get(str(video.get_attribute("src"))).headers["content-type"] == "video/mp4"
+    page.get_by_text("Telemetry").wait_for()
+    page.get_by_role("link", name="Garage").first.click()
+    page.locator(".picture img").wait_for()
+    assert complaints == []
+
+
+@pytest.mark.slow
+@needs_pages
+@needs_browser
+def test_mistakes_are_shown_where_they_are(visited: tuple[RunningConsole, Any]) -> None:
+    console, page = visited
+    page.goto(f"{console.client.base_url}/create")
+    page.get_by_text("The function is fine.").wait_for()
+    editor = page.locator(".cm-content")
+    editor.click()
+    page.keyboard.press("ControlOrMeta+a")
+    page.keyboard.insert_text("def reward_function(params):\n    return parms['speed']\n")
+    page.get_by_text("parms").nth(1).wait_for()
+    assert page.get_by_role("button", name="Train now").first.is_disabled()
+
+
+@pytest.mark.slow
+@needs_pages
+@needs_browser
+@pytest.mark.skipif(not AXE.exists(), reason="web/node_modules is not installed")
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_serious(visited: tuple[RunningConsole, Any], theme: str) -> None:
+    console, page = visited
+    model = next(iter(console.client.get("/api/models").json()), None)
+    own = [f"/models/{model['name']}/{tab}" for tab in ("watch", "race", "setup")] if model else []
+    page.context.add_init_script(f"localStorage.setItem('racecraft-theme', '{theme}')")
+    found = {}
+    for path in ("/", "/create", "/tracks", "/settings", *own):
+        page.goto(f"{console.client.base_url}{path}")
+        page.locator("h1").wait_for()
+        page.wait_for_timeout(1000)
+        page.evaluate(AXE.read_text())
+        result = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+        for violation in result["violations"]:
+            if violation["impact"] in ("serious", "critical"):
+                found[f"{path}: {violation['id']}"] = [node["html"][:160] for node in violation["nodes"][:3]]
+    assert found == {}
+
+
+def _colours(png: bytes) -> set[Any]:
+    from PIL import Image
+
+    return set(Image.open(io.BytesIO(png)).convert("RGB").getdata())
+
+
+def _is_ours(url: str, console: RunningConsole) -> bool:
+    return url.startswith((str(console.client.base_url), "data:", "blob:"))

@@ -1,0 +1,89 @@
+/** The server's answers, typed by its own OpenAPI; every error is one `Problem`. */
+import type { components } from "./schema";
+
+type Schemas = components["schemas"];
+export type ModelCard = Schemas["ModelCard"];
+export type ModelDetail = Schemas["ModelDetail"];
+export type TrackFacts = Schemas["TrackFacts"];
+export type TrackGeometry = Schemas["TrackGeometry"];
+export type RewardPreset = Schemas["RewardPreset"];
+export type RewardVerdict = Schemas["RewardVerdict"];
+export type RewardPainting = Schemas["RewardPainting"];
+export type ActionPreset = Schemas["ActionPreset"];
+export type EvaluationCard = Schemas["EvaluationCard"];
+export type JobInfo = Schemas["JobInfo"];
+export type NewModel = Partial<Schemas["NewModel"]>;
+export type HistoryPage = Schemas["HistoryPage"];
+export type ConsoleFacts = Schemas["Console"];
+
+export class Problem extends Error {
+  constructor(
+    readonly code: string,
+    message: string,
+    readonly hint: string,
+    readonly line: number | null,
+    readonly field: string | null,
+  ) {
+    super(message);
+  }
+}
+
+async function ask<T>(method: string, path: string, body?: unknown): Promise<T> {
+  let reply: Response;
+  try {
+    reply = await fetch(`/api${path}`, {
+      method,
+      headers: body === undefined ? {} : { "content-type": "application/json" },
+      body: body === undefined ? null : JSON.stringify(body),
+    });
+  } catch {
+    throw new Problem("Offline", "The console does not answer.", "Is racecraft serve still running?", null, null);
+  }
+  if (reply.status === 204) return undefined as T;
+  const document = await reply.json().catch(() => null);
+  if (!reply.ok) {
+    const error = document?.error ?? {};
+    throw new Problem(
+      error.code ?? "Bug",
+      error.message ?? `The console answered ${reply.status}.`,
+      error.hint ?? "",
+      error.line ?? null,
+      error.field ?? null,
+    );
+  }
+  return document as T;
+}
+
+const name = encodeURIComponent;
+
+export const api = {
+  console: () => ask<ConsoleFacts>("GET", "/console"),
+  models: () => ask<ModelCard[]>("GET", "/models"),
+  model: (run: string) => ask<ModelDetail>("GET", `/models/${name(run)}`),
+  create: (model: NewModel) => ask<ModelCard>("POST", "/models", model),
+  change: (run: string, change: { name?: string; tags?: string[] }) =>
+    ask<ModelCard>("PATCH", `/models/${name(run)}`, change),
+  clone: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/clone`, {}),
+  remove: (run: string) => ask<void>("DELETE", `/models/${name(run)}`),
+  restore: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/restore`),
+  train: (run: string, change: { until?: string; reward?: string }) =>
+    ask<JobInfo>("POST", `/models/${name(run)}/train`, change),
+  stop: (run: string) => ask<JobInfo>("POST", `/models/${name(run)}/stop`),
+  history: (run: string, offset: number) => ask<HistoryPage>("GET", `/models/${name(run)}/history?offset=${offset}`),
+  tracks: () => ask<TrackFacts[]>("GET", "/tracks"),
+  track: (track: string) => ask<TrackGeometry>("GET", `/tracks/${name(track)}`),
+  rewards: () => ask<RewardPreset[]>("GET", "/rewards"),
+  actions: () => ask<ActionPreset[]>("GET", "/actions"),
+  checkReward: (source: string, track: string) =>
+    ask<RewardVerdict>("POST", "/rewards/check", { source, track }),
+  evaluations: (run: string) => ask<EvaluationCard[]>("GET", `/models/${name(run)}/evaluations`),
+  evaluate: (run: string, request: Record<string, unknown>) =>
+    ask<JobInfo>("POST", `/models/${name(run)}/evaluations`, request),
+  telemetry: (run: string, stamp: string) =>
+    ask<{ columns: Record<string, (number | string)[]> }>("GET", `/models/${name(run)}/evaluations/${stamp}/telemetry`),
+  job: (id: string) => ask<JobInfo>("GET", `/jobs/${id}`),
+};
+
+/** Address of one of a model's files. */
+export const fileOf = (run: string, path: string) =>
+  `/api/models/${name(run)}/files/${path.split("/").map(encodeURIComponent).join("/")}`;

@@ -1,0 +1,23 @@
+/** Texts in the chosen language; kept in this browser. */
+import { de } from "./de";
+import { en, type Key } from "./en";
+
+export const languages = { en: "English", de: "Deutsch" } as const;
+export type Language = keyof typeof languages;
+
+const STORE = "racecraft-language";
+const catalogues: Record<Language, Record<Key, string>> = { en, de };
+const first = localStorage.getItem(STORE) ?? navigator.language.slice(0, 2);
+export const language = $state({ choice: (first in catalogues ? first : "en") as Language });
+document.documentElement.lang = language.choice;
+
+export function speak(choice: Language): void {
+  language.choice = choice;
+  localStorage.setItem(STORE, choice);
+  document.documentElement.lang = choice;
+}
+
+/** The text of a key, with {names} filled in. */
+export function t(key: Key, values: Record<string, string | number> = {}): string {
+  return catalogues[language.choice][key].replace(/\{(\w+)\}/g, (_, name: string) => String(values[name] ?? ""));
+}

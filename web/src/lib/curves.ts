@@ -1,0 +1,87 @@
+/** A training's curves: points arrive in pages and in a stream, and are never counted twice. */
+export interface Point {
+  kind: "iteration" | "evaluation" | "note";
+  step: number;
+  seconds: number;
+  [name: string]: unknown;
+}
+
+const MAX_POINTS = 4000; // of iterations; beyond it every other one is dropped, so that a tab open for hours stays small
+
+export class Curves {
+  iterations: Point[] = [];
+  evaluations: Point[] = [];
+  notes: Point[] = [];
+
+  /** Add points in the order they were written; a run that was set back writes its later points again. */
+  add(points: Point[]): void {
+    for (const point of points) {
+      const list = point.kind === "evaluation" ? this.evaluations : point.kind === "note" ? this.notes : this.iterations;
+      while (list.length && list[list.length - 1]!.step >= point.step && point.kind !== "note") list.pop();
+      list.push(point);
+    }
+    if (this.iterations.length > MAX_POINTS) this.iterations = this.iterations.filter((_, index) => index % 2 === 0);
+  }
+
+  get last(): Point | undefined {
+    return this.iterations[this.iterations.length - 1];
+  }
+
+  /** The best evaluation so far. */
+  get best(): Point | undefined {
+    return this.evaluations.findLast((point) => point["is_best"] === true);
+  }
+}
+
+export const completionOf = (evaluation: Point): number => {
+  const shares = evaluation["completions"] as number[];
+  return shares.reduce((sum, share) => sum + share, 0) / Math.max(shares.length, 1);
+};
+
+export const bestLapOf = (evaluation: Point): number | null => {
+  const laps = evaluation["lap_times"] as number[];
+  return laps.length ? Math.min(...laps) : null;
+};
+
+/** Mean of a value and its neighbours, so that a noisy curve shows its way; null where nothing is known. */
+export function smooth(values: (number | null)[], reach: number): (number | null)[] {
+  if (reach <= 0) return values;
+  return values.map((_, index) => {
+    const known = values.slice(Math.max(0, index - reach), index + reach + 1).filter((v): v is number => v !== null);
+    return known.length ? known.reduce((sum, value) => sum + value, 0) / known.length : null;
+  });
+}
+
+export interface Hint {
+  key: "entropy" | "value" | "exploit" | "stuck";
+  evidence: string;
+}
+
+/** What the curves say when something goes wrong, with the numbers that say it. */
+export function hints(curves: Curves, numActions: number): Hint[] {
+  const found: Hint[] = [];
+  const points = curves.iterations;
+  const last = points[points.length - 1];
+  if (!last || points.length < 20) return found;
+  const number = (point: Point, name: string) => (typeof point[name] === "number" ? (point[name] as number) : null);
+  const entropy = number(last, "entropy");
+  const completion = number(last, "completion") ?? 0;
+  if (entropy !== null && numActions > 1 && entropy < 0.05 * Math.log(numActions) && completion < 0.5)
+    found.push({ key: "entropy", evidence: `${entropy.toFixed(3)} / ${Math.log(numActions).toFixed(2)}` });
+  const losses = points.slice(-40).map((point) => number(point, "value_loss") ?? 0);
+  const before = Math.max(...losses.slice(0, 20), 1e-9);
+  const after = losses[losses.length - 1]!;
+  if (losses.length === 40 && after > 50 * before) found.push({ key: "value", evidence: `${before.toPrecision(2)} → ${after.toPrecision(2)}` });
+  if (points.length >= 60) {
+    const third = Math.floor(points.length / 3);
+    const [early, late] = [points[third]!, last];
+    const [r0, r1] = [number(early, "reward"), number(late, "reward")];
+    const [c0, c1] = [number(early, "completion"), number(late, "completion")];
+    if (r0 !== null && r1 !== null && c0 !== null && c1 !== null) {
+      if (r1 > r0 + 0.5 * Math.abs(r0) && c1 < c0 + 0.02 && c1 < 0.5)
+        found.push({ key: "exploit", evidence: `${r0.toFixed(1)} → ${r1.toFixed(1)}, ${Math.round(100 * c0)} → ${Math.round(100 * c1)} %` });
+      else if (last.step > 60000 && c1 < 0.15) found.push({ key: "stuck", evidence: `${Math.round(100 * c1)} %` });
+    }
+  }
+  return found;
+}

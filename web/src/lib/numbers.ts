@@ -1,0 +1,20 @@
+/** Numbers as people read them. */
+export const NONE = "–";
+
+export const seconds = (value: number | null | undefined, digits = 2): string =>
+  value == null || !Number.isFinite(value) ? NONE : `${value.toFixed(digits)} s`;
+
+export const percent = (value: number | null | undefined): string =>
+  value == null || !Number.isFinite(value) ? NONE : `${Math.round(100 * value)} %`;
+
+export const count = (value: number | null | undefined): string =>
+  value == null ? NONE : Math.round(value).toLocaleString("en-US").replaceAll(",", "\u202f");
+
+/** 75 → 1:15, 3700 → 1:01:40. */
+export function clock(value: number | null | undefined): string {
+  if (value == null || !Number.isFinite(value)) return NONE;
+  const whole = Math.max(0, Math.round(value));
+  const parts = [Math.floor(whole / 60) % 60, whole % 60].map((part) => String(part).padStart(2, "0"));
+  const hours = Math.floor(whole / 3600);
+  return hours ? `${hours}:${parts.join(":")}` : `${Math.floor(whole / 60)}:${parts[1]}`;
+}

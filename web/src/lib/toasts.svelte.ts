@@ -1,0 +1,29 @@
+/** Short messages at the edge of the page; an error stays until it is closed. */
+import { Problem } from "../api/client";
+
+export interface Toast {
+  id: number;
+  text: string;
+  hint: string;
+  isError: boolean;
+  action: { label: string; run: () => void } | undefined;
+}
+
+export const toasts = $state<Toast[]>([]);
+let next = 0;
+
+export function say(text: string, action?: Toast["action"]): void {
+  const id = next++;
+  toasts.push({ id, text, hint: "", isError: false, action });
+  setTimeout(() => close(id), 8000);
+}
+
+export function fail(error: unknown): void {
+  const hint = error instanceof Problem ? error.hint : "";
+  toasts.push({ id: next++, text: error instanceof Error ? error.message : String(error), hint, isError: true, action: undefined });
+}
+
+export function close(id: number): void {
+  const index = toasts.findIndex((toast) => toast.id === id);
+  if (index >= 0) toasts.splice(index, 1);
+}

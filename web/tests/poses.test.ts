@@ -1,0 +1,87 @@
+import { describe, expect, it } from "vitest";
+import { scale, span } from "../src/lib/colors";
+import { viewBox } from "../src/lib/geometry";
+import { clock, percent, seconds } from "../src/lib/numbers";
+import { between, turn, type Look } from "../src/lib/poses";
+import { resample, splitLaps } from "../src/lib/telemetry";
+import { de } from "../src/i18n/de";
+import { en } from "../src/i18n/en";
+
+const look = (poses: number[][], steps: number[]): Look => ({ step: 0, poses, steps, policy: [], is_discrete: true, frame: "", frame_shape: [0, 0] });
+
+describe("cars between two looks", () => {
+  const before = look([[0, 0, 3100, 0, 0, 0], [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]], [5, 90, 5]);
+  const now = look([[1000, 0, -3100, 0, 0, 0], [1000, 0, 0, 0, 0, 0], [9000, 0, 0, 0, 0, 0]], [6, 2, 6]);
+  const [smooth, restarted, far] = between(before, now, 0.5);
+
+  it("drive on smoothly, the short way round", () => {
+    expect(smooth!.x).toBeCloseTo(0.5);
+    expect(Math.abs(smooth!.heading)).toBeGreaterThan(3.1);
+  });
+  it("jump when they were put at a new start, or are far away", () => {
+    expect(restarted!.x).toBe(1);
+    expect(far!.x).toBe(9);
+  });
+  it("are where they are when nothing came before", () => {
+    expect(between(undefined, now, 0.3)[0]!.x).toBe(1);
+  });
+  it("turn by less than half a turn", () => {
+    expect(turn(3, -3)).toBeCloseTo(2 * Math.PI - 6);
+  });
+});
+
+describe("what is drawn", () => {
+  it("has a colour for every number", () => {
+    expect(scale(0)).toBe("rgb(68 1 84)");
+    expect(scale(2)).toBe("rgb(253 231 37)");
+    expect(scale(Number.NaN)).toBe("rgb(68 1 84)");
+  });
+  it("has a range even when all values are the same, or none is known", () => {
+    expect(span([3, 3, null])).toEqual([2.5, 3.5]);
+    expect(span([null])).toEqual([0, 1]);
+  });
+  it("fits its frame", () => {
+    expect(viewBox([[[0, 0], [2, 1]]], 1)).toBe("-1.000 -2.000 4.000 3.000");
+  });
+  it("reads well", () => {
+    expect([clock(75), clock(3700), clock(null), percent(0.126), seconds(9.3)]).toEqual(["1:15", "1:01:40", "–", "13 %", "9.30 s"]);
+  });
+});
+
+describe("telemetry", () => {
+  it("takes complete laps only, on one axis of place", () => {
+    const rows = 30;
+    const column = (make: (row: number) => number | string) => Array.from({ length: 2 * rows }, (_, row) => make(row));
+    const laps = splitLaps({
+      episode: column((row) => Math.floor(row / rows)),
+      progress: column((row) => (100 * (row % rows)) / (rows - 1)),
+      X: column((row) => row % rows),
+      Y: column(() => 0),
+      tstamp: column((row) => row / 15),
+      throttle: column((row) => row % rows),
+      steer: column(() => 0),
+      reward: column(() => 1),
+      episode_status: column((row) => (row === rows - 1 ? "lap_complete" : row === 2 * rows - 1 ? "off_track" : "in_progress")),
+    });
+    expect(laps.length).toBe(1);
+    expect(laps[0]!.seconds).toBeCloseTo(29 / 15);
+    expect(laps[0]!.speed[0]).toBe(0);
+    expect(laps[0]!.speed.at(-1)).toBe(29);
+  });
+  it("keeps a value until the next one is reached", () => {
+    const values = resample([0, 0.5, 1], [1, 2, 3]);
+    expect([values[0], values[98], values[101], values[199]]).toEqual([1, 1, 2, 3]);
+  });
+});
+
+describe("languages", () => {
+  const holes = (text: string) => (text.match(/\{\w+\}/g) ?? []).sort();
+
+  it("have the same keys with the same holes, and no text is empty", () => {
+    expect(Object.keys(de).sort()).toEqual(Object.keys(en).sort());
+    for (const key of Object.keys(en) as (keyof typeof en)[]) {
+      expect(de[key].length).toBeGreaterThan(0);
+      expect(holes(de[key])).toEqual(holes(en[key]));
+    }
+  });
+});
