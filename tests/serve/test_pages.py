@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 from running_consoles import PATIENCE, RunningConsole, running_console
 
@@ -152,7 +153,8 @@ def test_axe_finds_nothing_serious(visited: tuple[RunningConsole, Any], theme: s
 def _colours(png: bytes) -> set[Any]:
     from PIL import Image
 
-    return set(Image.open(io.BytesIO(png)).convert("RGB").getdata())
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).reshape(-1, 3)
+    return set(map(tuple, pixels.tolist()))
 
 
 def _is_ours(url: str, console: RunningConsole) -> bool:

@@ -56,6 +56,7 @@ export function openEditor(parent: HTMLElement, text: string, label: string, onC
       EditorView.updateListener.of((update) => update.docChanged && onChange(update.state.doc.toString())),
     ],
   });
+  view.scrollDOM.tabIndex = 0; // so that the keyboard can scroll long code without editing it
   const show = (mistakes: Mistake[]) => {
     const lines = view.state.doc.lines;
     const found = mistakes.map((mistake) => {
