@@ -11,8 +11,8 @@ namespace racecraft {
 struct LoggedRow {
     double x, y, heading;  // m, m, rad
     double steering_angle, speed;
-    double progress;  // fraction of a lap, read in the first row of an episode: it tells where the lap began
-    double is_first;  // 1 in the first row of an episode
+    double progress;   // fraction of a lap, read in the first row of an episode: it tells where the lap began
+    double is_first;   // 1 in the first row of an episode
     double is_paused;  // 1 while the car stands for a penalty
 };
 
