@@ -126,6 +126,7 @@ RC_HD GreyPalette palette_under(const Conditions& conditions, const Randomizatio
     for (int32_t i = 0; i < kNumWalls; ++i) palette.wall[i] = grey(colours.wall[i]);
     palette.sky = grey(colours.sky);
     palette.outside = grey(colours.outside);
+    for (int32_t i = 0; i < kNumMaterials; ++i) palette.grain[i] = colours.grain[i];
     return palette;
 }
 

@@ -12,7 +12,6 @@ from typing import Final
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
 
-from racecraft import __version__
 from racecraft.serve import problems
 from racecraft.serve.context import Context
 from racecraft.serve.courses import Courses
@@ -22,7 +21,7 @@ from racecraft.serve.jobs import JobQueue
 from racecraft.serve.routes import console, evaluations, events, jobs, models, rewards, tracks
 from racecraft.serve.schemas import ProblemReply
 from racecraft.serve.security import Guard, content_policy
-from racecraft.serve.settings import ServeSettings
+from racecraft.serve.settings import ServeSettings, version
 from racecraft.serve.supervisor import Supervisor
 
 PAGES: Final = Path(__file__).parent / "pages"
@@ -66,7 +65,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
 
     app = FastAPI(
         title="Racecraft",
-        version=__version__,
+        version=version(),
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 from typing import Final
 
@@ -54,3 +55,8 @@ class ServeSettings:
     def database_url(self) -> str:
         """The database in use."""
         return self.database or f"sqlite:///{self.state / 'console.db'}"
+
+
+def version() -> str:
+    """Of Racecraft."""
+    return metadata.version("racecraft")

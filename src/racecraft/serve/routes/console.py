@@ -6,10 +6,10 @@ import os
 
 from fastapi import APIRouter
 
-from racecraft import __version__
 from racecraft.serve.context import InContext
 from racecraft.serve.database import LOCAL_USER
 from racecraft.serve.schemas import Console
+from racecraft.serve.settings import version
 
 router = APIRouter(prefix="/api/console", tags=["console"])
 
@@ -17,4 +17,4 @@ router = APIRouter(prefix="/api/console", tags=["console"])
 @router.get("")
 def get_console(context: InContext) -> Console:
     """What this console is."""
-    return Console(version=__version__, runs=str(context.settings.runs), cores=os.cpu_count() or 1, user=LOCAL_USER)
+    return Console(version=version(), runs=str(context.settings.runs), cores=os.cpu_count() or 1, user=LOCAL_USER)
