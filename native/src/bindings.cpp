@@ -14,6 +14,8 @@
 #include "dispatch.hpp"
 #include "engine.hpp"
 #include "log_judge.hpp"
+#include "racecraft/lidar.hpp"
+#include "racecraft/object_look.hpp"
 #include "replay_kernel.hpp"
 #include "scene.hpp"
 
@@ -130,7 +132,7 @@ void bind_camera(nb::module_& m) {
 }
 
 void bind_views(nb::module_& m) {
-    constexpr int kNumCarFields = 8;  // x, y, heading, steering, red, green, blue, alpha
+    constexpr int kNumCarFields = 9;  // x, y, heading, steering, red, green, blue, alpha, whether a box
     using Cars = nb::ndarray<const float, nb::shape<-1, kNumCarFields>, nb::c_contig, nb::device::cpu>;
     using Picture = nb::ndarray<uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
     using Poses = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
@@ -180,7 +182,8 @@ void bind_views(nb::module_& m) {
                 const auto byte = [&](int field) {
                     return static_cast<uint8_t>(clamp(car[field], 0.0f, 255.0f));
                 };
-                pictures.push_back({car[0], car[1], car[2], car[3], {byte(4), byte(5), byte(6)}, car[7]});
+                pictures.push_back(
+                    {car[0], car[1], car[2], car[3], {byte(4), byte(5), byte(6)}, car[7], car[8] != 0.0f});
             }
             const RgbPalette& world = rgb_palette(palette);
             const RgbPalette colours = lit_walls ? with_lit_walls(world) : world;
@@ -244,7 +247,7 @@ void bind_engine(nb::module_& m) {
                const CameraSpec* camera, const GreyPalette& palette, size_t num_envs, uint64_t seed,
                int substeps, int num_threads, int laps, int max_steps, double time_limit, int start_mode,
                double start_offset, double start_advance, bool start_spread, float lateral_jitter,
-               float heading_jitter, int direction, const ObjectRule& objects) {
+               float heading_jitter, int direction, const ObjectRule& objects, bool has_lidar) {
                 std::vector<TrackStore> stores;
                 for (const bool reversed : {false, true}) {
                     for (const NativeTrack* track : tracks) stores.push_back(track->store(reversed));
@@ -258,7 +261,8 @@ void bind_engine(nb::module_& m) {
                     StartRule{static_cast<StartMode>(start_mode), start_offset, start_advance, start_spread,
                               lateral_jitter, heading_jitter},
                     static_cast<Direction>(direction),
-                    objects};
+                    objects,
+                    has_lidar};
                 new (self)
                     Engine(config, std::move(stores),
                            std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
@@ -267,7 +271,7 @@ void bind_engine(nb::module_& m) {
             "tracks"_a, "grounds"_a, "vehicle"_a, "camera"_a.none(), "palette"_a, "num_envs"_a, "seed"_a,
             "substeps"_a, "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a,
             "start_offset"_a, "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a,
-            "direction"_a, "objects"_a)
+            "direction"_a, "objects"_a, "has_lidar"_a)
         .def(
             "reset",
             [](Engine& self, Mask mask, std::optional<Seeds> seeds) {
@@ -323,6 +327,12 @@ void bind_engine(nb::module_& m) {
                              e.camera() ? static_cast<size_t>(e.camera()->spec().height) : 0;
                          const size_t width = e.camera() ? static_cast<size_t>(e.camera()->spec().width) : 0;
                          return Array<uint8_t, 3>(e.frames(), {e.num_envs(), height, width}, self);
+                     })
+        .def_prop_ro("lidar",
+                     [](nb::handle_t<Engine> self) {
+                         Engine& e = nb::cast<Engine&>(self);
+                         const size_t rays = e.lidar() != nullptr ? kLidarRays : 0;
+                         return Array<float, 2>(e.lidar(), {e.num_envs(), rays}, self);
                      })
         .def_prop_ro("terminated",
                      [](nb::handle_t<Engine> self) {
@@ -414,6 +424,10 @@ NB_MODULE(_native, m) {
     m.attr("STATE_COLUMNS") = racecraft::names_of(racecraft::kStateNames);
     m.attr("OBJECT_HEADER") = racecraft::names_of(racecraft::kObjectHeaderNames);
     m.attr("OBJECT_COLUMNS") = racecraft::names_of(racecraft::kObjectNames);
+    nb::list colours;
+    for (const racecraft::Rgb& colour : racecraft::kCarColours)
+        colours.append(nb::make_tuple(colour.red, colour.green, colour.blue));
+    m.attr("CAR_COLOURS") = nb::tuple(colours);
     m.attr("VEHICLE_PARAMETERS") = racecraft::names_of(racecraft::kVehicleNames);
     m.def("isa", [] { return std::string(racecraft::isa_name(racecraft::current_isa())); });
     m.def("available_isas", [] {

@@ -9,7 +9,7 @@ struct Vector3 {
     float x, y, z;  // m in the car's frame: x ahead, y left, z up, z = 0 on the ground
 };
 
-enum class Paint : int { body, accent, glass, tyre, rim, light, tail_light };
+enum class Paint : int { body, accent, glass, tyre, rim, light, tail_light, cardboard, flap, tape, ink };
 
 struct Triangle {
     Vector3 corners[3];

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "lidar_kernel.hpp"
 #include "object_painter.hpp"
 #include "vehicle_kernel.hpp"
 
@@ -26,6 +27,7 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
     is_moving_.resize(n);
     state_.resize(state_width() * n);
     rows_.resize(row_width() * n);
+    if (config_.has_lidar) lidar_.resize(kLidarRays * n);
     episodes_.resize(n);
     track_choice_.resize(n);
     seeds_.assign(n, config_.seed);
@@ -133,6 +135,19 @@ void Engine::look(size_t env) {
     float* seen = &state_[env * state_width()];
     observe(track_of(env), state, episodes_[env], seen);
     objects_.observe(env, track_of(env), episodes_[env], seen + kNumStateColumns);
+    if (config_.has_lidar) {
+        const Episode& episode = episodes_[env];
+        const LidarPose pose{state.x,
+                             state.y,
+                             episode.sine,
+                             episode.cosine,
+                             seeds_[env],
+                             streams_[env],
+                             static_cast<uint32_t>(episode.episode),
+                             static_cast<uint32_t>(episode.steps)};
+        RC_DISPATCH(scan_lidar, track_of(env).room, pose, objects_.objects_of(env), objects_.count(),
+                    &lidar_[env * kLidarRays]);
+    }
     if (camera_ != nullptr) {
         const size_t ground = static_cast<size_t>(episodes_[env].track) % num_tracks();
         const size_t pixels = frames_.size() / num_envs();
@@ -266,7 +281,7 @@ void Engine::visit_saved(Visitor&& visit) {
 }
 
 size_t Engine::num_bytes() const {
-    size_t bytes = frames_.size() + is_moving_.size() * sizeof(float) +
+    size_t bytes = frames_.size() + lidar_.size() * sizeof(float) + is_moving_.size() * sizeof(float) +
                    steering_command_.size() * sizeof(float) + speed_command_.size() * sizeof(float);
     const_cast<Engine*>(this)->visit_saved([&](const void*, size_t size) { bytes += size; });
     return bytes;

@@ -35,7 +35,8 @@ struct EngineConfig {
     RuleLimits limits;
     StartRule start;
     Direction direction;
-    ObjectRule objects;  // none by default
+    ObjectRule objects;      // none by default
+    bool has_lidar = false;  // whether cars carry a LIDAR
 };
 
 // Calls from several threads wait for each other; the arrays are shared all the same.
@@ -68,6 +69,7 @@ class Engine {
     size_t state_width() const { return kNumStateColumns + static_cast<size_t>(objects_.state_width()); }
     double* rows() { return rows_.data(); }                  // (N, row_width())
     float* state() { return state_.data(); }                 // (N, state_width())
+    float* lidar() { return lidar_.data(); }                 // (N, kLidarRays), or nothing
     uint8_t* frames() { return frames_.data(); }             // (N, height, width)
     bool* terminated() { return flags_.get(); }              // (N,)
     bool* truncated() { return flags_.get() + num_envs(); }  // (N,)
@@ -112,6 +114,7 @@ class Engine {
 
     std::vector<float> vehicles_, parameters_, steering_command_, speed_command_, is_moving_, state_;
     std::vector<double> rows_;
+    std::vector<float> lidar_;
     std::vector<uint8_t> frames_;
     std::vector<Episode> episodes_;
     std::vector<int32_t> track_choice_;

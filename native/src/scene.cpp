@@ -4,8 +4,10 @@
 #include <numeric>
 #include <vector>
 
+#include "box_mesh.hpp"
 #include "camera_kernel.hpp"
 #include "car_mesh.hpp"
+#include "racecraft/object_look.hpp"
 
 namespace racecraft {
 namespace {
@@ -16,6 +18,8 @@ constexpr Vector3 kSun = {0.352f, 0.264f, 0.898f};  // unit vector towards the l
 constexpr float kAmbient = 0.50f;                   // share of light that comes from everywhere
 constexpr float kShadowLength = 0.205f;             // m, half axes of the soft shadow under a car
 constexpr float kShadowWidth = 0.135f;
+constexpr float kBoxShadowLength = 0.262f;
+constexpr float kBoxShadowWidth = 0.205f;
 constexpr float kShadowDepth = 0.55f;  // share of light that the shadow takes at most
 
 // From the world to the image: x right, y down, both in pixels; depth along the optical axis.
@@ -101,6 +105,14 @@ Colour paint_colour(Paint paint, const CarPicture& car) {
             return {250.0f, 248.0f, 230.0f};
         case Paint::tail_light:
             return {225.0f, 28.0f, 24.0f};
+        case Paint::cardboard:
+            return {kCardboard.red + 20.0f, kCardboard.green + 16.0f, kCardboard.blue + 10.0f};
+        case Paint::flap:
+            return {kCardboard.red + 12.0f, kCardboard.green + 10.0f, kCardboard.blue + 6.0f};
+        case Paint::tape:
+            return {kTape.red, kTape.green, kTape.blue};
+        case Paint::ink:
+            return {92.0f, 62.0f, 38.0f};
     }
     return {};
 }
@@ -118,7 +130,7 @@ class CarPainter {
     void draw(const CarPicture& car, std::vector<Sample>& samples, uint8_t* out) {
         place(car);
         draw_shadow(car, out);
-        const auto& mesh = car_mesh();
+        const auto& mesh = car.is_box ? box_mesh() : car_mesh();
         box_ = nothing(spec_);
         for (const Triangle& triangle : mesh) {
             for (const Vector3& corner : triangle.corners) {
@@ -155,9 +167,11 @@ class CarPainter {
     }
 
     void draw_shadow(const CarPicture& car, uint8_t* out) const {
+        const float length = car.is_box ? kBoxShadowLength : kShadowLength;
+        const float width = car.is_box ? kBoxShadowWidth : kShadowWidth;
         Box box = nothing(spec_);
-        for (const float x : {-kShadowLength, kShadowLength}) {
-            for (const float y : {-kShadowWidth, kShadowWidth}) {
+        for (const float x : {-length, length}) {
+            for (const float y : {-width, width}) {
                 const Vector3 p = projection_.project(to_world({x, y, 0.0f}, 0));
                 if (p.z < kNearest) return;
                 box.cover(p, spec_);
@@ -167,8 +181,8 @@ class CarPainter {
             for (int column = box.x0; column < box.x1; ++column) {
                 float x, y;
                 if (!projection_.find_ground(column, row, x, y)) continue;
-                const float along = ((x - x_) * cosine_ + (y - y_) * sine_) / kShadowLength;
-                const float across = ((y - y_) * cosine_ - (x - x_) * sine_) / kShadowWidth;
+                const float along = ((x - x_) * cosine_ + (y - y_) * sine_) / length;
+                const float across = ((y - y_) * cosine_ - (x - x_) * sine_) / width;
                 const float edge = along * along * along * along + across * across * across * across;
                 if (edge >= 1.0f) continue;
                 const float light = 1.0f - car.alpha * kShadowDepth * (1.0f - edge);

@@ -6,12 +6,14 @@
 
 namespace racecraft {
 
+// A car, or with is_box an obstacle, whose steering and colour do not matter.
 struct CarPicture {
     float x, y;         // m, the car's origin
     float heading;      // rad
     float steering;     // rad, of the front wheels, left positive
     uint8_t colour[3];  // of the body, RGB
     float alpha;        // 1 is solid; a car that waits for its reset blinks between 0.3 and 1
+    bool is_box;
 };
 
 // 1.5 m behind the car, 1 m up, looking 18 degrees down.

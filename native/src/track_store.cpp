@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "racecraft/ground.hpp"
+
 namespace racecraft {
 namespace {
 
@@ -91,6 +93,8 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
     const double cell = std::max(kFinestCell, std::sqrt(width * height / kMostCells));
 
     TrackGeometry& g = geometry_;
+    g.room = {static_cast<float>(x_min) - kRoomMargin, static_cast<float>(y_min) - kRoomMargin,
+              static_cast<float>(x_max) + kRoomMargin, static_cast<float>(y_max) + kRoomMargin};
     g.num_segments = static_cast<int32_t>(segments_.size());
     g.is_closed = outline.is_closed ? 1 : 0;
     g.length = arc_length;

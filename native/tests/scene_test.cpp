@@ -17,7 +17,7 @@ std::vector<uint8_t> frame(const CameraModel& camera, const GroundMap& ground, f
 }
 
 CarPicture car_at(float x, float y, float heading) {
-    return {x, y, heading, 0.2f, {220, 30, 20}, 1.0f};
+    return {x, y, heading, 0.2f, {220, 30, 20}, 1.0f, false};
 }
 
 // Mean position of the pixels that differ, and how many there are.

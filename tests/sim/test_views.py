@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from racecraft.errors import ConfigError
-from racecraft.sim import CameraSpec, Simulation, Start
-from racecraft.sim.views import CarView, Scene, driver_frames
+from racecraft.sim import ROW_COLUMNS, Bots, CameraSpec, Objects, Obstacles, Simulation, Start
+from racecraft.sim.views import BoxView, CarView, Scene, driver_frames, views_of_objects
 from racecraft.track import load_track
 
 OVAL = load_track("oval")
@@ -115,3 +115,21 @@ def test_palettes_have_names():
     with pytest.raises(ConfigError, match="'2019'"):
         Scene(OVAL, palette="2019")
     assert (Scene(OVAL).driver_view().draw(*START) != Scene(OVAL, palette="2020").driver_view().draw(*START)).any()
+
+
+def test_boxes_and_bots_stand_where_the_simulation_has_them():
+    objects = Objects(
+        obstacles=Obstacles(count=1, placement="fixed", positions=((1.2 / OVAL.length, 1),)),
+        bots=Bots(count=1, placement="fixed", positions=((1.8 / OVAL.length, -1),)),
+    )
+    simulation = Simulation(OVAL, objects=objects, start=Start(mode="fixed"))
+    views = views_of_objects(simulation.judged[0, len(ROW_COLUMNS) :])
+    assert [type(view) for view in views] == [BoxView, CarView]
+    driver = Scene(OVAL).driver_view()
+    pictures = [driver.draw(*START, cars=cars) for cars in ([], views)]
+    seen = np.abs(simulation.frames[0].astype(int) - Simulation(OVAL, start=Start(mode="fixed")).frames[0]) > 4
+    drawn = (pictures[0] != pictures[1]).any(axis=2)  # its shadow included
+    assert seen.sum() > 300
+    assert (seen & drawn).sum() > 0.9 * seen.sum()
+    assert drawn.sum() < 2.5 * seen.sum()
+    assert views_of_objects(np.zeros(0)) == []

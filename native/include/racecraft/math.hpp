@@ -90,6 +90,30 @@ RC_HD void sincos_of(float angle, float& sine, float& cosine) {
     cosine = ((q + 1) & 2) != 0 ? -cosine_of_r : cosine_of_r;
 }
 
+// Natural logarithm of a positive normal number, relative error below 2e-7 (Cephes logf).
+RC_HD float log_of(float value) {
+    uint32_t bits;
+    __builtin_memcpy(&bits, &value, sizeof(bits));
+    const uint32_t mantissa_bits = (bits & 0x007fffffu) | 0x3f000000u;  // in [1/2, 1)
+    float m;
+    __builtin_memcpy(&m, &mantissa_bits, sizeof(m));
+    const bool is_low = m < 0.707106781186547524f;
+    const float exponent = static_cast<float>(static_cast<int32_t>(bits >> 23) - (is_low ? 127 : 126));
+    m = (is_low ? m + m : m) - 1.0f;
+    const float m2 = m * m;
+    float y = 7.0376836292e-2f;
+    y = y * m - 1.1514610310e-1f;
+    y = y * m + 1.1676998740e-1f;
+    y = y * m - 1.2420140846e-1f;
+    y = y * m + 1.4249322787e-1f;
+    y = y * m - 1.6668057665e-1f;
+    y = y * m + 2.0000714765e-1f;
+    y = y * m - 2.4999993993e-1f;
+    y = y * m + 3.3333331174e-1f;
+    y = y * m * m2 - 2.12194440e-4f * exponent - 0.5f * m2;
+    return m + y + 0.693359375f * exponent;
+}
+
 // Arc tangent of y/x in (-pi, pi], absolute error below 3e-7; atan2_of(0, 0) is 0.
 RC_HD float atan2_of(float y, float x) {
     const float ax = abs_of(x);

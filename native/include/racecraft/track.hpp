@@ -32,7 +32,13 @@ struct LaneOffset {
     double inner_x, inner_y, outer_x, outer_y;
 };
 
+// The walls around a track, m; the ground map of cameras has the same.
+struct Room {
+    float min_x, min_y, max_x, max_y;
+};
+
 struct TrackGeometry {
+    Room room;
     int32_t num_segments;            // W - 1
     int32_t is_closed;               // 1 or 0
     double length;                   // m, of the centre line

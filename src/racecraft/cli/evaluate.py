@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from racecraft.cli import race_options
 from racecraft.cli.app import Json, app, print_json, text
 
 
@@ -30,6 +31,17 @@ def evaluate(
     offtrack_penalty: Annotated[
         float | None, typer.Option("--offtrack-penalty", help="Seconds; by default the rules'.")
     ] = None,
+    collision_penalty: Annotated[
+        float | None, typer.Option("--collision-penalty", help="Seconds; by default the rules'.")
+    ] = None,
+    race: race_options.Race = "",
+    objects: race_options.NumObjects = 0,
+    bots: race_options.NumBots = 0,
+    bot_speed: race_options.BotSpeed = None,
+    lane_changes: race_options.LaneChanges = False,
+    parked_cars: race_options.ParkedCars = False,
+    placement: race_options.Placement = "",
+    positions: race_options.Positions = "",
     max_resets: Annotated[int | None, typer.Option("--max-resets", help="Resets to a trial.")] = None,
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of the starts.")] = 0,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of the best trial.")] = True,
@@ -38,11 +50,21 @@ def evaluate(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Race a run's policy against the clock and film it."""
+    """Race a run's policy against the clock and film it; by default among the objects it was trained with."""
     if as_json and aws_log == "-":
         context.fail("--json and --aws-log - both want stdout; give the log a file.")
     from racecraft.race.run_evaluation import evaluate_run
 
+    given = race_options.objects_of(
+        race,
+        objects=objects,
+        bots=bots,
+        bot_speed=bot_speed,
+        lane_changes=lane_changes,
+        parked_cars=parked_cars,
+        placement=placement,
+        positions=positions,
+    )
     outcome = evaluate_run(
         run,
         track=track or None,
@@ -53,6 +75,8 @@ def evaluate(
         vehicle=vehicle or None,
         direction=direction or None,
         offtrack_penalty=offtrack_penalty,
+        collision_penalty=collision_penalty,
+        objects=given if race else None,
         max_resets=max_resets,
         seed=seed,
         video=video,

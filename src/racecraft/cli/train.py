@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from racecraft.cli import race_options
 from racecraft.cli.app import INTERRUPTED, Json, TrackOption, app, print_json, text
 
 
@@ -36,6 +37,14 @@ def train(
     critic: Annotated[str, typer.Option("--critic", help="What the critic sees: privileged or camera.")] = "privileged",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
     direction: Annotated[str, typer.Option("--direction", help="forward, reverse or alternate.")] = "forward",
+    race: race_options.Race = "time-trial",
+    objects: race_options.NumObjects = 0,
+    bots: race_options.NumBots = 0,
+    bot_speed: race_options.BotSpeed = None,
+    lane_changes: race_options.LaneChanges = False,
+    parked_cars: race_options.ParkedCars = False,
+    placement: race_options.Placement = "",
+    positions: race_options.Positions = "",
     num_envs: Annotated[int, typer.Option("--num-envs", help="Cars driven at once; 0 decides by itself.")] = 0,
     seed: Annotated[int, typer.Option("--seed", "-s", help="The same seed repeats a run on the same machine.")] = 0,
     evaluate_every: Annotated[
@@ -82,6 +91,16 @@ def train(
                 critic=critic,
                 vehicle=vehicle,
                 direction=direction,
+                objects=race_options.objects_of(
+                    race,
+                    objects=objects,
+                    bots=bots,
+                    bot_speed=bot_speed,
+                    lane_changes=lane_changes,
+                    parked_cars=parked_cars,
+                    placement=placement,
+                    positions=positions,
+                ),
                 num_envs=num_envs,
                 seed=seed,
                 evaluate_every=evaluate_every,

@@ -23,6 +23,7 @@ from racecraft.race.results import Evaluation
 from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import CONTROL_DT, Simulation, Start
 from racecraft.sim.vehicle import Vehicle
 from racecraft.track.track import Track
@@ -47,6 +48,7 @@ def evaluate(
     seed: int = 0,
     vehicle: Vehicle | str = "v5",
     camera: CameraSpec = CameraSpec(),
+    objects: Objects = NO_OBJECTS,
     sees: str = "frames",
     num_threads: int = 0,
 ) -> Evaluation:
@@ -64,6 +66,7 @@ def evaluate(
         seed: Of the starts.
         vehicle: Preset name, vehicle file or `Vehicle`.
         camera: What the cars see with.
+        objects: Boxes and bot cars on the track, around every car of its own; random places differ by trial.
         sees: ``frames``, or ``state`` for a policy that drives by the privileged state, without a camera.
         num_threads: Of the simulation; 0 takes one per core.
 
@@ -79,6 +82,7 @@ def evaluate(
         seed=seed,
         vehicle=vehicle,
         camera=_needed(camera, sees),
+        objects=objects,
         num_threads=num_threads,
     )
     sight = simulation.frames if sees == "frames" else simulation.state
@@ -97,6 +101,7 @@ def trial_simulation(
     seed: int = 0,
     vehicle: Vehicle | str = "v5",
     camera: CameraSpec | None = CameraSpec(),
+    objects: Objects = NO_OBJECTS,
     num_threads: int = 0,
 ) -> Simulation:
     """A simulation by the rules, a car for each trial: what `evaluate` makes and `completion` reuses."""
@@ -113,6 +118,7 @@ def trial_simulation(
         direction=rules.direction,
         laps=laps,
         max_steps=laps * MAX_STEPS,
+        objects=objects,
         num_threads=num_threads,
     )
 

@@ -3,6 +3,7 @@
 One step of the simulation is one call of `judge`. A mistake costs what it costs in the original:
 
     off track in step t -> placed in the nearest lane, where it was in step t - 1, wheels straight, standing
+    (object near)          or behind the object, in the other lane
                         -> stands for the penalty (status ``pause``, the clock runs), then drives on
     ... but with no resets left the trial is over, in the step of the mistake.
 """
@@ -16,17 +17,25 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.race.placement import driven_track, line_up, reset_pose, start_distance, start_pose
+from racecraft.race.placement import (
+    avoiding_pose,
+    driven_track,
+    line_up,
+    start_distance,
+    start_offset,
+    start_pose,
+)
 from racecraft.race.recording import REFERENCE_AHEAD, Recording
 from racecraft.race.results import Lap, Trial
 from racecraft.race.rules import RESET_STATUSES, RaceRules
-from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim.columns import OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.simulation import CONTROL_DT, Simulation
 
 _X, _Y, _HEADING, _PROGRESS, _OFFSET, _DISTANCE, _STATUS, _TIME, _LAP = (
     ROW_COLUMNS.index(name)
     for name in ("x", "y", "heading", "progress", "offset", "projection_distance", "status", "time", "lap")
 )
+_CRASHED_OBJECT: Final = len(ROW_COLUMNS) + OBJECT_HEADER.index("crashed_object")
 _LAP_COMPLETE: Final = STATUS_NAMES.index("lap_complete")
 _PAUSE: Final = STATUS_NAMES.index("pause")
 _TIME_UP: Final = STATUS_NAMES.index("time_up")
@@ -45,6 +54,7 @@ class _Car:
     began: float = 0.0  # s on the clock when the simulation's present episode began
     laps_before: int = 0  # laps completed before that
     mistakes: Counter[str] = field(default_factory=Counter)  # of the present lap, by status
+    crashes: Counter[int] = field(default_factory=Counter)  # of the trial, by object
     resets: int = 0  # in the present lap
     penalty: float = 0.0  # s, in the present lap
 
@@ -71,7 +81,7 @@ class Marshal:
     def judge(self) -> None:
         """Take note of the simulation's last step and do what the rules ask for."""
         simulation, limit = self._simulation, self._rules.time_limit
-        rows = simulation.rows.copy()
+        rows = simulation.judged.copy()
         is_event = (rows[:, _STATUS] == _LAP_COMPLETE) | simulation.terminated | simulation.truncated
         for car in self._cars:
             if car.status:
@@ -111,7 +121,13 @@ class Marshal:
 
     def _put_back(self, car: _Car, status: str) -> None:
         steps = self._rules.penalty_steps(status)
-        self._simulation.set_pose(car.index, *reset_pose(self._track, car.rows[-2]))
+        crashed = int(car.rows[-1][_CRASHED_OBJECT]) if status == "crashed" else -1
+        car.crashes[crashed] += crashed >= 0
+        mercy = self._rules.mercy_after > 0 and crashed >= 0 and car.crashes[crashed] >= self._rules.mercy_after
+        if mercy:
+            car.crashes[crashed] = 0
+        pose = avoiding_pose(self._track, car.rows[-2], crashed=crashed, mercy=mercy)
+        self._simulation.set_pose(car.index, *pose)
         self._simulation.freeze(car.index, steps)
         car.resets_left -= 1
         car.resets += 1
@@ -121,7 +137,8 @@ class Marshal:
         mask = np.zeros(self._simulation.num_envs, dtype=np.bool_)
         mask[car.index] = True
         self._simulation.reset(mask)
-        pose = start_pose(self._track, self._rules, seed=self._seed, trial=car.index, lap=len(car.laps))
+        offset = start_offset(self._simulation, car.index)
+        pose = start_pose(self._track, self._rules, seed=self._seed, trial=car.index, lap=len(car.laps), offset=offset)
         if car.index > 0:
             self._simulation.set_pose(car.index, *pose)
         car.began = clock
@@ -131,7 +148,7 @@ class Marshal:
 
     def _log_start(self, car: _Car) -> None:
         """Log the prepare step, at the pose that the car was given since."""
-        row = self._simulation.rows[car.index].copy()
+        row = self._simulation.judged[car.index].copy()
         x, y, heading = self._simulation.vehicles[:3, car.index].astype(np.float64).tolist()
         row[_X], row[_Y] = x + REFERENCE_AHEAD * np.cos(heading), y + REFERENCE_AHEAD * np.sin(heading)
         row[_HEADING] = heading

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.race.rules import RaceRules
-from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.sim.simulation import Simulation
 from racecraft.track.polyline import interpolate, wrap_angle
 from racecraft.track.track import Track
 
+CLEARANCE: Final = 1.0
+"""m that are kept between an object and a car that is put back on the track."""
+LEAST_ROOM: Final = 0.6
+"""m to the next object in a lane below which a car is not put there if the other lane has more."""
+
+_OBJECT_DISTANCE, _OBJECT_OFFSET = OBJECT_COLUMNS.index("object_distance"), OBJECT_COLUMNS.index("object_offset")
 _OFFSET, _DISTANCE = ROW_COLUMNS.index("offset"), ROW_COLUMNS.index("projection_distance")
 
 
@@ -37,7 +43,7 @@ def start_distance(track: Track, rules: RaceRules) -> float:
     return rules.start_offset * track.length if track.is_closed else 0.0
 
 
-def start_pose(track: Track, rules: RaceRules, *, seed: int, trial: int, lap: int = 0) -> Pose:
+def start_pose(track: Track, rules: RaceRules, *, seed: int, trial: int, lap: int = 0, offset: float = 0.0) -> Pose:
     """Where a trial starts: on the centre line, exactly for trial 0, else off by the rules' jitter.
 
     Args:
@@ -46,10 +52,12 @@ def start_pose(track: Track, rules: RaceRules, *, seed: int, trial: int, lap: in
         seed: Of the evaluation.
         trial: From 0; with `seed` and `lap` it decides the jitter.
         lap: Laps completed before this start, each standing start has its own jitter.
+        offset: m to the left of the centre line, where an object near the start asks for the other lane.
     """
     s = start_distance(track, rules)
     heading = float(track.heading_at(s))
     x, y = track.point_at(s).tolist()
+    x, y = x - offset * np.sin(heading), y + offset * np.cos(heading)
     if trial == 0:
         return Pose(x, y, heading)
     across, turn = np.random.default_rng([seed, trial, lap]).uniform(-1.0, 1.0, 2).tolist()
@@ -73,8 +81,54 @@ def reset_pose(track: Track, previous: NDArray[np.float64]) -> Pose:
     return Pose(x, y, float(track.heading_at(s)))
 
 
+def avoiding_pose(track: Track, previous: NDArray[np.float64], *, crashed: int = -1, mercy: bool = False) -> Pose:
+    """Where a car is put back on a track with objects: as `reset_pose`, but not where an object is near.
+
+    With an object within `CLEARANCE` of that place, or when it has run into one, the car comes that far behind
+    the object, in the other lane; with mercy that far ahead of it. Where another object stands in that lane,
+    too, the lane with more room is taken.
+
+    Args:
+        track: In driving direction.
+        previous: Judged row of the step before, objects included  (row_width(objects),).
+        crashed: Index of the object it ran into, or -1.
+        mercy: Whether to put it past the object.
+    """
+    objects = previous[len(ROW_COLUMNS) + len(OBJECT_HEADER) :].reshape(-1, len(OBJECT_COLUMNS))
+    if not len(objects):
+        return reset_pose(track, previous)
+    places, offsets = objects[:, _OBJECT_DISTANCE], objects[:, _OBJECT_OFFSET]
+    s = float(previous[_DISTANCE])
+    nearest = crashed if crashed >= 0 else int(np.abs(_ahead(track, places, s)).argmin())
+    if crashed < 0 and abs(_ahead(track, places[nearest], s)) >= CLEARANCE:
+        return reset_pose(track, previous)
+    s = float(places[nearest]) + (CLEARANCE if mercy else -CLEARANCE)
+    s = s % track.length if track.is_closed else min(max(s, 0.0), track.length)
+    room = {}
+    for side in (1.0, -1.0):
+        in_lane = places[np.sign(offsets) == side]
+        room[side] = float(np.abs(_ahead(track, in_lane, s)).min(initial=CLEARANCE))
+    other = -1.0 if offsets[nearest] > 0.0 else 1.0
+    side = other if room[other] >= room[-other] or room[other] > LEAST_ROOM else -other
+    row = previous.copy()
+    row[_DISTANCE], row[_OFFSET] = s, side
+    return reset_pose(track, row)
+
+
+def _ahead(track: Track, places: Any, s: float) -> Any:
+    """M that places are ahead of s along the track, the shorter way round a closed one."""
+    ahead = places - s
+    return ahead - track.length * np.round(ahead / track.length) if track.is_closed else ahead
+
+
 def line_up(simulation: Simulation, track: Track, rules: RaceRules, *, seed: int) -> None:
     """Put every car of a simulation at the start of its trial."""
     simulation.reset()
     for trial in range(1, simulation.num_envs):  # trial 0 already stands where it should
-        simulation.set_pose(trial, *start_pose(track, rules, seed=seed, trial=trial))
+        offset = start_offset(simulation, trial)
+        simulation.set_pose(trial, *start_pose(track, rules, seed=seed, trial=trial, offset=offset))
+
+
+def start_offset(simulation: Simulation, trial: int) -> float:
+    """M to the left of the centre line where the simulation started a car, because of an object near the start."""
+    return float(simulation.column("offset")[trial]) if simulation.objects.count else 0.0

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.simulation import CONTROL_DT
+from racecraft.sim.views import ObjectView, views_of_objects
 from racecraft.track.track import Track
 
 REFERENCE_AHEAD = 0.14
@@ -23,7 +24,7 @@ class Recording:
     track: Track
     """In driving direction."""
     rows: NDArray[np.float64]
-    """As the simulation gave them, with `lap` counted over the whole trial  (T, len(ROW_COLUMNS))."""
+    """As the simulation gave them, objects included, with `lap` counted over the whole trial  (T, row_width)."""
     clock: NDArray[np.float64]
     """s since the trial began; the rows' own `time` begins anew with every standing start  (T,)."""
 
@@ -33,6 +34,10 @@ class Recording:
     def column(self, name: str) -> NDArray[np.float64]:
         """A column of the rows by name, as a view  (T,)."""
         return self.rows[:, ROW_COLUMNS.index(name)]
+
+    def objects(self, step: int) -> list[ObjectView]:
+        """What stood or drove on the track besides the car, as pictures show it."""
+        return views_of_objects(self.rows[step, len(ROW_COLUMNS) :])
 
     @cached_property
     def origins(self) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""The rules of a race against the clock: laps, resets, penalties, where and how a trial starts.
+"""The rules of a race against the clock, alone or among objects: laps, resets, penalties, where and how a trial starts.
 
 What happens in a step (off track, immobilized, reversed, lap complete) is judged by the simulator's core;
 these rules say what follows from it. Defaults are deepracer-for-cloud's; `RULE_SETS` has others by name.
@@ -45,6 +45,8 @@ class RaceRules:
     """s that the car stands after a crash."""
     immobilized_penalty: float = 0.0
     """s that the car stands after having been stuck; the original asks for none."""
+    mercy_after: int = 3
+    """Crashes into the same object after which a car is put past it instead of behind it; 0 for never."""
     time_limit: float = 0.0
     """s on the clock, penalties included, that end a trial; 0 for none, 180 in AWS's live events."""
     start_offset: float = 0.0
@@ -59,6 +61,7 @@ class RaceRules:
     def __post_init__(self) -> None:
         _check_whole("laps", self.laps, 1, 1000)
         _check_whole("max_resets", self.max_resets, 0, 1_000_000)
+        _check_whole("mercy_after", self.mercy_after, 0, 1_000_000)
         _check_range("offtrack_penalty", self.offtrack_penalty, 0.0, 600.0, "s")
         _check_range("collision_penalty", self.collision_penalty, 0.0, 600.0, "s")
         _check_range("immobilized_penalty", self.immobilized_penalty, 0.0, 600.0, "s")

@@ -31,6 +31,7 @@ from racecraft.race.yardstick import Placing, placings
 from racecraft.run.atomic import write_json
 from racecraft.run.aws_log import AwsLog
 from racecraft.run.folder import RunFolder, RunInfo
+from racecraft.sim.objects import Objects
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import Track, load_track
 
@@ -101,6 +102,8 @@ def evaluate_run(
     direction: str | None = None,
     offtrack_penalty: float | None = None,
     max_resets: int | None = None,
+    collision_penalty: float | None = None,
+    objects: Objects | None = None,
     seed: int = 0,
     video: bool = True,
     aws_log: str | Path | None = None,
@@ -120,6 +123,8 @@ def evaluate_run(
             ``forward`` if in both.
         offtrack_penalty: Seconds; by default the rules'.
         max_resets: By default the rules'.
+        collision_penalty: Seconds; by default the rules'.
+        objects: On the track; by default those it was trained with.
         seed: Of the starts.
         video: Whether to film the best trial.
         aws_log: File for the log lines that AWS's tools read, ``-`` for stdout.
@@ -134,7 +139,13 @@ def evaluate_run(
         rules = _own_rules(folder)
     elif direction is None:
         direction = "reverse" if info.settings.get("direction") == "reverse" else "forward"
-    changes = {"laps": laps, "direction": direction, "offtrack_penalty": offtrack_penalty, "max_resets": max_resets}
+    changes = {
+        "laps": laps,
+        "direction": direction,
+        "offtrack_penalty": offtrack_penalty,
+        "collision_penalty": collision_penalty,
+        "max_resets": max_resets,
+    }
     rules = _rules(rules or "drfc", {name: value for name, value in changes.items() if value is not None})
     if not isinstance(vehicle, Vehicle):
         vehicle = load_vehicle(vehicle) if vehicle else _trained_vehicle(info)
@@ -142,7 +153,14 @@ def evaluate_run(
 
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=num_threads)
     evaluation = evaluate(
-        policy, where, rules=rules, num_trials=num_trials, seed=seed, vehicle=vehicle, num_threads=num_threads
+        policy,
+        where,
+        rules=rules,
+        num_trials=num_trials,
+        seed=seed,
+        vehicle=vehicle,
+        objects=_trained_objects(info) if objects is None else objects,
+        num_threads=num_threads,
     )
     try:
         files = _write(folder, evaluation, policy.action_space, is_filmed=video, aws_log=aws_log)
@@ -175,6 +193,10 @@ def _trained_vehicle(info: RunInfo) -> Vehicle:
         return Vehicle(**info.settings.get("vehicle", {}))
     except TypeError as error:
         raise RunError(f"The vehicle in run.json does not fit this version of Racecraft: {error}.") from error
+
+
+def _trained_objects(info: RunInfo) -> Objects:
+    return Objects.from_dict(info.settings.get("objects") or {})
 
 
 def _trained_track(info: RunInfo) -> Track:

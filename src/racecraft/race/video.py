@@ -104,8 +104,9 @@ def frames(
     for step in range(len(recording)):
         (x, y), heading = places[step].tolist(), float(headings[step])
         car = CarView(x, y, heading, float(steering[step]), color, float(alphas[step]))
-        chase.draw(x, y, float(directions[step]), cars=[car], out=frame)
-        frame[top : top + height, left : left + width] = driver.draw(x, y, heading, out=inset)
+        objects = recording.objects(step)
+        chase.draw(x, y, float(directions[step]), cars=[car, *objects], out=frame)
+        frame[top : top + height, left : left + width] = driver.draw(x, y, heading, cars=objects, out=inset)
         if step == len(recording) - 1:
             break
         overlay.draw(frame, step)

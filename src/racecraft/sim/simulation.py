@@ -91,10 +91,13 @@ class Simulation:
         max_steps: Steps that truncate an episode.
         substeps: Physics steps to a control step.
         objects: Boxes and cars on the track, around every car of its own.
+        lidar: Whether the cars carry the original's LIDAR.
         num_threads: 0 takes one per core.
 
     Attributes:
         frames: What the cameras see now, uint8 (N, height, width); empty without a camera.
+        lidar: Distances of the LIDAR's rays now, m, counter-clockwise from 30° left of straight ahead over the
+            car's back, float32 (N, 64); empty without one.
         rows: The last step as the rules judged it, float64 (N, len(ROW_COLUMNS)).
         judged: The same with the columns of objects behind, float64 (N, row_width(objects.count)).
         state: Privileged state now, scaled to about unit size, float32 (N, state_width(objects.count)).
@@ -124,6 +127,7 @@ class Simulation:
         max_steps: int = 100_000,
         substeps: int = 8,
         objects: Objects = NO_OBJECTS,
+        lidar: bool = False,
         num_threads: int = 0,
     ) -> None:
         if isinstance(tracks, Track):
@@ -138,6 +142,7 @@ class Simulation:
         if camera is not None:
             check_type("camera", camera, CameraSpec, "use racecraft.CameraSpec(...), or None")
         check_type("vehicle", vehicle, (Vehicle, str, Path), "use a preset's name, a file or racecraft.Vehicle(...)")
+        check_type("lidar", lidar, bool, "allowed are True and False")
         check_type("objects", objects, Objects, "use racecraft.sim.Objects(...)")
         if direction not in DIRECTIONS:
             raise ConfigError(f"direction is {direction!r}; allowed are {', '.join(DIRECTIONS)}.")
@@ -179,11 +184,13 @@ class Simulation:
             heading_jitter=start.heading_jitter,
             direction=DIRECTIONS.index(direction),
             objects=native_objects(objects),
+            has_lidar=lidar,
         )
         self.frames: NDArray[np.uint8] = self._engine.frames
         self.judged: NDArray[np.float64] = self._engine.rows
         self.rows: NDArray[np.float64] = self.judged[:, : len(ROW_COLUMNS)]
         self.state: NDArray[np.float32] = self._engine.state
+        self.lidar: NDArray[np.float32] = self._engine.lidar
         self.terminated: NDArray[np.bool_] = self._engine.terminated
         self.truncated: NDArray[np.bool_] = self._engine.truncated
         self.vehicles: NDArray[np.float32] = self._engine.vehicles

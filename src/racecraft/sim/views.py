@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from racecraft import _native
 from racecraft.errors import ConfigError
 from racecraft.sim.camera import CameraSpec
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER
+from racecraft.sim.objects import OBJECT_KINDS
 from racecraft.sim.simulation import ground_map, native_camera
 from racecraft.track.track import Track
 
@@ -52,6 +54,45 @@ class CarView(NamedTuple):
     """Of the body, RGB."""
     alpha: float = 1.0
     """1 is solid; a car that stands as a penalty blinks between 0.3 and 1."""
+
+
+class BoxView(NamedTuple):
+    """A cardboard box in a picture."""
+
+    x: float
+    """m, of its middle."""
+    y: float
+    """m"""
+    heading: float
+    """rad"""
+    alpha: float = 1.0
+    """1 is solid."""
+
+
+ObjectView = CarView | BoxView
+
+
+def views_of_objects(columns: NDArray[np.float64]) -> list[ObjectView]:
+    """The objects of one judged row as a picture shows them.
+
+    Args:
+        columns: What follows the row's own columns (`Simulation.judged`); empty where there are no objects.
+    """
+    views: list[ObjectView] = []
+    table = columns[len(OBJECT_HEADER) :].reshape(-1, len(OBJECT_COLUMNS))
+    for index, (kind, x, y, heading, *_) in enumerate(table.tolist()):
+        if OBJECT_KINDS[int(kind)] == "box":
+            views.append(BoxView(x, y, heading))
+        else:
+            views.append(CarView(x, y, heading, color=_native.CAR_COLOURS[index % len(_native.CAR_COLOURS)]))
+    return views
+
+
+def _fields(view: ObjectView) -> tuple[float, ...]:
+    """As the core takes it."""
+    if isinstance(view, BoxView):
+        return (view.x, view.y, view.heading, 0.0, 0.0, 0.0, 0.0, view.alpha, 1.0)
+    return (*view[:4], *view.color, view.alpha, 0.0)
 
 
 class Scene:
@@ -117,7 +158,7 @@ class View:
         y: float = 0.0,
         heading: float = 0.0,
         *,
-        cars: Sequence[CarView] = (),
+        cars: Sequence[ObjectView] = (),
         out: NDArray[np.uint8] | None = None,
     ) -> NDArray[np.uint8]:
         """A picture, RGB uint8 (height, width, 3).
@@ -126,12 +167,12 @@ class View:
             x: Origin of the car that carries the camera, m.
             y: The same.
             heading: Of that car, rad.
-            cars: What is seen besides the track.
+            cars: What is seen besides the track, boxes included.
             out: Where to draw; a new array by default.
         """
         if out is None:
             out = np.empty((self.height, self.width, 3), dtype=np.uint8)
-        table = np.array([(*car[:4], *car.color, car.alpha) for car in cars], dtype=np.float32).reshape(-1, 8)
+        table = np.array([_fields(car) for car in cars], dtype=np.float32).reshape(-1, 9)
         x, y, heading = self._fixed or (x, y, heading)
         _native.render_rgb(
             self._camera, self._ground, self._palette, x, y, heading, table, lit_walls=self._lit_walls, out=out

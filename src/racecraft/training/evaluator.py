@@ -45,6 +45,7 @@ class Evaluator:
             rules=self._rules,
             num_trials=settings.evaluation_trials,
             vehicle=settings.vehicle,
+            objects=settings.objects,
             num_threads=settings.num_threads,
         )
         self.last: EvaluationReport | None = None

@@ -150,6 +150,7 @@ class Training:
                 vehicle=settings.vehicle,
                 start=settings.start,
                 direction=settings.direction,
+                objects=settings.objects,
                 num_threads=settings.num_threads,
             )
             if not self.is_checked:
@@ -159,7 +160,9 @@ class Training:
         with ExitStack() as stack:
             # A function that remembers something gets a memory for each car: on AWS one process drove one car.
             copies = ppo_config.num_envs if keeps_state(source) else 1
-            worker = stack.enter_context(RewardWorker(source, [track], seed=settings.seed, num_cars=copies))
+            worker = stack.enter_context(
+                RewardWorker(source, [track], seed=settings.seed, num_cars=copies, num_objects=settings.objects.count)
+            )
             kept = saved.step if saved is not None else 0
             after = kept if saved is not None else -1
             events = stack.enter_context(EventWriter(folder.events, after_step=after))

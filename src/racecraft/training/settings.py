@@ -9,7 +9,8 @@ from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.learn import NetworkSpec, PPOConfig, network_names
 from racecraft.sim import Start, Vehicle, load_vehicle
-from racecraft.sim.columns import STATE_COLUMNS
+from racecraft.sim.columns import state_width
+from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import DIRECTIONS
 from racecraft.training.stop import Until
 
@@ -40,6 +41,8 @@ class TrainSettings:
     """Where training episodes start."""
     direction: str = "forward"
     """``forward``, ``reverse`` or ``alternate`` with every episode."""
+    objects: Objects = NO_OBJECTS
+    """Boxes and bot cars on the track; evaluations have them, too."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
     """How the policy improves."""
     evaluate_every: int = 4096
@@ -67,6 +70,8 @@ class TrainSettings:
         ):
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 raise ConfigError(f"{name} is {value!r}; allowed is a whole number from {low} to {high}.")
+        if not isinstance(self.objects, Objects):
+            raise ConfigError(f"objects is {self.objects!r}; use racecraft.sim.Objects(...).")
         if not isinstance(self.until, Until):
             raise ConfigError(f"until is {self.until!r}; allowed is a text such as '5 laps'.")
         if self.until.laps > self.evaluation_trials:
@@ -80,7 +85,7 @@ class TrainSettings:
             name=self.network,
             num_actions=space.size if is_discrete else 2,
             is_discrete=is_discrete,
-            state_size=len(STATE_COLUMNS) if self.critic == "privileged" else 0,
+            state_size=state_width(self.objects.count) if self.critic == "privileged" else 0,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -103,6 +108,7 @@ class TrainSettings:
             values["until"] = Until.parse(values["until"])
             values["vehicle"] = Vehicle(**values["vehicle"])
             values["start"] = Start(**values["start"])
+            values["objects"] = Objects.from_dict(values["objects"])
             values["ppo"] = PPOConfig(**values["ppo"])
             return cls(**values)
         except (TypeError, AttributeError) as error:
