@@ -12,6 +12,7 @@ from racecraft.agent.action_space import (
     DiscreteActionSpace,
     action_space,
 )
+from racecraft.agent.lidar import observe_lidar
 from racecraft.agent.sensors import LidarConfig, check_sensors, check_simulated, observation_shape
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ __all__ = [
     "check_sensors",
     "check_simulated",
     "observation_shape",
+    "observe_lidar",
 ]
 
 _WITH_PYDANTIC = {"Hyperparameters": "hyperparameters", "ModelMetadata": "model_metadata"}
