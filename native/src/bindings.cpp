@@ -247,7 +247,8 @@ void bind_engine(nb::module_& m) {
                const CameraSpec* camera, const GreyPalette& palette, size_t num_envs, uint64_t seed,
                int substeps, int num_threads, int laps, int max_steps, double time_limit, int start_mode,
                double start_offset, double start_advance, bool start_spread, float lateral_jitter,
-               float heading_jitter, int direction, const ObjectRule& objects, bool has_lidar) {
+               float heading_jitter, int direction, const ObjectRule& objects, bool has_lidar,
+               float baseline) {
                 std::vector<TrackStore> stores;
                 for (const bool reversed : {false, true}) {
                     for (const NativeTrack* track : tracks) stores.push_back(track->store(reversed));
@@ -262,7 +263,8 @@ void bind_engine(nb::module_& m) {
                               lateral_jitter, heading_jitter},
                     static_cast<Direction>(direction),
                     objects,
-                    has_lidar};
+                    has_lidar,
+                    baseline};
                 new (self)
                     Engine(config, std::move(stores),
                            std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
@@ -271,7 +273,7 @@ void bind_engine(nb::module_& m) {
             "tracks"_a, "grounds"_a, "vehicle"_a, "camera"_a.none(), "palette"_a, "num_envs"_a, "seed"_a,
             "substeps"_a, "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a,
             "start_offset"_a, "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a,
-            "direction"_a, "objects"_a, "has_lidar"_a)
+            "direction"_a, "objects"_a, "has_lidar"_a, "baseline"_a)
         .def(
             "reset",
             [](Engine& self, Mask mask, std::optional<Seeds> seeds) {
@@ -323,10 +325,11 @@ void bind_engine(nb::module_& m) {
         .def_prop_ro("frames",
                      [](nb::handle_t<Engine> self) {
                          Engine& e = nb::cast<Engine&>(self);
+                         const size_t lenses = e.num_lenses();
                          const size_t height =
                              e.camera() ? static_cast<size_t>(e.camera()->spec().height) : 0;
                          const size_t width = e.camera() ? static_cast<size_t>(e.camera()->spec().width) : 0;
-                         return Array<uint8_t, 3>(e.frames(), {e.num_envs(), height, width}, self);
+                         return Array<uint8_t, 4>(e.frames(), {e.num_envs(), lenses, height, width}, self);
                      })
         .def_prop_ro("lidar",
                      [](nb::handle_t<Engine> self) {

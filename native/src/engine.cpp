@@ -44,8 +44,12 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
         episodes_[env].episode = -1;
     }
     if (camera != nullptr) {
-        camera_ = std::make_unique<CameraModel>(*camera);
-        frames_.resize(n * static_cast<size_t>(camera->width) * static_cast<size_t>(camera->height));
+        CameraSpec spec = *camera;
+        spec.left = camera->left + 0.5f * config_.baseline;
+        camera_ = std::make_unique<CameraModel>(spec);
+        spec.left = camera->left - 0.5f * config_.baseline;
+        if (config_.baseline != 0.0f) right_camera_ = std::make_unique<CameraModel>(spec);
+        frames_.resize(num_lenses() * n * static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height));
     }
     reset(nullptr);
 }
@@ -148,18 +152,19 @@ void Engine::look(size_t env) {
         RC_DISPATCH(scan_lidar, track_of(env).room, pose, objects_.objects_of(env), objects_.count(),
                     &lidar_[env * kLidarRays]);
     }
-    if (camera_ != nullptr) {
-        const size_t ground = static_cast<size_t>(episodes_[env].track) % num_tracks();
-        const size_t pixels = frames_.size() / num_envs();
-        render_grey(*camera_, *grounds_[ground], palettes_[env], state.x, state.y, state.heading,
-                    &frames_[env * pixels]);
-        if (objects_.count() > 0) {
-            const LensPose lens =
-                place_lens(camera_->view(), grounds_[ground]->view(), state.x, state.y, state.heading);
-            draw_objects(camera_->spec(), lens, objects_.objects_of(env), objects_.count(),
-                         &frames_[env * pixels]);
-        }
-    }
+    if (camera_ == nullptr) return;
+    const size_t pixels = frames_.size() / (num_envs() * num_lenses());
+    uint8_t* frame = &frames_[env * num_lenses() * pixels];
+    render(*camera_, env, state, frame);
+    if (right_camera_ != nullptr) render(*right_camera_, env, state, frame + pixels);
+}
+
+void Engine::render(const CameraModel& camera, size_t env, const VehicleState& state, uint8_t* frame) {
+    const GroundMap& ground = *grounds_[static_cast<size_t>(episodes_[env].track) % num_tracks()];
+    render_grey(camera, ground, palettes_[env], state.x, state.y, state.heading, frame);
+    if (objects_.count() == 0) return;
+    const LensPose lens = place_lens(camera.view(), ground.view(), state.x, state.y, state.heading);
+    draw_objects(camera.spec(), lens, objects_.objects_of(env), objects_.count(), frame);
 }
 
 size_t Engine::chunk_size(size_t most) const {

@@ -37,6 +37,8 @@ struct EngineConfig {
     Direction direction;
     ObjectRule objects;      // none by default
     bool has_lidar = false;  // whether cars carry a LIDAR
+    float baseline =
+        0.0f;  // m between the two lenses of a stereo camera, left and right of its place; 0 for one
 };
 
 // Calls from several threads wait for each other; the arrays are shared all the same.
@@ -64,13 +66,14 @@ class Engine {
     int num_threads() const { return pool_.num_threads(); }
     size_t num_bytes() const;  // of the batch's own buffers, frames included
     const CameraModel* camera() const { return camera_.get(); }
+    size_t num_lenses() const { return camera_ == nullptr ? 0 : right_camera_ == nullptr ? 1 : 2; }
     // Columns of a row and of a state: more than kNumRowColumns and kNumStateColumns where there are objects.
     size_t row_width() const { return kNumRowColumns + static_cast<size_t>(objects_.row_width()); }
     size_t state_width() const { return kNumStateColumns + static_cast<size_t>(objects_.state_width()); }
     double* rows() { return rows_.data(); }                  // (N, row_width())
     float* state() { return state_.data(); }                 // (N, state_width())
     float* lidar() { return lidar_.data(); }                 // (N, kLidarRays), or nothing
-    uint8_t* frames() { return frames_.data(); }             // (N, height, width)
+    uint8_t* frames() { return frames_.data(); }             // (N, num_lenses(), height, width)
     bool* terminated() { return flags_.get(); }              // (N,)
     bool* truncated() { return flags_.get() + num_envs(); }  // (N,)
     float* vehicles() { return vehicles_.data(); }           // (kNumVehicleFields, N), order of VehicleState
@@ -94,6 +97,7 @@ class Engine {
     void store_vehicle(size_t env, const VehicleState& state);
     VehicleState start_pose(size_t env);
     void begin_episode(size_t env);
+    void render(const CameraModel& camera, size_t env, const VehicleState& state, uint8_t* frame);
     void look(size_t env);  // observes and renders the current pose
     void step_chunk(size_t begin, size_t end, const float* actions);
     size_t chunk_size(size_t most) const;
@@ -108,7 +112,7 @@ class Engine {
     mutable std::mutex mutex_;  // held by every public call that reads or writes cars
     std::vector<TrackStore> tracks_;
     std::vector<std::shared_ptr<const GroundMap>> grounds_;
-    std::unique_ptr<CameraModel> camera_;
+    std::unique_ptr<CameraModel> camera_, right_camera_;  // the one, or the left one, and the right one
     ObjectField objects_;
     ThreadPool pool_;
 

@@ -13,7 +13,7 @@ from racecraft.agent.action_space import (
     action_space,
 )
 from racecraft.agent.lidar import observe_lidar
-from racecraft.agent.sensors import LidarConfig, check_sensors, check_simulated, observation_shape
+from racecraft.agent.sensors import LidarConfig, camera_of, check_sensors, check_simulated, observation_shape
 
 if TYPE_CHECKING:
     from racecraft.agent.hyperparameters import Hyperparameters
@@ -28,6 +28,7 @@ __all__ = [
     "LidarConfig",
     "ModelMetadata",
     "action_space",
+    "camera_of",
     "check_sensors",
     "check_simulated",
     "observation_shape",

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from racecraft.errors import ConfigError, did_you_mean
+
+if TYPE_CHECKING:
+    from racecraft.sim.camera import CameraSpec
 
 FRAME_HEIGHT = 120  # pixels
 FRAME_WIDTH = 160  # pixels
 LIDAR_RAYS = 64
+STEREO_BASELINE = 0.06  # m between the lenses of the stereo pair; LEFT_CAMERA is its left one
 
 CAMERAS = ("FRONT_FACING_CAMERA", "observation", "LEFT_CAMERA", "STEREO_CAMERAS")
 LIDARS = ("LIDAR", "SECTOR_LIDAR", "DISCRETIZED_SECTOR_LIDAR")
 SENSOR_NAMES = CAMERAS + LIDARS
 SIMULATED = ("FRONT_FACING_CAMERA", "observation")
-"""Sensors the simulator can give; ``observation`` is what the front camera was called before 2019."""
+"""Sensors that networks are trained with; environments give all of them.
+
+``observation`` is what the front camera was called before 2019.
+"""
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,7 @@ def check_sensors(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def check_simulated(names: Sequence[str]) -> None:
-    """Refuse sensors that files may name but the simulator does not give yet.
+    """Refuse sensors that files may name but the networks do not see yet.
 
     Raises:
         ConfigError: Names the sensor.
@@ -60,9 +68,25 @@ def check_simulated(names: Sequence[str]) -> None:
     for name in names:
         if name not in SIMULATED:
             raise ConfigError(
-                f"sensor {name!r} cannot be used for training: only the front camera is simulated.",
+                f"sensor {name!r} cannot be used for training: networks here see the front camera.",
                 hint='Set "sensor": ["FRONT_FACING_CAMERA"] in model_metadata.json.',
             )
+
+
+def camera_of(names: Sequence[str], *, camera: CameraSpec | None = None) -> CameraSpec:
+    """The simulator's camera for the sensors of a car.
+
+    Args:
+        names: Sensors; one of them is a camera.
+        camera: Its size and look; AWS's by default.
+    """
+    from racecraft.sim.camera import CameraSpec
+
+    camera = camera or CameraSpec()
+    (name,) = (name for name in check_sensors(names) if name in CAMERAS)
+    if name == "STEREO_CAMERAS":
+        return replace(camera, baseline=STEREO_BASELINE)
+    return replace(camera, left=camera.left + 0.5 * STEREO_BASELINE) if name == "LEFT_CAMERA" else camera
 
 
 def observation_shape(name: str, *, lidar: LidarConfig | None = None) -> tuple[int, ...]:

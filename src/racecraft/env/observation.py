@@ -32,6 +32,18 @@ STATE_BOUNDS: Final[Mapping[str, tuple[float, float]]] = {
 """The columns of the state in the core's order, and the range that each is clipped to."""
 
 
+OBJECT_STATE_BOUNDS: Final[Mapping[str, tuple[float, float]]] = {
+    f"{name}_{i}": bounds
+    for i in range(2)
+    for name, bounds in (
+        ("object_closeness", (0.0, 1.0)),  # of the next object ahead and the one after: 1 / (1 + m ahead); 0 for none
+        ("object_offset", (-4.0, 4.0)),  # from the centre line, over half the track's width
+        ("object_speed", (0.0, 3.0)),  # over 4 m/s
+    )
+}
+"""What follows where there are objects."""
+
+
 def check_kind(kind: str) -> None:
     """Refuse an observation that does not exist.
 
@@ -47,12 +59,14 @@ class Observer:
 
     Args:
         simulation: Has a camera unless the kind is ``state``.
-        kind: ``camera``: pixels (120, 160, 1); ``state``: numbers (16,); ``both``: a dict of the two.
+        kind: ``camera``: pixels (120, 160, 1); ``state``: numbers (16,), with objects (22,);
+            ``both``: a dict of the two.
     """
 
     def __init__(self, simulation: Simulation, *, kind: ObservationKind) -> None:
         check_kind(kind)
-        low, high = np.array(list(STATE_BOUNDS.values()), dtype=np.float32).T
+        more = OBJECT_STATE_BOUNDS.values() if simulation.objects.count else ()
+        low, high = np.array([*STATE_BOUNDS.values(), *more], dtype=np.float32).T
         self._low, self._high = low, high
         self._kind = kind
         self._state = simulation.state  # (N, 16)

@@ -80,7 +80,12 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | 14  | curvature_6       | -10 | 10  | 1/m, 2 m ahead                        |
     | 15  | curvature_7       | -10 | 10  | 1/m, 3 m ahead                        |
 
+    With `objects`, six more numbers tell of the next two ahead: closeness, offset and speed of each.
+
     `observation="both"`: a `Dict` with `camera` and `state`.
+
+    With `sensors`, a `Dict` of what AWS's networks take: cameras `Box(0, 255, (120, 160, 1 or 2), uint8)`, LIDARs
+    `Box(0.0, 1.0, ...)` of 64, 8, or sectors times values numbers.
 
     ## Rewards
 
@@ -110,6 +115,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     2. `off_track`: no wheel is on the track.
     3. `reversed`: progress fell in 15 consecutive steps.
     4. `immobilized`: the car stood for 15 steps.
+    5. `crashed`: the car ran into an object.
 
     Truncation:
 
@@ -125,6 +131,9 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | `observation`       | `camera`        | `camera`, `state` (many times faster) or `both`                |
     | `camera`            | `CameraSpec()`  | size, lens and place of the driver's camera                    |
     | `vehicle`           | `v5`            | preset, file, or `Vehicle`                                     |
+    | `sensors`           | None            | AWS's sensor names, for a `Dict` of what each of them sees     |
+    | `lidar`             | None            | `LidarConfig` of `DISCRETIZED_SECTOR_LIDAR`                    |
+    | `objects`           | None            | boxes and bot cars: `racecraft.sim.Objects`                    |
     | `start`             | `random`        | `random`, `advance`, `fixed`, or a `Start` with jitter         |
     | `direction`         | `forward`       | `forward`, `reverse`, or `alternate` with every episode        |
     | `laps`              | `1`             | laps to an episode, driven without a stop                      |

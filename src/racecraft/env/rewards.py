@@ -44,7 +44,9 @@ class RewardSource(Protocol):
         ...
 
 
-def open_reward(reward: str | Path | RewardFunction, *, tracks: Sequence[Track], num_envs: int) -> RewardSource:
+def open_reward(
+    reward: str | Path | RewardFunction, *, tracks: Sequence[Track], num_envs: int, num_objects: int = 0
+) -> RewardSource:
     """The reward that a user named.
 
     Args:
@@ -52,6 +54,7 @@ def open_reward(reward: str | Path | RewardFunction, *, tracks: Sequence[Track],
             each run in a process of its own; or a trusted callable of AWS's params dict, run in this one.
         tracks: The simulation's tracks.
         num_envs: Cars, N.
+        num_objects: On the track besides the car.
 
     Raises:
         RewardError: It does not exist or is not valid.
@@ -65,21 +68,24 @@ def open_reward(reward: str | Path | RewardFunction, *, tracks: Sequence[Track],
     else:
         raise RewardError(f"reward is {reward!r}; allowed are a preset's name, a path, source text or a callable.")
     validate_reward(source)
-    return IsolatedReward(source, tracks=tracks, num_envs=num_envs)
+    return IsolatedReward(source, tracks=tracks, num_envs=num_envs, num_objects=num_objects)
 
 
 class IsolatedReward:
     """A reward function's source in a worker process, which a seeded restart replaces where that matters."""
 
-    def __init__(self, source: str, *, tracks: Sequence[Track], num_envs: int) -> None:
+    def __init__(self, source: str, *, tracks: Sequence[Track], num_envs: int, num_objects: int = 0) -> None:
         self._source, self._tracks = source, tracks
+        self._num_objects = num_objects
         has_state = keeps_state(source)
         self._num_cars = num_envs if has_state else 1
         self._remembers = has_state or "random" in source
         self._worker = self._start(seed=0)
 
     def _start(self, *, seed: int) -> RewardWorker:
-        return RewardWorker(self._source, self._tracks, seed=seed, num_cars=self._num_cars)
+        return RewardWorker(
+            self._source, self._tracks, seed=seed, num_cars=self._num_cars, num_objects=self._num_objects
+        )
 
     def __call__(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rewards (N,) of rows (N, columns)."""

@@ -9,13 +9,17 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from racecraft.agent import ActionSpace, ModelMetadata
+from racecraft.agent import ActionSpace, LidarConfig, ModelMetadata, camera_of
 from racecraft.agent import action_space as preset_action_space
+from racecraft.agent.sensors import LIDARS
 from racecraft.env.info import LapClock
 from racecraft.env.observation import ObservationKind, Observer, check_kind
 from racecraft.env.rewards import RewardFunction, open_reward
+from racecraft.env.sensor_observation import SensorObserver
 from racecraft.errors import ConfigError
-from racecraft.sim import CameraSpec, Simulation, Start, Vehicle
+from racecraft.sim import CameraSpec, Objects, Simulation, Start, Vehicle
+from racecraft.sim.checks import check_type
+from racecraft.sim.objects import NO_OBJECTS
 from racecraft.track import Track, load_track
 
 
@@ -32,6 +36,12 @@ class TaskSettings(TypedDict, total=False):
     """The driver's camera."""
     vehicle: str | Vehicle
     """Preset, vehicle file, or vehicle."""
+    sensors: Sequence[str] | None
+    """AWS's sensor names, for a dict of what each sees instead of `observation`: one camera, at most one LIDAR."""
+    lidar: LidarConfig | None
+    """Sizes of ``DISCRETIZED_SECTOR_LIDAR``."""
+    objects: Objects | None
+    """Boxes and bot cars on the track."""
     start: str | Start
     """Where episodes start: ``random`` along the lap, ``advance``, ``fixed``, or a `Start`."""
     direction: str
@@ -61,6 +71,9 @@ class DrivingTask:
         action_space: str | Path | ActionSpace = "default",
         observation: ObservationKind = "camera",
         camera: CameraSpec = CameraSpec(),  # noqa: B008 (frozen)
+        sensors: Sequence[str] | None = None,
+        lidar: LidarConfig | None = None,
+        objects: Objects | None = None,
         vehicle: str | Vehicle = "v5",
         start: str | Start = "random",
         direction: str = "forward",
@@ -68,6 +81,8 @@ class DrivingTask:
         max_episode_steps: int = 3000,
     ) -> None:
         check_kind(observation)
+        objects = NO_OBJECTS if objects is None else objects
+        check_type("objects", objects, Objects, "use racecraft.sim.Objects(...)")
         if isinstance(max_episode_steps, bool) or not isinstance(max_episode_steps, int | np.integer):
             raise ConfigError(f"max_episode_steps is {max_episode_steps!r}, expected a whole number.")
         if not 1 <= max_episode_steps < 2**31 - 1:
@@ -78,16 +93,22 @@ class DrivingTask:
             [item if isinstance(item, Track) else load_track(item) for item in tracks],
             num_envs=num_envs,
             vehicle=vehicle,
-            camera=None if observation == "state" else camera,
+            camera=camera_of(sensors, camera=camera) if sensors else None if observation == "state" else camera,
+            objects=objects,
+            lidar=any(name in LIDARS for name in sensors or ()),
             start=start if isinstance(start, Start) else Start(mode=start),
             direction=direction,
             laps=laps,
             max_steps=int(max_episode_steps) + 1,  # the simulation counts the prepare step
             num_threads=num_threads,
         )
-        self.observer = Observer(self.simulation, kind=observation)
+        self.observer: Observer | SensorObserver
+        if sensors:
+            self.observer = SensorObserver(self.simulation, sensors, lidar=lidar)
+        else:
+            self.observer = Observer(self.simulation, kind=observation)
         self._lap_clock = LapClock(num_envs)
-        self._reward = open_reward(reward, tracks=self.simulation.tracks, num_envs=num_envs)
+        self._reward = open_reward(reward, tracks=self.simulation.tracks, num_envs=num_envs, num_objects=objects.count)
 
     @property
     def done(self) -> NDArray[np.bool_]:

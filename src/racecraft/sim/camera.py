@@ -26,6 +26,9 @@ class CameraSpec:
     """m, lens above the road, as fitted to frames of the original."""
     pitch: float = 0.2385
     """rad, downwards, as fitted; the original's drawing says 0.2618, but its car squats a little."""
+    baseline: float = 0.0
+    """m between the two lenses of a stereo camera, half of it to either side of `left`; 0 for one lens. AWS's
+    has 0.06."""
     palette: str = "2018"
     """Colours of the world: ``2018`` or ``2020``."""
 
@@ -38,6 +41,7 @@ class CameraSpec:
             "left": (-2.0, 2.0),
             "above_ground": (0.02, 0.9),
             "pitch": (0.0, 1.5),
+            "baseline": (0.0, 0.5),
         }
         for name, (low, high) in limits.items():
             check_number(f"Camera setting {name}", getattr(self, name), low, high)

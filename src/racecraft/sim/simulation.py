@@ -95,7 +95,8 @@ class Simulation:
         num_threads: 0 takes one per core.
 
     Attributes:
-        frames: What the cameras see now, uint8 (N, height, width); empty without a camera.
+        frames: What the cameras see now, uint8 (N, height, width); empty without a camera. Of a stereo camera,
+            uint8 (N, 2, height, width), the left lens first.
         lidar: Distances of the LIDAR's rays now, m, counter-clockwise from 30° left of straight ahead over the
             car's back, float32 (N, 64); empty without one.
         rows: The last step as the rules judged it, float64 (N, len(ROW_COLUMNS)).
@@ -185,8 +186,11 @@ class Simulation:
             direction=DIRECTIONS.index(direction),
             objects=native_objects(objects),
             has_lidar=lidar,
+            baseline=camera.baseline if camera else 0.0,
         )
-        self.frames: NDArray[np.uint8] = self._engine.frames
+        frames: NDArray[np.uint8] = self._engine.frames  # (N, lenses, height, width)
+        is_stereo = camera is not None and camera.baseline > 0.0
+        self.frames: NDArray[np.uint8] = frames if is_stereo else frames.reshape(num_envs, *frames.shape[2:])
         self.judged: NDArray[np.float64] = self._engine.rows
         self.rows: NDArray[np.float64] = self.judged[:, : len(ROW_COLUMNS)]
         self.state: NDArray[np.float32] = self._engine.state
