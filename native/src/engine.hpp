@@ -35,7 +35,7 @@ struct EngineConfig {
     RuleLimits limits;
     StartRule start;
     Direction direction;
-    ObjectRule objects;      // none by default
+    ObjectRule objects{};    // none by default
     bool has_lidar = false;  // whether cars carry a LIDAR
     float baseline =
         0.0f;  // m between the two lenses of a stereo camera, left and right of its place; 0 for one
