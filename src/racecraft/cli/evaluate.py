@@ -50,7 +50,10 @@ def evaluate(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Race a run's policy against the clock and film it; by default among the objects it was trained with."""
+    """Race a run's policy against the clock and film it.
+
+    By default among the objects it was trained with.
+    """
     if as_json and aws_log == "-":
         context.fail("--json and --aws-log - both want stdout; give the log a file.")
     from racecraft.race.run_evaluation import evaluate_run
