@@ -18,7 +18,7 @@ BotSpeed = Annotated[float | None, typer.Option("--bot-speed", help="m/s of the 
 LaneChanges = Annotated[bool, typer.Option("--lane-changes", help="Bot cars change lanes every 3 to 5 s.")]
 ParkedCars = Annotated[bool, typer.Option("--parked-cars", help="Obstacles are parked cars, not boxes.")]
 Placement = Annotated[str, typer.Option("--placement", help="Of objects: random (each episode anew), even or fixed.")]
-Positions = Annotated[str, typer.Option("--positions", help="Fixed places, 'lap,lane;...': '0.23,-1;0.46,1'.")]
+Positions = Annotated[str, typer.Option("--positions", help="Fixed places, lap and lane of each: '0.23,-1;0.46,1'.")]
 
 
 def objects_of(
