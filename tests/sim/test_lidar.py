@@ -25,7 +25,7 @@ def walk(simulation: Simulation, env: int) -> np.ndarray:
     x, y, heading = (float(value) for value in simulation.vehicles[:3, env])
     x, y = x + 0.02913 * math.cos(heading), y + 0.02913 * math.sin(heading)
     lines = np.concatenate([OVAL.inner, OVAL.outer])
-    low, high = lines.min(axis=0) - 0.91, lines.max(axis=0) + 0.91
+    low, high = lines.min(axis=0) - 0.86, lines.max(axis=0) + 0.86
     steps = np.arange(0.0, 12.0, 0.005)
     points = (
         np.array([x, y])
@@ -122,7 +122,7 @@ def test_without_a_lidar_there_are_no_rays():
 
 def test_a_car_outside_the_room_or_in_a_wall_gets_numbers():
     simulation = Simulation(OVAL, num_envs=3, camera=None, lidar=True)
-    for env, x in enumerate((1e5, -1e5, OVAL.outer[:, 0].max() + 0.91)):
+    for env, x in enumerate((1e5, -1e5, OVAL.outer[:, 0].max() + 0.86)):
         simulation.set_pose(env, float(x), 0.0, 0.3)
     assert np.isfinite(simulation.lidar).all()
     assert simulation.lidar.min() >= 0.15
