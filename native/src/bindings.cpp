@@ -85,7 +85,17 @@ VehicleParameters vehicle_of(const std::vector<float>& values) {
     return parameters;
 }
 
+// Ranges (low, high) of all conditions, then of tint and colour.
+Randomization randomization_of(const std::vector<float>& ranges) {
+    Randomization randomization;
+    if (ranges.size() != sizeof(randomization) / sizeof(float))
+        throw std::invalid_argument("Wrong number of ranges of a randomisation.");
+    std::memcpy(&randomization, ranges.data(), sizeof(randomization));
+    return randomization;
+}
+
 #define RC_NAME(name) #name,
+const char* const kConditionNames[] = {RC_CONDITIONS(RC_NAME)};
 const char* const kRowNames[] = {RC_ROW_COLUMNS(RC_NAME)};
 const char* const kStateNames[] = {RC_STATE_COLUMNS(RC_NAME)};
 const char* const kVehicleNames[] = {RC_VEHICLE_PARAMETERS(RC_NAME)};
@@ -247,8 +257,8 @@ void bind_engine(nb::module_& m) {
                const CameraSpec* camera, const GreyPalette& palette, size_t num_envs, uint64_t seed,
                int substeps, int num_threads, int laps, int max_steps, double time_limit, int start_mode,
                double start_offset, double start_advance, bool start_spread, float lateral_jitter,
-               float heading_jitter, int direction, const ObjectRule& objects, bool has_lidar,
-               float baseline) {
+               float heading_jitter, int direction, const ObjectRule& objects, bool has_lidar, float baseline,
+               bool draws_tracks, const std::vector<float>& randomization, const std::string& world) {
                 std::vector<TrackStore> stores;
                 for (const bool reversed : {false, true}) {
                     for (const NativeTrack* track : tracks) stores.push_back(track->store(reversed));
@@ -264,16 +274,20 @@ void bind_engine(nb::module_& m) {
                     static_cast<Direction>(direction),
                     objects,
                     has_lidar,
-                    baseline};
-                new (self)
-                    Engine(config, std::move(stores),
-                           std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
-                           vehicle_of(vehicle), camera, palette);
+                    baseline,
+                    draws_tracks};
+                std::optional<Randomization> ranges;
+                if (!randomization.empty()) ranges = randomization_of(randomization);
+                new (self) Engine(
+                    config, std::move(stores),
+                    std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
+                    vehicle_of(vehicle), camera, palette, ranges ? &*ranges : nullptr, rgb_palette(world));
             },
             "tracks"_a, "grounds"_a, "vehicle"_a, "camera"_a.none(), "palette"_a, "num_envs"_a, "seed"_a,
             "substeps"_a, "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a,
             "start_offset"_a, "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a,
-            "direction"_a, "objects"_a, "has_lidar"_a, "baseline"_a)
+            "direction"_a, "objects"_a, "has_lidar"_a, "baseline"_a, "draws_tracks"_a = false,
+            "randomization"_a = std::vector<float>(), "world"_a = "2018")
         .def(
             "reset",
             [](Engine& self, Mask mask, std::optional<Seeds> seeds) {
@@ -358,6 +372,12 @@ void bind_engine(nb::module_& m) {
                          Engine& e = nb::cast<Engine&>(self);
                          return Array<float, 2>(e.parameters(), {kNumVehicleParameters, e.num_envs()}, self);
                      })
+        .def_prop_ro("conditions",
+                     [](nb::handle_t<Engine> self) {
+                         Engine& e = nb::cast<Engine&>(self);
+                         float* values = reinterpret_cast<float*>(e.conditions());
+                         return Array<float, 2>(values, {e.num_conditions(), kNumConditions}, self);
+                     })
         .def_prop_ro("track_choice", [](nb::handle_t<Engine> self) {
             Engine& e = nb::cast<Engine&>(self);
             return Array<int32_t, 1>(e.track_choice(), {e.num_envs()}, self);
@@ -431,6 +451,7 @@ NB_MODULE(_native, m) {
     for (const racecraft::Rgb& colour : racecraft::kCarColours)
         colours.append(nb::make_tuple(colour.red, colour.green, colour.blue));
     m.attr("CAR_COLOURS") = nb::tuple(colours);
+    m.attr("CONDITIONS") = racecraft::names_of(racecraft::kConditionNames);
     m.attr("VEHICLE_PARAMETERS") = racecraft::names_of(racecraft::kVehicleNames);
     m.def("isa", [] { return std::string(racecraft::isa_name(racecraft::current_isa())); });
     m.def("available_isas", [] {

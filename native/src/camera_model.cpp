@@ -45,6 +45,9 @@ void check(const CameraSpec& spec) {
         fail("height above the ground = " + std::to_string(spec.above) +
              " m must lie between 0.001 and 100 m.");
     }
+    if (!(abs_of(spec.yaw) <= kPi)) {
+        fail("yaw = " + std::to_string(spec.yaw) + " rad must lie between -pi and pi.");
+    }
     if (!(abs_of(spec.forward) < 100.0f && abs_of(spec.left) < 100.0f)) {
         fail("position (" + std::to_string(spec.forward) + ", " + std::to_string(spec.left) +
              ") must be within 100 m of the car.");
@@ -54,7 +57,21 @@ void check(const CameraSpec& spec) {
 }  // namespace
 
 CameraModel::CameraModel(const CameraSpec& spec) {
+    rebuild(spec);
+}
+
+size_t CameraModel::num_bytes() const {
+    return row_begin_.size() * sizeof(int32_t) + kind_.size() * (2 + 4 * sizeof(float)) +
+           corner_scale_.size() * sizeof(float);
+}
+
+void CameraModel::rebuild(const CameraSpec& spec) {
     check(spec);
+    row_begin_.clear();
+    kind_.clear();
+    exponent_.clear();
+    for (std::vector<float>* table : {&distance_, &start_, &step_, &sharpness_, &corner_scale_})
+        table->clear();
     float sine, cosine, half_sine, half_cosine;
     sincos_of(spec.pitch, sine, cosine);
     sincos_of(0.5f * spec.hfov, half_sine, half_cosine);

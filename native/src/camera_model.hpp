@@ -13,6 +13,10 @@ class CameraModel {
     // Throws std::invalid_argument for a size, angle or height that no camera can have.
     explicit CameraModel(const CameraSpec& spec);
 
+    // Becomes the model of another camera, in the memory it has.
+    void rebuild(const CameraSpec& spec);
+    size_t num_bytes() const;
+
     CameraModel(CameraModel&&) = default;
     CameraModel& operator=(CameraModel&&) = default;
 

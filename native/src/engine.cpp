@@ -5,6 +5,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "exposure_kernel.hpp"
 #include "lidar_kernel.hpp"
 #include "object_painter.hpp"
 #include "vehicle_kernel.hpp"
@@ -13,12 +14,15 @@ namespace racecraft {
 
 Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
                std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
-               const CameraSpec* camera, const GreyPalette& palette)
+               const CameraSpec* camera, const GreyPalette& palette, const Randomization* randomization,
+               const RgbPalette& colours)
     : config_(config),
       tracks_(std::move(tracks)),
       grounds_(std::move(grounds)),
       objects_(config.objects, config.num_envs, camera),
-      pool_(config.num_threads) {
+      pool_(config.num_threads),
+      colours_(colours),
+      vehicle_(vehicle) {
     const size_t n = config_.num_envs;
     vehicles_.resize(kNumVehicleFields * n);
     parameters_.resize(kNumVehicleParameters * n);
@@ -50,6 +54,16 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
         spec.left = camera->left - 0.5f * config_.baseline;
         if (config_.baseline != 0.0f) right_camera_ = std::make_unique<CameraModel>(spec);
         frames_.resize(num_lenses() * n * static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height));
+    }
+    if (randomization != nullptr) {
+        randomization_ = std::make_unique<Randomization>(*randomization);
+        conditions_.resize(n);
+        if (randomization->has_latency()) {
+            delay_.resize(n);
+            earlier_.resize(4 * n);
+        }
+        const bool has_cameras = camera != nullptr && randomization->has_cameras();
+        for (size_t lens = 0; has_cameras && lens < num_lenses() * n; ++lens) cameras_.emplace_back(*camera);
     }
     reset(nullptr);
 }
@@ -107,11 +121,39 @@ VehicleState Engine::start_pose(size_t env) {
     return state;
 }
 
+void Engine::draw_episode(size_t env) {
+    const uint32_t number = static_cast<uint32_t>(episodes_[env].episode);
+    conditions_[env] = draw_conditions(*randomization_, seeds_[env], streams_[env], number);
+    for (size_t lens = 0; !cameras_.empty() && lens < num_lenses(); ++lens) {
+        const CameraModel& camera = lens == 0 ? *camera_ : *right_camera_;
+        cameras_[env * num_lenses() + lens].rebuild(camera_under(conditions_[env], camera.spec()));
+    }
+    if (!delay_.empty()) {
+        delay_[env] =
+            static_cast<int32_t>(conditions_[env].latency * static_cast<float>(config_.substeps) + 0.5f);
+    }
+}
+
 void Engine::begin_episode(size_t env) {
     Episode& episode = episodes_[env];
     const int32_t number = episode.episode + 1;
     episode = Episode{};
     episode.episode = number;
+    const uint32_t draw = static_cast<uint32_t>(number);
+    if (config_.draws_tracks) {
+        const uint64_t word = philox(seeds_[env], streams_[env], draw, 0, Purpose::track).words[0];
+        track_choice_[env] = static_cast<int32_t>((word * num_tracks()) >> 32);
+    }
+    if (randomization_ != nullptr) {
+        draw_episode(env);
+        const VehicleParameters car = vehicle_under(conditions_[env], vehicle_);
+        float values[kNumVehicleParameters];
+        std::memcpy(values, &car, sizeof(values));
+        for (size_t k = 0; k < kNumVehicleParameters; ++k) parameters_[k * num_envs() + env] = values[k];
+        palettes_[env] =
+            palette_under(conditions_[env], *randomization_, colours_, seeds_[env], streams_[env], draw);
+        forget_commands(env);
+    }
     const bool reversed = config_.direction == Direction::reverse ||
                           (config_.direction == Direction::alternate && (number & 1) != 0);
     episode.track = track_choice_[env] + (reversed ? static_cast<int32_t>(num_tracks()) : 0);
@@ -155,16 +197,25 @@ void Engine::look(size_t env) {
     if (camera_ == nullptr) return;
     const size_t pixels = frames_.size() / (num_envs() * num_lenses());
     uint8_t* frame = &frames_[env * num_lenses() * pixels];
-    render(*camera_, env, state, frame);
-    if (right_camera_ != nullptr) render(*right_camera_, env, state, frame + pixels);
+    for (size_t lens = 0; lens < num_lenses(); ++lens) {
+        const CameraModel& camera = lens == 0 ? *camera_ : *right_camera_;
+        render(cameras_.empty() ? camera : cameras_[env * num_lenses() + lens], env, state,
+               frame + lens * pixels);
+    }
 }
 
 void Engine::render(const CameraModel& camera, size_t env, const VehicleState& state, uint8_t* frame) {
     const GroundMap& ground = *grounds_[static_cast<size_t>(episodes_[env].track) % num_tracks()];
     render_grey(camera, ground, palettes_[env], state.x, state.y, state.heading, frame);
-    if (objects_.count() == 0) return;
-    const LensPose lens = place_lens(camera.view(), ground.view(), state.x, state.y, state.heading);
-    draw_objects(camera.spec(), lens, objects_.objects_of(env), objects_.count(), frame);
+    if (objects_.count() > 0) {
+        const LensPose lens = place_lens(camera.view(), ground.view(), state.x, state.y, state.heading);
+        draw_objects(camera.spec(), lens, objects_.objects_of(env), objects_.count(), frame);
+    }
+    if (randomization_ != nullptr) {
+        const Conditions& light = conditions_[env];
+        RC_DISPATCH(expose, frame, camera.spec().width, camera.spec().height, light.gradient_across,
+                    light.gradient_down, light.blur);
+    }
 }
 
 size_t Engine::chunk_size(size_t most) const {
@@ -224,12 +275,20 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
                                speed_command_.data(),
                                is_moving_.data(),
                                parameters_.data(),
-                               n};
+                               n,
+                               delay_.empty() ? nullptr : delay_.data(),
+                               earlier_.empty() ? nullptr : earlier_.data()};
     for (size_t env = begin; env < end; env += kLanes) {
         const int count = static_cast<int>(std::min(end - env, size_t{kLanes}));
         RC_DISPATCH(advance_vehicles, arrays, env, count, config_.substeps);
     }
     for (size_t env = begin; env < end; ++env) {
+        if (is_moving_[env] != 0.0f && !earlier_.empty()) {
+            earlier_[2 * n + env] = earlier_[env];
+            earlier_[3 * n + env] = earlier_[n + env];
+            earlier_[env] = steering_command_[env];
+            earlier_[n + env] = speed_command_[env];
+        }
         // Bots drive on around a car that stands as a penalty, so its view changes, too.
         const bool lives = objects_.has_bots() && !terminated()[env] && !truncated()[env];
         if (is_moving_[env] == 0.0f && !lives) continue;
@@ -255,6 +314,7 @@ void Engine::set_pose(size_t env, float x, float y, float heading, float speed) 
     state.heading = wrap_angle(heading);
     state.speed = speed;
     store_vehicle(env, state);
+    forget_commands(env);
     Episode& episode = episodes_[env];
     episode.falling_steps = 0;
     episode.still_steps = 0;
@@ -263,6 +323,10 @@ void Engine::set_pose(size_t env, float x, float y, float heading, float speed) 
     look(env);
     episode.last_x = episode.reference_x;
     episode.last_y = episode.reference_y;
+}
+
+void Engine::forget_commands(size_t env) {
+    for (size_t k = 0; k < 4 && !earlier_.empty(); ++k) earlier_[k * num_envs() + env] = 0.0f;
 }
 
 void Engine::freeze(size_t env, int steps) {
@@ -282,6 +346,7 @@ void Engine::visit_saved(Visitor&& visit) {
     visit(streams_.data(), streams_.size() * sizeof(uint32_t));
     visit(palettes_.data(), palettes_.size() * sizeof(GreyPalette));
     visit(objects_.states().data(), objects_.states().size() * sizeof(ObjectState));
+    visit(earlier_.data(), earlier_.size() * sizeof(float));
     visit(flags_.get(), 2 * num_envs() * sizeof(bool));
 }
 
@@ -289,6 +354,8 @@ size_t Engine::num_bytes() const {
     size_t bytes = frames_.size() + lidar_.size() * sizeof(float) + is_moving_.size() * sizeof(float) +
                    steering_command_.size() * sizeof(float) + speed_command_.size() * sizeof(float);
     const_cast<Engine*>(this)->visit_saved([&](const void*, size_t size) { bytes += size; });
+    bytes += conditions_.size() * sizeof(Conditions) + delay_.size() * sizeof(int32_t);
+    for (const CameraModel& camera : cameras_) bytes += camera.num_bytes();
     return bytes;
 }
 
@@ -321,7 +388,10 @@ void Engine::load(const uint8_t* bytes, size_t size) {
         restore(before.data());
         throw std::invalid_argument(std::string("Saved simulation state ") + fault);
     }
-    for (size_t env = 0; env < num_envs(); ++env) look(env);
+    for (size_t env = 0; env < num_envs(); ++env) {
+        if (randomization_ != nullptr) draw_episode(env);
+        look(env);
+    }
 }
 
 void Engine::restore(const uint8_t* bytes) {
@@ -345,6 +415,7 @@ const char* Engine::find_fault() const {
             return "holds a status that does not exist.";
     }
     if (!std::all_of(vehicles_.begin(), vehicles_.end(), is_number)) return "holds a car that is nowhere.";
+    if (!std::all_of(earlier_.begin(), earlier_.end(), is_number)) return "holds a command that cannot be.";
     if (!std::all_of(parameters_.begin(), parameters_.end(), is_number)) return "holds a car that cannot be.";
     if (const char* fault = objects_.find_fault()) return fault;
     const uint8_t* flags = reinterpret_cast<const uint8_t*>(flags_.get());

@@ -8,6 +8,7 @@
 #include "camera_model.hpp"
 #include "object_field.hpp"
 #include "racecraft/random.hpp"
+#include "racecraft/randomization.hpp"
 #include "racecraft/rules.hpp"
 #include "thread_pool.hpp"
 #include "track_store.hpp"
@@ -39,16 +40,19 @@ struct EngineConfig {
     bool has_lidar = false;  // whether cars carry a LIDAR
     float baseline =
         0.0f;  // m between the two lenses of a stereo camera, left and right of its place; 0 for one
+    bool draws_tracks = false;  // a track for every episode by chance, instead of track_choice
 };
 
 // Calls from several threads wait for each other; the arrays are shared all the same.
 class Engine {
   public:
     // Tracks come in order; the reversed twin of track i is track i + num_tracks. Both drive over ground map
-    // i. Without a camera there are no frames.
+    // i. Without a camera there are no frames. With randomization every episode has its own conditions, and
+    // colours take the place of the palette.
     Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
            std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
-           const CameraSpec* camera, const GreyPalette& palette);
+           const CameraSpec* camera, const GreyPalette& palette, const Randomization* randomization = nullptr,
+           const RgbPalette& colours = kPalette2018);
 
     // Puts the masked cars (all of them without a mask) at the start of their next episode. With seeds (N,)
     // they begin anew: each draws from now on as the first car of an engine with its seed, and its next
@@ -78,6 +82,8 @@ class Engine {
     bool* truncated() { return flags_.get() + num_envs(); }  // (N,)
     float* vehicles() { return vehicles_.data(); }           // (kNumVehicleFields, N), order of VehicleState
     float* parameters() { return parameters_.data(); }       // (kNumVehicleParameters, N)
+    Conditions* conditions() { return conditions_.data(); }  // (N,), or empty without randomization
+    size_t num_conditions() const { return conditions_.size(); }
     int32_t* track_choice() {
         return track_choice_.data();
     }  // (N,) track of each car from its next episode on
@@ -98,6 +104,8 @@ class Engine {
     VehicleState start_pose(size_t env);
     void begin_episode(size_t env);
     void render(const CameraModel& camera, size_t env, const VehicleState& state, uint8_t* frame);
+    void draw_episode(size_t env);  // conditions and camera of an episode
+    void forget_commands(size_t env);
     void look(size_t env);  // observes and renders the current pose
     void step_chunk(size_t begin, size_t end, const float* actions);
     size_t chunk_size(size_t most) const;
@@ -125,6 +133,16 @@ class Engine {
     std::vector<uint64_t> seeds_;    // (N,) with its stream, the key of each car's random numbers
     std::vector<uint32_t> streams_;  // (N,)
     std::vector<GreyPalette> palettes_;
+
+    // Randomisation; all of it empty where there is none.
+    std::unique_ptr<Randomization> randomization_;
+    RgbPalette colours_;
+    VehicleParameters vehicle_;           // before randomisation
+    std::vector<Conditions> conditions_;  // (N,)
+    std::vector<CameraModel> cameras_;    // (N, lenses), empty unless cameras differ
+    std::vector<int32_t> delay_;          // (N,) substeps, empty unless commands act late
+    std::vector<float> earlier_;          // (4, N), see VehicleArrays
+
     std::unique_ptr<bool[]> flags_;  // terminated, then truncated (std::vector<bool> has no bytes to show)
 };
 

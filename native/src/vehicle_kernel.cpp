@@ -22,6 +22,8 @@ void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int 
     alignas(64) ConstantLanes constants;
     alignas(64) float steering_command[kLanes];
     alignas(64) float speed_command[kLanes];
+    alignas(64) float earlier[4][kLanes];
+    alignas(64) int32_t delay[kLanes];
     size_t car[kLanes];  // unused lanes repeat the last car and are not stored
     for (int i = 0; i < kLanes; ++i) car[i] = begin + static_cast<size_t>(i < count ? i : count - 1);
     for (int i = 0; i < kLanes; ++i) {
@@ -34,6 +36,10 @@ void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int 
         lanes.steering[i] = arrays.steering[car[i]];
         steering_command[i] = arrays.steering_command[car[i]];
         speed_command[i] = arrays.speed_command[car[i]];
+        delay[i] = arrays.delay != nullptr ? arrays.delay[car[i]] : 0;
+        for (size_t k = 0; k < 4; ++k) {
+            earlier[k][i] = arrays.earlier != nullptr ? arrays.earlier[k * arrays.stride + car[i]] : 0.0f;
+        }
     }
     for (int i = 0; i < kLanes; ++i) {
 #define RC_LOAD(name) arrays.parameters[kVehicle_##name * arrays.stride + car[i]],
@@ -53,8 +59,11 @@ void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int 
             const VehicleState state{
                 lanes.x[i],        lanes.y[i],       lanes.heading[i], lanes.speed[i], lanes.lateral_speed[i],
                 lanes.yaw_rate[i], lanes.steering[i]};
-            const VehicleState next =
-                vehicle_substep(c, state, steering_command[i], speed_command[i], sim_dt);
+            const bool acts = substep >= delay[i];
+            const bool acts_before = substep >= delay[i] - substeps;
+            const float steering = acts ? steering_command[i] : (acts_before ? earlier[0][i] : earlier[2][i]);
+            const float speed = acts ? speed_command[i] : (acts_before ? earlier[1][i] : earlier[3][i]);
+            const VehicleState next = vehicle_substep(c, state, steering, speed, sim_dt);
             lanes.x[i] = next.x;
             lanes.y[i] = next.y;
             lanes.heading[i] = next.heading;

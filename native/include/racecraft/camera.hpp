@@ -32,6 +32,7 @@ struct CameraSpec {
     float left = 0.0f;         // m, lens to the left of it; +-0.03 are the stereo pair
     float above = 0.1314f;     // m, lens above the ground
     int32_t min_samples = 1;   // of every row: 1, 2, 4 or 8; 4 gives pictures for people their smooth edges
+    float yaw = 0.0f;          // rad, looking to the left of where the car points
 };
 
 enum SampleKind : uint8_t {
@@ -76,6 +77,9 @@ RC_HD LensPose place_lens(const CameraView& camera, const GroundView& ground, fl
     constexpr float margin = 0.02f;
     lens.x = clamp(wanted_x, ground.min_x + margin, ground.max_x - margin);
     lens.y = clamp(wanted_y, ground.min_y + margin, ground.max_y - margin);
+    if (camera.spec.yaw != 0.0f) {
+        sincos_of((is_usable ? heading : 0.0f) + camera.spec.yaw, lens.sine, lens.cosine);
+    }
     return lens;
 }
 

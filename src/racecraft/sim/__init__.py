@@ -3,10 +3,12 @@
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATE_COLUMNS, STATUS_NAMES
 from racecraft.sim.objects import Bots, Objects, Obstacles, objects_for_race, objects_from_drfc
+from racecraft.sim.randomization import CONDITIONS, Randomization, load_randomization
 from racecraft.sim.simulation import CONTROL_DT, MAX_STEERING, Simulation, Start, instruction_set
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 
 __all__ = [
+    "CONDITIONS",
     "CONTROL_DT",
     "MAX_STEERING",
     "OBJECT_COLUMNS",
@@ -18,10 +20,12 @@ __all__ = [
     "CameraSpec",
     "Objects",
     "Obstacles",
+    "Randomization",
     "Simulation",
     "Start",
     "Vehicle",
     "instruction_set",
+    "load_randomization",
     "load_vehicle",
     "objects_for_race",
     "objects_from_drfc",

@@ -24,6 +24,7 @@ from racecraft.sim.camera import CameraSpec
 from racecraft.sim.checks import check_number, check_type, check_whole
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS, Objects, native_objects
+from racecraft.sim.randomization import Randomization, load_randomization
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track.track import Track
 
@@ -34,6 +35,7 @@ MAX_STEERING: Final = np.pi / 6
 TABLE_SPACING: Final = 0.05
 """m between samples of width and curvature along the centre line."""
 
+TRACK_ORDERS: Final = ("fixed", "random")
 START_MODES: Final = ("fixed", "advance", "random")
 DIRECTIONS: Final = ("forward", "reverse", "alternate")
 VEHICLE_FIELDS: Final = ("x", "y", "heading", "speed", "lateral_speed", "yaw_rate", "steering")
@@ -79,13 +81,16 @@ class Simulation:
     `prepare` step, so the first judged step of an episode has ``steps == 2``.
 
     Args:
-        tracks: One track, or several to be driven in one batch (car i starts on track i modulo their number).
+        tracks: One track, or several to be driven in one batch.
         num_envs: Cars, N.
         seed: Key of every random number; same seed, settings and actions give the same bits.
         vehicle: Preset name, vehicle file or `Vehicle`.
         camera: The driver's camera, or None to drive without (much faster).
         start: Where episodes start.
         direction: ``forward``, ``reverse``, or ``alternate`` with every episode.
+        track_order: ``fixed``: car i drives track i modulo their number, or its `track_choice`; ``random``: one drawn
+            for every episode.
+        randomize: Preset name, file or `Randomization`: the ranges of what differs from episode to episode.
         laps: Completed laps that end an episode; laps flow without a stop.
         time_limit: Seconds that truncate an episode; 0 for none.
         max_steps: Steps that truncate an episode.
@@ -107,6 +112,7 @@ class Simulation:
         vehicles: x, y, heading, speed, lateral_speed, yaw_rate, steering (SI), float32 (7, N).
         parameters: Vehicle parameters per car, writeable, float32 (len(VEHICLE_PARAMETERS), N).
         track_choice: Track of each car from its next episode on, writeable, int32 (N,).
+        conditions: What randomisation drew for each car's episode, float32 (N, len(CONDITIONS)); (0, ...) without.
 
     Raises:
         ConfigError: A setting is outside its range.
@@ -123,6 +129,8 @@ class Simulation:
         camera: CameraSpec | None = CameraSpec(),
         start: Start = Start(),
         direction: str = "forward",
+        track_order: str = "fixed",
+        randomize: Randomization | str | Path = "none",
         laps: int = 1,
         time_limit: float = 0.0,
         max_steps: int = 100_000,
@@ -147,6 +155,11 @@ class Simulation:
         check_type("objects", objects, Objects, "use racecraft.sim.Objects(...)")
         if direction not in DIRECTIONS:
             raise ConfigError(f"direction is {direction!r}; allowed are {', '.join(DIRECTIONS)}.")
+        if track_order not in TRACK_ORDERS:
+            raise ConfigError(f"track_order is {track_order!r}; allowed are {', '.join(TRACK_ORDERS)}.")
+        check_type(
+            "randomize", randomize, (Randomization, str, Path), "use a preset's name, a file or Randomization(...)"
+        )
         check_whole("num_envs", num_envs, 1, 1_000_000)
         check_whole("seed", seed, 0, 2**64 - 1)
         check_whole("laps", laps, 1, 1_000_000)
@@ -159,6 +172,8 @@ class Simulation:
         self.seed = seed
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
         self.camera = camera
+        self.randomize = randomize if isinstance(randomize, Randomization) else load_randomization(randomize)
+        self.randomize.check(self.vehicle, camera)
         self.start = start
         self.direction = direction
         self.laps = laps
@@ -187,6 +202,9 @@ class Simulation:
             objects=native_objects(objects),
             has_lidar=lidar,
             baseline=camera.baseline if camera else 0.0,
+            draws_tracks=track_order == "random",
+            randomization=[] if self.randomize.is_off else self.randomize.values(),
+            world=camera.palette if camera else "2018",
         )
         frames: NDArray[np.uint8] = self._engine.frames  # (N, lenses, height, width)
         is_stereo = camera is not None and camera.baseline > 0.0
@@ -200,6 +218,7 @@ class Simulation:
         self.vehicles: NDArray[np.float32] = self._engine.vehicles
         self.parameters: NDArray[np.float32] = self._engine.parameters
         self.track_choice: NDArray[np.int32] = self._engine.track_choice
+        self.conditions: NDArray[np.float32] = self._engine.conditions
 
     @property
     def num_threads(self) -> int:

@@ -1,0 +1,247 @@
+"""Domain randomisation: every episode of every car in its own light, on its own tyres, behind its own camera.
+
+Each quantity is a range, drawn from evenly by the native core (native/include/racecraft/randomization.hpp). A policy
+that learned under many conditions does not rely on any of them.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Final
+
+from racecraft.errors import ConfigError, did_you_mean
+from racecraft.sim.camera import CameraSpec
+from racecraft.sim.checks import check_number, check_type
+from racecraft.sim.vehicle import Vehicle
+
+MAX_FILE_BYTES: Final = 100_000
+
+Range = tuple[float, float]
+"""Least and greatest value."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Randomization:
+    """Ranges from which each episode of a car draws its conditions, evenly and each quantity by itself.
+
+    The defaults change nothing. A range of one point is a constant change: ``Randomization(friction=(0.8, 0.8))``.
+    """
+
+    friction: Range = (1.0, 1.0)
+    """Factor on the friction of all tyres."""
+    mass: Range = (1.0, 1.0)
+    """Factor on mass and inertia; motors and brakes stay as strong as they are."""
+    speed_gain: Range = (1.0, 1.0)
+    """Factor on the speed reached: a full battery or an empty one."""
+    steering_bias: Range = (0.0, 0.0)
+    """rad, added to the vehicle's own."""
+    latency: Range = (0.0, 0.0)
+    """Control steps (1/15 s) before a command acts, 0 to 2; until then the ones before do."""
+    camera_pitch: Range = (0.0, 0.0)
+    """rad, further down."""
+    camera_yaw: Range = (0.0, 0.0)
+    """rad, to the left."""
+    camera_height: Range = (0.0, 0.0)
+    """m, higher."""
+    camera_left: Range = (0.0, 0.0)
+    """m, to the left."""
+    camera_forward: Range = (0.0, 0.0)
+    """m, ahead."""
+    camera_fov: Range = (0.0, 0.0)
+    """rad, wider horizontal field of view."""
+    light: Range = (1.0, 1.0)
+    """Factor on every brightness."""
+    black_level: Range = (0.0, 0.0)
+    """Added to every brightness, as a fraction of white."""
+    gradient_across: Range = (0.0, 0.0)
+    """Change of the light from the middle of the picture to its right edge, as a fraction."""
+    gradient_down: Range = (0.0, 0.0)
+    """Change of the light from the middle of the picture to its lower edge, as a fraction."""
+    blur: Range = (0.0, 0.0)
+    """Pixels, standard deviation."""
+    tint: Range = (1.0, 1.0)
+    """Factor on the light's red, green and blue, drawn for each; grey weighs them afterwards."""
+    colour: Range = (0.0, 0.0)
+    """Added to the brightness of road, lines, field, walls and sky, drawn for each, as a fraction of white."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not isinstance(value, list | tuple) or len(value) != 2:
+                raise ConfigError(f"Randomization {field.name} is {value!r}; allowed are two numbers, least and most.")
+            low, high = value
+            for number in (low, high):
+                check_number(f"Randomization {field.name}", number, *LIMITS[field.name])
+            if low > high:
+                raise ConfigError(
+                    f"Randomization {field.name} is {value!r}; the first number is greater than the second."
+                )
+            object.__setattr__(self, field.name, (float(low), float(high)))
+
+    @property
+    def is_off(self) -> bool:
+        """Whether nothing is changed."""
+        return self == PRESETS["none"]
+
+    def check(self, vehicle: Vehicle, camera: CameraSpec | None) -> None:
+        """Refuse ranges that would make a car or a camera that cannot be.
+
+        Raises:
+            ConfigError: An end of a range leads outside the limits of a vehicle's or a camera's parameters.
+        """
+        try:
+            for friction, mass, gain, bias in zip(
+                self.friction, self.mass, self.speed_gain, self.steering_bias, strict=True
+            ):
+                replace(
+                    vehicle,
+                    front_friction=vehicle.front_friction * friction,
+                    rear_friction=vehicle.rear_friction * friction,
+                    mass=vehicle.mass * mass,
+                    yaw_inertia=vehicle.yaw_inertia * mass,
+                    drive_acceleration=vehicle.drive_acceleration / mass,
+                    brake_acceleration=vehicle.brake_acceleration / mass,
+                    speed_gain=vehicle.speed_gain * gain,
+                    steering_bias=vehicle.steering_bias + bias,
+                )
+            for index in (0, 1) if camera is not None else ():
+                assert camera is not None
+                replace(
+                    camera,
+                    pitch=camera.pitch + self.camera_pitch[index],
+                    above_ground=camera.above_ground + self.camera_height[index],
+                    left=camera.left + self.camera_left[index],
+                    forward=camera.forward + self.camera_forward[index],
+                    horizontal_fov=camera.horizontal_fov + self.camera_fov[index],
+                )
+        except ConfigError as error:
+            raise ConfigError(f"At an end of the randomization's ranges: {error}", hint=error.hint) from error
+
+    def values(self) -> list[float]:
+        """The ranges in the native core's order."""
+        return [end for field in fields(self) for end in getattr(self, field.name)]
+
+    def save(self, path: str | Path) -> None:
+        """Write a file that `load_randomization` reads."""
+        Path(path).write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+
+
+LIMITS: Final[dict[str, Range]] = {
+    "friction": (0.1, 3.0),
+    "mass": (0.2, 5.0),
+    "speed_gain": (0.2, 1.5),
+    "steering_bias": (-0.3, 0.3),
+    "latency": (0.0, 2.0),
+    "camera_pitch": (-0.5, 0.5),
+    "camera_yaw": (-0.5, 0.5),
+    "camera_height": (-0.1, 0.5),
+    "camera_left": (-0.3, 0.3),
+    "camera_forward": (-0.3, 0.3),
+    "camera_fov": (-0.8, 1.2),
+    "light": (0.0, 4.0),
+    "black_level": (-0.5, 0.5),
+    "gradient_across": (-0.9, 0.9),
+    "gradient_down": (-0.9, 0.9),
+    "blur": (0.0, 4.0),
+    "tint": (0.0, 4.0),
+    "colour": (-0.5, 0.5),
+}
+"""Allowed range of every quantity."""
+
+PRESETS: Final[dict[str, Randomization]] = {
+    "none": Randomization(),
+    "light": Randomization(
+        friction=(0.85, 1.1),
+        mass=(0.95, 1.05),
+        speed_gain=(0.95, 1.05),
+        steering_bias=(-0.02, 0.02),
+        latency=(0.0, 0.5),
+        camera_pitch=(-0.02, 0.02),
+        camera_yaw=(-0.02, 0.02),
+        camera_height=(-0.005, 0.005),
+        camera_left=(-0.005, 0.005),
+        camera_forward=(-0.01, 0.01),
+        camera_fov=(-0.02, 0.02),
+        light=(0.8, 1.2),
+        black_level=(-0.03, 0.03),
+        gradient_across=(-0.1, 0.1),
+        gradient_down=(-0.1, 0.1),
+        blur=(0.0, 0.5),
+        tint=(0.9, 1.1),
+        colour=(-0.05, 0.05),
+    ),
+    "strong": Randomization(
+        friction=(0.6, 1.3),
+        mass=(0.8, 1.3),
+        speed_gain=(0.85, 1.15),
+        steering_bias=(-0.06, 0.06),
+        latency=(0.0, 1.0),
+        camera_pitch=(-0.07, 0.07),
+        camera_yaw=(-0.05, 0.05),
+        camera_height=(-0.02, 0.02),
+        camera_left=(-0.02, 0.02),
+        camera_forward=(-0.03, 0.03),
+        camera_fov=(-0.08, 0.08),
+        light=(0.5, 1.5),
+        black_level=(-0.08, 0.08),
+        gradient_across=(-0.4, 0.4),
+        gradient_down=(-0.4, 0.4),
+        blur=(0.0, 1.0),
+        tint=(0.5, 1.5),
+        colour=(-0.12, 0.12),
+    ),
+    "aws": Randomization(light=(0.8, 1.0), tint=(0.5, 1.0)),
+}
+"""``aws`` is what the original's ENABLE_DOMAIN_RANDOMIZATION does to the driver's picture: each lamp takes a random
+colour while half of the light, the ambient part, stays as it is."""
+
+
+def load_randomization(name_or_path: str | Path) -> Randomization:
+    """A preset by name, or a JSON file of ranges.
+
+    A file holds one object, such as ``{"preset": "light", "friction": [0.7, 1.2]}``: what it does not name is as in
+    its preset, and without one does not change.
+
+    Raises:
+        ConfigError: No such preset or file, an unknown quantity, or a range that is not allowed.
+    """
+    check_type("randomize", name_or_path, (str, Path), "use a preset's name, a file or racecraft.Randomization(...)")
+    name = str(name_or_path)
+    if name in PRESETS:
+        return PRESETS[name]
+    path = Path(name_or_path)
+    if not path.is_file():
+        raise ConfigError(
+            f"Randomization {name!r} is neither a preset ({', '.join(PRESETS)}) nor a file.",
+            hint=did_you_mean(name, PRESETS),
+        )
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise ConfigError(f"Randomization file {name!r} has more than {MAX_FILE_BYTES} bytes.")
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(f"Randomization file {name!r} is not JSON: {error}.") from error
+    except OSError as error:
+        raise ConfigError(f"Randomization file {name!r} cannot be read: {error.strerror or error}.") from error
+    if not isinstance(data, dict):
+        raise ConfigError(f"Randomization file {name!r} must hold one JSON object, not {type(data).__name__}.")
+    preset = data.pop("preset", "none")
+    if preset not in list(PRESETS):
+        raise ConfigError(
+            f"Randomization file {name!r} names the preset {preset!r}; allowed are {', '.join(PRESETS)}.",
+            hint=did_you_mean(str(preset), PRESETS),
+        )
+    for key in data:
+        if key not in LIMITS:
+            raise ConfigError(f"Randomization file {name!r} has an unknown quantity {key!r}.", hint=_hint(key))
+    return replace(PRESETS[preset], **data)
+
+
+def _hint(key: Any) -> str:
+    return did_you_mean(str(key), LIMITS) or f"Known are {', '.join(LIMITS)}."
+
+
+CONDITIONS: Final = tuple(field.name for field in fields(Randomization))[:-2]
+"""Names of what an episode has one value of, in the order of `Simulation.conditions`."""
