@@ -9,6 +9,7 @@ from racecraft.track.library import Course, course, track_names
 from racecraft.track.load import load_track
 from racecraft.track.picture import TrackPicture, describe, draw_contact_sheet, draw_track
 from racecraft.track.readers import read_centerline_csv, read_route, read_track, save_route
+from racecraft.track.selection import join_names, joint_digest, load_tracks
 from racecraft.track.track import Track
 from racecraft.track.validate import validate
 
@@ -23,7 +24,10 @@ __all__ = [
     "draw_track",
     "find_corners",
     "generate_track",
+    "join_names",
+    "joint_digest",
     "load_track",
+    "load_tracks",
     "read_centerline_csv",
     "read_route",
     "read_track",
