@@ -25,6 +25,7 @@ _HOME = {
     "RacecraftError": "errors",
     "RacecraftVectorEnv": "env",
     "RewardWorker": "reward",
+    "Randomization": "sim",
     "Simulation": "sim",
     "Start": "sim",
     "Track": "track",
@@ -33,9 +34,11 @@ _HOME = {
     "check_reward": "reward",
     "draw_track": "track",
     "evaluate": "race.run_evaluation:evaluate_run",
+    "generalize": "race.run_generalization:generalize_run",
     "generate_track": "track",
     "load_reward": "reward",
     "load_track": "track",
+    "load_tracks": "track",
     "resume": "training",
     "track_names": "track",
     "train": "training",
@@ -51,10 +54,12 @@ if TYPE_CHECKING:
     from racecraft.errors import RacecraftError as RacecraftError
     from racecraft.race import RaceRules as RaceRules
     from racecraft.race.run_evaluation import evaluate_run
+    from racecraft.race.run_generalization import generalize_run
     from racecraft.reward import RewardWorker as RewardWorker
     from racecraft.reward import check_reward as check_reward
     from racecraft.reward import load_reward as load_reward
     from racecraft.sim import CameraSpec as CameraSpec
+    from racecraft.sim import Randomization as Randomization
     from racecraft.sim import Simulation as Simulation
     from racecraft.sim import Start as Start
     from racecraft.sim import Vehicle as Vehicle
@@ -62,11 +67,13 @@ if TYPE_CHECKING:
     from racecraft.track import draw_track as draw_track
     from racecraft.track import generate_track as generate_track
     from racecraft.track import load_track as load_track
+    from racecraft.track import load_tracks as load_tracks
     from racecraft.track import track_names as track_names
     from racecraft.training import resume as resume
     from racecraft.training import train as train
 
     evaluate = evaluate_run
+    generalize = generalize_run
 
 
 def __getattr__(name: str) -> Any:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 import typer
 
 from racecraft.cli import race_options
 from racecraft.cli.app import Json, app, print_json, text
+
+RACE_ONLY: Final = ("track", "laps", "rules", "offtrack_penalty", "max_resets", "video")
 
 
 @app.command()
@@ -16,10 +18,14 @@ def evaluate(
     context: typer.Context,
     run: Annotated[Path, typer.Argument(help="Run folder.")],
     track: Annotated[str, typer.Option("--track", "-t", help="Track; by default the one it was trained on.")] = "",
+    tracks: Annotated[
+        list[str] | None,
+        typer.Option("--tracks", help="A table of one lap on each: all, library, generated:0..99 or a folder."),
+    ] = None,
     laps: Annotated[int | None, typer.Option("--laps", "-l", help="Laps to a trial; by default the rules'.")] = None,
     trials: Annotated[
-        int, typer.Option("--trials", help="Cars that start side by side, each a little differently.")
-    ] = 5,
+        int | None, typer.Option("--trials", help="Cars that start side by side, 5; with --tracks on each of them, 1.")
+    ] = None,
     rules: Annotated[
         str, typer.Option("--rules", help="drfc, worker, droa or live; by default the run's own, else drfc.")
     ] = "",
@@ -28,6 +34,9 @@ def evaluate(
     direction: Annotated[
         str, typer.Option("--direction", help="forward or reverse; by default as it was trained.")
     ] = "",
+    randomize: Annotated[
+        str, typer.Option("--randomize", help="What differs from trial to trial: light, strong, aws or a JSON file.")
+    ] = "none",
     offtrack_penalty: Annotated[
         float | None, typer.Option("--offtrack-penalty", help="Seconds; by default the rules'.")
     ] = None,
@@ -52,8 +61,23 @@ def evaluate(
 ) -> None:
     """Race a run's policy against the clock and film it.
 
-    By default among the objects it was trained with.
+    By default among the objects it was trained with. With --tracks it tries one
+    lap on each of many tracks, both ways.
     """
+    if tracks:
+        _generalize(
+            context,
+            run,
+            tracks=tracks,
+            directions=(direction,) if direction else ("forward", "reverse"),
+            num_trials=1 if trials is None else trials,
+            checkpoint=int(checkpoint) if checkpoint.isdigit() else checkpoint,
+            vehicle=vehicle or None,
+            randomize=randomize,
+            seed=seed,
+            as_json=as_json,
+        )
+        return
     if as_json and aws_log == "-":
         context.fail("--json and --aws-log - both want stdout; give the log a file.")
     from racecraft.race.run_evaluation import evaluate_run
@@ -72,11 +96,12 @@ def evaluate(
         run,
         track=track or None,
         laps=laps,
-        num_trials=trials,
+        num_trials=5 if trials is None else trials,
         rules=rules or None,
         checkpoint=int(checkpoint) if checkpoint.isdigit() else checkpoint,
         vehicle=vehicle or None,
         direction=direction or None,
+        randomize=randomize,
         offtrack_penalty=offtrack_penalty,
         collision_penalty=collision_penalty,
         objects=given if race else None,
@@ -89,3 +114,18 @@ def evaluate(
         print_json(outcome.to_dict())
     elif aws_log != "-":
         text().say_evaluated(outcome)
+
+
+def _generalize(context: typer.Context, run: Path, *, as_json: bool, **settings: Any) -> None:
+    """One lap on each of many tracks; the rules of a race do not apply."""
+    for option in context.command.params:
+        source = context.get_parameter_source(str(option.name))
+        if option.name in RACE_ONLY and source is not None and source.name == "COMMANDLINE":
+            context.fail(f"{option.opts[0]} does not go with --tracks: each track is one lap without a reset.")
+    from racecraft.race.run_generalization import generalize_run
+
+    outcome = generalize_run(run, **settings)
+    if as_json:
+        print_json(outcome.to_dict())
+    else:
+        text().say_generalized(outcome)

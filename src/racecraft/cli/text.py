@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from racecraft.importing import ImportedRun
     from racecraft.limits import TrackLimit
     from racecraft.race.run_evaluation import RunEvaluation
+    from racecraft.race.run_generalization import RunGeneralization
     from racecraft.replay import Calibration, Comparison, FrameFit
     from racecraft.reward import Outcome, Problem
     from racecraft.track import Track
@@ -137,6 +138,37 @@ def say_limit(name: str, limit: TrackLimit) -> None:
         f"Medals: author {medals.author:.2f} s (driven by our line driver), gold {medals.gold:.2f} s, "
         f"silver {medals.silver:.2f} s, bronze {medals.bronze:.2f} s.",
     )
+
+
+def say_generalized(outcome: RunGeneralization) -> None:
+    """A line for each track and the sum."""
+    console, found = Console(), outcome.generalization
+    directions = tuple(dict.fromkeys(result.direction for result in found.results))
+    table = _table(title=f"{outcome.run.name} after {outcome.step:,} camera steps")
+    table.add_column("track", style="bold", overflow="ellipsis", no_wrap=True)
+    table.add_column("length", justify="right", no_wrap=True)
+    for direction in directions:
+        table.add_column(direction, justify="right", no_wrap=True)
+        table.add_column("lap", justify="right", no_wrap=True)
+    by_track: dict[str, list[Any]] = {}
+    for result in found.results:
+        by_track.setdefault(result.track, []).append(result)
+    for name, results in by_track.items():
+        cells: list[str | Text] = []
+        for result in results:
+            is_done = result.laps == len(result.completions)
+            cells.append(Text(f"{100 * result.completion:.0f} %", "" if is_done else "yellow"))
+            cells.append(f"{min(result.lap_times):.1f} s" if result.lap_times else "–")
+        table.add_row(name, f"{results[0].length:.1f} m", *cells)
+    console.print(table)
+    low, high = found.lap_interval
+    _say(
+        console,
+        (f"{found.laps} of {found.trials} laps completed, {100 * found.lap_share:.1f} %", "bold"),
+        f" (95 % interval {100 * low:.0f} to {100 * high:.0f} %); "
+        f"mean {100 * found.completion:.1f} % of a lap; {len(found.mastered)} of {len(by_track)} tracks mastered.",
+    )
+    _say(console, "  table        ", (str(outcome.path), "bold"))
 
 
 def say_tracks(listed: list[tuple[Track, Any]], limits: list[TrackLimit | None]) -> None:

@@ -10,13 +10,16 @@ from typing import Annotated
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import INTERRUPTED, Json, TrackOption, app, print_json, text
+from racecraft.cli.app import INTERRUPTED, Json, app, print_json, text
 
 
 @app.command()
 def train(
     context: typer.Context,
-    track: TrackOption = "reinvent_2018",
+    track: Annotated[
+        list[str] | None,
+        typer.Option("--track", "-t", help="Track, file, folder, library or generated:0..99; several by repeating it."),
+    ] = None,
     reward: Annotated[str, typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py.")] = "racing",
     until: Annotated[
         str,
@@ -45,6 +48,10 @@ def train(
     parked_cars: race_options.ParkedCars = False,
     placement: race_options.Placement = "",
     positions: race_options.Positions = "",
+    randomize: Annotated[
+        str,
+        typer.Option("--randomize", help="What differs between episodes: light, strong, aws or a JSON file."),
+    ] = "none",
     num_envs: Annotated[int, typer.Option("--num-envs", help="Cars driven at once; 0 decides by itself.")] = 0,
     seed: Annotated[int, typer.Option("--seed", "-s", help="The same seed repeats a run on the same machine.")] = 0,
     evaluate_every: Annotated[
@@ -73,7 +80,9 @@ def train(
     from racecraft.training.progress import SilentReporter
     from racecraft.training.terminal import TerminalReporter
 
-    title = f"Racecraft · {resume}" if resume else f"Racecraft · {Path(track).stem} · {Path(reward).stem}"
+    tracks = track or ["reinvent_2018"]
+    where = Path(tracks[0]).stem if len(tracks) == 1 else f"{len(tracks)} tracks"
+    title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
     with SilentReporter() if is_quiet else TerminalReporter(title=title) as reporter:
         if resume is not None:
             result = training.resume(
@@ -81,7 +90,7 @@ def train(
             )
         else:
             result = training.train(
-                track,
+                tracks,
                 reward=reward,
                 until=until or "5 laps",
                 actions=actions,
@@ -101,6 +110,7 @@ def train(
                     placement=placement,
                     positions=positions,
                 ),
+                randomize=randomize,
                 num_envs=num_envs,
                 seed=seed,
                 evaluate_every=evaluate_every,

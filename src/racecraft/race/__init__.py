@@ -2,6 +2,7 @@
 
 from racecraft.race.autopilot import Autopilot
 from racecraft.race.evaluation import Completion, completion, evaluate, trial_simulation
+from racecraft.race.generalization import Generalization, TrackResult, generalize
 from racecraft.race.racing_line import draw_racing_line
 from racecraft.race.recording import Recording
 from racecraft.race.results import Evaluation, Lap, Trial
@@ -17,17 +18,20 @@ __all__ = [
     "Autopilot",
     "Completion",
     "Evaluation",
+    "Generalization",
     "Interval",
     "Lap",
     "OfficialRace",
     "Placing",
     "RaceRules",
     "Recording",
+    "TrackResult",
     "Trial",
     "completion",
     "draw_racing_line",
     "evaluate",
     "film",
+    "generalize",
     "mean_interval",
     "official_races",
     "places",

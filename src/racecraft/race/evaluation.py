@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.marshal import Marshal
-from racecraft.race.placement import driven_track, line_up
+from racecraft.race.placement import line_up
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.objects import NO_OBJECTS, Objects
+from racecraft.sim.randomization import Randomization
 from racecraft.sim.simulation import CONTROL_DT, Simulation, Start
 from racecraft.sim.vehicle import Vehicle
 from racecraft.track.track import Track
@@ -50,6 +51,7 @@ def evaluate(
     camera: CameraSpec = CameraSpec(),
     objects: Objects = NO_OBJECTS,
     sees: str = "frames",
+    randomize: Randomization | str = "none",
     num_threads: int = 0,
 ) -> Evaluation:
     """Race a policy against the clock, several times side by side.
@@ -68,6 +70,7 @@ def evaluate(
         camera: What the cars see with.
         objects: Boxes and bot cars on the track, around every car of its own; random places differ by trial.
         sees: ``frames``, or ``state`` for a policy that drives by the privileged state, without a camera.
+        randomize: Preset, file or ranges of what differs between the trials.
         num_threads: Of the simulation; 0 takes one per core.
 
     Raises:
@@ -82,6 +85,7 @@ def evaluate(
         seed=seed,
         vehicle=vehicle,
         camera=_needed(camera, sees),
+        randomize=randomize,
         objects=objects,
         num_threads=num_threads,
     )
@@ -94,28 +98,36 @@ def evaluate(
 
 
 def trial_simulation(
-    track: Track,
+    tracks: Track | Sequence[Track],
     *,
     rules: RaceRules = RULE_SETS["first_lap"],
     num_trials: int = 5,
     seed: int = 0,
     vehicle: Vehicle | str = "v5",
     camera: CameraSpec | None = CameraSpec(),
+    randomize: Randomization | str = "none",
     objects: Objects = NO_OBJECTS,
     num_threads: int = 0,
 ) -> Simulation:
-    """A simulation by the rules, a car for each trial: what `evaluate` makes and `completion` reuses."""
+    """A simulation by the rules, a car for each trial: what `evaluate` makes and `completion` reuses.
+
+    On several tracks, for `completion` only, trial i drives track i modulo their number.
+    """
     if isinstance(num_trials, bool) or not isinstance(num_trials, int) or not 1 <= num_trials <= 1000:
         raise ConfigError(f"num_trials is {num_trials!r}; allowed is a whole number from 1 to 1000.")
-    laps = rules.laps if rules.is_continuous and track.is_closed else 1  # of one simulated episode
+    if isinstance(tracks, Track):
+        tracks = (tracks,)
+    is_closed = all(track.is_closed for track in tracks)
+    laps = rules.laps if rules.is_continuous and is_closed else 1  # of one simulated episode
     return Simulation(
-        track,
+        tracks,
         num_envs=num_trials,
         seed=seed,
         vehicle=vehicle,
         camera=camera,
         start=Start(mode="fixed", offset=rules.start_offset),
         direction=rules.direction,
+        randomize=randomize,
         laps=laps,
         max_steps=laps * MAX_STEPS,
         objects=objects,
@@ -179,8 +191,13 @@ def completion(
     _needed(simulation.camera, sees)
     if simulation.laps != 1:
         raise ConfigError(f"completion judges one lap; the simulation was made for {simulation.laps}.")
+    line_up(simulation, rules, seed=seed)
+    return drive_lap(policy, simulation, sees=sees, max_seconds=max_seconds)
+
+
+def drive_lap(policy: Driver, simulation: Simulation, *, sees: str = "frames", max_seconds: float = 0.0) -> Completion:
+    """The same from where the cars stand."""
     sight = simulation.frames if sees == "frames" else simulation.state
-    line_up(simulation, driven_track(simulation.tracks[0], rules), rules, seed=seed)
     rewards = np.zeros(simulation.num_envs)
     is_running = np.ones(simulation.num_envs, dtype=np.bool_)
     for _ in range(round(max_seconds / CONTROL_DT) if max_seconds > 0.0 else MAX_STEPS):

@@ -69,7 +69,7 @@ class Marshal:
         self._track = driven_track(simulation.tracks[0], rules)
         self._cars = [_Car(index=index, resets_left=rules.max_resets) for index in range(simulation.num_envs)]
         self._is_racing = np.ones(simulation.num_envs, dtype=np.bool_)
-        line_up(simulation, self._track, rules, seed=seed)
+        line_up(simulation, rules, seed=seed)
         for car in self._cars:
             self._log_start(car)
 

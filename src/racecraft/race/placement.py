@@ -121,11 +121,17 @@ def _ahead(track: Track, places: Any, s: float) -> Any:
     return ahead - track.length * np.round(ahead / track.length) if track.is_closed else ahead
 
 
-def line_up(simulation: Simulation, track: Track, rules: RaceRules, *, seed: int) -> None:
-    """Put every car of a simulation at the start of its trial."""
-    simulation.reset()
+def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
+    """Put every car of a simulation at the start of its trial; equal seeds mean equal starts and conditions."""
+    if simulation.randomize.is_off:
+        simulation.reset()
+    else:
+        trials = np.arange(simulation.num_envs, dtype=np.uint64)
+        simulation.reset(seeds=trials + np.uint64((seed % 2**32) << 20))
+    tracks = [track.reversed() if rules.direction == "reverse" else track for track in simulation.tracks]
     for trial in range(1, simulation.num_envs):  # trial 0 already stands where it should
         offset = start_offset(simulation, trial)
+        track = tracks[trial % len(tracks)]
         simulation.set_pose(trial, *start_pose(track, rules, seed=seed, trial=trial, offset=offset))
 
 

@@ -32,8 +32,9 @@ from racecraft.run.atomic import write_json
 from racecraft.run.aws_log import AwsLog
 from racecraft.run.folder import RunFolder, RunInfo
 from racecraft.sim.objects import Objects
+from racecraft.sim.randomization import Randomization, load_randomization
 from racecraft.sim.vehicle import Vehicle, load_vehicle
-from racecraft.track import Track, load_track
+from racecraft.track import Track, joint_digest, load_track, load_tracks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,6 +101,7 @@ def evaluate_run(
     checkpoint: str | int = "best",
     vehicle: str | Vehicle | None = None,
     direction: str | None = None,
+    randomize: Randomization | str | Path = "none",
     offtrack_penalty: float | None = None,
     max_resets: int | None = None,
     collision_penalty: float | None = None,
@@ -113,7 +115,7 @@ def evaluate_run(
 
     Args:
         run: The run folder.
-        track: Where; by default where it was trained.
+        track: Where; by default where it was trained, the first of several.
         laps: Laps to a trial; by default the rules'.
         num_trials: Cars that start side by side, each a little differently.
         rules: A name of `RULE_SETS`, or rules; by default the run's own, where it has some, else ``drfc``.
@@ -121,6 +123,7 @@ def evaluate_run(
         vehicle: By default the one it was trained with.
         direction: ``forward`` or ``reverse``; by default that of the run's own rules, else the one it was trained in,
             ``forward`` if in both.
+        randomize: Preset, file or ranges of what differs between the trials.
         offtrack_penalty: Seconds; by default the rules'.
         max_resets: By default the rules'.
         collision_penalty: Seconds; by default the rules'.
@@ -148,7 +151,9 @@ def evaluate_run(
     }
     rules = _rules(rules or "drfc", {name: value for name, value in changes.items() if value is not None})
     if not isinstance(vehicle, Vehicle):
-        vehicle = load_vehicle(vehicle) if vehicle else _trained_vehicle(info)
+        vehicle = load_vehicle(vehicle) if vehicle else trained_vehicle(info)
+    if not isinstance(randomize, Randomization):
+        randomize = load_randomization(randomize)
     where = track if isinstance(track, Track) else load_track(track) if track else _trained_track(info)
 
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=num_threads)
@@ -160,6 +165,7 @@ def evaluate_run(
         seed=seed,
         vehicle=vehicle,
         objects=_trained_objects(info) if objects is None else objects,
+        randomize=randomize,
         num_threads=num_threads,
     )
     try:
@@ -188,7 +194,8 @@ def _own_rules(folder: RunFolder) -> RaceRules:
         raise ConfigError(f"{folder.race_rules.name}: {error}", hint=error.hint) from error
 
 
-def _trained_vehicle(info: RunInfo) -> Vehicle:
+def trained_vehicle(info: RunInfo) -> Vehicle:
+    """The vehicle of run.json."""
     try:
         return Vehicle(**info.settings.get("vehicle", {}))
     except TypeError as error:
@@ -200,13 +207,13 @@ def _trained_objects(info: RunInfo) -> Objects:
 
 
 def _trained_track(info: RunInfo) -> Track:
-    track = load_track(info.track)
-    if track.digest != info.track_digest:
+    tracks = load_tracks(info.track)
+    if joint_digest(tracks) != info.track_digest:
         raise ConfigError(
             f"Track {info.track!r} has changed since the run was trained on it.",
             hint="Say which one you mean with --track, be it the same name.",
         )
-    return track
+    return tracks[0]
 
 
 def _write(
@@ -217,7 +224,7 @@ def _write(
     is_filmed: bool,
     aws_log: str | Path | None,
 ) -> dict[str, Path]:
-    stamp, inside = _new_folder(folder)
+    stamp, inside = new_folder(folder)
     metrics = folder.evaluation_metrics(stamp)
     metrics.parent.mkdir(exist_ok=True)
     write_metrics(evaluation, metrics)
@@ -247,7 +254,7 @@ def _write(
     return files
 
 
-def _new_folder(folder: RunFolder) -> tuple[str, Path]:
+def new_folder(folder: RunFolder) -> tuple[str, Path]:
     """A folder named after now, to the second, or a little later where one of this second exists."""
     moment = datetime.now(UTC)
     while True:

@@ -15,6 +15,8 @@ from racecraft.training.progress import (
 from racecraft.training.stop import Until
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from racecraft.agent import ActionSpace
 
 __all__ = [
@@ -30,7 +32,7 @@ __all__ = [
 
 
 def train(
-    track: str = "reinvent_2018",
+    track: str | Path | Sequence[str | Path] = "reinvent_2018",
     *,
     reward: str | Path = "racing",
     until: str | Until = "5 laps",
@@ -48,7 +50,7 @@ def train(
     """Train a car from camera pixels with a reward function.
 
     Args:
-        track: Name of a track, or path of a track file.
+        track: Name of a track, or path of a track file; or several, as `racecraft.track.load_tracks` reads them.
         reward: Name of a preset, or path of a ``reward_function.py``.
         until: When to stop: ``"5 laps"``, ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or several joined by
             ``or``.

@@ -5,7 +5,7 @@ Every evaluation has the same starts, so that two of them can be compared.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any, Final
 
@@ -30,21 +30,24 @@ class Evaluator:
 
     Args:
         policy: What drives; it sees new weights as soon as they are learned.
-        track: Where.
+        tracks: Where; of many, as many as there are trials, evenly chosen, and every other one reversed where training
+            drives both ways.
         settings: Of the run.
     """
 
-    def __init__(self, policy: NetworkPolicy, track: Track, settings: TrainSettings) -> None:
+    def __init__(self, policy: NetworkPolicy, tracks: Sequence[Track], settings: TrainSettings) -> None:
         self.policy = policy
         self._seed = (settings.seed + SEED) % 2**32
-        self._patience = track.length / SLOWEST
         direction = "reverse" if settings.direction == "reverse" else "forward"
         self._rules = replace(RULE_SETS["first_lap"], direction=direction)
+        driven = _evenly(tracks, settings) if len(tracks) > 1 else tracks[:1]
+        self._patience = max(track.length for track in driven) / SLOWEST
         self._trials = trial_simulation(
-            track,
+            driven,
             rules=self._rules,
             num_trials=settings.evaluation_trials,
             vehicle=settings.vehicle,
+            randomize=settings.randomize,
             objects=settings.objects,
             num_threads=settings.num_threads,
         )
@@ -125,3 +128,12 @@ class Evaluator:
             self.last = EvaluationReport(**{**last, **tuples})
         self.best_score = None if score is None else tuple(map(float, score))
         self.best_lap = None if lap is None else float(lap)
+
+
+def _evenly(tracks: Sequence[Track], settings: TrainSettings) -> list[Track]:
+    """A track for each trial, in the direction it is driven in."""
+    trials = settings.evaluation_trials
+    chosen = [tracks[trial * len(tracks) // trials] for trial in range(trials)]
+    if settings.direction != "alternate":
+        return chosen
+    return [track.reversed() if trial % 2 else track for trial, track in enumerate(chosen)]

@@ -41,7 +41,7 @@ from racecraft.run import (
 )
 from racecraft.run.history import HistoryWriter
 from racecraft.sim import Simulation
-from racecraft.track import Track, load_track
+from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.environment import TrainingEnvironment
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
@@ -142,26 +142,30 @@ class Training:
         with ThreadPoolExecutor(1) as pool:
             spec = settings.network_spec(metadata)
             future = pool.submit(make_learner, spec, seed=settings.seed, num_threads=settings.num_threads)
-            track = self._load_track()
+            tracks = self._load_tracks()
             simulation = Simulation(
-                track,
+                tracks,
                 num_envs=ppo_config.num_envs,
                 seed=settings.seed,
                 vehicle=settings.vehicle,
                 start=settings.start,
                 direction=settings.direction,
+                track_order="random" if len(tracks) > 1 else "fixed",
+                randomize=settings.randomize,
                 objects=settings.objects,
                 num_threads=settings.num_threads,
             )
             if not self.is_checked:
-                require_valid_reward(source, track)
+                require_valid_reward(source, tracks[0])
             learner = future.result()
 
         with ExitStack() as stack:
             # A function that remembers something gets a memory for each car: on AWS one process drove one car.
             copies = ppo_config.num_envs if keeps_state(source) else 1
             worker = stack.enter_context(
-                RewardWorker(source, [track], seed=settings.seed, num_cars=copies, num_objects=settings.objects.count)
+                RewardWorker(
+                    source, list(tracks), seed=settings.seed, num_cars=copies, num_objects=settings.objects.count
+                )
             )
             kept = saved.step if saved is not None else 0
             after = kept if saved is not None else -1
@@ -182,7 +186,7 @@ class Training:
             trace = SimTraceWriter(
                 folder.training_simtrace,
                 num_envs=ppo_config.num_envs,
-                tracks=[track],
+                tracks=list(tracks),
                 action_space=metadata.action_space,
                 episodes_per_iteration=per_iteration,
                 episodes=episodes,
@@ -201,7 +205,7 @@ class Training:
             session = _Session(
                 environment=environment,
                 ppo=PPO(ppo_config, learner, environment, seed=settings.seed),
-                evaluator=Evaluator(NetworkPolicy(learner, metadata.action_space), track, settings),
+                evaluator=Evaluator(NetworkPolicy(learner, metadata.action_space), tracks, settings),
                 trace=trace,
                 metrics=metrics,
                 events=events,
@@ -280,16 +284,16 @@ class Training:
                 return "score"
         return ""
 
-    def _load_track(self) -> Track:
-        track = load_track(self.settings.track)
-        digest = self.folder.read_info().track_digest
-        if track.digest != digest:
+    def _load_tracks(self) -> tuple[Track, ...]:
+        tracks = load_tracks(self.settings.track)
+        digest, before = joint_digest(tracks), self.folder.read_info().track_digest
+        if digest != before:
             raise ConfigError(
                 f"Track {self.settings.track!r} is not the one this run was started on: its digest is "
-                f"{track.digest[:12]}, it was {digest[:12]}.",
+                f"{digest[:12]}, it was {before[:12]}.",
                 hint="Start a new run on the changed track.",
             )
-        return track
+        return tracks
 
     # ---- evaluate, save, resume
 

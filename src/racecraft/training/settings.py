@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
 from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.learn import NetworkSpec, PPOConfig, network_names
-from racecraft.sim import Start, Vehicle, load_vehicle
+from racecraft.sim import CameraSpec, Randomization, Start, Vehicle, load_randomization, load_vehicle
 from racecraft.sim.columns import state_width
 from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import DIRECTIONS
+from racecraft.track import join_names, load_tracks
 from racecraft.training.stop import Until
 
 DEFAULT_TRACK: Final = "reinvent_2018"
 DEFAULT_REWARD: Final = "racing"
 VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
 CRITICS: Final = ("privileged", "camera")
+SCATTERED: Final = Start(mode="random", lateral_jitter=0.12, heading_jitter=0.2)
+"""Where episodes on several tracks start: what the car meets there, no single line prepares it for."""
 MAX_ENVS: Final = 4096  # cars; 80 MB of frames, and more would only wait for each other
 
 
@@ -26,7 +31,7 @@ class TrainSettings:
     """Settings of a training run, apart from its files (reward function, model metadata, hyperparameters)."""
 
     track: str = DEFAULT_TRACK
-    """Name of a track, or path of a track file."""
+    """Name of a track, path of a track file, or several, as `racecraft.track.load_tracks` reads them."""
     until: Until = field(default_factory=lambda: Until(laps=5))
     """When to stop."""
     seed: int = 0
@@ -41,6 +46,8 @@ class TrainSettings:
     """Where training episodes start."""
     direction: str = "forward"
     """``forward``, ``reverse`` or ``alternate`` with every episode."""
+    randomize: Randomization = field(default_factory=Randomization)
+    """From what ranges every episode draws its light, friction, camera pose, ..."""
     objects: Objects = NO_OBJECTS
     """Boxes and bot cars on the track; evaluations have them, too."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
@@ -70,6 +77,7 @@ class TrainSettings:
         ):
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 raise ConfigError(f"{name} is {value!r}; allowed is a whole number from {low} to {high}.")
+        self.randomize.check(self.vehicle, CameraSpec())
         if not isinstance(self.objects, Objects):
             raise ConfigError(f"objects is {self.objects!r}; use racecraft.sim.Objects(...).")
         if not isinstance(self.until, Until):
@@ -108,6 +116,7 @@ class TrainSettings:
             values["until"] = Until.parse(values["until"])
             values["vehicle"] = Vehicle(**values["vehicle"])
             values["start"] = Start(**values["start"])
+            values["randomize"] = Randomization(**values["randomize"])
             values["objects"] = Objects.from_dict(values["objects"])
             values["ppo"] = PPOConfig(**values["ppo"])
             return cls(**values)
@@ -121,6 +130,8 @@ def make_settings(
     hyperparameters: Hyperparameters | None = None,
     network: str = "",
     vehicle: Vehicle | str = "",
+    track: str | Path | Sequence[str | Path] = DEFAULT_TRACK,
+    randomize: Randomization | str | Path = "none",
     num_envs: int = 0,
     ppo: PPOConfig | None = None,
     **settings: Any,
@@ -135,6 +146,9 @@ def make_settings(
         hyperparameters: AWS's, or None.
         network: Overrides the metadata's.
         vehicle: Preset, file or parameters; by default the preset of the metadata's version.
+        track: One track, or several; with several, episodes start anywhere, a little beside the line, unless `start`
+            says otherwise.
+        randomize: Preset, file or ranges of what differs from episode to episode.
         num_envs: Cars driven at once; 0 decides by itself.
         ppo: How the policy improves, instead of hyperparameters.
         settings: Other fields of `TrainSettings`.
@@ -148,6 +162,10 @@ def make_settings(
             raise ConfigError(f"There is no setting {name!r}. {did_you_mean(name, [*known, 'num_envs'])}".rstrip())
     if not isinstance(vehicle, Vehicle):
         vehicle = load_vehicle(vehicle or VEHICLE_OF_VERSION[metadata.version])
+    if not isinstance(randomize, Randomization):
+        randomize = load_randomization(randomize)
+    if not isinstance(track, str | Path) or len(load_tracks(track)) > 1:
+        settings.setdefault("start", SCATTERED)
     if hyperparameters is not None:
         if ppo is not None:
             raise ConfigError("ppo and hyperparameters both say how the policy improves; give one of them.")
@@ -158,7 +176,14 @@ def make_settings(
         own = PPOConfig() if metadata.action_space.kind == "discrete" else PPOConfig(ent_coef=0.0)
         ppo = ppo or own
         ppo = _with_num_envs(ppo, num_envs) if num_envs else ppo
-    return TrainSettings(vehicle=vehicle, network=network or metadata.neural_network, ppo=ppo, **settings)
+    return TrainSettings(
+        track=join_names(track),
+        randomize=randomize,
+        vehicle=vehicle,
+        network=network or metadata.neural_network,
+        ppo=ppo,
+        **settings,
+    )
 
 
 def _with_num_envs(ppo: PPOConfig, num_envs: int) -> PPOConfig:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from racecraft.learn import PPOConfig
 from racecraft.reward import dry_run, validate_reward
 from racecraft.run import RunFolder, RunInfo
 from racecraft.run.training_params import TrainingParams
-from racecraft.track import Track, load_track
+from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.settings import TrainSettings
 
 
@@ -41,9 +42,11 @@ def start_run(
         RunError: The folder cannot be made, or the name is taken.
     """
     require_trainable(settings, metadata)
-    track = load_track(settings.track)
+    tracks = load_tracks(settings.track)
+    track = tracks[0]
     require_valid_reward(reward, track)
-    folder = RunFolder.create(root, name=name, prefix=track.name)
+    prefix = track.name if len(tracks) == 1 else f"{len(tracks)}-tracks"
+    folder = RunFolder.create(root, name=name, prefix=prefix)
     params = TrainingParams(
         world_name=track.name,
         reverse_dir=settings.direction == "reverse",
@@ -53,14 +56,14 @@ def start_run(
         start_position_offset=settings.start.offset % 1.0,
         min_eval_trials=settings.evaluation_trials,
     )
-    write_run(folder, settings, track, reward, metadata, hyperparameters, params)
+    write_run(folder, settings, tracks, reward, metadata, hyperparameters, params)
     return folder
 
 
 def write_run(
     folder: RunFolder,
     settings: TrainSettings,
-    track: Track,
+    tracks: Sequence[Track],
     reward: str,
     metadata: ModelMetadata,
     hyperparameters: Hyperparameters | None,
@@ -76,7 +79,8 @@ def write_run(
     )
     document = settings.to_dict()
     del document["seed"], document["track"]  # they have places of their own
-    folder.write_info(RunInfo(seed=settings.seed, track=settings.track, track_digest=track.digest, settings=document))
+    digest = joint_digest(tracks)
+    folder.write_info(RunInfo(seed=settings.seed, track=settings.track, track_digest=digest, settings=document))
 
 
 def aws_hyperparameters(ppo: PPOConfig, given: Hyperparameters | None = None) -> dict[str, Any]:

@@ -1,0 +1,224 @@
+"""`generalize`: how far a policy gets on each of many tracks, in both directions, in one batch of cars.
+
+A trial is one lap from a standing start with nobody to put the car back. What happens in it depends on the policy, the
+track, the direction, the trial's number and the seed, not on which other tracks are driven.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import ConfigError
+from racecraft.race.evaluation import MAX_STEPS, Driver, drive_lap
+from racecraft.race.placement import start_pose
+from racecraft.race.rules import RULE_SETS
+from racecraft.race.statistics import Interval, wilson_interval
+from racecraft.sim.camera import CameraSpec
+from racecraft.sim.randomization import Randomization
+from racecraft.sim.simulation import Simulation, Start
+from racecraft.sim.vehicle import Vehicle
+from racecraft.track.track import Track
+
+DIRECTIONS: Final = ("forward", "reverse")
+SLOWEST: Final = 0.3
+"""m/s; a car that needs longer for its lap is not waited for."""
+GROUP: Final = 32
+"""Tracks whose grounds are in memory at once, some 9 MB each."""
+MAX_TRIALS: Final = 100
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackResult:
+    """What the trials on one track, in one direction, came to."""
+
+    track: str
+    direction: str
+    length: float
+    """m"""
+    completions: tuple[float, ...]
+    """Fraction of the lap that each trial drove."""
+    lap_times: tuple[float, ...]
+    """s, of the trials that completed it."""
+
+    @property
+    def laps(self) -> int:
+        """Trials that completed the lap."""
+        return len(self.lap_times)
+
+    @property
+    def completion(self) -> float:
+        """Mean fraction of the lap."""
+        return float(np.mean(self.completions))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        return {
+            "track": self.track,
+            "direction": self.direction,
+            "length_m": round(self.length, 3),
+            "trials": len(self.completions),
+            "laps": self.laps,
+            "completion": self.completion,
+            "best_lap_s": min(self.lap_times, default=None),
+            "mean_lap_s": float(np.mean(self.lap_times)) if self.lap_times else None,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Generalization:
+    """How a policy did on many tracks."""
+
+    results: tuple[TrackResult, ...]
+    """By track, then direction."""
+
+    @property
+    def trials(self) -> int:
+        """All laps tried."""
+        return sum(len(result.completions) for result in self.results)
+
+    @property
+    def laps(self) -> int:
+        """Laps completed."""
+        return sum(result.laps for result in self.results)
+
+    @property
+    def lap_share(self) -> float:
+        """Completed laps over laps tried: the figure of merit."""
+        return self.laps / self.trials
+
+    @property
+    def lap_interval(self) -> Interval:
+        """95 % interval of `lap_share`."""
+        return wilson_interval(self.laps, self.trials)
+
+    @property
+    def completion(self) -> float:
+        """Mean fraction of a lap over all trials."""
+        return float(np.mean([value for result in self.results for value in result.completions]))
+
+    @property
+    def mastered(self) -> tuple[str, ...]:
+        """Tracks on which every trial, in every direction, completed its lap."""
+        failed = {result.track for result in self.results if result.laps < len(result.completions)}
+        return tuple(dict.fromkeys(result.track for result in self.results if result.track not in failed))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        return {
+            "tracks": len({result.track for result in self.results}),
+            "trials": self.trials,
+            "laps": self.laps,
+            "lap_share": self.lap_share,
+            "lap_interval": list(self.lap_interval),
+            "completion": self.completion,
+            "tracks_mastered": len(self.mastered),
+            "results": [result.to_dict() for result in self.results],
+        }
+
+
+def generalize(
+    policy: Driver,
+    tracks: Sequence[Track],
+    *,
+    directions: Sequence[str] = DIRECTIONS,
+    num_trials: int = 1,
+    seed: int = 0,
+    vehicle: Vehicle | str = "v5",
+    camera: CameraSpec = CameraSpec(),
+    randomize: Randomization | str = "none",
+    num_threads: int = 0,
+) -> Generalization:
+    """Let a policy try one lap on each of many tracks.
+
+    Args:
+        policy: What drives: called with the frames of the cars that still do, uint8 (N, 120, 160).
+        tracks: Where.
+        directions: ``forward``, ``reverse`` or both.
+        num_trials: Laps to try on each track in each direction, 1 to 100; the first starts exactly on the line.
+        seed: Of the starts and of the randomisation.
+        vehicle: Preset name, vehicle file or `Vehicle`.
+        camera: What the cars see with.
+        randomize: Preset, file or ranges of what differs from trial to trial.
+        num_threads: Of the simulation; 0 takes one per core.
+
+    Raises:
+        ConfigError: No track, a direction that does not exist, or a setting outside its range.
+    """
+    for direction in directions:
+        if direction not in DIRECTIONS:
+            raise ConfigError(f"direction is {direction!r}; allowed are {' and '.join(DIRECTIONS)}.")
+    if not tracks or not directions:
+        raise ConfigError("There is no track or no direction to drive.")
+    by_length = sorted(range(len(tracks)), key=lambda index: tracks[index].length)  # cars of a group end together
+    results: dict[tuple[int, str], TrackResult] = {}
+    for begin in range(0, len(by_length), GROUP):
+        group = by_length[begin : begin + GROUP]
+        roads = [tracks[index] for index in group]
+        simulation = Simulation(
+            roads,
+            num_envs=_checked(num_trials) * len(roads),
+            vehicle=vehicle,
+            camera=camera,
+            direction="alternate",
+            randomize=randomize,
+            num_threads=num_threads,
+            max_steps=MAX_STEPS,
+            start=Start(mode="fixed"),
+        )
+        for direction in directions:
+            _line_up(simulation, direction, seed=seed)
+            patience = max(road.length for road in roads) / SLOWEST
+            outcome = drive_lap(_awake(policy, simulation), simulation, max_seconds=patience)
+            for course, index in enumerate(group):
+                times = outcome.lap_times[course :: len(roads)]
+                results[index, direction] = TrackResult(
+                    track=tracks[index].name,
+                    direction=direction,
+                    length=tracks[index].length,
+                    completions=tuple(outcome.completions[course :: len(roads)].tolist()),
+                    lap_times=tuple(times[np.isfinite(times)].tolist()),
+                )
+    return Generalization(
+        results=tuple(results[index, direction] for index in range(len(tracks)) for direction in directions)
+    )
+
+
+def _checked(num_trials: int) -> int:
+    if isinstance(num_trials, bool) or not isinstance(num_trials, int) or not 1 <= num_trials <= MAX_TRIALS:
+        raise ConfigError(f"num_trials is {num_trials!r}; allowed on each track is a whole number to {MAX_TRIALS}.")
+    return num_trials
+
+
+def _line_up(simulation: Simulation, direction: str, *, seed: int) -> None:
+    """Every car at its start, under its conditions; both by what it drives, not by its place in the batch."""
+    roads, rules = simulation.tracks, RULE_SETS["first_lap"]
+    keys = []
+    for car in range(simulation.num_envs):
+        trial, course = divmod(car, len(roads))
+        text = f"{seed}/{roads[course].digest}/{direction}/{trial}"
+        keys.append(int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little"))
+    simulation.reset(seeds=np.array(keys, dtype=np.uint64))
+    if direction == "reverse":
+        simulation.reset()  # every car's second episode goes the other way
+    driven = [road.reversed() if direction == "reverse" else road for road in roads]
+    for car in range(len(roads), simulation.num_envs):
+        pose = start_pose(driven[car % len(roads)], rules, seed=seed, trial=car // len(roads))
+        simulation.set_pose(car, *pose)
+
+
+def _awake(policy: Driver, simulation: Simulation) -> Driver:
+    """A policy that is asked for the cars under way only: most of a group's time a few slow ones are."""
+    commands = np.zeros((simulation.num_envs, 2), dtype=np.float32)
+
+    def drive(frames: NDArray[Any]) -> NDArray[np.float32]:
+        awake = ~(simulation.terminated | simulation.truncated)
+        commands[awake] = policy(frames[awake])
+        return commands
+
+    return drive

@@ -1,0 +1,53 @@
+"""Training on several tracks at once, both ways, under randomised conditions."""
+
+from __future__ import annotations
+
+import pytest
+from tiny_runs import TINY, Train, assert_same
+
+from racecraft.errors import ConfigError
+from racecraft.run import RunFolder
+from racecraft.sim import Randomization
+from racecraft.training import resume
+
+MANY = {
+    "track": ["oval", "generated:0..3"],
+    "direction": "alternate",
+    "randomize": "strong",
+    "ppo": TINY,
+    "evaluate_every": 128,
+    "evaluation_trials": 4,
+}
+
+
+def test_a_resumed_run_ends_in_the_same_weights(tmp_path, tiny: Train):
+    whole = tiny(**MANY, until="384 steps", name="whole").run
+    part = tiny(**MANY, until="128 steps", name="part").run
+    resume(part, until="384 steps")
+    assert_same(whole, part)
+
+
+def test_it_drives_all_tracks_both_ways(tiny: Train):
+    run = tiny(**MANY, until="2000 steps").run
+    settings = RunFolder.open(run).read_info()
+    assert settings.track == "oval + generated:0..3"
+    assert settings.settings["start"]["mode"] == "random"
+    assert settings.settings["randomize"]["latency"] == [0.0, 1.0]
+    text = "".join(path.read_text() for path in (run / "training-simtrace").iterdir())
+    assert "nan" not in text.lower()
+
+
+def test_a_track_that_changed_is_refused(tmp_path, tiny: Train):
+    from racecraft.track import generate_track, save_route
+
+    save_route(generate_track(1), tmp_path / "mine.npy")
+    run = tiny(**{**MANY, "track": ["oval", str(tmp_path / "mine.npy")]}, until="64 steps").run
+    save_route(generate_track(2), tmp_path / "mine.npy")
+    with pytest.raises(ConfigError, match="not the one this run was started on"):
+        resume(run, until="128 steps")
+
+
+@pytest.mark.parametrize("randomize", ["stong", Randomization(camera_pitch=(-0.5, 0.0)), 3])
+def test_randomisations_that_are_refused(randomize, tiny: Train):
+    with pytest.raises(ConfigError):
+        tiny(**{**MANY, "randomize": randomize}, until="64 steps")
