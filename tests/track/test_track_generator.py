@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -90,3 +92,20 @@ def test_what_cannot_be_is_refused(seed, options, words) -> None:
 def test_names_that_say_nothing_are_refused(name: str) -> None:
     with pytest.raises(TrackError):
         load_track(name)
+
+
+def test_a_radius_makes_bends_as_tight_as_official_ones():
+    tight = [generate_track(seed, radius=0.45, width=0.75, difficulty=0.9) for seed in range(12)]
+    radii = [track.min_radius for track in tight]
+    assert min(radii) > 0.42
+    assert np.median(radii) < 0.62 < 0.69 < min(generate_track(seed, difficulty=0.9).min_radius for seed in range(12))
+    for track in tight:
+        validate(track)
+        assert load_track(track.name).digest == track.digest
+    assert tight[0].name == "generated:0,width=0.75,difficulty=0.9,radius=0.45"
+
+
+@pytest.mark.parametrize("radius", [0.3, 6.0, math.nan, -1.0])
+def test_radii_that_are_refused(radius):
+    with pytest.raises(TrackError, match=r"radius is .*; allowed are 0.35 to 5"):
+        generate_track(1, radius=radius)

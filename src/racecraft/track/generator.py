@@ -25,11 +25,18 @@ MIN_WIDTH, MAX_WIDTH = 0.5, 2.0  # metres
 SHORTEST_LAP = 14.0  # times the width; shorter, no bend is both inside the lap and wide enough
 TIGHTEST_RADIUS = 0.7  # metres; a DeepRacer turns on about 0.3 m at full lock, slowly
 VERGE = 0.3  # metres of ground between two stretches of road, at least
+NARROW_VERGE = 0.1  # metres; the same where a radius is asked for, as some official tracks have it
+MIN_RADIUS, MAX_RADIUS = 0.35, 5.0  # metres
 _DRAFTS = 300
 
 
 def generate_track(
-    seed: int, *, length: float | None = None, width: float | None = None, difficulty: float = 0.5
+    seed: int,
+    *,
+    length: float | None = None,
+    width: float | None = None,
+    difficulty: float = 0.5,
+    radius: float | None = None,
 ) -> Track:
     """A new closed track, the same for the same arguments everywhere.
 
@@ -39,6 +46,8 @@ def generate_track(
             to 45, by seed.
         width: Width of the road, metres, 0.5 to 2. Default: 0.7 to 1.1, by seed.
         difficulty: 0 (few, wide bends) to 1 (many, tight ones).
+        radius: Tightest bend of the centre line, metres, 0.35 to 5, but at least 0.52 times the width; roads may
+            then come as close as 0.1 m. Default: 0.7, and more for a wide road; official tracks go down to 0.4.
 
     Returns:
         A track whose name, given to `load_track`, brings it back.
@@ -49,7 +58,13 @@ def generate_track(
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**63:
         raise TrackError(f"seed is {seed!r}; allowed are integers from 0.")
     options = {"length": length, "width": width, "difficulty": difficulty if difficulty != 0.5 else None}
-    ranges = {"length": (MIN_LENGTH, MAX_LENGTH), "width": (MIN_WIDTH, MAX_WIDTH), "difficulty": (0.0, 1.0)}
+    options["radius"] = radius
+    ranges = {
+        "length": (MIN_LENGTH, MAX_LENGTH),
+        "width": (MIN_WIDTH, MAX_WIDTH),
+        "difficulty": (0.0, 1.0),
+        "radius": (MIN_RADIUS, MAX_RADIUS),
+    }
     for key, value in options.items():
         lowest, highest = ranges[key]
         if value is not None and not lowest <= value <= highest:
@@ -67,15 +82,16 @@ def generate_track(
     is_clockwise = rng.random() < 0.5
     is_street = rng.random() < 0.5
     roundness = (0.05 if is_street else 0.13) * lap  # metres of radius that chance may add to the tightest
+    room = _Room(road_width, radius)
     for draft in range(_DRAFTS):
         # a draft that fails too often was too ambitious: become simpler
         ambition = difficulty * (1.0 - draft / _DRAFTS)
-        corners = (_street if is_street else _country)(rng, lap, road_width, ambition)
-        line = None if corners is None else _fit(corners, lap, road_width, rng, roundness * (1.0 - 0.8 * ambition))
-        if line is not None and _is_clear(line, road_width):
+        corners = (_street if is_street else _country)(rng, lap, room, ambition)
+        line = None if corners is None else _fit(corners, lap, room, rng, roundness * (1.0 - 0.8 * ambition))
+        if line is not None and _is_clear(line, room):
             break
     else:
-        line = _oval(lap, road_width)
+        line = _oval(lap, room)
     line = _from_longest_straight(line)
     if is_clockwise:
         line = line[::-1]
@@ -96,20 +112,34 @@ def parse_generated(name: str) -> Track:
             values[key] = float(value)
         except ValueError:
             values[key] = math.nan
-        if key not in {"length", "width", "difficulty"} or math.isnan(values[key]):
-            raise TrackError(f"{option!r} in {name[:80]!r} is no option; allowed are length=, width= and difficulty=.")
+        if key not in {"length", "width", "difficulty", "radius"} or math.isnan(values[key]):
+            allowed = "length=, width=, difficulty= and radius="
+            raise TrackError(f"{option!r} in {name[:80]!r} is no option; allowed are {allowed}.")
     if not (seed.isascii() and seed.isdigit() and len(seed) < 20):
         raise TrackError(f"{name[:80]!r} has no seed; write an integer after the colon, as in 'generated:7'.")
     return generate_track(int(seed), **values)
 
 
+class _Room:
+    """What a road of some width needs around it, metres."""
+
+    def __init__(self, width: float, radius: float | None) -> None:
+        self.width = width
+        self.verge = VERGE if radius is None else NARROW_VERGE
+        self.sharpest = max(TIGHTEST_RADIUS, width / 2 + VERGE / 2) if radius is None else max(radius, 0.52 * width)
+        # smallest radius to draw: room for a verge inside a hairpin
+        self.tightest = 1.02 * (
+            max(TIGHTEST_RADIUS, 0.54 * (width + VERGE)) if radius is None else max(radius, 0.52 * width)
+        )
+
+
 # --- layouts: corner points of a counter-clockwise polygon, of any scale
 
 
-def _street(rng: random.Random, lap: float, width: float, difficulty: float) -> Floats | None:
+def _street(rng: random.Random, lap: float, room: _Room, difficulty: float) -> Floats | None:
     """The outline of random squares grown from one, without a hole, its corners shaken."""
     # neighbouring roads are one square apart, and each square beyond the first adds two sides to the lap
-    side = max(width + VERGE + 0.4, 2 * _tightest(width) + 0.2) * 1.12
+    side = max(room.width + room.verge + 0.4, 2 * room.tightest + 0.2) * 1.12
     most = int((lap / side * 1.12 - 2) / 2)
     if most < 2:
         return None
@@ -133,9 +163,9 @@ def _street(rng: random.Random, lap: float, width: float, difficulty: float) -> 
     return turned
 
 
-def _country(rng: random.Random, lap: float, width: float, difficulty: float) -> Floats | None:
+def _country(rng: random.Random, lap: float, room: _Room, difficulty: float) -> Floats | None:
     """Points round a middle at uneven angles, some of them pulled in."""
-    most = max(4, int(lap / (3.2 * _tightest(width))))
+    most = max(4, int(lap / (3.2 * room.tightest)))
     num_points = max(4, min(most, round(5 + 8 * difficulty + 2 * rng.random())))
     stretch = _between(rng, 1.0, 1.9)
     phase = _between(rng, 0.0, 2 * math.pi)
@@ -148,9 +178,9 @@ def _country(rng: random.Random, lap: float, width: float, difficulty: float) ->
     return np.array(points)
 
 
-def _fit(points: Floats, lap: float, width: float, rng: random.Random, roundness: float) -> Floats | None:
+def _fit(points: Floats, lap: float, room: _Room, rng: random.Random, roundness: float) -> Floats | None:
     """The rounded line through a polygon, scaled to the length of the lap; none if a bend gets too tight."""
-    tightest = _tightest(width)
+    tightest = room.tightest
     wanted = [1.05 * tightest + (0.3 * tightest + roundness) * rng.random() for _ in points]
     scale = 1.1 * lap / float(arc_length(np.concatenate((points, points[:1])))[-1])
     for _ in range(4):
@@ -183,27 +213,28 @@ def _rounded(points: Floats, wanted: list[float], tightest: float) -> list[Corne
     return [(float(x), float(y), float(r)) for (x, y), r in zip(points, radius, strict=True)]
 
 
-def _is_clear(line: Floats, width: float) -> bool:
+def _is_clear(line: Floats, room: _Room) -> bool:
     """True when no two stretches of road come close and no bend is tighter than allowed."""
     length = float(arc_length(line)[-1])
     coarse = resample(line, max(24, round(length / 0.2)) + 1)[:-1]
     step = length / len(coarse)
     before, after = np.roll(coarse, 1, axis=0), np.roll(coarse, -1, axis=0)
     turn = np.abs(wrap_angle(_heading(after - coarse) - _heading(coarse - before)))
-    if turn.max() > step / max(TIGHTEST_RADIUS, width / 2 + VERGE / 2):
+    if turn.max() > step / room.sharpest:
         return False
     distance = np.hypot(*(coarse[:, None] - coarse[None]).transpose(2, 0, 1))
     apart = np.abs(np.arange(len(coarse))[:, None] - np.arange(len(coarse)))
     along = np.minimum(apart, len(coarse) - apart) * step
     # on a half circle of the tightest radius, places this far along the road are a full diameter apart
-    is_elsewhere = along > math.pi / 2 * (width + VERGE) + step
+    apart_at_least = room.width + room.verge
+    is_elsewhere = along > math.pi / 2 * apart_at_least + step
     return signed_area(np.concatenate((coarse, coarse[:1]))) > 0.0 and bool(
-        (distance[is_elsewhere] > width + VERGE).all()
+        (distance[is_elsewhere] > apart_at_least).all()
     )
 
 
-def _oval(lap: float, width: float) -> Floats:
-    radius = max(0.1 * lap, 1.1 * _tightest(width))
+def _oval(lap: float, room: _Room) -> Floats:
+    radius = max(0.1 * lap, 1.1 * room.tightest)
     straight = lap / 2 - math.pi * radius
     x, y = straight + 2 * radius, 2 * radius
     line = trace_corners([(x, 0, radius), (x, y, radius), (0, y, radius), (0, 0, radius)], ease=0.5)
@@ -256,11 +287,6 @@ def _outline(squares: set[tuple[int, int]]) -> Floats:
 
 
 # --- small words
-
-
-def _tightest(width: float) -> float:
-    """Smallest radius of the centre line: room for a verge inside a hairpin, metres."""
-    return max(TIGHTEST_RADIUS, 0.54 * (width + VERGE)) * 1.02
 
 
 def _heading(vectors: Floats) -> Floats:
