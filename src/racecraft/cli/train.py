@@ -28,7 +28,7 @@ def train(
         ),
     ] = "",
     actions: Annotated[
-        str, typer.Option("--actions", help="Action space: default, aws, fast or continuous.")
+        str, typer.Option("--actions", help="Action space: default, aws, fast, safe or continuous.")
     ] = "default",
     model_metadata: Annotated[
         Path | None, typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions.")
@@ -55,8 +55,8 @@ def train(
     num_envs: Annotated[int, typer.Option("--num-envs", help="Cars driven at once; 0 decides by itself.")] = 0,
     seed: Annotated[int, typer.Option("--seed", "-s", help="The same seed repeats a run on the same machine.")] = 0,
     evaluate_every: Annotated[
-        int, typer.Option("--evaluate-every", help="Camera steps between evaluations, and so checkpoints.")
-    ] = 4096,
+        int, typer.Option("--evaluate-every", help="Camera steps between evaluations, and so checkpoints; 0 decides.")
+    ] = 0,
     num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the run.")] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),

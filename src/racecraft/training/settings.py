@@ -21,6 +21,12 @@ DEFAULT_TRACK: Final = "reinvent_2018"
 DEFAULT_REWARD: Final = "racing"
 VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
 CRITICS: Final = ("privileged", "camera")
+EVALUATE_EVERY: Final = 4096
+FAR_EVALUATE_EVERY: Final = 50_000
+"""Camera steps between two evaluations where there are several tracks: one of them drives hundreds of metres."""
+FAR_TRIALS: Final = 24
+FAR_PPO: Final = PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4, ent_coef=0.005)
+"""For many tracks: more cars see more of them at once, and smaller steps keep what was learned on the others."""
 SCATTERED: Final = Start(mode="random", lateral_jitter=0.12, heading_jitter=0.2)
 """Where episodes on several tracks start: what the car meets there, no single line prepares it for."""
 MAX_ENVS: Final = 4096  # cars; 80 MB of frames, and more would only wait for each other
@@ -52,7 +58,7 @@ class TrainSettings:
     """Boxes and bot cars on the track; evaluations have them, too."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
     """How the policy improves."""
-    evaluate_every: int = 4096
+    evaluate_every: int = EVALUATE_EVERY
     """Camera steps between two evaluations, each followed by a checkpoint."""
     evaluation_trials: int = 5
     """Cars that drive one lap in each evaluation."""
@@ -164,18 +170,23 @@ def make_settings(
         vehicle = load_vehicle(vehicle or VEHICLE_OF_VERSION[metadata.version])
     if not isinstance(randomize, Randomization):
         randomize = load_randomization(randomize)
-    if not isinstance(track, str | Path) or len(load_tracks(track)) > 1:
-        settings.setdefault("start", SCATTERED)
+    is_far = len(load_tracks(track)) > 1
+    if is_far:
+        settings = {"start": SCATTERED, "evaluation_trials": FAR_TRIALS, **settings}
+    if settings.get("evaluate_every", 0) == 0:
+        settings["evaluate_every"] = FAR_EVALUATE_EVERY if is_far else EVALUATE_EVERY
     if hyperparameters is not None:
         if ppo is not None:
             raise ConfigError("ppo and hyperparameters both say how the policy improves; give one of them.")
         learning: dict[str, Any] = hyperparameters.to_ppo()
         ppo = PPOConfig(**learning, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
-    else:
-        # A Gaussian keeps its spread by itself; a bonus for entropy would make it grow and the car restless.
-        own = PPOConfig() if metadata.action_space.kind == "discrete" else PPOConfig(ent_coef=0.0)
-        ppo = ppo or own
-        ppo = _with_num_envs(ppo, num_envs) if num_envs else ppo
+    elif ppo is None:
+        ppo = FAR_PPO if is_far else PPOConfig()
+        if metadata.action_space.kind == "continuous":
+            # A Gaussian keeps its spread by itself; a bonus for entropy would make it grow and the car restless.
+            ppo = replace(ppo, ent_coef=0.0)
+    if hyperparameters is None and num_envs:
+        ppo = _with_num_envs(ppo, num_envs)
     return TrainSettings(
         track=join_names(track),
         randomize=randomize,
