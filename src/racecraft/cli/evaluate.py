@@ -10,7 +10,7 @@ import typer
 from racecraft.cli import race_options
 from racecraft.cli.app import Json, app, print_json, text
 
-RACE_ONLY: Final = ("track", "laps", "rules", "offtrack_penalty", "max_resets", "video")
+RACE_ONLY: Final = ("track", "laps", "rules", "offtrack_penalty", "max_resets", "video", "aws_log")
 
 
 @app.command()

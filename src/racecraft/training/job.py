@@ -178,7 +178,7 @@ class Training:
             if self.aws_log is not None:
                 log = stack.enter_context(AwsLog(self.aws_log, steps=kept))
                 log.write_settings(
-                    world=track.name,
+                    world=tracks[0].name,
                     metadata=metadata,
                     hyperparameters=aws_hyperparameters(ppo_config, hyperparameters),
                 )
