@@ -5,21 +5,23 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from racecraft.cli import race_options
 from racecraft.cli.app import INTERRUPTED, Json, app, print_json, text
 
+DEFAULT_TRACK: Final = "reinvent_2018"
+
 
 @app.command()
 def train(
     context: typer.Context,
     track: Annotated[
-        list[str] | None,
+        list[str],
         typer.Option("--track", "-t", help="Track, file, folder, library or generated:0..99; several by repeating it."),
-    ] = None,
+    ] = [DEFAULT_TRACK],  # noqa: B006 (Typer copies it)
     reward: Annotated[str, typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py.")] = "racing",
     until: Annotated[
         str,
@@ -55,8 +57,8 @@ def train(
     num_envs: Annotated[int, typer.Option("--num-envs", help="Cars driven at once; 0 decides by itself.")] = 0,
     seed: Annotated[int, typer.Option("--seed", "-s", help="The same seed repeats a run on the same machine.")] = 0,
     evaluate_every: Annotated[
-        int, typer.Option("--evaluate-every", help="Camera steps between evaluations, and so checkpoints; 0 decides.")
-    ] = 0,
+        int, typer.Option("--evaluate-every", help="Camera steps between evaluations; 50,000 on several tracks.")
+    ] = 4096,
     num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the run.")] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
@@ -80,8 +82,7 @@ def train(
     from racecraft.training.progress import SilentReporter
     from racecraft.training.terminal import TerminalReporter
 
-    tracks = track or ["reinvent_2018"]
-    where = Path(tracks[0]).stem if len(tracks) == 1 else f"{len(tracks)} tracks"
+    where = Path(track[0]).stem if len(track) == 1 else f"{len(track)} tracks"
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
     with SilentReporter() if is_quiet else TerminalReporter(title=title) as reporter:
         if resume is not None:
@@ -90,7 +91,7 @@ def train(
             )
         else:
             result = training.train(
-                tracks,
+                track,
                 reward=reward,
                 until=until or "5 laps",
                 actions=actions,
@@ -113,7 +114,7 @@ def train(
                 randomize=randomize,
                 num_envs=num_envs,
                 seed=seed,
-                evaluate_every=evaluate_every,
+                evaluate_every=evaluate_every if _is_given(context, "evaluate_every") else 0,
                 num_threads=num_threads,
                 root=runs,
                 name=name,
@@ -136,12 +137,21 @@ def train(
         raise typer.Exit(INTERRUPTED)
 
 
+def _is_given(context: typer.Context, option: str) -> bool:
+    source = context.get_parameter_source(option)
+    return source is not None and source.name == "COMMANDLINE"
+
+
 def _refuse_beside_resume(context: typer.Context) -> None:
     """A resumed run keeps its settings: only its limit may change."""
     for option in context.command.params:
-        source = context.get_parameter_source(str(option.name))
-        is_given = source is not None and source.name == "COMMANDLINE"
-        if is_given and option.name not in ("resume", "until", "video", "aws_log", "as_json"):
+        if _is_given(context, str(option.name)) and option.name not in (
+            "resume",
+            "until",
+            "video",
+            "aws_log",
+            "as_json",
+        ):
             context.fail(f"{option.opts[0]} does not go with --resume: a run keeps the settings it was started with.")
 
 
