@@ -126,7 +126,7 @@ def import_run(
             (folder.path / ORIGINAL).mkdir(exist_ok=True)
             write_json(folder.path / ORIGINAL / "import.json", {**report.to_dict(), "source": source.title})
             params = replace(params, world_name=where.name)
-            write_run(folder, settings, where, text, metadata, hyperparameters, params)
+            write_run(folder, settings, [where], text, metadata, hyperparameters, params)
         except BaseException as error:
             shutil.rmtree(folder.path, ignore_errors=True)
             if isinstance(error, OSError):
