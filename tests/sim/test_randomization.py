@@ -223,7 +223,7 @@ def test_yaw_turns_the_camera_about_itself():
 def test_light_and_black_level_are_linear():
     plain = one().frames.astype(float)
     np.testing.assert_allclose(one(light=0.5).frames, 0.5 * plain, atol=1.5)
-    np.testing.assert_allclose(one(black_level=0.1).frames, plain + 25.5, atol=1.5)
+    np.testing.assert_allclose(one(black_level=0.1).frames, plain + 25.5, atol=4)  # grain is relative
     assert one(light=4.0).frames.max() == 255
     assert one(black_level=-0.5).frames.min() == 0
 
@@ -244,7 +244,7 @@ def test_blur_is_a_gaussian_of_that_width(sigma):
 
     expected = gaussian_filter(one().frames[0].astype(float), sigma, mode="reflect")
     difference = np.abs(one(blur=sigma).frames[0] - expected)
-    assert difference.mean() < 0.8
+    assert difference.mean() < (1.6 if sigma < 1 else 0.8)
     assert difference.max() < (14 if sigma < 1 else 5)  # a narrow one is hardly a Gaussian in whole pixels
 
 
