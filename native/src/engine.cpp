@@ -390,7 +390,7 @@ void Engine::load(const uint8_t* bytes, size_t size) {
 
 void Engine::restore(const uint8_t* bytes) {
     visit_saved([&](void* data, size_t part) {
-        std::memcpy(data, bytes, part);
+        if (part > 0) std::memcpy(data, bytes, part);  // without objects there is no address to copy to
         bytes += part;
     });
 }

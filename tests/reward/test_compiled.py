@@ -88,11 +88,13 @@ def test_what_is_not_numeric_is_refused_with_its_reason(source, why):
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_all_presets_but_one_are_numeric(name):
+def test_presets_that_neither_remember_nor_loop_over_objects_are_numeric(name):
     if name in NUMERIC:
         assert "def kernel(" in numeric_source(load_preset(name))
     else:
-        assert name == "object_avoidance"
+        assert name in ("lap_time", "object_avoidance")
+        with pytest.raises(NotNumeric):
+            numeric_source(load_preset(name))
 
 
 # --- in the worker

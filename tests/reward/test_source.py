@@ -15,6 +15,7 @@ def test_the_presets():
         "anti_zigzag",
         "centerline",
         "heading",
+        "lap_time",
         "object_avoidance",
         "progress_pace",
         "racing",

@@ -244,7 +244,7 @@ def test_blur_is_a_gaussian_of_that_width(sigma):
 
     expected = gaussian_filter(one().frames[0].astype(float), sigma, mode="reflect")
     difference = np.abs(one(blur=sigma).frames[0] - expected)
-    assert difference.mean() < 1.5
+    assert difference.mean() < (1.5 if sigma < 1 else 0.8)  # grain is a blurred pixel's worst neighbour
     assert difference.max() < (14 if sigma < 1 else 5)  # a narrow one is hardly a Gaussian in whole pixels
 
 
