@@ -81,6 +81,7 @@ VERBS = (
     "train",
     "import",
     "evaluate",
+    "verify",
     "tracks",
     "tracks show",
     "tracks sheet",

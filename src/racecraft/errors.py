@@ -84,6 +84,10 @@ class RunError(RacecraftError, ValueError):
     """A run folder is missing, in use or unreadable."""
 
 
+class ReplayError(RacecraftError, ValueError):
+    """A replay file is damaged, hostile, of another version, or not what a re-simulation gives."""
+
+
 class ArchiveError(RacecraftError, ValueError):
     """An archive is damaged, hostile, or of a kind that is not read."""
 

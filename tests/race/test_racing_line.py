@@ -46,10 +46,12 @@ def test_mistakes_are_marked_and_lines_do_not_jump():
 
 def test_two_steps_are_the_least():
     recording = record(Autopilot(), laps=1)
-    few = Recording(recording.track, recording.rows[:1], recording.clock[:1])
+    few = Recording(recording.track, recording.rows[:1], recording.clock[:1], recording.actions[:1])
     with pytest.raises(ConfigError, match="two steps"):
         racing_line_image(few)
-    racing_line_image(Recording(recording.track, recording.rows[:2], recording.clock[:2]), width_px=320)
+    racing_line_image(
+        Recording(recording.track, recording.rows[:2], recording.clock[:2], recording.actions[:2]), width_px=320
+    )
 
 
 def test_only_images_are_written(tmp_path):

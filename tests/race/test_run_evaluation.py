@@ -40,7 +40,7 @@ def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path:
     run = trained(tmp_path)
     first, again = evaluate(run, **QUICK, seed=3), evaluate(run, **QUICK, seed=3)
     assert first.evaluation.summary() == again.evaluation.summary()
-    assert len({*first.files.values(), *again.files.values()}) == 8
+    assert len({*first.files.values(), *again.files.values()}) == 10
     assert len(list(run.glob("evaluation-*"))) == 2
     traces = [found.files["sim-trace"].read_text() for found in (first, again)]
     assert traces[0] == traces[1]

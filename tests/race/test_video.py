@@ -48,11 +48,11 @@ def test_bad_paths(tmp_path):
 
 def test_an_empty_recording():
     with pytest.raises(ConfigError, match="recorded"):
-        next(frames(Recording(OVAL, CLUMSY.rows[:0], CLUMSY.clock[:0])))
+        next(frames(Recording(OVAL, CLUMSY.rows[:0], CLUMSY.clock[:0], CLUMSY.actions[:0])))
 
 
 def test_a_single_step_is_a_video():
-    few = Recording(OVAL, CLUMSY.rows[:1], CLUMSY.clock[:1])
+    few = Recording(OVAL, CLUMSY.rows[:1], CLUMSY.clock[:1], CLUMSY.actions[:1])
     assert sum(1 for _ in frames(few)) == 1 + round(15 * END_SECONDS)
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from racecraft.bench.doctor import Finding
     from racecraft.importing import ImportedRun
     from racecraft.limits import TrackLimit
+    from racecraft.race import Verification
     from racecraft.race.run_evaluation import RunEvaluation
     from racecraft.race.run_generalization import RunGeneralization
     from racecraft.replay import Calibration, Comparison, FrameFit
@@ -127,6 +128,21 @@ def say_evaluated(outcome: RunEvaluation) -> None:
         _say(console, placing.sentence)
     for what, path in outcome.files.items():
         _say(console, f"  {what:<12} ", (str(path), "bold"))
+
+
+def say_verified(found: Verification) -> None:
+    """Whether a replay is what its actions lead to, and what it holds."""
+    console, replay = Console(), found.replay
+    for name, car in zip(replay.names, replay.cars, strict=True):
+        best = f", best {min(car.lap_times):.2f} s" if car.lap_times else ""
+        laps = f"{len(car.lap_times)} laps{best}, {car.time:.2f} s in all"
+        _say(console, f"  {_harmless(name)}: ", (laps, "dim"))
+    track = f"{_harmless(replay.conditions.track.name)} ({found.track_note})"
+    _say(console, f"Track {track}, vehicle {found.vehicle_note}, seed {replay.conditions.seed}.")
+    if found.difference is None:
+        _say(console, ("Genuine: ", "bold green"), f"all {found.num_steps:,} steps come out the same, bit for bit.")
+    else:
+        _say(console, ("Not genuine: ", "bold red"), found.difference.sentence)
 
 
 def say_limit(name: str, limit: TrackLimit) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.action_space import ActionSpace, DiscreteActionSpace
-from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.results import Evaluation, Lap, Trial
 from racecraft.run.aws_log import AwsLog
 from racecraft.run.episodes import Episode
@@ -24,7 +23,7 @@ from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.simulation import CONTROL_DT
 
 _STEERING, _SPEED = ROW_COLUMNS.index("steering_angle"), ROW_COLUMNS.index("speed")
-_STATUS, _TIME = ROW_COLUMNS.index("status"), ROW_COLUMNS.index("time")
+_TIME = ROW_COLUMNS.index("time")
 
 
 def metrics_of(evaluation: Evaluation) -> list[MetricsTrial]:
@@ -75,7 +74,7 @@ def write_simtrace(
             is_driven = recording.column("status") != STATUS_NAMES.index("prepare")  # the writer adds that row
             rows, clock = recording.rows[is_driven], recording.clock[is_driven]
             actions = _actions(rows, action_space)
-            rewards = np.where(rows[:, _STATUS] == STATUS_NAMES.index("pause"), 0.0, centerline_rewards(rows))
+            rewards = recording.rewards[is_driven]
             episode = Episode(
                 number=number,
                 env=0,

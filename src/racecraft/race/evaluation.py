@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, ShapeError
+from racecraft.race.conditions import Conditions
 from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.marshal import Marshal
 from racecraft.race.placement import line_up
@@ -24,9 +25,9 @@ from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.objects import NO_OBJECTS, Objects
-from racecraft.sim.randomization import Randomization
+from racecraft.sim.randomization import Randomization, load_randomization
 from racecraft.sim.simulation import CONTROL_DT, Simulation, Start
-from racecraft.sim.vehicle import Vehicle
+from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track.track import Track
 
 MAX_STEPS: Final = 100_000
@@ -78,23 +79,36 @@ def evaluate(
         ShapeError: The policy's commands do not have the shape (N, 2).
         NonFiniteAction: A command is NaN or infinite.
     """
-    simulation = trial_simulation(
-        track,
+    conditions = Conditions(
+        track=track,
         rules=rules,
-        num_trials=num_trials,
         seed=seed,
-        vehicle=vehicle,
+        vehicle=vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle),
         camera=_needed(camera, sees),
-        randomize=randomize,
         objects=objects,
-        num_threads=num_threads,
+        randomize=randomize if isinstance(randomize, Randomization) else load_randomization(randomize),
     )
+    simulation = race_simulation(conditions, num_cars=num_trials, num_threads=num_threads)
     sight = simulation.frames if sees == "frames" else simulation.state
     marshal = Marshal(simulation, rules, seed=seed)
     while marshal.is_racing:
-        simulation.step(_checked(policy(sight), num_trials))
-        marshal.judge()
-    return Evaluation(track=track, rules=rules, seed=seed, trials=marshal.trials())
+        marshal.step(_checked(policy(sight), num_trials))
+    return Evaluation(conditions=conditions, trials=marshal.trials())
+
+
+def race_simulation(conditions: Conditions, *, num_cars: int, num_threads: int = 0) -> Simulation:
+    """The simulation of a race against the clock: what `evaluate` drives and what verifying a replay drives again."""
+    return trial_simulation(
+        conditions.track,
+        rules=conditions.rules,
+        num_trials=num_cars,
+        seed=conditions.seed,
+        vehicle=conditions.vehicle,
+        camera=conditions.camera,
+        randomize=conditions.randomize,
+        objects=conditions.objects,
+        num_threads=num_threads,
+    )
 
 
 def trial_simulation(

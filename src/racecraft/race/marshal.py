@@ -1,6 +1,6 @@
 """The marshal: watches every car of an evaluation, counts laps and mistakes, and puts cars back on the track.
 
-One step of the simulation is one call of `judge`. A mistake costs what it costs in the original:
+One step of the simulation is one call of `step`. A mistake costs what it costs in the original:
 
     off track in step t -> placed in the nearest lane, where it was in step t - 1, wheels straight, standing
     (object near)          or behind the object, in the other lane
@@ -11,6 +11,7 @@ One step of the simulation is one call of `judge`. A mistake costs what it costs
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -50,6 +51,7 @@ class _Car:
     status: str = ""  # how the trial ended; empty while it races
     rows: list[NDArray[np.float64]] = field(default_factory=list)
     clock: list[float] = field(default_factory=list)  # s at each row
+    actions: list[NDArray[np.float32]] = field(default_factory=list)  # asked for at each row  (2,)
     laps: list[Lap] = field(default_factory=list)
     began: float = 0.0  # s on the clock when the simulation's present episode began
     laps_before: int = 0  # laps completed before that
@@ -78,9 +80,15 @@ class Marshal:
         """Whether any trial goes on."""
         return bool(self._is_racing.any())
 
-    def judge(self) -> None:
-        """Take note of the simulation's last step and do what the rules ask for."""
+    def step(self, actions: NDArray[np.float32]) -> None:
+        """Step the simulation, take note of what happened and do what the rules ask for.
+
+        Args:
+            actions: Of every car, steering angle [rad] and speed [m/s]; those of cars that race no more mean nothing
+                (N, 2).
+        """
         simulation, limit = self._simulation, self._rules.time_limit
+        simulation.step(actions)
         rows = simulation.judged.copy()
         is_event = (rows[:, _STATUS] == _LAP_COMPLETE) | simulation.terminated | simulation.truncated
         for car in self._cars:
@@ -91,12 +99,19 @@ class Marshal:
             clock = car.began + float(row[_TIME])
             car.rows.append(row)
             car.clock.append(clock)
+            car.actions.append(np.array(actions[car.index], dtype=np.float32))
+            if row[_STATUS] == _PAUSE:  # the core keeps the progress of the mistake; log where the car stands
+                row[_PROGRESS] = self._progress(row[_DISTANCE], near=row[_PROGRESS])
             if is_event[car.index]:
                 self._event(car, row, clock)
             # half a step of slack: the clock runs in steps of 1/15 s
             if not car.status and limit > 0.0 and clock >= limit - 0.5 * CONTROL_DT:
                 row[_STATUS] = _TIME_UP
                 self._end(car, row, clock)
+
+    def rows_of(self, car: int) -> Sequence[NDArray[np.float64]]:
+        """The steps of a car that are logged by now, the ones that prepare a start included; each (row_width,)."""
+        return self._cars[car].rows
 
     def trials(self) -> tuple[Trial, ...]:
         """The results, once no car is racing."""
@@ -157,6 +172,7 @@ class Marshal:
         row[_PROGRESS] = self._progress(row[_DISTANCE], near=0.0)
         car.rows.append(row)
         car.clock.append(car.began + float(row[_TIME]))
+        car.actions.append(np.zeros(2, dtype=np.float32))
 
     def _finish_lap(self, car: _Car, row: NDArray[np.float64], clock: float) -> None:
         began = car.laps[-1].start_time + car.laps[-1].time if car.laps else 0.0
@@ -189,16 +205,13 @@ class Marshal:
 
     def _trial(self, car: _Car) -> Trial:
         rows = np.array(car.rows)
-        # while a car stands as a penalty the core keeps the progress of its mistake; log where it stands
-        for step in np.flatnonzero(rows[:, _STATUS] == _PAUSE).tolist():
-            rows[step, _PROGRESS] = self._progress(rows[step, _DISTANCE], near=rows[step, _PROGRESS])
         rows.flags.writeable = False
         return Trial(
             index=car.index,
             laps=tuple(car.laps),
             status=car.status,
             completion=sum(lap.completion for lap in car.laps) / self._rules.laps,
-            recording=Recording(self._track, rows, np.array(car.clock)),
+            recording=Recording(self._track, rows, np.array(car.clock), np.array(car.actions)),
         )
 
     def _progress(self, distance: float, *, near: float) -> float:

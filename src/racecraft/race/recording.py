@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.race.default_reward import centerline_rewards
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.simulation import CONTROL_DT
 from racecraft.sim.views import ObjectView, views_of_objects
@@ -27,6 +28,9 @@ class Recording:
     """As the simulation gave them, objects included, with `lap` counted over the whole trial  (T, row_width)."""
     clock: NDArray[np.float64]
     """s since the trial began; the rows' own `time` begins anew with every standing start  (T,)."""
+    actions: NDArray[np.float32]
+    """What the driver asked for in every step, steering angle [rad] and speed [m/s], before any limit; zero in prepare
+    steps, where nobody is asked  (T, 2)."""
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -45,6 +49,23 @@ class Recording:
         heading = self.column("heading")
         ahead = REFERENCE_AHEAD * np.stack([np.cos(heading), np.sin(heading)], axis=1)
         return np.asarray(np.stack([self.column("x"), self.column("y")], axis=1) - ahead)
+
+    @cached_property
+    def poses(self) -> NDArray[np.float64]:
+        """X [m], y [m] and heading [rad] of the car's origin  (T, 3)."""
+        return np.column_stack([self.origins, self.column("heading")])
+
+    @cached_property
+    def rewards(self) -> NDArray[np.float64]:
+        """AWS's default reward, which evaluations log whatever the policy learned from; 0 while a car stands  (T,)."""
+        stands = np.isin(self.column("status"), [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")])
+        return np.where(stands, 0.0, centerline_rewards(self.rows))
+
+    @cached_property
+    def events(self) -> list[tuple[int, str]]:
+        """Steps in which something happened, and what: a start (``prepare``), a lap, a mistake, the end of the time."""
+        quiet = ("in_progress", "pause", "park")
+        return [(step, status) for step, status in enumerate(self.statuses) if status not in quiet]
 
     @cached_property
     def statuses(self) -> list[str]:
@@ -71,4 +92,4 @@ class Recording:
     def lap(self, number: int) -> Recording:
         """The steps of one lap, numbered from 1."""
         steps = self.lap_numbers == number
-        return Recording(self.track, self.rows[steps], self.clock[steps])
+        return Recording(self.track, self.rows[steps], self.clock[steps], self.actions[steps])

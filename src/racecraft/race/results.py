@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from racecraft.race.conditions import Conditions
 from racecraft.race.recording import Recording
 from racecraft.race.rules import RaceRules
 from racecraft.race.statistics import Interval, mean_interval, wilson_interval
@@ -86,11 +87,24 @@ class Trial:
 class Evaluation:
     """All trials of an evaluation; times are in seconds, completions are fractions."""
 
-    track: Track
-    """As handed in; with direction ``reverse`` it was driven the other way."""
-    rules: RaceRules
-    seed: int
+    conditions: Conditions
+    """Where and by which rules."""
     trials: tuple[Trial, ...]
+
+    @property
+    def track(self) -> Track:
+        """As handed in; with direction ``reverse`` it was driven the other way."""
+        return self.conditions.track
+
+    @property
+    def rules(self) -> RaceRules:
+        """Of the race."""
+        return self.conditions.rules
+
+    @property
+    def seed(self) -> int:
+        """Of the starts."""
+        return self.conditions.seed
 
     def laps(self) -> Iterator[Lap]:
         """Every lap that was begun."""

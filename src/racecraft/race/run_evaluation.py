@@ -3,6 +3,7 @@
 evaluation-<time>/evaluation-simtrace/0-iteration.csv   every step                  (AWS)
 metrics/EvaluationMetrics-<time>.json                    every lap                   (AWS)
 evaluation-<time>/evaluation.json                        the summary with its intervals
+evaluation-<time>/evaluation.replay                      every trial, to be shown and driven again
 evaluation-<time>/racing-line.png                        the best trial's line, coloured by speed
 mp4/camera-pip/<n>-video.mp4                             the best trial, filmed
 """
@@ -23,6 +24,7 @@ from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.evaluation import evaluate
 from racecraft.race.placement import driven_track
 from racecraft.race.policy import load_policy
+from racecraft.race.race_replay import Replay, write_replay
 from racecraft.race.racing_line import draw_racing_line
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RULE_SETS, RaceRules
@@ -242,8 +244,10 @@ def _write(
         "metrics": metrics,
         "sim-trace": inside / "evaluation-simtrace" / "0-iteration.csv",
         "summary": inside / "evaluation.json",
+        "replay": inside / "evaluation.replay",
         "racing line": draw_racing_line(best.recording, inside / "racing-line.png", subtitle=folder.name),
     }
+    write_replay(Replay.of(evaluation, title=folder.name), files["replay"])
     if is_filmed:
         videos = folder.videos / "camera-pip"
         videos.mkdir(parents=True, exist_ok=True)

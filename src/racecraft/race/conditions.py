@@ -1,0 +1,33 @@
+"""What a race is held under: all that a re-simulation needs besides the actions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from racecraft.race.rules import RaceRules
+from racecraft.sim.camera import CameraSpec
+from racecraft.sim.objects import NO_OBJECTS, Objects
+from racecraft.sim.randomization import PRESETS, Randomization
+from racecraft.sim.vehicle import PRESETS as VEHICLES
+from racecraft.sim.vehicle import Vehicle
+from racecraft.track.track import Track
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """Where, by which rules, with which car and among what; the same for every car of a race."""
+
+    track: Track
+    """As handed in; with direction ``reverse`` it is driven the other way."""
+    rules: RaceRules
+    """Laps, resets, penalties, starts."""
+    seed: int = 0
+    """Of the starts, of what stands on the track and of the randomisation."""
+    vehicle: Vehicle = VEHICLES["v5"]
+    """What is driven."""
+    camera: CameraSpec | None = None
+    """What the rules take the driver's camera for (`object_in_camera`); None where no car has one."""
+    objects: Objects = NO_OBJECTS
+    """On the track, around every car of its own."""
+    randomize: Randomization = PRESETS["none"]
+    """What differs from car to car."""

@@ -1,0 +1,121 @@
+"""The bytes of a replay file: a strict JSON header and columns of numbers, compressed, with every size bounded.
+
+    RACECRAFTREPLAY and a zero    16 bytes
+    version                       u32, little-endian as all numbers
+    size of the body              u64
+    SHA-256 of the body           32 bytes
+    the body, zlib                to the end of the file
+
+    body: size of the header u32, header (UTF-8 JSON), columns one after the other
+
+A column is stored in the smallest type that holds every value exactly. Its values are combined by exclusive or with the
+one before, and their bytes sorted by significance, so that what changes slowly compresses well. Nothing is lost.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+import zlib
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.agent.aws_file import parse_json_object
+from racecraft.errors import ConfigError, ReplayError
+
+MAGIC: Final = b"RACECRAFTREPLAY\0"
+VERSION: Final = 1
+MAX_FILE_BYTES: Final = 256 << 20
+MAX_BODY_BYTES: Final = 512 << 20
+MAX_HEADER_BYTES: Final = 16 << 20
+TYPES: Final = {"u1": 1, "i2": 2, "i4": 4, "f4": 4, "f8": 8}
+"""Column types, smallest first, and their bytes."""
+
+_PREFIX: Final = struct.Struct("<16sIQ32s")
+
+
+def pack_column(values: NDArray[Any]) -> tuple[str, bytes]:
+    """Type and bytes of a column of finite numbers (T,), exactly.
+
+    Raises:
+        ReplayError: A number is NaN or infinite.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if not np.isfinite(values).all():
+        raise ReplayError("A replay holds finite numbers only; one is NaN or infinite.")
+    for kind in TYPES:
+        with np.errstate(invalid="ignore", over="ignore"):
+            narrow = values.astype(f"<{kind}")
+        if (narrow.astype(np.float64).view(np.uint64) == values.view(np.uint64)).all():
+            break
+    bits = narrow.view(f"<u{TYPES[kind]}")
+    bits = bits ^ np.concatenate((np.zeros(1, bits.dtype), bits[:-1]))[: len(bits)]
+    return kind, bits.view(np.uint8).reshape(-1, TYPES[kind]).T.tobytes()
+
+
+def unpack_column(kind: str, data: bytes | memoryview) -> NDArray[np.float64]:
+    """A column from its bytes (T,).
+
+    Raises:
+        ReplayError: A number is NaN or infinite.
+    """
+    width = TYPES[kind]
+    sorted_bytes = np.frombuffer(data, dtype=np.uint8).reshape(width, -1)
+    bits = np.ascontiguousarray(sorted_bytes.T).view(f"<u{width}").reshape(-1)
+    with np.errstate(invalid="ignore"):  # what is not a number is refused below
+        values = np.bitwise_xor.accumulate(bits).view(f"<{kind}").astype(np.float64)
+    if not np.isfinite(values).all():
+        raise ReplayError(f"A replay's number is {values[~np.isfinite(values)][0]}; allowed are finite ones.")
+    return values
+
+
+def pack(header: dict[str, Any], columns: list[bytes]) -> bytes:
+    """The whole file's bytes; equal content gives equal bytes."""
+    text = json.dumps(header, separators=(",", ":"), allow_nan=False).encode()
+    body = b"".join([struct.pack("<I", len(text)), text, *columns])
+    if len(text) > MAX_HEADER_BYTES or len(body) > MAX_BODY_BYTES:
+        raise ReplayError(f"A replay of {len(body):,} bytes is too long; allowed are {MAX_BODY_BYTES:,}.")
+    prefix = _PREFIX.pack(MAGIC, VERSION, len(body), hashlib.sha256(body).digest())
+    return prefix + zlib.compress(body, 9)
+
+
+def unpack(data: bytes, *, name: str) -> tuple[dict[str, Any], memoryview]:
+    """Header and the bytes of all columns.
+
+    Args:
+        data: Of the file, whole.
+        name: What messages call it.
+
+    Raises:
+        ReplayError: Says what is wrong with the file.
+    """
+    if len(data) < _PREFIX.size or not data.startswith(MAGIC):
+        raise ReplayError(f"{name} is no replay of Racecraft: it does not begin like one.")
+    _, version, size, digest = _PREFIX.unpack_from(data)
+    if version != VERSION:
+        raise ReplayError(
+            f"{name} is a replay of version {version}; this Racecraft reads version {VERSION}.",
+            hint="Update Racecraft." if version > VERSION else "",
+        )
+    if not 4 <= size <= MAX_BODY_BYTES:
+        raise ReplayError(f"{name} says it holds {size:,} bytes; allowed are 4 to {MAX_BODY_BYTES:,}.")
+    inflater = zlib.decompressobj()
+    try:
+        body = inflater.decompress(memoryview(data)[_PREFIX.size :], size + 1)
+    except zlib.error as error:
+        raise ReplayError(f"{name} is damaged: {error}.") from error
+    if len(body) != size or not inflater.eof or inflater.unused_data:
+        raise ReplayError(f"{name} is damaged: it holds another number of bytes than the {size:,} it says.")
+    if hashlib.sha256(body).digest() != digest:
+        raise ReplayError(f"{name} is damaged: its checksum does not fit its content.")
+    (length,) = struct.unpack_from("<I", body)
+    if length > min(MAX_HEADER_BYTES, size - 4):
+        raise ReplayError(f"{name} says its header has {length:,} bytes, which it does not hold.")
+    try:
+        header = parse_json_object(body[4 : 4 + length], name=f"The header of {name}")
+    except ConfigError as error:
+        raise ReplayError(str(error)) from error
+    return header, memoryview(body)[4 + length :]
