@@ -6,7 +6,7 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command 
 VENV := .venv
 BIN := $(VENV)/bin
 UV := $(BIN)/uv
-NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/*)
+NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/* native/gpu/*)
 
 PAGES := src/racecraft/serve/pages/index.html
 WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/*)
@@ -32,12 +32,12 @@ lint: $(VENV)/.built $(VENV)/.dev  ## ruff, mypy --strict and clang-format, chan
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/clang-format --dry-run --Werror native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/tests/*.cpp
+	$(BIN)/clang-format --dry-run --Werror native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/tests/*.cpp
 
 format: $(VENV)/.dev  ## apply ruff and clang-format
 	$(BIN)/ruff check --fix-only -q .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/tests/*.cpp
+	$(BIN)/clang-format -i native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/tests/*.cpp
 
 bench: $(VENV)/.built $(VENV)/.dev  ## measure everything, rivals included, and print the table
 	$(BIN)/racecraft bench

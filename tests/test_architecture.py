@@ -12,6 +12,7 @@ NATIVE = Path(__file__).parents[1] / "native"
 LAYERS = (
     "errors",
     "track",
+    "gpu",
     "sim",
     "limits",
     "reward",

@@ -25,6 +25,7 @@ using namespace nb::literals;
 namespace racecraft {
 
 void bind_learner(nb::module_& m);  // bind_learner.cpp
+void bind_device(nb::module_& m);   // bind_device.cpp
 
 namespace {
 
@@ -467,4 +468,5 @@ NB_MODULE(_native, m) {
     racecraft::bind_engine(m);
     racecraft::bind_replay(m);
     racecraft::bind_learner(m);
+    racecraft::bind_device(m);
 }

@@ -1,13 +1,13 @@
 #include "camera_kernel.hpp"
 
 #include "lanes.hpp"
+#include "racecraft/camera_walk.hpp"
 
 namespace racecraft::RC_ISA {
 namespace {
 
-constexpr int kMaxSamples = 8;         // of a row
-constexpr int kBlock = 64;             // sample rows that are set up together
-constexpr float kFixedOne = 65536.0f;  // a texel in 16.16 fixed point
+constexpr int kMaxSamples = 8;  // of a row
+constexpr int kBlock = 64;      // sample rows that are set up together
 
 // The walks of a block of sample rows: everything that needs floating point, done for all rows at once.
 struct Block {
@@ -21,41 +21,19 @@ struct Block {
 void set_up(const CameraView& camera, const GroundView& ground, const LensPose& lens, int first, int count,
             float plane_scale, Block& block) {
     for (int i = 0; i < count; ++i) {
-        block.level[i] = clamp(camera.exponent[first + i] - ground.exponent, 0, ground.num_levels - 1);
+        block.level[i] = sample_level(camera, ground, first + i);
         block.scale[i] = ground.levels[block.level[i]].texels_per_metre * kFixedOne;
     }
-    const float right_x = lens.sine;
-    const float right_y = -lens.cosine;
-    constexpr float limit = 2.0e9f;
 #pragma GCC ivdep
     for (int i = 0; i < count; ++i) {
-        const float ahead = camera.distance[first + i] * plane_scale;
-        const float start = camera.start[first + i] * plane_scale;
-        const float step = camera.step[first + i] * plane_scale;
-        const float x = lens.x + ahead * lens.cosine + start * right_x;
-        const float y = lens.y + ahead * lens.sine + start * right_y;
-        const PixelSpan span = clip_walk(ground, x, y, step * right_x, step * right_y, camera.spec.width);
-        // The ring of one texel is where a level's texels begin.
-        const float u = (x - ground.min_x) * block.scale[i] + kFixedOne;
-        const float v = (y - ground.min_y) * block.scale[i] + kFixedOne;
-        const float farthest = max_of(abs_of(u), abs_of(v));
-        block.begin[i] = span.begin;
-        block.end[i] = farthest < limit ? span.end : span.begin;
-        block.u[i] = static_cast<int32_t>(clamp(u, -limit, limit));
-        block.v[i] = static_cast<int32_t>(clamp(v, -limit, limit));
-        block.du[i] = static_cast<int32_t>(clamp(step * right_x * block.scale[i], -limit, limit));
-        block.dv[i] = static_cast<int32_t>(clamp(step * right_y * block.scale[i], -limit, limit));
+        const SampleWalk walk = sample_walk(camera, ground, lens, first + i, plane_scale, block.scale[i]);
+        block.begin[i] = walk.begin;
+        block.end[i] = walk.end;
+        block.u[i] = walk.u;
+        block.v[i] = walk.v;
+        block.du[i] = walk.du;
+        block.dv[i] = walk.dv;
     }
-}
-
-// Half of a signed step of a walk.
-uint32_t half(uint32_t step) {
-    return static_cast<uint32_t>(static_cast<int32_t>(step) >> 1);
-}
-
-// Sums of a row's samples are brightness times 64 times samples; this divides them.
-int row_shift(int samples) {
-    return samples == 1 ? 6 : samples == 2 ? 7 : samples == 4 ? 8 : 9;
 }
 
 // A row near the lens, see store_ground().
@@ -143,7 +121,8 @@ void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTab
     WalkLanes at[kMaxSamples];
     for (int k = 0; k < row.samples; ++k) {
         const GroundWalk& walk = row.walk[k];
-        at[k] = start_walk(walk.u + half(walk.du), walk.v + half(walk.dv), 2 * walk.du, 2 * walk.dv);
+        at[k] =
+            start_walk(walk.u + half_step(walk.du), walk.v + half_step(walk.dv), 2 * walk.du, 2 * walk.dv);
     }
     for (int i = 0; i < width; i += 2 * Lanes::kCount) {
         Lanes left = rounding;
@@ -202,8 +181,8 @@ void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTab
         int32_t right = left;
         for (int k = 0; k < row.samples; ++k) {
             const GroundWalk& walk = row.walk[k];
-            const uint32_t u = walk.u + half(walk.du) + static_cast<uint32_t>(i) * walk.du;
-            const uint32_t v = walk.v + half(walk.dv) + static_cast<uint32_t>(i) * walk.dv;
+            const uint32_t u = walk.u + half_step(walk.du) + static_cast<uint32_t>(i) * walk.du;
+            const uint32_t v = walk.v + half_step(walk.dv) + static_cast<uint32_t>(i) * walk.dv;
             const uint32_t texel = ground.texels[texel_index(ground.levels[0], u, v)];
             const int32_t distance = edge_distance(texel, u, v);
             const int32_t growth = edge_growth(texel, row.half_x[k], row.half_y[k]);
@@ -298,18 +277,14 @@ class Painter {
                 static_cast<uint32_t>(block.du[i]), static_cast<uint32_t>(block.dv[i])};
     }
 
-    int32_t sharpness_of(int sample) const {
-        return static_cast<int32_t>(min_of(camera_.sharpness[sample] * ground_.texel, 32767.0f));
-    }
+    int32_t sharpness_of(int sample) const { return sample_sharpness(camera_, ground_, sample); }
 
-    // Whether store_ground() may draw the row: all of it ground, and pixels small against an edge texel.
+    // Whether store_ground() may draw the row.
     bool can_share(int sample, int samples, const Block& block, int i) const {
-        constexpr float largest_step = 0.95f;  // texels
         bool can = width_ % 32 == 0;
         for (int k = 0; k < samples; ++k) {
-            can = can && camera_.kind[sample + k] == kSampleGround && block.begin[i + k] == 0 &&
-                  block.end[i + k] == width_ && block.level[i + k] == 0 &&
-                  camera_.step[sample + k] < largest_step * ground_.texel;
+            can = can && can_share_texels(camera_, ground_, sample + k, block.begin[i + k], block.end[i + k],
+                                          block.level[i + k]);
         }
         return can;
     }
@@ -349,8 +324,6 @@ class Painter {
 
     // What the row would show if there were only walls; a corner's pixel is a mixture of both walls.
     void find_walls(int row) {
-        const float middle = 0.5f * static_cast<float>(width_);
-        const float scale = camera_.corner_scale[row];
         for (int c = 0; c < kChannels; ++c) {
             int32_t* values = wall_row_ + c * stride_;
             int x = 0;
@@ -360,13 +333,11 @@ class Painter {
                     fill(values, shade, x, width_);
                     break;
                 }
-                const float edge = clamp(middle + scale * walls_[w].right, 0.0f, static_cast<float>(width_));
-                const int pixel = static_cast<int>(edge);
-                const int32_t share = static_cast<int32_t>((edge - static_cast<float>(pixel)) * 64.0f);
-                const int32_t next = tables_[c].wall[walls_[w + 1].wall];
-                fill(values, shade, x, pixel);
-                values[pixel] = (shade * share + next * (64 - share)) >> 6;
-                x = max_of(x, pixel + 1);
+                const WallEdge edge =
+                    wall_edge(walls_, w, camera_.corner_scale[row], width_, tables_[c].wall);
+                fill(values, shade, x, edge.pixel);
+                values[edge.pixel] = edge.mixture;
+                x = max_of(x, edge.pixel + 1);
             }
         }
     }

@@ -4,25 +4,10 @@
 #include <string>
 
 #include "camera_kernel.hpp"
+#include "racecraft/camera_tables.hpp"
 
 namespace racecraft {
 namespace {
-
-constexpr float kFarthest = 60.0f;  // m; rows that look farther along the ground show only wall
-constexpr float kStretch = 4.25f;  // length over width of a sample's footprint on the ground, at most, before
-constexpr int32_t kMaxRowSamples = 8;  // the row is split into twice as many, up to this many
-constexpr float kSteep = 1.0f;         // rad; cameras that look down more steeply see no walls, as on a map
-constexpr int32_t kSkySamples = 4;     // of rows above the horizon: they only smooth the walls' upper edge
-
-// Sideways shifts of the samples of a row, in pixels, so that upright borders are smoothed as well.
-constexpr float kShift[4][8] = {{0.0f},
-                                {-0.25f, 0.25f},
-                                {-0.375f, 0.125f, 0.375f, -0.125f},
-                                {-0.4375f, 0.0625f, -0.1875f, 0.3125f, 0.4375f, -0.0625f, 0.1875f, -0.3125f}};
-
-struct Ray {
-    float down, ahead;  // per unit along the optical axis
-};
 
 void check(const CameraSpec& spec) {
     const auto fail = [](const std::string& what) { throw std::invalid_argument("Camera " + what); };
@@ -67,81 +52,20 @@ size_t CameraModel::num_bytes() const {
 
 void CameraModel::rebuild(const CameraSpec& spec) {
     check(spec);
-    row_begin_.clear();
-    kind_.clear();
-    exponent_.clear();
-    for (std::vector<float>* table : {&distance_, &start_, &step_, &sharpness_, &corner_scale_})
-        table->clear();
-    float sine, cosine, half_sine, half_cosine;
-    sincos_of(spec.pitch, sine, cosine);
-    sincos_of(0.5f * spec.hfov, half_sine, half_cosine);
-    const float width = static_cast<float>(spec.width);
-    const float focal = 0.5f * width * half_cosine / half_sine;
-    const auto ray = [&](float row) {  // row in pixels from the image's upper edge
-        const float b = (row - 0.5f * static_cast<float>(spec.height)) / focal;
-        return Ray{sine + b * cosine, cosine - b * sine};
-    };
-    const auto ground_distance = [&](const Ray& r) { return spec.above * r.ahead / r.down; };
-    // Samples that lie beside each other as well may each be sharper.
-    const float narrowing = spec.min_samples >= 4 ? 0.65f : 0.9f;
-    const float farthest_slope = spec.above / kFarthest;
+    const size_t rows = static_cast<size_t>(spec.height);
+    row_begin_.resize(rows + 1);
+    corner_scale_.resize(rows);
+    resize_samples(rows * kMaxRowSamples);
+    const CameraTables tables{row_begin_.data(), kind_.data(), exponent_.data(),  distance_.data(),
+                              start_.data(),     step_.data(), sharpness_.data(), corner_scale_.data()};
+    view_ = fill_camera(spec, tables);
+    resize_samples(static_cast<size_t>(view_.num_samples));  // keeps its memory, and so the tables' places
+}
 
-    for (int32_t row = 0; row < spec.height; ++row) {
-        const Ray middle = ray(static_cast<float>(row) + 0.5f);
-        row_begin_.push_back(static_cast<int32_t>(kind_.size()));
-        corner_scale_.push_back(focal * max_of(middle.ahead, 0.01f));
-        // How many samples: enough that none is much longer on the ground than wide.
-        int32_t samples = kSkySamples;
-        if (ray(static_cast<float>(row)).down > farthest_slope) {
-            const float wide = spec.above / (middle.down * focal);
-            const float length = abs_of(ground_distance(ray(static_cast<float>(row))) -
-                                        ground_distance(ray(static_cast<float>(row + 1))));
-            samples = spec.min_samples;
-            while (samples < kMaxRowSamples && length > kStretch * wide * static_cast<float>(samples))
-                samples *= 2;
-        }
-        const float* shifts = kShift[samples == 1 ? 0 : samples == 2 ? 1 : samples == 4 ? 2 : 3];
-        for (int32_t k = 0; k < samples; ++k) {
-            const float part = 1.0f / static_cast<float>(samples);
-            const float upper = static_cast<float>(row) + part * static_cast<float>(k);
-            const Ray r = ray(upper + 0.5f * part);
-            const float middle_pixel = 0.5f * width - 0.5f - shifts[k];
-            // The plane that the walk lies in: the ground, or that of the walls' upper edge.
-            const float drop = r.down > 0.0f ? spec.above : spec.above - kWallHeight;
-            const bool is_seen = drop / r.down > 0.0f && abs_of(r.down) * kFarthest > abs_of(drop);
-            const float reach = is_seen ? drop / r.down : 0.0f;
-            const float step = reach / focal;
-            float filter = step;
-            if (is_seen && r.down > 0.0f) {
-                const Ray first = ray(upper);
-                const float length = first.down > farthest_slope
-                                         ? abs_of(ground_distance(first) - ground_distance(ray(upper + part)))
-                                         : kFarthest;
-                filter = narrowing * (length > step ? sqrt_of(step * length) : step);
-            }
-            int8_t exponent = -8;
-            for (float texel = 0.01f / 256.0f; texel * 1.41421356f < filter && exponent < 8; texel *= 2.0f)
-                ++exponent;
-            kind_.push_back(is_seen ? (r.down > 0.0f ? kSampleGround : kSampleSky) : kSampleWall);
-            exponent_.push_back(exponent);
-            distance_.push_back(reach * r.ahead);
-            start_.push_back(-middle_pixel * step);
-            step_.push_back(step);
-            sharpness_.push_back(filter > 0.0f ? 256.0f / filter : 0.0f);
-        }
-    }
-    row_begin_.push_back(static_cast<int32_t>(kind_.size()));
-    view_ = {spec,
-             static_cast<int32_t>(kind_.size()),
-             row_begin_.data(),
-             kind_.data(),
-             exponent_.data(),
-             distance_.data(),
-             start_.data(),
-             step_.data(),
-             sharpness_.data(),
-             corner_scale_.data(),
-             spec.pitch > kSteep ? 1.0f : (spec.above - kWallHeight) / spec.above};
+void CameraModel::resize_samples(size_t count) {
+    kind_.resize(count);
+    exponent_.resize(count);
+    for (std::vector<float>* table : {&distance_, &start_, &step_, &sharpness_}) table->resize(count);
 }
 
 void render_grey(const CameraModel& camera, const GroundMap& ground, const GreyPalette& palette, float x,

@@ -24,6 +24,8 @@ class CameraModel {
     const CameraView& view() const { return view_; }
 
   private:
+    void resize_samples(size_t count);
+
     std::vector<int32_t> row_begin_;
     std::vector<uint8_t> kind_;
     std::vector<int8_t> exponent_;

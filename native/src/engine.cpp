@@ -83,42 +83,9 @@ void Engine::store_vehicle(size_t env, const VehicleState& state) {
 }
 
 VehicleState Engine::start_pose(size_t env) {
-    const StartRule& rule = config_.start;
-    const TrackGeometry& track = track_of(env);
-    Episode& episode = episodes_[env];
-    const uint64_t seed = seeds_[env];
-    const uint32_t car = streams_[env];
-    const uint32_t number = static_cast<uint32_t>(episode.episode);
-
-    double fraction = rule.offset;
-    if (rule.spread) fraction += static_cast<double>(env) / static_cast<double>(num_envs());
-    if (rule.mode == StartMode::advance) fraction += rule.advance * episode.episode;
-    if (rule.mode == StartMode::random) {
-        fraction =
-            static_cast<double>(uniform_of(philox(seed, car, number, 0, Purpose::start_position).words[0]));
-    }
-    fraction = track.is_closed ? fraction - floor_of(fraction) : 0.0;
-    episode.start = fraction;
-
-    const double arc_length = fraction * track.length;
-    const Segment* last = track.segments + track.num_segments - 1;
-    const Segment* segment = track.segments;
-    while (segment < last && segment[1].arc_length <= arc_length) ++segment;
-    const double along = arc_length - segment->arc_length;
-    const double ux = segment->dx * segment->inverse_length;
-    const double uy = segment->dy * segment->inverse_length;
-
-    const RandomBlock random = philox(seed, car, number, 0, Purpose::start_pose);
-    const double lateral = static_cast<double>(rule.lateral_jitter * symmetric_of(random.words[0]));
-    const float lane = start_lane(track, objects_.objects_of(env), objects_.count(), arc_length);
-    const LanePoint middle = lane == 0.0f ? LanePoint{segment->x + along * ux, segment->y + along * uy}
-                                          : lane_point(track, arc_length, lane);
-    VehicleState state{};
-    state.x = static_cast<float>(middle.x - lateral * uy);
-    state.y = static_cast<float>(middle.y + lateral * ux);
-    state.heading = wrap_angle(atan2_of(static_cast<float>(uy), static_cast<float>(ux)) +
-                               rule.heading_jitter * symmetric_of(random.words[1]));
-    return state;
+    const Draws draws{seeds_[env], streams_[env], static_cast<uint32_t>(episodes_[env].episode)};
+    return racecraft::start_pose(config_.start, track_of(env), env, num_envs(), draws,
+                                 objects_.objects_of(env), objects_.count(), episodes_[env].start);
 }
 
 void Engine::draw_episode(size_t env) {

@@ -10,23 +10,11 @@
 #include "racecraft/random.hpp"
 #include "racecraft/randomization.hpp"
 #include "racecraft/rules.hpp"
+#include "racecraft/start.hpp"
 #include "thread_pool.hpp"
 #include "track_store.hpp"
 
 namespace racecraft {
-
-enum class StartMode : int32_t { fixed = 0, advance = 1, random = 2 };
-enum class Direction : int32_t { forward = 0, reverse = 1, alternate = 2 };
-
-// Where an episode starts, as a fraction of a lap; an open track always starts at its beginning.
-struct StartRule {
-    StartMode mode;
-    double offset;         // of the first episode
-    double advance;        // added with every episode of a car (mode advance)
-    bool spread;           // spaces the cars of a batch evenly along the lap
-    float lateral_jitter;  // m, uniform in plus or minus
-    float heading_jitter;  // rad, uniform in plus or minus
-};
 
 struct EngineConfig {
     size_t num_envs;  // N
@@ -95,6 +83,8 @@ class Engine {
     void load(const uint8_t* bytes, size_t size);
 
   private:
+    friend class DevicePlan;  // reads the settings
+
     static constexpr size_t kNumVehicleFields = sizeof(VehicleState) / sizeof(float);
 
     const TrackGeometry& track_of(size_t env) const { return tracks_[episodes_[env].track].geometry(); }

@@ -1,17 +1,9 @@
 #include "exposure_kernel.hpp"
 
-#include "racecraft/math.hpp"
+#include "racecraft/exposure.hpp"
 
 namespace racecraft::RC_ISA {
 namespace {
-
-constexpr float kVariance = 2.0f / 3.0f;  // px^2, most that one pass of (a, 1 - 2a, a) blurs
-
-// Light at a column or row, 1 is 1 << 14.
-uint16_t light_at(int index, int count, float gradient) {
-    const float across = 2.0f * (static_cast<float>(index) + 0.5f) / static_cast<float>(count) - 1.0f;
-    return static_cast<uint16_t>(16384.0f * (1.0f + gradient * across) + 0.5f);
-}
 
 // Halves of 16 x 16 bits throughout: twice as many lanes as with whole words.
 void shade(uint8_t* frame, int width, int height, float gradient_across, float gradient_down) {
@@ -22,19 +14,13 @@ void shade(uint8_t* frame, int width, int height, float gradient_across, float g
         uint8_t* line = frame + static_cast<size_t>(y) * static_cast<size_t>(width);
 #pragma GCC ivdep
         for (int x = 0; x < width; ++x) {
-            const uint16_t factor =
-                static_cast<uint16_t>((uint32_t{light[x]} * row_light) >> 16);  // 1 is 1 << 12
-            const uint16_t bright = static_cast<uint16_t>(line[x] << 8);
-            const uint16_t lit = static_cast<uint16_t>((uint32_t{bright} * factor) >> 16);  // 1 is 1 << 4
-            const uint16_t level = static_cast<uint16_t>((lit + 8) >> 4);
-            line[x] = static_cast<uint8_t>(level < 255 ? level : 255);
+            line[x] = lit_pixel(line[x], light[x], row_light);
         }
     }
 }
 
 // (side, 256 - 2 side, side) / 256 across, then down; borders repeat.
 void blur_once(uint8_t* frame, int width, int height, uint16_t side) {
-    const uint16_t middle = static_cast<uint16_t>(256 - 2 * side);
     alignas(64) uint8_t padded[kMaxExposedWidth + 2];
     alignas(64) uint8_t lines[3][kMaxExposedWidth];  // blurred across: the line above, this one, the next
     const auto blur_across = [&](int y, uint8_t* out) {
@@ -44,9 +30,7 @@ void blur_once(uint8_t* frame, int width, int height, uint16_t side) {
         padded[width + 1] = line[width - 1];
 #pragma GCC ivdep
         for (int x = 0; x < width; ++x) {
-            const uint16_t sum =
-                static_cast<uint16_t>((padded[x] + padded[x + 2]) * side + padded[x + 1] * middle + 128);
-            out[x] = static_cast<uint8_t>(sum >> 8);
+            out[x] = blurred_pixel(padded[x], padded[x + 1], padded[x + 2], side);
         }
     };
     blur_across(0, lines[0]);
@@ -63,8 +47,7 @@ void blur_once(uint8_t* frame, int width, int height, uint16_t side) {
         uint8_t* line = frame + static_cast<size_t>(y) * static_cast<size_t>(width);
 #pragma GCC ivdep
         for (int x = 0; x < width; ++x) {
-            const uint16_t sum = static_cast<uint16_t>((above[x] + below[x]) * side + here[x] * middle + 128);
-            line[x] = static_cast<uint8_t>(sum >> 8);
+            line[x] = blurred_pixel(above[x], here[x], below[x], side);
         }
     }
 }
@@ -75,10 +58,8 @@ void expose(uint8_t* frame, int width, int height, float gradient_across, float 
     if (gradient_across != 0.0f || gradient_down != 0.0f) {
         shade(frame, width, height, gradient_across, gradient_down);
     }
-    const float variance = blur * blur;
-    const int passes = static_cast<int>(variance / kVariance) + 1;
-    const uint16_t side = static_cast<uint16_t>(128.0f * variance / static_cast<float>(passes) + 0.5f);
-    for (int pass = 0; side > 0 && pass < passes; ++pass) blur_once(frame, width, height, side);
+    const BlurFilter filter = blur_filter(blur);
+    for (int pass = 0; pass < filter.passes; ++pass) blur_once(frame, width, height, filter.side);
 }
 
 }  // namespace racecraft::RC_ISA

@@ -44,6 +44,8 @@ class ObjectField {
     const char* find_fault() const;
 
   private:
+    friend class DevicePlan;
+
     ObjectRule rule_;
     int32_t count_;
     float lens_forward_, lens_left_, half_tangent_;

@@ -18,6 +18,7 @@ class TrackStore {
     TrackStore(const TrackStore&) = delete;
 
     const TrackGeometry& geometry() const { return geometry_; }
+    size_t num_samples() const { return widths_.size(); }  // of the width and the curvature table
 
   private:
     void build_segments();

@@ -219,3 +219,30 @@ def orthonormalize(vectors: Annotated[NDArray[numpy.float64], dict(shape=(None, 
     """
     Make the rows orthonormal in place, each from itself and those before it.
     """
+
+class DevicePlan:
+    """What a GPU needs to drive cars by an engine's settings."""
+
+    def __init__(self, engine: Engine, num_envs: int) -> None: ...
+
+    @property
+    def world_bytes(self) -> int: ...
+
+    @property
+    def arrays(self) -> list[tuple[str, int]]: ...
+
+    def world(self, address: int) -> Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C')]: ...
+
+    def initial(self, name: str) -> Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C')]: ...
+
+    def batch(self, world: int, addresses: Sequence[int]) -> Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C')]: ...
+
+BATCH_BYTES: int = 1416
+
+CAR_THREADS: int = 128
+
+IMAGE_THREADS: int = 256
+
+ROW_THREADS: int = 128
+
+LIDAR_RAYS: int = 64

@@ -57,4 +57,43 @@ RC_HD float distance_to_rectangle(float half_length, float half_width, float x, 
     return enter <= leave ? enter : kLidarFarthest;
 }
 
+// One ray of a scan, noise included, as native/src/lidar_kernel.cpp measures all of them at once.
+RC_HD float measure_ray(const Room& room, const LidarPose& pose, const ObjectState* objects, int32_t count,
+                        int32_t ray) {
+    float ray_sine, ray_cosine;
+    sincos_of(lidar_angle(ray), ray_sine, ray_cosine);
+    const float x = pose.x + kLidarForward * pose.cosine;
+    const float y = pose.y + kLidarForward * pose.sine;
+    const float dx = pose.cosine * ray_cosine - pose.sine * ray_sine;
+    const float dy = pose.sine * ray_cosine + pose.cosine * ray_sine;
+    float distance = distance_to_walls(room, x, y, dx, dy);
+    for (int32_t k = 0; k < count; ++k) {
+        const ObjectState& object = objects[k];
+        const float from_x = x - object.x;
+        const float from_y = y - object.y;
+        const float half_x = half_length(object.kind);
+        const float half_y = half_width(object.kind);
+        const float reach = kLidarFarthest + half_x + half_y;
+        if (from_x * from_x + from_y * from_y > reach * reach) continue;
+        const float hit = distance_to_rectangle(half_x, half_y, from_x * object.cosine + from_y * object.sine,
+                                                from_y * object.cosine - from_x * object.sine,
+                                                dx * object.cosine + dy * object.sine,
+                                                dy * object.cosine - dx * object.sine);
+        distance = min_of(distance, hit);
+    }
+    // Normal numbers by Box and Muller's method: two rays share two uniform ones.
+    constexpr int32_t pairs = kLidarRays / 2;
+    constexpr int32_t blocks = kLidarRays / 4;
+    const int32_t pair = ray % pairs;
+    const uint32_t number = pose.step * blocks + static_cast<uint32_t>(pair / 2);
+    const RandomBlock random = philox(pose.seed, pose.stream, pose.episode, number, Purpose::lidar_noise);
+    const bool is_first = pair % 2 == 0;
+    const float radius = uniform_of(is_first ? random.words[0] : random.words[2]) + 1.0f / 16777216.0f;
+    float sine, cosine;
+    sincos_of(kPi * symmetric_of(is_first ? random.words[1] : random.words[3]), sine, cosine);
+    const float length = kLidarNoise * sqrt_of(-2.0f * log_of(radius));
+    const float measured = distance + length * (ray < pairs ? cosine : sine);
+    return distance < kLidarFarthest ? clamp(measured, kLidarNearest, kLidarFarthest) : kLidarFarthest;
+}
+
 }  // namespace racecraft
