@@ -81,6 +81,8 @@ VERBS = (
     "train",
     "import",
     "evaluate",
+    "race",
+    "ladder",
     "verify",
     "tracks",
     "tracks show",
@@ -102,7 +104,7 @@ def test_every_verb_explains_itself_in_80_columns(racecraft: Run, verb: str) -> 
     assert outcome.status == 0
     assert outcome.out.startswith(f"Usage: racecraft {verb}".rstrip())
     assert all(len(line) <= 80 for line in outcome.out.splitlines())
-    assert "..." not in re.sub(r"(ARGS\]|TRACKS\]|logs[\]}]?)\.\.\.", "", outcome.out)  # nothing is cut
+    assert "..." not in re.sub(r"(ARGS\]|TRACKS\]|MODELS\}?|logs[\]}]?)\.\.\.", "", outcome.out)  # nothing is cut
     assert racecraft(*verb.split(), "-h").out == outcome.out
 
 
@@ -512,6 +514,39 @@ def test_evaluate_as_json_names_files_that_can_be_read(racecraft: Run, trained: 
     assert files["video"].read_bytes()[4:8] == b"ftyp"
     assert document["files"]["video"].endswith("mp4/camera-pip/0-video.mp4")
     json.loads(files["summary"].read_text())
+
+
+def test_race_verify_and_ladder(racecraft: Run, trained: Path, tmp_path: Path) -> None:
+    short = ("--track", "oval", "--time-limit", "4", "--no-video", "--laps", "1")
+    document = racecraft("race", str(trained), f"{trained}@64", *short, "--json").document
+    assert [result["place"] for result in document["results"]] == [None, None]
+    replays = [path for name, path in document["files"].items() if name.startswith("replay")]
+    assert len(replays) == 2
+    for replay in replays:
+        assert racecraft("verify", replay, "--json").document["is_genuine"]
+    told = racecraft("verify", replays[0])
+    assert told.status == 0
+    assert "bit for bit" in told.out
+    table = racecraft("race", str(trained), "--type", "object-avoidance", "--objects", "2", *short)
+    assert table.status == 0
+    assert "crashes" in table.out
+
+    rated = racecraft("ladder", str(trained), f"{trained}@64", "-t", "oval", "--starts", "1", "--time-limit", "4")
+    assert rated.status == 0
+    assert "rating" in rated.out
+    assert racecraft("race", str(trained), "--bots", "2", *short).err.startswith("ConfigError: --bots goes with --type")
+
+    from racecraft.race import read_replay, write_replay
+
+    forged = read_replay(replays[0])
+    forged.rewards[0][5] += 1.0
+    path = write_replay(forged, tmp_path / "forged.replay")
+    refused = racecraft("verify", str(path))
+    assert refused.status == 1
+    assert "step 5" in refused.out
+    document = racecraft("verify", str(path), "--json").document
+    assert (document["is_genuine"], document["difference"]["step"]) == (False, 5)
+    assert racecraft("verify", str(tmp_path / "none.replay")).err.startswith("ReplayError")
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import typer
 from racecraft.cli import race_options
 from racecraft.cli.app import Json, app, print_json, text
 
-RACE_ONLY: Final = ("track", "laps", "rules", "offtrack_penalty", "max_resets", "video", "aws_log")
+RACE_ONLY: Final = ("track", "laps", "rules", "offtrack_penalty", "max_resets", "video", "aws_log", "ghost")
 
 
 @app.command()
@@ -54,6 +54,7 @@ def evaluate(
     max_resets: Annotated[int | None, typer.Option("--max-resets", help="Resets to a trial.")] = None,
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of the starts.")] = 0,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of the best trial.")] = True,
+    ghost: race_options.Ghosts = None,
     aws_log: Annotated[
         str, typer.Option("--aws-log", help="File for the log lines that AWS's tools read; - for stdout.")
     ] = "",
@@ -108,6 +109,7 @@ def evaluate(
         seed=seed,
         video=video,
         aws_log=aws_log or None,
+        ghosts=ghost or (),
     )
     if as_json:
         print_json(outcome.to_dict())

@@ -1,4 +1,4 @@
-"""What stands or drives on the track: the options that `train` and `evaluate` share."""
+"""What stands or drives on the track: the options that `train`, `evaluate` and `race` share."""
 
 from __future__ import annotations
 
@@ -18,6 +18,10 @@ BotSpeed = Annotated[float | None, typer.Option("--bot-speed", help="m/s of the 
 LaneChanges = Annotated[bool, typer.Option("--lane-changes", help="Bot cars change lanes every 3 to 5 s.")]
 ParkedCars = Annotated[bool, typer.Option("--parked-cars", help="Obstacles are parked cars, not boxes.")]
 Placement = Annotated[str, typer.Option("--placement", help="Of objects: random (each episode anew), even or fixed.")]
+Ghosts = Annotated[
+    list[str] | None,
+    typer.Option("--ghost", help="Ghost in the video: a replay file, RUN[@STEP], @STEP or best-lap; repeatable."),
+]
 Positions = Annotated[str, typer.Option("--positions", help="Fixed places, lap and lane of each: '0.23,-1;0.46,1'.")]
 
 
@@ -31,8 +35,9 @@ def objects_of(
     parked_cars: bool = False,
     placement: str = "",
     positions: str = "",
+    option: str = "--race",
 ) -> Objects:
-    """The objects that the options ask for.
+    """The objects that the options ask for; `option` is the one that names the race.
 
     Raises:
         ConfigError: An option does not go with the race, or has no meaning.
@@ -40,7 +45,7 @@ def objects_of(
     from racecraft.sim.objects import objects_for_race, parse_positions
 
     name = race.lower().replace("_", "-") or "time-trial"
-    for option, is_given, needed in (
+    for name_given, is_given, needed in (
         ("--objects", objects != 0, "object-avoidance"),
         ("--parked-cars", parked_cars, "object-avoidance"),
         ("--bots", bots != 0, "head-to-bot"),
@@ -48,7 +53,7 @@ def objects_of(
         ("--lane-changes", lane_changes, "head-to-bot"),
     ):
         if is_given and name != needed:
-            raise ConfigError(f"{option} goes with --race {needed}; the race is {name}.")
+            raise ConfigError(f"{name_given} goes with {option} {needed}; the race is {name}.")
     if name == "time-trial" and (placement or positions):
         raise ConfigError("--placement and --positions say where objects are; a time trial has none.")
     settings: dict[str, Any] = {}

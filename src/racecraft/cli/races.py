@@ -1,13 +1,161 @@
-"""`racecraft verify`."""
+"""`racecraft race`, `racecraft ladder` and `racecraft verify`."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from racecraft.cli.app import Json, app, print_json, text
+from racecraft.cli import race_options
+from racecraft.cli.app import Json, TrackOption, app, print_json, text
+
+Models = Annotated[list[str], typer.Argument(metavar="MODELS", help="Runs, RUN or RUN@CHECKPOINT.")]
+Kind = Annotated[
+    str,
+    typer.Option("--type", help="time-trial, object-avoidance, head-to-bot, head-to-model or grid."),
+]
+
+
+@app.command()
+def race(
+    models: Models,
+    track: TrackOption = "reinvent_2018",
+    kind: Kind = "time-trial",
+    laps: Annotated[int | None, typer.Option("--laps", "-l", help="By default the rules'.")] = None,
+    rules: Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")] = "drfc",
+    ranking: Annotated[str, typer.Option("--ranking", help="total, best or average.")] = "total",
+    minimum_laps: Annotated[
+        int | None, typer.Option("--minimum-laps", help="Laps that a model must complete to be ranked.")
+    ] = None,
+    time_limit: Annotated[float | None, typer.Option("--time-limit", help="Seconds on the clock; 0 for none.")] = None,
+    offtrack_penalty: Annotated[
+        float | None, typer.Option("--offtrack-penalty", help="Seconds; by default the rules'.")
+    ] = None,
+    collision_penalty: Annotated[
+        float | None, typer.Option("--collision-penalty", help="Seconds; by default the rules'.")
+    ] = None,
+    max_resets: Annotated[int | None, typer.Option("--max-resets", help="Resets to a race.")] = None,
+    direction: Annotated[str, typer.Option("--direction", help="forward or reverse.")] = "",
+    objects: race_options.NumObjects = 0,
+    bots: race_options.NumBots = 0,
+    bot_speed: race_options.BotSpeed = None,
+    lane_changes: race_options.LaneChanges = False,
+    parked_cars: race_options.ParkedCars = False,
+    placement: race_options.Placement = "",
+    positions: race_options.Positions = "",
+    vehicle: Annotated[
+        str, typer.Option("--vehicle", help="Everybody's: v4, v5, v6 or a file; by default the first model's.")
+    ] = "",
+    randomize: Annotated[str, typer.Option("--randomize", help="none, light, strong, aws or a JSON file.")] = "none",
+    seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts and objects.")] = 0,
+    video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of every entry.")] = True,
+    ghost: race_options.Ghosts = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of all races.")] = Path("races"),
+    as_json: Json = False,
+) -> None:
+    """Race models against each other.
+
+    Writes results, and for every entry a replay, a sim-trace and a film.
+    """
+    from racecraft.race.run_race import race_models
+
+    outcome = race_models(
+        models,
+        track=track,
+        kind=_kind(kind),
+        laps=laps,
+        rules=rules,
+        ranking=ranking,
+        minimum_laps=minimum_laps,
+        objects=_objects(
+            kind,
+            objects=objects,
+            bots=bots,
+            bot_speed=bot_speed,
+            lane_changes=lane_changes,
+            parked_cars=parked_cars,
+            placement=placement,
+            positions=positions,
+        ),
+        vehicle=vehicle or None,
+        randomize=randomize,
+        seed=seed,
+        changes={
+            "time_limit": time_limit,
+            "offtrack_penalty": offtrack_penalty,
+            "collision_penalty": collision_penalty,
+            "max_resets": max_resets,
+            "direction": direction or None,
+        },
+        video=video,
+        ghosts=ghost or (),
+        root=output,
+    )
+    if as_json:
+        print_json(outcome.to_dict())
+    else:
+        text().say_raced(outcome)
+
+
+@app.command()
+def ladder(
+    models: Models,
+    track: Annotated[
+        list[str] | None,
+        typer.Option("--track", "-t", help="Track, repeatable: a name, a file, library, generated:0..9."),
+    ] = None,
+    kind: Annotated[str, typer.Option("--type", help="time-trial, object-avoidance or head-to-bot.")] = "time-trial",
+    schedule: Annotated[str, typer.Option("--schedule", help="round-robin or swiss.")] = "round-robin",
+    starts: Annotated[int, typer.Option("--starts", help="Different starts on each track.")] = 3,
+    rounds: Annotated[int, typer.Option("--rounds", help="Of a Swiss schedule; by default one for every start.")] = 0,
+    laps: Annotated[int, typer.Option("--laps", "-l", help="To a race.")] = 1,
+    rules: Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")] = "drfc",
+    time_limit: Annotated[float, typer.Option("--time-limit", help="Seconds on the clock; 0 for none.")] = 180.0,
+    objects: race_options.NumObjects = 0,
+    bots: race_options.NumBots = 0,
+    bot_speed: race_options.BotSpeed = None,
+    lane_changes: race_options.LaneChanges = False,
+    parked_cars: race_options.ParkedCars = False,
+    placement: race_options.Placement = "",
+    positions: race_options.Positions = "",
+    vehicle: Annotated[
+        str, typer.Option("--vehicle", help="Everybody's: v4, v5, v6 or a file; by default the first model's.")
+    ] = "",
+    seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts, objects and the order of races.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Rate models by many races."""
+    from racecraft.race.run_ladder import rate_models
+
+    found = rate_models(
+        models,
+        tracks=track or ["reinvent_2018"],
+        kind=_kind(kind),
+        schedule=schedule,
+        starts=starts,
+        rounds=rounds,
+        laps=laps,
+        rules=rules,
+        changes={"time_limit": time_limit},
+        objects=_objects(
+            kind,
+            objects=objects,
+            bots=bots,
+            bot_speed=bot_speed,
+            lane_changes=lane_changes,
+            parked_cars=parked_cars,
+            placement=placement,
+            positions=positions,
+        ),
+        vehicle=vehicle or None,
+        seed=seed,
+        progress=(lambda line: None) if as_json else text().say_progress,
+    )
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        text().say_rated(found)
 
 
 @app.command()
@@ -15,7 +163,7 @@ def verify(
     replay: Annotated[Path, typer.Argument(help="Replay file, as evaluations and races write it.")],
     as_json: Json = False,
 ) -> None:
-    """Drive a replay again from its stored actions and say whether every bit is the same."""
+    """Drive a replay again and compare every bit."""
     from racecraft.race import read_replay
     from racecraft.race import verify as drive_again
 
@@ -26,3 +174,18 @@ def verify(
         text().say_verified(found)
     if not found.is_genuine:
         raise typer.Exit(1)
+
+
+def _kind(kind: str) -> str:
+    """AWS's spelling is understood, too."""
+    return kind.lower().replace("_", "-")
+
+
+def _objects(kind: str, **options: Any) -> Any:
+    """Those of the race's type; on a road that models share there are none unless boxes or bots are asked for."""
+    from racecraft.race.contest import TOGETHER
+
+    name = _kind(kind)
+    if name in TOGETHER:
+        name = "object-avoidance" if options["objects"] else "head-to-bot" if options["bots"] else "time-trial"
+    return race_options.objects_of(name, option="--type", **options)

@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from racecraft.importing import ImportedRun
     from racecraft.limits import TrackLimit
     from racecraft.race import Verification
+    from racecraft.race.ladder import Ladder
     from racecraft.race.run_evaluation import RunEvaluation
     from racecraft.race.run_generalization import RunGeneralization
+    from racecraft.race.run_race import RunRace
     from racecraft.replay import Calibration, Comparison, FrameFit
     from racecraft.reward import Outcome, Problem
     from racecraft.track import Track
@@ -107,7 +109,9 @@ def say_evaluated(outcome: RunEvaluation) -> None:
     """Every trial, the summary, and what was written."""
     console, evaluation = Console(), outcome.evaluation
     table = _table(title=f"{outcome.run.name} on {evaluation.track.name}")
-    for heading in ("trial", "laps", "best lap", "total", "off track", "resets", "penalty", "driven"):
+    has_objects = evaluation.conditions.objects.count > 0
+    crashes = ("crashes",) if has_objects else ()
+    for heading in ("trial", "laps", "best lap", "total", "off track", *crashes, "resets", "penalty", "driven"):
         table.add_column(heading, justify="right", no_wrap=True)
     for trial in evaluation.trials:
         table.add_row(
@@ -116,6 +120,7 @@ def say_evaluated(outcome: RunEvaluation) -> None:
             f"{min(trial.lap_times):.2f} s" if trial.lap_times else "–",
             f"{trial.time:.2f} s",
             str(sum(lap.off_track_count for lap in trial.laps)),
+            *([str(sum(lap.crash_count for lap in trial.laps))] if has_objects else []),
             str(sum(lap.resets for lap in trial.laps)),
             f"{sum(lap.penalty_seconds for lap in trial.laps):.1f} s",
             f"{100 * trial.completion:.0f} %",
@@ -128,6 +133,64 @@ def say_evaluated(outcome: RunEvaluation) -> None:
         _say(console, placing.sentence)
     for what, path in outcome.files.items():
         _say(console, f"  {what:<12} ", (str(path), "bold"))
+
+
+def say_raced(outcome: RunRace) -> None:
+    """The result of a race, the winner first, and what was written."""
+    console, contest = Console(), outcome.contest
+    conditions = contest.conditions
+    laps = f"{conditions.rules.laps} lap" + "s" * (conditions.rules.laps > 1)
+    table = _table(title=f"{contest.kind} on {conditions.track.name}, {laps}")
+    table.add_column("", justify="right", no_wrap=True)
+    table.add_column("model", style="bold", overflow="ellipsis", no_wrap=True, max_width=max(8, console.width - 68))
+    is_crowded = conditions.objects.count > 0 or contest.shares_road
+    crashes = ("crashes",) if is_crowded else ()
+    for heading in ("laps", "best lap", "total", "gap", "off track", *crashes, "resets"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for standing in contest.standings:
+        score = "–" if standing.score is None else f"{standing.total:.2f} s"
+        gap = "–" if standing.gap is None else f"+{standing.gap:.2f}" if standing.gap else ""
+        table.add_row(
+            "–" if standing.place is None else str(standing.place),
+            contest.names[standing.car],
+            f"{standing.laps} of {conditions.rules.laps}",
+            "–" if standing.best is None else f"{standing.best:.2f} s",
+            score,
+            gap,
+            str(standing.off_track_count),
+            *([str(standing.crash_count)] if is_crowded else []),
+            str(standing.resets),
+        )
+    console.print(table)
+    if contest.ranking != "total" or contest.minimum_laps < conditions.rules.laps:
+        what = {"total": "total time", "best": "best lap", "average": "best average"}[contest.ranking]
+        _say(console, f"Ranked by {what}; {contest.minimum_laps} laps needed.")
+    _say(console, "Race folder: ", (str(outcome.folder), "bold"))
+    for what, path in outcome.files.items():
+        if what.startswith(("video", "replay")):
+            _say(console, f"  {what}  ", (str(path), "bold"))
+
+
+def say_rated(found: Ladder) -> None:
+    """The ladder, the strongest model first, with the uncertainty of every rating."""
+    console, count = Console(), len(found.matches)
+    table = _table(title=f"{found.kind}, {count:,} races on {', '.join(dict.fromkeys(found.tracks))}")
+    table.add_column("", justify="right", no_wrap=True)
+    table.add_column("model", style="bold", overflow="ellipsis", no_wrap=True)
+    for heading in ("rating", "95 %", "won", "drawn", "lost"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for row in found.rows:
+        table.add_row(
+            str(row.place),
+            row.name,
+            f"{row.rating.mean:.1f}",
+            f"± {1.96 * row.rating.deviation:.1f}",
+            str(row.wins),
+            str(row.draws),
+            str(row.losses),
+        )
+    console.print(table)
+    _say(console, (f"Schedule {found.schedule}, seed {found.seed}: the same command gives the same table.", "dim"))
 
 
 def say_verified(found: Verification) -> None:

@@ -1,4 +1,4 @@
-"""What is written over a race video: who, where, lap and times, speed, steering, progress, mistakes, a map.
+"""What is written over a race video: who, where, lap and times, speed, steering, progress, mistakes, ghosts, a map.
 
 name                                  LAP     TIME
 track                                 2/3    12.47      what never changes lies in one layer that is blended
@@ -13,18 +13,24 @@ track                                 2/3    12.47      what never changes lies 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.race.ghost import Ghost
 from racecraft.race.lettering import Lettering, Mask, blend, disc_mask, pill_mask
 from racecraft.race.racing_line import SPEED_COLORS, speed_color
 from racecraft.race.recording import Recording
 from racecraft.race.rules import RESET_STATUSES
 from racecraft.sim.simulation import CONTROL_DT, MAX_STEERING
+from racecraft.sim.views import CarView
 from racecraft.track.canvas import Color
 from racecraft.track.picture import describe
+
+Place = tuple[int, int]
+"""Pixel of a frame, x and y."""
 
 WIDTH, HEIGHT = 640, 480
 """Pixels of a frame."""
@@ -44,6 +50,7 @@ MARGIN = 16
 MAP: Final = (12, 350, 120, 116)  # x, y, width, height
 SPEED_X, STEERING_X, GAUGE_WIDTH, GAUGE_Y = 150, 300, 128, 462
 PROGRESS_HEIGHT = 5
+GHOSTS_Y, GHOST_LINE, SHOWN_GHOSTS = 84, 18, 8  # pixels of the first name and from one to the next, names
 MAX_SPEED = 4.0  # m/s, the end of the gauge
 
 LABELS: Final = {
@@ -67,9 +74,10 @@ class Overlay:
         recording: What is shown.
         name: The racer's.
         laps: Laps that the race has; 0 if that is not known.
+        ghosts: Named beside their colour, and shown on the map.
     """
 
-    def __init__(self, recording: Recording, *, name: str, laps: int = 0) -> None:
+    def __init__(self, recording: Recording, *, name: str, laps: int = 0, ghosts: Sequence[Ghost] = ()) -> None:
         self._recording = recording
         self._laps = laps
         numbers = recording.lap_numbers
@@ -82,8 +90,15 @@ class Overlay:
         self._steering = recording.column("actual_steering_angle").tolist()
         self._progress = recording.column("progress").clip(0.0, 1.0).tolist()
         self._mistake, self._remaining = _penalties(recording)
-        self._map, self._places = _map(recording)
+        self._ghosts = ghosts
+        self._map, self._pixels = _map(recording)
+        self._places = self._pixels(recording.origins)
         self._static = _Layer(self._drawn_once(name))
+
+    def ghosts_at(self, step: int) -> list[CarView | None]:
+        """Where every ghost is when the car is in a step; None for one that is no longer there."""
+        race, lap = float(self._recording.clock[step]), self._lap_time[step]
+        return [ghost.at(lap if ghost.is_lap else race) for ghost in self._ghosts]
 
     def draw(self, frame: NDArray[np.uint8], step: int, *, is_over: bool = False) -> None:
         """Draw over the frame of a step.
@@ -96,6 +111,7 @@ class Overlay:
         self._static.blend(frame)
         self._draw_laps(frame, step)
         self._draw_gauges(frame, step)
+        self._draw_ghosts(frame, step)
         disc = disc_mask(5.0)
         x, y = self._places[step]
         blend(frame, x - disc.shape[1] // 2, y - disc.shape[0] // 2, disc, DARK)
@@ -108,6 +124,21 @@ class Overlay:
             _draw_pill(frame, LABELS.get(status, "STOPPED"), figure, FINISHED if is_finished else ALARM)
         elif self._mistake[step]:
             _draw_pill(frame, LABELS[self._mistake[step]], f"{self._remaining[step]:.1f} s", ALARM)
+
+    def _draw_ghosts(self, frame: NDArray[np.uint8], step: int) -> None:
+        views = self.ghosts_at(step)
+        disc = disc_mask(3.2)
+        for ghost, view in zip(self._ghosts, views, strict=True):
+            if view is not None:
+                ((x, y),) = self._pixels(np.array([[view.x, view.y]]))
+                blend(frame, x - disc.shape[1] // 2, y - disc.shape[0] // 2, disc, ghost.color)
+        disc = disc_mask(4.5)
+        for line, (ghost, view) in enumerate(list(zip(self._ghosts, views, strict=True))[:SHOWN_GHOSTS]):
+            y = GHOSTS_Y + line * GHOST_LINE
+            blend(frame, MARGIN, y - disc.shape[0] + 1, disc, ghost.color)
+            words, color = _fitted(ghost.name, _SMALL, 240), WHITE if view is not None else SOFT
+            _SMALL.draw(frame, MARGIN + 17, y + 1, words, DARK)
+            _SMALL.draw(frame, MARGIN + 16, y, words, color)
 
     def _draw_laps(self, frame: NDArray[np.uint8], step: int) -> None:
         right = WIDTH - MARGIN
@@ -238,8 +269,8 @@ def _penalties(recording: Recording) -> tuple[list[str], list[float]]:
     return mistakes, remaining
 
 
-def _map(recording: Recording) -> tuple[list[tuple[Mask, Color]], list[tuple[int, int]]]:
-    """Layers of the small map, and the pixel of every step on the frame."""
+def _map(recording: Recording) -> tuple[list[tuple[Mask, Color]], Callable[[NDArray[np.float64]], list[Place]]]:
+    """Layers of the small map, and what says where on the frame points in metres are (T, 2)."""
     from PIL import Image, ImageDraw
 
     x, y, width, height = MAP
@@ -262,8 +293,11 @@ def _map(recording: Recording) -> tuple[list[tuple[Mask, Color]], list[tuple[int
         draw.line(points, fill=255, width=round(thickness * fine), joint="curve")
         mask = np.asarray(image.reduce(fine), dtype=np.uint16)[..., None]
         layers.append((mask + (mask >> 7), color))
-    places = (pixels(recording.origins) + np.array([x, y])).round().astype(int)
-    return layers, [(px, py) for px, py in places.tolist()]
+
+    def places(points: NDArray[np.float64]) -> list[Place]:
+        return [(px, py) for px, py in (pixels(points) + np.array([x, y])).round().astype(int).tolist()]
+
+    return layers, places
 
 
 def _fitted(words: str, lettering: Lettering, room: int) -> str:

@@ -89,6 +89,11 @@ class Recording:
                 times[number] = float(self.clock[steps[-1]] - self.clock[steps[0]]) + CONTROL_DT
         return times
 
+    def until(self, seconds: float) -> Recording:
+        """The steps up to a time on the clock."""
+        steps = self.clock <= seconds
+        return Recording(self.track, self.rows[steps], self.clock[steps], self.actions[steps])
+
     def lap(self, number: int) -> Recording:
         """The steps of one lap, numbered from 1."""
         steps = self.lap_numbers == number

@@ -10,6 +10,7 @@ mp4/camera-pip/<n>-video.mp4                             the best trial, filmed
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
@@ -22,6 +23,8 @@ from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.limits import TrackLimit, known_limit
 from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.evaluation import evaluate
+from racecraft.race.ghost import Ghost
+from racecraft.race.ghost_source import check_sources, load_ghosts
 from racecraft.race.placement import driven_track
 from racecraft.race.policy import load_policy
 from racecraft.race.race_replay import Replay, write_replay
@@ -111,6 +114,7 @@ def evaluate_run(
     seed: int = 0,
     video: bool = True,
     aws_log: str | Path | None = None,
+    ghosts: Sequence[str] = (),
     num_threads: int = 0,
 ) -> RunEvaluation:
     """Race a run's policy against the clock.
@@ -133,6 +137,8 @@ def evaluate_run(
         seed: Of the starts.
         video: Whether to film the best trial.
         aws_log: File for the log lines that AWS's tools read, ``-`` for stdout.
+        ghosts: Translucent cars in the film: replay files, ``RUN``, ``RUN@CHECKPOINT``, ``@CHECKPOINT`` of this run,
+            ``best-lap``.
         num_threads: 0 takes one per core.
 
     Raises:
@@ -151,13 +157,14 @@ def evaluate_run(
         "collision_penalty": collision_penalty,
         "max_resets": max_resets,
     }
-    rules = _rules(rules or "drfc", {name: value for name, value in changes.items() if value is not None})
+    rules = rules_by_name(rules or "drfc", {name: value for name, value in changes.items() if value is not None})
     if not isinstance(vehicle, Vehicle):
         vehicle = load_vehicle(vehicle) if vehicle else trained_vehicle(info)
     if not isinstance(randomize, Randomization):
         randomize = load_randomization(randomize)
     where = track if isinstance(track, Track) else load_track(track) if track else _trained_track(info)
 
+    check_sources(ghosts, run=folder.path)
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=num_threads)
     evaluation = evaluate(
         policy,
@@ -170,15 +177,24 @@ def evaluate_run(
         objects=_trained_objects(info) if objects is None else objects,
         num_threads=num_threads,
     )
+    recordings = [trial.recording for trial in evaluation.trials]
+    shown = (
+        load_ghosts(ghosts, evaluation.conditions, run=folder.path, recordings=recordings) if video and ghosts else []
+    )
     try:
-        files = _write(folder, evaluation, policy.action_space, is_filmed=video, aws_log=aws_log)
+        files = _write(folder, evaluation, policy.action_space, is_filmed=video, aws_log=aws_log, ghosts=shown)
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
     limit = known_limit(driven_track(where, rules), vehicle)
     return RunEvaluation(run=folder.path, step=step, evaluation=evaluation, files=files, limit=limit)
 
 
-def _rules(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
+def rules_by_name(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
+    """A rule set, with single rules changed.
+
+    Raises:
+        ConfigError: There are no such rules, or a value is outside its range.
+    """
     if isinstance(rules, str):
         if rules not in RULE_SETS:
             raise ConfigError(
@@ -225,6 +241,7 @@ def _write(
     *,
     is_filmed: bool,
     aws_log: str | Path | None,
+    ghosts: Sequence[Ghost] = (),
 ) -> dict[str, Path]:
     stamp, inside = new_folder(folder)
     metrics = folder.evaluation_metrics(stamp)
@@ -253,7 +270,7 @@ def _write(
         videos.mkdir(parents=True, exist_ok=True)
         number = next(n for n in range(10**6) if not (videos / f"{n}-video.mp4").exists())
         path = videos / f"{number}-video.mp4"
-        files["video"] = film(best.recording, path, laps=evaluation.rules.laps, name=folder.name)
+        files["video"] = film(best.recording, path, laps=evaluation.rules.laps, name=folder.name, ghosts=ghosts)
     video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
     write_json(inside / "evaluation.json", {**evaluation.summary(), "video": video})
     return files

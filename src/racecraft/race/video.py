@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, RunError
+from racecraft.race.ghost import LIVERY, Ghost
 from racecraft.race.overlay import HEIGHT, INSET, WIDTH, Overlay
 from racecraft.race.recording import Recording
 from racecraft.race.rules import RESET_STATUSES
@@ -42,8 +43,9 @@ def film(
     *,
     name: str = "",
     laps: int = 0,
-    color: Color = (214, 60, 44),
+    color: Color = LIVERY[0],
     palette: str = "2018",
+    ghosts: Sequence[Ghost] = (),
 ) -> Path:
     """Write the video of a trial.
 
@@ -54,6 +56,7 @@ def film(
         laps: Laps that the race has; 0 if that is not known.
         color: Of the car.
         palette: Colours of the world: ``2018`` or ``2020``.
+        ghosts: Translucent cars that drove at another time; the driver does not see them.
 
     Raises:
         ConfigError: Nothing was recorded, the palette is unknown, or the path does not end in .mp4.
@@ -69,7 +72,7 @@ def film(
         with av.open(str(unfinished), "w", options={"movflags": "faststart"}) as container:
             stream = container.add_stream("h264", rate=FRAME_RATE, options={"preset": "veryfast", "crf": QUALITY})
             stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
-            for pixels in frames(recording, name=name, laps=laps, color=color, palette=palette):
+            for pixels in frames(recording, name=name, laps=laps, color=color, palette=palette, ghosts=ghosts):
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
             container.mux(stream.encode())
         os.replace(unfinished, path)
@@ -81,7 +84,13 @@ def film(
 
 
 def frames(
-    recording: Recording, *, name: str = "", laps: int = 0, color: Color = (214, 60, 44), palette: str = "2018"
+    recording: Recording,
+    *,
+    name: str = "",
+    laps: int = 0,
+    color: Color = LIVERY[0],
+    palette: str = "2018",
+    ghosts: Sequence[Ghost] = (),
 ) -> Iterator[NDArray[np.uint8]]:
     """The frames of `film`, RGB (480, 640, 3), each in the same array: copy what must last.
 
@@ -94,7 +103,7 @@ def frames(
     scene = Scene(recording.track, palette=palette)
     chase = scene.chase_view(width=WIDTH, height=HEIGHT)
     driver = scene.driver_view(CameraSpec(width=width, height=height))
-    overlay = Overlay(recording, name=name, laps=laps)
+    overlay = Overlay(recording, name=name, laps=laps, ghosts=ghosts)
     places, headings = recording.origins, recording.column("heading")
     steering = recording.column("actual_steering_angle")
     directions, alphas = follow(recording), blink(recording)
@@ -105,7 +114,8 @@ def frames(
         (x, y), heading = places[step].tolist(), float(headings[step])
         car = CarView(x, y, heading, float(steering[step]), color, float(alphas[step]))
         objects = recording.objects(step)
-        chase.draw(x, y, float(directions[step]), cars=[car, *objects], out=frame)
+        around = [view for view in overlay.ghosts_at(step) if view is not None]
+        chase.draw(x, y, float(directions[step]), cars=[car, *objects, *around], out=frame)
         frame[top : top + height, left : left + width] = driver.draw(x, y, heading, cars=objects, out=inset)
         if step == len(recording) - 1:
             break

@@ -1,0 +1,171 @@
+"""`hold_race`: several models race, each alone against the clock or all on one road, and are placed.
+
+time-trial, object-avoidance, head-to-bot   a road for each, equal to the others' to the last bit
+head-to-model (2), grid (2 to 8)            one road, a staggered grid, cars that see and hit each other
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from racecraft.errors import ConfigError, did_you_mean
+from racecraft.race.classification import Standing, classify
+from racecraft.race.conditions import Conditions
+from racecraft.race.entry import Entry
+from racecraft.race.evaluation import evaluate
+from racecraft.race.race_replay import Replay
+from racecraft.race.results import Trial
+from racecraft.race.standings import RANKINGS
+
+ALONE: Final = ("time-trial", "object-avoidance", "head-to-bot")
+TOGETHER: Final = ("head-to-model", "grid")
+RACE_KINDS: Final = ALONE + TOGETHER
+"""What `racecraft race` can hold."""
+MAX_ENTRIES: Final = 1000
+MAX_GRID: Final = 8
+"""Cars on one road."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contest:
+    """A race that was held."""
+
+    kind: str
+    """Of `RACE_KINDS`."""
+    conditions: Conditions
+    """The same for everybody."""
+    names: tuple[str, ...]
+    """Of the entries."""
+    trials: tuple[Trial, ...]
+    """What each of them did."""
+    ranking: str
+    """``total``, ``best`` or ``average``."""
+    minimum_laps: int
+    """Completed laps that an entry must have to be ranked."""
+
+    @property
+    def shares_road(self) -> bool:
+        """Whether all cars were on one road."""
+        return self.kind in TOGETHER
+
+    @property
+    def standings(self) -> list[Standing]:
+        """The result, the winner first."""
+        return classify(
+            self.trials,
+            ranking=self.ranking,
+            minimum_laps=self.minimum_laps,
+            ranks_all=self.shares_road,
+        )
+
+    def replays(self) -> list[tuple[str, Replay]]:
+        """Replays by what to call them: one for each entry, or one of all where they shared a road."""
+        title = f"{self.kind} on {self.conditions.track.name}"
+        if self.shares_road:
+            return [("race", self._replay(title, range(len(self.names))))]
+        return [(name, self._replay(title, [index])) for index, name in enumerate(self.names)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        conditions = self.conditions
+        return {
+            "type": self.kind,
+            "track": conditions.track.name,
+            "seed": conditions.seed,
+            "rules": conditions.rules.to_dict(),
+            "objects": conditions.objects.to_dict(),
+            "ranking": self.ranking,
+            "minimum_laps": self.minimum_laps,
+            "results": [
+                {
+                    "name": self.names[standing.car],
+                    **{name: value for name, value in standing.to_dict().items() if name != "car"},
+                    "lap_seconds": list(self.trials[standing.car].lap_times),
+                }
+                for standing in self.standings
+            ],
+        }
+
+    def _replay(self, title: str, cars: Sequence[int]) -> Replay:
+        trials = tuple(self.trials[car] for car in cars)
+        return Replay(
+            title=title,
+            conditions=self.conditions,
+            names=tuple(self.names[car] for car in cars),
+            cars=trials,
+            rewards=tuple(trial.recording.rewards for trial in trials),
+        )
+
+
+def hold_race(
+    entries: Sequence[Entry],
+    conditions: Conditions,
+    *,
+    kind: str = "time-trial",
+    ranking: str = "total",
+    minimum_laps: int | None = None,
+    num_threads: int = 0,
+) -> Contest:
+    """Race.
+
+    Args:
+        entries: Models at the start, in the order of the grid.
+        conditions: Track, rules, vehicle, objects, seed; everybody has the very same.
+        kind: Of `RACE_KINDS`.
+        ranking: ``total`` time, ``best`` lap or ``average`` of the best `minimum_laps` laps in a row.
+        minimum_laps: Completed laps that an entry must have to be ranked; by default all for ``total``, three for
+            ``average``, one for ``best``.
+        num_threads: 0 takes one per core.
+
+    Raises:
+        ConfigError: No such race or ranking, or the number of entries does not go with it.
+    """
+    check_kind(kind, len(entries))
+    laps = conditions.rules.laps
+    needed = {"total": laps, "average": min(3, laps)}.get(ranking, 1) if minimum_laps is None else minimum_laps
+    if ranking not in RANKINGS:
+        hint = did_you_mean(ranking, RANKINGS)
+        raise ConfigError(f"ranking is {ranking!r}; allowed are {', '.join(RANKINGS)}.", hint=hint)
+    if not 1 <= needed <= laps:
+        raise ConfigError(f"minimum_laps is {needed}; allowed is 1 to {laps}, the laps of the race.")
+    trials = tuple(_alone(entry, conditions, num_threads=num_threads) for entry in entries)
+    return Contest(
+        kind=kind,
+        conditions=conditions,
+        names=tuple(entry.name for entry in entries),
+        trials=trials,
+        ranking=ranking,
+        minimum_laps=needed,
+    )
+
+
+def check_kind(kind: str, num_entries: int) -> None:
+    """Refuse a race that there is not, or with too few or too many cars.
+
+    Raises:
+        ConfigError: Says what is allowed.
+    """
+    if kind not in RACE_KINDS:
+        hint = did_you_mean(kind, RACE_KINDS)
+        raise ConfigError(f"Race type is {kind!r}; allowed are {', '.join(RACE_KINDS)}.", hint=hint)
+    low, high = {"head-to-model": (2, 2), "grid": (2, MAX_GRID)}.get(kind, (1, MAX_ENTRIES))
+    if not low <= num_entries <= high:
+        allowed = str(low) if low == high else f"{low} to {high}"
+        raise ConfigError(f"A {kind} race has {num_entries} models; allowed are {allowed}.")
+
+
+def _alone(entry: Entry, conditions: Conditions, *, num_threads: int) -> Trial:
+    """One entry's race against the clock."""
+    return evaluate(
+        entry.policy,
+        conditions.track,
+        rules=conditions.rules,
+        num_trials=1,
+        seed=conditions.seed,
+        vehicle=conditions.vehicle,
+        objects=conditions.objects,
+        randomize=conditions.randomize,
+        num_threads=num_threads,
+    ).trials[0]
