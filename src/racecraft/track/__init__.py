@@ -10,17 +10,20 @@ from racecraft.track.load import load_track
 from racecraft.track.picture import TrackPicture, describe, draw_contact_sheet, draw_track
 from racecraft.track.readers import read_centerline_csv, read_route, read_track, save_route
 from racecraft.track.selection import join_names, joint_digest, load_tracks
+from racecraft.track.sketch import Sketch, draw_road, sketch_of
 from racecraft.track.track import Track
 from racecraft.track.validate import validate
 
 __all__ = [
     "Course",
+    "Sketch",
     "Track",
     "TrackCorner",
     "TrackPicture",
     "course",
     "describe",
     "draw_contact_sheet",
+    "draw_road",
     "draw_track",
     "find_corners",
     "generate_track",
@@ -32,6 +35,7 @@ __all__ = [
     "read_route",
     "read_track",
     "save_route",
+    "sketch_of",
     "track_names",
     "validate",
 ]
