@@ -16,9 +16,11 @@ from racecraft.serve import problems
 from racecraft.serve.context import Context
 from racecraft.serve.courses import Courses
 from racecraft.serve.database import Database
+from racecraft.serve.drives import Drives
 from racecraft.serve.garage import Garage
+from racecraft.serve.ghosts import Ghosts
 from racecraft.serve.jobs import JobQueue
-from racecraft.serve.routes import console, evaluations, events, jobs, models, rewards, tracks
+from racecraft.serve.routes import console, drives, evaluations, events, jobs, models, rewards, tracks
 from racecraft.serve.schemas import ProblemReply
 from racecraft.serve.security import Guard, content_policy
 from racecraft.serve.settings import ServeSettings, version
@@ -44,13 +46,16 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     database = Database(settings.database_url)
     database.migrate()
     queue = JobQueue(database)
+    garage, courses = Garage(settings.runs, settings.state, database), Courses(settings.tracks)
     context = Context(
         settings=settings,
         database=database,
         queue=queue,
-        garage=Garage(settings.runs, settings.state, database),
-        courses=Courses(settings.tracks),
+        garage=garage,
+        courses=courses,
         supervisor=Supervisor(settings, database, queue),
+        drives=Drives(),
+        ghosts=Ghosts(settings.runs, database),
     )
 
     @asynccontextmanager
@@ -77,7 +82,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.state.guard = guard = Guard(database, hosts)
     app.add_middleware(guard.middleware)
     problems.install(app)
-    for part in (console, tracks, rewards, models, evaluations, jobs, events):
+    for part in (console, tracks, drives, rewards, models, evaluations, jobs, events):
         app.include_router(part.router)
 
     @app.get("/assets/{name}", include_in_schema=False)

@@ -9,7 +9,9 @@ from fastapi import Depends, Request
 
 from racecraft.serve.courses import Courses
 from racecraft.serve.database import Database
+from racecraft.serve.drives import Drives
 from racecraft.serve.garage import Garage
+from racecraft.serve.ghosts import Ghosts
 from racecraft.serve.jobs import JobQueue
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.supervisor import Supervisor
@@ -25,6 +27,8 @@ class Context:
     garage: Garage
     courses: Courses
     supervisor: Supervisor
+    drives: Drives
+    ghosts: Ghosts
 
 
 def _context(request: Request) -> Context:
@@ -32,5 +36,13 @@ def _context(request: Request) -> Context:
     return context
 
 
+def _user(request: Request) -> int:
+    user: int = request.state.user_id
+    return user
+
+
 InContext = Annotated[Context, Depends(_context)]
 """A route's parameter of this type is given the console's parts."""
+
+InUser = Annotated[int, Depends(_user)]
+"""A route's parameter of this type is given the id of who asks."""

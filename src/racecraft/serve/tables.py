@@ -8,7 +8,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Any, ClassVar
 
-from sqlalchemy import JSON, DateTime, ForeignKey, Index, String, UniqueConstraint
+from sqlalchemy import JSON, BigInteger, DateTime, ForeignKey, Index, String, UniqueConstraint
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
@@ -32,7 +32,12 @@ class UtcTime(TypeDecorator[datetime]):
 class Table(DeclarativeBase):
     """Base of all tables."""
 
-    type_annotation_map: ClassVar[dict[Any, Any]] = {datetime: UtcTime(), dict[str, Any]: JSON, list[str]: JSON}
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        datetime: UtcTime(),
+        dict[str, Any]: JSON,
+        list[str]: JSON,
+        list[list[int]]: JSON,
+    }
 
 
 class User(Table):
@@ -98,16 +103,28 @@ class Race(Table):
     id: Mapped[int] = mapped_column(primary_key=True)
     owner_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
     title: Mapped[str] = mapped_column(String(100))
+    description: Mapped[str] = mapped_column(String(500), default="")
+    visibility: Mapped[str] = mapped_column(String(16), default="private")
+    """Who sees it once there are accounts: ``private``, ``unlisted`` or ``public``."""
+    kind: Mapped[str] = mapped_column(String(24), default="time-trial")
     track: Mapped[str] = mapped_column(String(200))
     rules: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    """As `racecraft.race.RaceRules.to_dict` gives them."""
+    objects: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    """As `racecraft.sim.Objects.to_dict` gives them."""
+    vehicle: Mapped[str] = mapped_column(String(16), default="")
+    """The same for all, or empty for the one that each model was trained with."""
+    seed: Mapped[int] = mapped_column(BigInteger, default=0)
     ranking: Mapped[str] = mapped_column(String(16))
+    minimum_laps: Mapped[int] = mapped_column(default=1)
     opens: Mapped[datetime] = mapped_column(default=now)
     closes: Mapped[datetime | None]
     created: Mapped[datetime] = mapped_column(default=now)
+    deleted: Mapped[datetime | None]
 
 
 class Entry(Table):
-    """A model's attempt at a race."""
+    """A model's attempt at a race; its job says how it went."""
 
     __tablename__ = "entries"
     __table_args__ = (UniqueConstraint("race_id", "job_id"),)
@@ -118,3 +135,22 @@ class Entry(Table):
     run: Mapped[str] = mapped_column(String(64))
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"))
     created: Mapped[datetime] = mapped_column(default=now)
+    withdrawn: Mapped[datetime | None]
+
+
+class DrivenRecord(Table):
+    """Somebody's fastest lap by hand on a track, which is known by its geometry's digest."""
+
+    __tablename__ = "driven_records"
+    __table_args__ = (UniqueConstraint("user_id", "digest", "vehicle", "direction"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    digest: Mapped[str] = mapped_column(String(64))
+    vehicle: Mapped[str] = mapped_column(String(16))
+    direction: Mapped[str] = mapped_column(String(16))
+    track: Mapped[str] = mapped_column(String(200))
+    seconds: Mapped[float]
+    trace: Mapped[list[list[int]]]
+    """x, y, heading of every step, in whole mm and mrad."""
+    driven: Mapped[datetime] = mapped_column(default=now)

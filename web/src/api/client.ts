@@ -28,14 +28,16 @@ export class Problem extends Error {
   }
 }
 
-async function ask<T>(method: string, path: string, body?: unknown): Promise<T> {
+export const ask = <T>(method: string, path: string, body?: unknown): Promise<T> =>
+  body === undefined ? send(method, path, null, undefined) : send(method, path, JSON.stringify(body), "application/json");
+
+/** The same with a file as it is. */
+export const askBytes = <T>(method: string, path: string, body: Blob): Promise<T> => send(method, path, body, "application/octet-stream");
+
+async function send<T>(method: string, path: string, body: BodyInit | null, kind: string | undefined): Promise<T> {
   let reply: Response;
   try {
-    reply = await fetch(`/api${path}`, {
-      method,
-      headers: body === undefined ? {} : { "content-type": "application/json" },
-      body: body === undefined ? null : JSON.stringify(body),
-    });
+    reply = await fetch(`/api${path}`, { method, headers: kind === undefined ? {} : { "content-type": kind }, body });
   } catch {
     throw new Problem("Offline", "The console does not answer.", "Is racecraft serve still running?", null, null);
   }

@@ -7,6 +7,8 @@ export interface Look {
   is_discrete: boolean;
   frame: string;
   frame_shape: [number, number];
+  focus?: number; // the car to follow; else the one that is furthest
+  tints?: number[]; // colour of each car; else by how far it is
 }
 
 export interface Pose {

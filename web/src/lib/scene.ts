@@ -5,7 +5,7 @@ import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import type { TrackGeometry } from "../api/client";
 import { between, type Look } from "./poses";
 
-export type View = "orbit" | "follow" | "top";
+export type View = "orbit" | "follow" | "top" | "chase";
 
 const LINE = 0.0762; // m, width of the white lines
 const MAX_CARS = 256;
@@ -211,10 +211,18 @@ export class Scene {
       if (pose.progress > poses[leader]!.progress) leader = car;
       this.matrix.makeRotationZ(pose.heading).setPosition(pose.x, pose.y, 2 * RISE);
       this.cars.setMatrixAt(car, this.matrix);
-      this.cars.setColorAt(car, colour.setHSL(0.58 - 0.5 * Math.min(Math.max(pose.progress, 0), 1), 0.75, 0.55));
+      const tint = this.now?.tints?.[car];
+      this.cars.setColorAt(car, tint !== undefined ? colour.setHex(tint) : colour.setHSL(0.58 - 0.5 * Math.min(Math.max(pose.progress, 0), 1), 0.75, 0.55));
     });
+    leader = this.now?.focus ?? leader;
     this.cars.instanceMatrix.needsUpdate = true;
     if (this.cars.instanceColor) this.cars.instanceColor.needsUpdate = true;
+    if (this.view === "chase" && poses[leader]) {
+      const { x, y, heading } = poses[leader]!;
+      const wanted = new three.Vector3(x - 0.85 * Math.cos(heading), y - 0.85 * Math.sin(heading), 0.42);
+      this.camera.position.lerp(wanted, this.isCalm || this.camera.position.distanceTo(wanted) > 4 ? 1 : 0.3);
+      this.camera.lookAt(x + 1.3 * Math.cos(heading), y + 1.3 * Math.sin(heading), 0.05);
+    }
     if (this.view === "follow" && poses[leader]) {
       const { x, y, heading } = poses[leader]!;
       const wanted = new three.Vector3(x - 1.5 * Math.cos(heading), y - 1.5 * Math.sin(heading), 0.85);

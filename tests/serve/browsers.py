@@ -1,0 +1,83 @@
+"""A real headless Chromium, signed in to a running console, that notes every complaint of a page."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from running_consoles import PATIENCE, RunningConsole
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+ROOT = Path(__file__).parents[2]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
+SOFTWARE_3D = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+
+needs_pages = pytest.mark.skipif(
+    not (ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html").exists(),
+    reason="the pages are not built: make console builds them",
+)
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
+needs_axe = pytest.mark.skipif(not AXE.exists(), reason="web/node_modules is not installed")
+
+
+@dataclass
+class Visit:
+    """A tab."""
+
+    console: RunningConsole
+    page: Page
+    complaints: list[str] = field(default_factory=list)
+
+    def open(self, path: str, *, width: int = 1440, height: int = 900) -> Page:
+        self.page.set_viewport_size({"width": width, "height": height})
+        self.page.goto(f"{self.console.client.base_url}{path}")
+        self.page.locator("h1").wait_for()
+        return self.page
+
+    def look(self, theme: str, language: str = "en") -> None:
+        """From the next page on."""
+        self.page.goto(f"{self.console.client.base_url}/settings")
+        self.page.evaluate(
+            "([theme, language]) => { localStorage.setItem('racecraft-theme', theme);"
+            " localStorage.setItem('racecraft-language', language); }",
+            [theme, language],
+        )
+
+    def violations(self) -> list[Any]:
+        """What axe finds, but for trifles."""
+        self.page.evaluate(AXE.read_text())
+        found = self.page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+        return [
+            (one["id"], [node["html"][:160] for node in one["nodes"][:3]])
+            for one in found
+            if one["impact"] in ("serious", "critical")
+        ]
+
+    def overflow(self) -> int:
+        """Pixels that the page is wider than the window."""
+        return int(self.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
+
+
+@contextmanager
+def visiting(console: RunningConsole) -> Iterator[Visit]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
+        page = browser.new_page()
+        page.set_default_timeout(1000 * PATIENCE)
+        cookie = console.client.cookies["racecraft_session"]
+        page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
+        visit = Visit(console, page)
+        page.on("console", lambda message: visit.complaints.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: visit.complaints.append(str(error)))
+        yield visit
+        browser.close()

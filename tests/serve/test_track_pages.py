@@ -1,0 +1,170 @@
+"""Finding, drawing, importing and driving tracks in real headless Chromium."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
+from running_consoles import RunningConsole
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+
+@pytest.fixture(scope="module")
+def visit(console: RunningConsole) -> Iterator[Visit]:
+    with visiting(console) as visit:
+        yield visit
+        assert visit.complaints == []
+
+
+def test_the_gallery_filters_imports_deletes_and_undoes(visit: Visit) -> None:
+    page = visit.open("/tracks")
+    page.get_by_text("18 tracks").wait_for()
+    page.get_by_role("searchbox").fill("oval")
+    page.get_by_role("heading", name="Paperclip").wait_for()
+    assert page.locator("li.card").count() < 4
+    page.get_by_role("searchbox").fill("")
+    page.get_by_role("button", name="Narrow").click()
+    page.get_by_role("button", name="Wide").click()
+    page.get_by_text("No track fits").wait_for()
+    page.get_by_role("button", name="Narrow").click()
+    page.get_by_role("button", name="Wide").click()
+
+    route = visit.console.client.get("/api/tracks/oval/route.npy").content
+    file = {"name": "Living room.npy", "mimeType": "application/octet-stream", "buffer": route}
+    page.locator("input[type=file]").set_input_files(file)
+    page.get_by_text("Living_room was imported.").wait_for()
+    page.get_by_role("heading", name="Living_room").wait_for()
+    bad = {"name": "virus.exe", "mimeType": "application/octet-stream", "buffer": b"x"}
+    page.locator("input[type=file]").set_input_files(bad)
+    page.get_by_text("is no track file").wait_for()
+
+    page.get_by_role("button", name="Your own").click()
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_text("No track fits").wait_for()
+    page.get_by_role("button", name="Undo").last.click()
+    page.get_by_role("heading", name="Living_room").wait_for()
+    visit.complaints.clear()  # the refused file is one, rightly
+
+
+def test_a_track_is_drawn_with_the_mouse_and_with_keys_tried_and_kept(visit: Visit) -> None:
+    page = visit.open("/tracks")
+    page.get_by_role("link", name="Draw a track").click()
+    page.get_by_text("It can be driven.").wait_for()
+    points = page.locator("[data-point]")
+    assert points.count() == 8
+
+    points.nth(3).focus()
+    before = str(points.nth(3).get_attribute("aria-label"))
+    page.keyboard.press("Shift+ArrowUp")
+    page.keyboard.press("ArrowLeft")
+    after = str(points.nth(3).get_attribute("aria-label"))
+    assert "3.4, 2.2" in before
+    assert "3.3, 2.7" in after
+    page.keyboard.press("Insert")
+    assert points.count() == 9
+    page.keyboard.press("Control+z")
+    page.keyboard.press("Control+z")
+    page.keyboard.press("Control+z")
+    assert points.count() == 8
+    assert points.nth(3).get_attribute("aria-label") == before
+
+    # over the other side of the road: it crosses itself, is told so, and cannot be kept
+    box, there = points.nth(4).bounding_box(), points.nth(0).bounding_box()
+    assert box is not None
+    assert there is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(there["x"], there["y"] + 90, steps=6)
+    page.mouse.up()
+    page.get_by_text("It cannot be driven yet").wait_for()
+    page.locator("circle.trouble").wait_for()
+    assert page.get_by_role("button", name="Save").is_disabled()
+    page.get_by_role("button", name="Undo").click()
+    page.get_by_text("It can be driven.").wait_for()
+
+    page.get_by_text("Points as a table").click()
+    cell = page.get_by_role("spinbutton", name="1: x")
+    cell.fill("0.5")
+    cell.press("Tab")
+    assert "0.5, -2.2" in str(points.nth(0).get_attribute("aria-label"))
+    page.get_by_role("button", name="Mirror").click()
+    page.get_by_text("It can be driven.").wait_for()
+
+    page.get_by_role("button", name="Test drive").click()
+    page.get_by_text("Press ↑ to drive off").wait_for()
+    page.get_by_role("link", name="Back to the drawing").click()
+    page.get_by_text("It can be driven.").wait_for()
+    page.get_by_label("Name of the track").fill("night-circuit")
+    page.get_by_role("button", name="Save").click()
+    page.get_by_text("night-circuit is kept").wait_for()
+    sketch = visit.console.client.get("/api/tracks/night-circuit/sketch").json()
+    assert len(sketch["points"]) == 8
+
+    page.get_by_role("searchbox").fill("night")
+    page.get_by_role("link", name="Edit", exact=True).click()
+    page.get_by_role("button", name="Save changes").wait_for()
+    page.get_by_role("button", name="Larger").click()
+    page.get_by_text("It can be driven.").wait_for()
+    page.get_by_role("button", name="Save changes").click()
+    page.get_by_text("night-circuit is kept").wait_for()
+    larger = visit.console.client.get("/api/tracks/night-circuit/sketch").json()
+    assert larger["points"] != sketch["points"]
+
+
+def test_a_lap_is_drawn_in_one_go(visit: Visit) -> None:
+    import math
+
+    page = visit.open("/draw")
+    page.get_by_text("It can be driven.").wait_for()
+    page.get_by_role("button", name="Draw in one go").click()
+    box = page.locator("svg.draw_free_mode").bounding_box()
+    assert box is not None
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    at = [(middle[0] + 260 * math.cos(a / 10), middle[1] - 150 * math.sin(a / 10)) for a in range(62)]
+    page.mouse.move(*at[0])
+    page.mouse.down()
+    for place in at:
+        page.mouse.move(*place)
+    page.mouse.up()
+    page.get_by_text("It can be driven.").wait_for()
+    assert 6 <= page.locator("[data-point]").count() <= 40
+    assert page.locator("[data-point]").count() != 8
+
+
+def test_somebody_drives(visit: Visit) -> None:
+    page = visit.open("/drive/oval")
+    page.get_by_text("Press ↑ to drive off").wait_for()
+    clock = page.locator(".clock strong")
+    assert clock.inner_text() == "0.00"
+    page.keyboard.down("ArrowUp")
+    visit.console.wait_for(lambda: float(clock.inner_text()) > 1.0)
+    visit.console.wait_for(lambda: float(page.locator(".gauge strong").inner_text()) > 0.4)
+    page.get_by_text("Off the road").wait_for()
+    page.keyboard.up("ArrowUp")
+    page.keyboard.press("p")
+    page.get_by_text("Paused").wait_for()
+    stopped = clock.inner_text()
+    page.wait_for_timeout(400)
+    assert clock.inner_text() == stopped
+    page.keyboard.press("r")
+    page.get_by_text("Press ↑ to drive off").wait_for()
+    pedal = page.get_by_role("button", name="Faster")
+    pedal.dispatch_event("pointerdown", {"pointerId": 1, "button": 0})
+
+
+@needs_axe
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_serious_and_nothing_sticks_out(visit: Visit, theme: str) -> None:
+    visit.look(theme, "de" if theme == "dark" else "en")
+    found = {}
+    for path in ("/tracks", "/draw", "/draw/generated:7", "/drive/oval"):
+        for width in (1440, 390):
+            page = visit.open(path, width=width)
+            page.wait_for_timeout(600)
+            if violations := visit.violations():
+                found[f"{path} {width}"] = violations
+            if visit.overflow() > 0:
+                found[f"{path} {width} is too wide"] = [str(visit.overflow())]
+    assert found == {}

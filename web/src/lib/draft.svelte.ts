@@ -1,0 +1,23 @@
+/** The track that is being drawn: it outlives a test drive and a reload of the page. */
+import type { Sketch } from "./sketch";
+
+const KEY = "racecraft-draft";
+
+interface Draft { sketch: Sketch; name: string; of: string }
+
+function read(): Draft | undefined {
+  try {
+    const found = JSON.parse(sessionStorage.getItem(KEY) ?? "null") as Draft | null;
+    return found && Array.isArray(found.sketch?.points) ? found : undefined;
+  } catch {
+    return undefined;
+  }
+}
+
+export const draft = { now: read() };
+
+export function keep(now: Draft | undefined): void {
+  draft.now = now;
+  if (now) sessionStorage.setItem(KEY, JSON.stringify(now));
+  else sessionStorage.removeItem(KEY);
+}
