@@ -47,7 +47,7 @@ def test_the_line_goes_through_every_point(places: list[tuple[float, float, floa
     away = [
         float(np.hypot(*(track.point_at(np.arange(0, track.length, 0.01)) - point).T).min()) for point in sketch.points
     ]
-    assert max(away) < 0.06  # waypoints are 0.15 m apart
+    assert max(away) < 0.1  # waypoints are 0.15 m apart, and a point may be a spike
     rows = np.hypot(*(track.inner - track.outer).T)
     assert rows.min() > min(sketch.widths) - 0.01
     assert rows.max() < max(sketch.widths) + 0.01
