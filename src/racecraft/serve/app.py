@@ -20,7 +20,8 @@ from racecraft.serve.drives import Drives
 from racecraft.serve.garage import Garage
 from racecraft.serve.ghosts import Ghosts
 from racecraft.serve.jobs import JobQueue
-from racecraft.serve.routes import console, drives, evaluations, events, jobs, models, rewards, tracks
+from racecraft.serve.races import Races
+from racecraft.serve.routes import console, drives, evaluations, events, jobs, models, races, rewards, tracks
 from racecraft.serve.schemas import ProblemReply
 from racecraft.serve.security import Guard, content_policy
 from racecraft.serve.settings import ServeSettings, version
@@ -56,6 +57,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         supervisor=Supervisor(settings, database, queue),
         drives=Drives(),
         ghosts=Ghosts(settings.runs, database),
+        races=Races(database, queue, garage, courses),
     )
 
     @asynccontextmanager
@@ -82,7 +84,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.state.guard = guard = Guard(database, hosts)
     app.add_middleware(guard.middleware)
     problems.install(app)
-    for part in (console, tracks, drives, rewards, models, evaluations, jobs, events):
+    for part in (console, tracks, drives, rewards, models, evaluations, races, jobs, events):
         app.include_router(part.router)
 
     @app.get("/assets/{name}", include_in_schema=False)

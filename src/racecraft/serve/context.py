@@ -13,6 +13,7 @@ from racecraft.serve.drives import Drives
 from racecraft.serve.garage import Garage
 from racecraft.serve.ghosts import Ghosts
 from racecraft.serve.jobs import JobQueue
+from racecraft.serve.races import Races
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.supervisor import Supervisor
 
@@ -29,6 +30,7 @@ class Context:
     supervisor: Supervisor
     drives: Drives
     ghosts: Ghosts
+    races: Races
 
 
 def _context(request: Request) -> Context:

@@ -24,7 +24,7 @@ LEASE: Final = timedelta(seconds=20)
 FIRST_LEASE: Final = timedelta(seconds=60)
 """The same before the first heartbeat: a process needs its time to start."""
 MAX_ATTEMPTS: Final = 5
-KINDS: Final = ("train", "evaluate")
+KINDS: Final = ("train", "evaluate", "race")
 ENDED: Final = ("done", "failed", "cancelled")
 
 

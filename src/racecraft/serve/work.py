@@ -21,6 +21,7 @@ from typing import Any
 from racecraft.errors import RacecraftError
 from racecraft.race.policy import NetworkPolicy
 from racecraft.run import RunFolder
+from racecraft.serve import race_tasks
 from racecraft.serve.database import Database
 from racecraft.serve.jobs import JobQueue
 from racecraft.serve.live import LiveWriter
@@ -71,6 +72,8 @@ def work(job: Job, *, runs: Path, on_stop: Callable[[Callable[[], None]], None])
         on_stop(training.stop)
         result: TrainResult = training.run()
         return result.to_dict()
+    if job.kind == "race":
+        return race_tasks.race(folder, job.payload)
     from racecraft.race.run_evaluation import evaluate_run
 
     return evaluate_run(folder.path, **job.payload).to_dict()

@@ -8,6 +8,7 @@ from fastapi import APIRouter
 
 from racecraft.serve.context import InContext
 from racecraft.serve.database import LOCAL_USER
+from racecraft.serve.machine import Machine, describe_machine
 from racecraft.serve.schemas import Console
 from racecraft.serve.settings import version
 
@@ -18,3 +19,9 @@ router = APIRouter(prefix="/api/console", tags=["console"])
 def get_console(context: InContext) -> Console:
     """What this console is."""
     return Console(version=version(), runs=str(context.settings.runs), cores=os.cpu_count() or 1, user=LOCAL_USER)
+
+
+@router.get("/machine")
+def get_machine(context: InContext) -> Machine:
+    """Where its work is done and kept."""
+    return describe_machine(context.settings)

@@ -1,0 +1,37 @@
+"""What a race's jobs do: a model drives by the race's rules, and its replay is driven again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from racecraft.race.rules import RaceRules
+from racecraft.run import RunFolder
+from racecraft.sim.objects import Objects
+
+
+def race(folder: RunFolder, payload: Mapping[str, Any]) -> dict[str, Any]:
+    """Drive an entry; its result as JSON.
+
+    Raises:
+        RacecraftError: It cannot be driven.
+    """
+    from racecraft.race.race_replay import read_replay
+    from racecraft.race.run_evaluation import evaluate_run
+    from racecraft.race.verification import verify
+
+    rules = RaceRules.from_dict(payload["rules"])
+    outcome = evaluate_run(
+        folder.path,
+        track=payload["track"],
+        rules=rules,
+        direction=rules.direction,
+        num_trials=1,
+        checkpoint=payload["checkpoint"],
+        vehicle=payload["vehicle"] or None,
+        objects=Objects.from_dict(payload["objects"]),
+        seed=payload["seed"],
+    )
+    found = verify(read_replay(outcome.files["replay"]))
+    verdict = found.difference.sentence if found.difference is not None else ""
+    return {**outcome.to_dict(), "verification": {"is_genuine": found.is_genuine, "verdict": verdict}}

@@ -1,0 +1,253 @@
+"""Races: made, entered, decided by real jobs, ranked; and what strangers try."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import sqlalchemy as sa
+from running_consoles import RunningConsole
+
+from racecraft.serve.courses import Courses
+from racecraft.serve.database import Database
+from racecraft.serve.garage import Garage
+from racecraft.serve.jobs import JobQueue
+from racecraft.serve.race_schemas import NewRace
+from racecraft.serve.races import Races
+from racecraft.serve.tables import Entry, Job
+
+
+def refused(reply: httpx.Response, status: int) -> dict[str, Any]:
+    assert reply.status_code == status, reply.text
+    assert set(reply.json()) == {"error"}
+    return dict(reply.json()["error"])
+
+
+class Stewards:
+    """Races whose jobs are decided by the test."""
+
+    def __init__(self, folder: Path) -> None:
+        self.database = Database(f"sqlite:///{folder / 'console.db'}")
+        self.database.migrate()
+        self.queue = JobQueue(self.database)
+        (folder / "tracks").mkdir()
+        garage = Garage(folder, folder / "state", self.database)
+        self.races = Races(self.database, self.queue, garage, Courses(folder / "tracks"))
+
+    def race(self, **settings: Any) -> int:
+        return self.races.create(NewRace(title="Cup", track="oval", **settings), user_id=1)
+
+    def drive(self, race: int, model: str, laps: list[float], **result: Any) -> int:
+        job = self.queue.add("race", model, {})
+        document = {"lap_seconds": [laps], "mean_completion": len(laps) / 3, **result}
+        with self.database.transaction() as session:
+            session.execute(sa.update(Job).where(Job.id == job.id).values(state="done", result=document))
+            entry = Entry(race_id=race, user_id=1, run=model, job_id=job.id)
+            session.add(entry)
+            session.flush()
+            return entry.id
+
+    def table(self, race: int) -> list[tuple[int | None, str, float | None, float | None]]:
+        return [(row.place, row.model, row.score, row.gap) for row in self.races.get(race).standings]
+
+
+@pytest.fixture
+def stewards(tmp_path: Path) -> Iterator[Stewards]:
+    stewards = Stewards(tmp_path)
+    yield stewards
+    stewards.database.close()
+
+
+def test_a_total_needs_every_lap_and_equals_share_a_place(stewards: Stewards) -> None:
+    race = stewards.race(laps=3)
+    stewards.drive(race, "steady", [10.0, 10.0, 10.0])
+    stewards.drive(race, "twin", [9.0, 10.0, 11.0])
+    stewards.drive(race, "quick", [8.0, 8.0], mean_completion=0.9)
+    stewards.drive(race, "slow", [12.0, 12.0, 12.0])
+    stewards.drive(race, "lost", [])
+    assert stewards.table(race) == [
+        (1, "steady", 30.0, 0.0),
+        (1, "twin", 30.0, 0.0),
+        (3, "slow", 36.0, 6.0),
+        (None, "quick", None, None),
+        (None, "lost", None, None),
+    ]
+
+
+def test_the_best_lap_of_the_best_entry_counts(stewards: Stewards) -> None:
+    race = stewards.race(ranking="best")
+    first = stewards.drive(race, "learner", [11.0, 12.0, 13.0])
+    second = stewards.drive(race, "learner", [9.5, 30.0])
+    stewards.drive(race, "other", [10.0, 10.0, 10.0])
+    assert stewards.table(race) == [(1, "learner", 9.5, 0.0), (2, "other", 10.0, 0.5)]
+    rows = stewards.races.get(race).standings
+    assert (rows[0].entry, rows[0].attempts, rows[0].laps) == (second, 2, 2)
+    stewards.races.withdraw(race, second)
+    assert [row.model for row in stewards.races.get(race).standings] == ["other", "learner"]
+    assert stewards.races.get(race).standings[1].entry == first
+
+
+def test_an_average_is_of_laps_in_a_row(stewards: Stewards) -> None:
+    race = stewards.race(ranking="average", laps=4, minimum_laps=2)
+    stewards.drive(race, "even", [10.0, 10.0, 10.0, 10.0])
+    stewards.drive(race, "wild", [8.0, 20.0, 8.0, 11.0])
+    assert stewards.table(race) == [(1, "wild", 9.5, 0.0), (2, "even", 10.0, 0.5)]
+    card = stewards.races.cards()[0]
+    assert (card.leader, card.leader_score, card.models) == ("wild", 9.5, 2)
+
+
+def test_a_failed_entry_is_not_ranked_but_shown(stewards: Stewards) -> None:
+    race = stewards.race()
+    entry = stewards.drive(race, "unlucky", [])
+    with stewards.database.transaction() as session:
+        session.execute(sa.update(Job).values(state="failed", error={"message": "No checkpoint."}))
+    found = stewards.races.get(race)
+    assert found.standings == []
+    assert [(one.entry, one.state) for one in found.undecided] == [(entry, "failed")]
+
+
+def test_what_a_run_says_about_itself_opens_no_other_files(stewards: Stewards, tmp_path: Path) -> None:
+    race = stewards.race()
+    (tmp_path / "secret.mp4").write_bytes(b"x")
+    files = {"video": str(tmp_path / "secret.mp4"), "summary": "/etc/passwd"}
+    entry = stewards.drive(race, "liar", [1.0], run=str(tmp_path / "liar"), files=files)
+    row = stewards.races.get(race).standings[0]
+    assert row.video is None
+    assert not row.has_replay
+    assert row.entry == entry
+
+
+# ---- over HTTP
+
+
+def make(console: RunningConsole, **settings: Any) -> dict[str, Any]:
+    reply = console.client.post("/api/races", json={"title": "Sunday cup", "track": "oval", **settings})
+    assert reply.status_code == 201, reply.text
+    return dict(reply.json())
+
+
+def test_a_race_from_beginning_to_end(console: RunningConsole) -> None:
+    client = console.client
+    for name in ("ada", "bob"):
+        console.create(name=name, track="oval", until="3000 steps", seed=len(name) + ord(name[0]))
+    for job in client.get("/api/jobs").json():
+        assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    race = make(console, laps=1, offtrack_penalty=1.0, max_resets=20)
+    assert race["state"] == "open"
+    entered = client.post(f"/api/races/{race['id']}/entries", json={"models": ["ada", "bob", "ada"]})
+    assert entered.status_code == 202, entered.text
+    assert len(entered.json()["undecided"]) == 2
+
+    def decided() -> Any:
+        found = client.get(f"/api/races/{race['id']}").json()
+        assert not any(one["state"] == "failed" for one in found["undecided"]), found
+        return found if not found["undecided"] else None
+
+    found = console.wait_for(decided)
+    assert {row["model"] for row in found["standings"]} == {"ada", "bob"}
+    scores = [row["score"] for row in found["standings"] if row["score"] is not None]
+    assert scores == sorted(scores)
+    for row in found["standings"]:
+        assert row["is_verified"] is True
+        assert row["has_replay"]
+        assert client.get(f"/api/models/{row['model']}/files/{row['video']}").headers["content-type"] == "video/mp4"
+        if row["laps"]:
+            assert row["score"] == pytest.approx(row["lap_times"][0])
+            assert row["penalty"] == pytest.approx(row["resets"] * 1.0, abs=0.1)
+    entries = ",".join(str(row["entry"]) for row in found["standings"])
+    film = client.get(f"/api/races/{race['id']}/replay", params={"entries": entries}).json()
+    assert [car["model"] for car in film["cars"]] == [row["model"] for row in found["standings"]]
+    for car, row in zip(film["cars"], found["standings"], strict=True):
+        assert len(car["trace"]) > 10
+        if row["laps"] == 1:
+            assert len(car["trace"]) / 15 == pytest.approx(row["lap_times"][0], abs=0.3)
+
+    # a model's new name is the standings', too; its files are found again
+    client.patch("/api/models/ada", json={"name": "ada-lovelace"})
+    found = client.get(f"/api/races/{race['id']}").json()
+    renamed = next(row for row in found["standings"] if row["model"] == "ada-lovelace")
+    assert renamed["video"]
+    refused(client.get(f"/api/races/{race['id']}/replay", params={"entries": "99999"}), 404)
+    assert client.delete(f"/api/races/{race['id']}/entries/{renamed['entry']}").status_code == 204
+    refused(client.delete(f"/api/races/{race['id']}/entries/{renamed['entry']}"), 404)
+    assert len(client.get(f"/api/races/{race['id']}").json()["standings"]) == 1
+
+
+def test_a_race_is_changed_closed_deleted_and_brought_back(console: RunningConsole) -> None:
+    client = console.client
+    moment = datetime.now(UTC)
+    race = make(console, opens=(moment + timedelta(days=1)).isoformat())
+    address = f"/api/races/{race['id']}"
+    assert race["state"] == "upcoming"
+    refused(client.patch(address, json={"closes": moment.isoformat()}), 422)
+    race = make(console, title="  Night cup  ", description=" late ")
+    address = f"/api/races/{race['id']}"
+    assert (race["title"], race["description"]) == ("Night cup", "late")
+    changed = client.patch(address, json={"closes": datetime.now(UTC).isoformat(), "title": "Day cup"}).json()
+    assert (changed["state"], changed["title"]) == ("closed", "Day cup")
+    assert client.patch(address, json={"closes": None}).json()["state"] == "open"
+    assert client.delete(address).status_code == 204
+    refused(client.get(address), 404)
+    assert race["id"] not in [one["id"] for one in client.get("/api/races").json()]
+    assert client.post(f"{address}/restore").json()["title"] == "Day cup"
+    refused(client.post(f"{address}/restore"), 404)
+
+
+def test_entries_that_cannot_be(console: RunningConsole) -> None:
+    client = console.client
+    race = make(console)
+    entries = f"/api/races/{race['id']}/entries"
+    refused(client.post(entries, json={"models": ["nobody"]}), 404)
+    refused(client.post(entries, json={"models": ["../../etc"]}), 422)
+    refused(client.post(entries, json={"models": []}), 422)
+    refused(client.post(entries, json={"models": ["x"] * 51}), 422)
+    console.create(name="untrained", track="oval", train=False)
+    assert "no checkpoint" in refused(client.post(entries, json={"models": ["untrained"]}), 409)["message"]
+    refused(client.post("/api/races/99999/entries", json={"models": ["untrained"]}), 404)
+    refused(client.get("/api/races/99999999999999999999"), 422)
+    refused(client.get(f"/api/races/{race['id']}/replay", params={"entries": "1;2"}), 422)
+    refused(client.get(f"/api/races/{race['id']}/replay", params={"entries": ",".join("123456789")}), 404)
+    many = ",".join(map(str, range(13)))
+    refused(client.get(f"/api/races/{race['id']}/replay", params={"entries": many}), 422)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"title": ""},
+        {"title": "   "},
+        {"title": "x" * 101},
+        {"description": "x" * 501},
+        {"track": "nowhere"},
+        {"track": "/etc/passwd"},
+        {"laps": 0},
+        {"laps": 10**9},
+        {"ranking": "worst"},
+        {"ranking": "average", "laps": 2, "minimum_laps": 3},
+        {"kind": "drag"},
+        {"offtrack_penalty": -1},
+        {"objects": 1000, "kind": "object-avoidance"},
+        {"seed": -1},
+        {"closes": "2001-01-01T00:00:00Z"},
+        {"opens": "2001-01-01T00:00:00"},
+        {"opens": "soon"},
+        {"vehicle": "../x"},
+        {"owner_id": 2},
+    ],
+)
+def test_races_that_cannot_be(console: RunningConsole, settings: dict[str, Any]) -> None:
+    reply = console.client.post("/api/races", json={"title": "Cup", "track": "oval", **settings})
+    assert reply.status_code in (404, 422)
+    refused(reply, reply.status_code)
+
+
+@pytest.mark.parametrize(("kind", "group"), [("object-avoidance", "obstacles"), ("head-to-bot", "bots")])
+def test_races_with_objects(console: RunningConsole, kind: str, group: str) -> None:
+    race = make(console, kind=kind, objects=2, bot_speed=0.4)
+    assert race["objects"][group]["count"] == 2
+    if group == "bots":
+        assert race["objects"][group]["speed"] == 0.4
