@@ -1,0 +1,95 @@
+"""Holding a race, its standings and its replay, and the settings, in real headless Chromium."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
+from running_consoles import RunningConsole
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+
+@pytest.fixture(scope="module")
+def visit(console: RunningConsole) -> Iterator[Visit]:
+    for name in ("ada", "bob"):
+        console.create(name=name, track="oval", until="3000 steps", seed=ord(name[0]))
+    with visiting(console) as visit:
+        for job in console.client.get("/api/jobs").json():
+            assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+        yield visit
+        assert visit.complaints == []
+
+
+def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
+    page = visit.open("/races")
+    page.get_by_role("link", name="Make the first race").click()
+    page.get_by_label("Title").fill("Sunday cup")
+    page.get_by_role("button", name="Best lap").click()
+    page.get_by_role("button", name="Object avoidance").click()
+    page.get_by_label("Boxes", exact=True).wait_for()
+    page.get_by_role("button", name="Time trial").click()
+    assert page.get_by_label("Boxes", exact=True).count() == 0
+    page.get_by_role("combobox", name="Track").select_option("oval")
+    page.get_by_label("Laps", exact=True).fill("1")
+    page.get_by_label("Resets allowed").fill("20")
+    page.get_by_role("button", name="Make the race").click()
+
+    page.get_by_text("Nobody has arrived yet.").wait_for()
+    page.get_by_role("checkbox", name="ada").check()
+    page.get_by_role("checkbox", name="bob").check()
+    page.get_by_role("button", name="Enter 2 and drive").click()
+    page.get_by_role("row", name="ada").wait_for()
+    page.get_by_role("row", name="bob").wait_for()
+    assert page.get_by_title("Driven again from its actions").count() == 2
+
+    page.get_by_role("button", name="Replay all together").click()
+    page.locator(".stage canvas").wait_for()
+    clock = page.locator(".controls .number")
+    visit.console.wait_for(lambda: float(clock.inner_text().split()[0]) > 0.5)
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("slider", name="Moment of the race").fill("3")
+    assert clock.inner_text() == "0.2 s"
+    page.get_by_role("button", name="Video: bob").click()
+    video = page.locator("video")
+    video.wait_for()
+    source = str(video.get_attribute("src"))
+    assert visit.console.client.get(source).headers["content-type"] == "video/mp4"
+
+    page.get_by_role("button", name="Close the race").click()
+    page.get_by_role("button", name="Open it again").wait_for()
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_role("heading", name="No race yet").wait_for()
+    page.get_by_role("button", name="Undo").click()
+    page.get_by_role("row", name="ada").wait_for()
+
+
+def test_the_settings_say_where_things_are(visit: Visit) -> None:
+    page = visit.open("/settings")
+    page.get_by_text(str(visit.console.runs), exact=True).wait_for()
+    page.get_by_text("Process of its own").wait_for()
+    page.get_by_role("button", name="Dark").click()
+    assert page.evaluate("document.documentElement.dataset.theme") == "dark"
+    page.get_by_role("button", name="Deutsch").click()
+    page.get_by_role("heading", name="Einstellungen").wait_for()
+    assert page.evaluate("document.documentElement.lang") == "de"
+    page.get_by_role("button", name="English").click()
+
+
+@needs_axe
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_serious_and_nothing_sticks_out(visit: Visit, theme: str) -> None:
+    visit.look(theme, "de" if theme == "dark" else "en")
+    races = visit.console.client.get("/api/races").json()
+    found: dict[str, Any] = {}
+    for path in ("/races", "/races/new", "/settings", *(f"/races/{race['id']}" for race in races[:1])):
+        for width in (1440, 390):
+            page = visit.open(path, width=width)
+            page.wait_for_timeout(600)
+            if violations := visit.violations():
+                found[f"{path} {width}"] = violations
+            if visit.overflow() > 0:
+                found[f"{path} {width} is too wide"] = visit.overflow()
+    assert found == {}
