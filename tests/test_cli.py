@@ -171,6 +171,7 @@ def test_quick_verbs_import_nothing_heavy(tmp_path: Path, arguments: list[str], 
         (["tracks", "show"], "name"),
         (["train", "--resume", "runs/x", "--seed", "4"], "--seed does not go with --resume"),
         (["train", "--resume", "runs/x", "--track", "oval"], "--track does not go with --resume"),
+        (["train", "--resume", "runs/x", "--from", "runs/y"], "--from does not go with --resume"),
     ],
 )
 def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str) -> None:
@@ -200,6 +201,7 @@ def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str
         (["train", "--name", "../x"], "RunError", "../x"),
         (["train", "--hyperparameters", "none.json"], "ConfigError", "none.json"),
         (["train", "--resume", "runs/none"], "RunError", "none"),
+        (["train", "--from", "runs/none@best"], "RunError", "none"),
         (["evaluate", "runs/none"], "RunError", "none"),
         (["import", "none"], "SourceError", "none"),
         (["import", "."], "SourceError", "reward_function.py"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -13,6 +13,13 @@ from racecraft.cli import race_options
 from racecraft.cli.app import INTERRUPTED, Json, app, print_json, text
 
 DEFAULT_TRACK: Final = "reinvent_2018"
+_OPTIONS_OF: Final = {
+    "objects": (
+        *("race", "objects", "bots", "bot_speed", "lane_changes"),
+        *("parked_cars", "placement", "positions"),
+    )
+}
+"""Settings that several options make."""
 
 
 @app.command()
@@ -63,6 +70,9 @@ def train(
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the run.")] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
     resume: Annotated[Path | None, typer.Option("--resume", help="Continue this run from its last checkpoint.")] = None,
+    parent: Annotated[
+        str | None, typer.Option("--from", help="Begin with the weights of RUN or RUN@checkpoint, in a new run.")
+    ] = None,
     video: Annotated[
         bool, typer.Option("--video", help="Afterwards evaluate the best checkpoint and film it.")
     ] = False,
@@ -84,25 +94,26 @@ def train(
 
     where = Path(track[0]).stem if len(track) == 1 else f"{len(track)} tracks"
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
+    if parent is not None:
+        title = f"Racecraft · from {parent}"
     with SilentReporter() if is_quiet else TerminalReporter(title=title) as reporter:
         if resume is not None:
             result = training.resume(
                 resume, until=until or None, reporter=reporter, aws_log=aws_log or None, started=started
             )
         else:
-            result = training.train(
-                track,
-                reward=reward,
-                until=until or "5 laps",
-                actions=actions,
-                model_metadata=model_metadata,
-                hyperparameters=hyperparameters,
-                network=network,
-                critic=critic,
-                vehicle=vehicle,
-                direction=direction,
-                randomize=randomize,
-                objects=race_options.objects_of(
+            options: dict[str, Any] = {
+                "track": track,
+                "reward": reward,
+                "actions": actions,
+                "model_metadata": model_metadata,
+                "hyperparameters": hyperparameters,
+                "network": network,
+                "critic": critic,
+                "vehicle": vehicle,
+                "direction": direction,
+                "randomize": randomize,
+                "objects": race_options.objects_of(
                     race,
                     objects=objects,
                     bots=bots,
@@ -112,10 +123,21 @@ def train(
                     placement=placement,
                     positions=positions,
                 ),
-                num_envs=num_envs,
+                "num_envs": num_envs,
+                "num_threads": num_threads,
+                "evaluate_every": evaluate_every,
+            }
+            # What is not given is the parent's, or follows from the rest.
+            given = {
+                name: value for name, value in options.items() if _is_given(context, *_OPTIONS_OF.get(name, (name,)))
+            }
+            if parent is None:
+                given = {**options, "evaluate_every": 0, **given}
+            result = training.train(
+                **given,
+                until=until or "5 laps",
                 seed=seed,
-                evaluate_every=evaluate_every if _is_given(context, "evaluate_every") else 0,
-                num_threads=num_threads,
+                parent=parent,
                 root=runs,
                 name=name,
                 reporter=reporter,
@@ -137,9 +159,9 @@ def train(
         raise typer.Exit(INTERRUPTED)
 
 
-def _is_given(context: typer.Context, option: str) -> bool:
-    source = context.get_parameter_source(option)
-    return source is not None and source.name == "COMMANDLINE"
+def _is_given(context: typer.Context, *options: str) -> bool:
+    sources = [context.get_parameter_source(option) for option in options]
+    return any(source is not None and source.name == "COMMANDLINE" for source in sources)
 
 
 def _refuse_beside_resume(context: typer.Context) -> None:

@@ -365,7 +365,7 @@ class PPO:
         rows = slice(0, rollout.num_steps)
         shape = rollout.values[rows].shape
         observations = rollout.observations[rows].reshape(-1, *rollout.observations.shape[2:])
-        states = rollout.states[rows].reshape(-1, rollout.states.shape[2])
+        states = rollout.states[rows].reshape(len(observations), rollout.states.shape[2])
         rollout.values[rows] = self._values(observations, states).reshape(shape)
         return rollout.advantages(gamma=self.config.gamma, gae_lambda=self.config.gae_lambda)
 
@@ -386,7 +386,7 @@ class PPO:
         self._follow_returns(returns.reshape(-1)[used])
         mean, spread = self._return_scale
         b_observations = rollout.observations.reshape(-1, *rollout.observations.shape[2:])
-        b_states = rollout.states.reshape(-1, rollout.states.shape[2])
+        b_states = rollout.states.reshape(len(b_observations), rollout.states.shape[2])
         b_actions = rollout.actions.reshape(-1, *rollout.actions.shape[2:])
         b_log_probs = rollout.log_probs.reshape(-1)
         b_returns = ((returns - mean) / spread).astype(np.float32).reshape(-1)

@@ -9,6 +9,7 @@ runs/<name>/run.json                      what is needed to repeat the run
             mp4/  events/                 videos, TensorBoard
             model/  ip/                   for AWS's tools: index of checkpoints, metadata; hyperparameters
             checkpoints/                  weights, see racecraft.run.checkpoint
+            parent/                       weights it began with, where another run gave them
             logs/                         reward.log: what the reward function printed
 """
 
@@ -57,6 +58,8 @@ class RunInfo:
     """When the run began, ISO 8601 in UTC."""
     versions: dict[str, str] = field(default_factory=lambda: _versions())
     """Versions of what may change the result, and the machine."""
+    parent: dict[str, Any] | None = None
+    """The run, step and file of the checkpoint it began from, if it did."""
 
 
 @dataclass(frozen=True)
@@ -187,6 +190,11 @@ class RunFolder:
     def checkpoints(self) -> CheckpointStore:
         """Weights, with AWS's index of them in ``model/``."""
         return CheckpointStore(self.path / "checkpoints", aws_index=self.path / "model" / "deepracer_checkpoints.json")
+
+    @property
+    def parent_checkpoint(self) -> CheckpointStore:
+        """A copy of the weights the run began with, where another run gave them."""
+        return CheckpointStore(self.path / "parent", keep=1)
 
     def evaluation(self, stamp: str) -> Path:
         """Folder of the evaluation begun at ``stamp`` (YYYYmmddHHMMSS)."""

@@ -32,14 +32,15 @@ __all__ = [
 
 
 def train(
-    track: str | Path | Sequence[str | Path] = "reinvent_2018",
+    track: str | Path | Sequence[str | Path] | None = None,
     *,
-    reward: str | Path = "racing",
+    reward: str | Path | None = None,
     until: str | Until = "5 laps",
-    actions: ActionSpace | str = "default",
+    actions: ActionSpace | str | None = None,
     model_metadata: str | Path | None = None,
     hyperparameters: str | Path | None = None,
     seed: int = 0,
+    parent: str | Path | None = None,
     root: str | Path = "runs",
     name: str | None = None,
     reporter: Reporter | None = None,
@@ -50,14 +51,17 @@ def train(
     """Train a car from camera pixels with a reward function.
 
     Args:
-        track: Name of a track, or path of a track file; or several, as `racecraft.track.load_tracks` reads them.
-        reward: Name of a preset, or path of a ``reward_function.py``.
+        track: Name of a track, or path of a track file; or several, as `racecraft.track.load_tracks` reads them; by
+            default ``reinvent_2018``.
+        reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``.
         until: When to stop: ``"5 laps"``, ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or several joined by
             ``or``.
-        actions: Action space or name of a preset, where no `model_metadata` is given.
+        actions: Action space or name of a preset, where no `model_metadata` is given; by default ``default``.
         model_metadata: AWS's file: action space, network, version.
         hyperparameters: AWS's file; by default Racecraft's own settings, tuned for speed.
         seed: The same seed repeats a run exactly on the same machine.
+        parent: Run whose weights it begins with, ``RUN`` or ``RUN@checkpoint`` (``best``, ``last`` or steps); what is
+            not given here is then as it is there, except `until` and `seed`.
         root: Where run folders lie.
         name: Name of the run; by default a new one.
         reporter: Is told how it goes.
@@ -70,28 +74,24 @@ def train(
     """
     import time
 
-    from racecraft.agent import Hyperparameters, ModelMetadata, action_space
-    from racecraft.reward import load_reward
     from racecraft.training.job import Training
-    from racecraft.training.settings import make_settings
-    from racecraft.training.start import start_run
+    from racecraft.training.plan import make_plan
 
     started = time.monotonic() if started is None else started
-    source = load_reward(reward)
-    if model_metadata is None:
-        space = action_space(actions) if isinstance(actions, str) else actions
-        metadata = ModelMetadata(action_space=space, neural_network="RACECRAFT_SMALL")
-    else:
-        metadata = ModelMetadata.load(model_metadata)
-    parameters = None if hyperparameters is None else Hyperparameters.load(hyperparameters)
-    if isinstance(until, str):
-        until = Until.parse(until)
-    chosen = make_settings(
-        metadata=metadata, hyperparameters=parameters, track=track, until=until, seed=seed, **settings
+    plan = make_plan(
+        track,
+        reward=reward,
+        until=until,
+        actions=actions,
+        model_metadata=model_metadata,
+        hyperparameters=hyperparameters,
+        seed=seed,
+        parent=parent,
+        **settings,
     )
-    run = start_run(chosen, reward=source, metadata=metadata, hyperparameters=parameters, root=root, name=name)
+    run = plan.start(root=root, name=name)
     if reporter is not None:
-        for note in (*metadata.notes, *(parameters.notes if parameters is not None else ())):
+        for note in plan.notes:
             reporter.note(note)
     return Training(run, reporter=reporter, aws_log=aws_log, started=started, is_checked=True).run()
 

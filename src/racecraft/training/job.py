@@ -45,6 +45,7 @@ from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.environment import TrainingEnvironment
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
+from racecraft.training.parent import begin_from
 from racecraft.training.progress import EvaluationReport, IterationReport, Reporter, SilentReporter, TrainResult
 from racecraft.training.start import aws_hyperparameters, read_settings, require_trainable, require_valid_reward
 from racecraft.training.stop import Until
@@ -158,6 +159,8 @@ class Training:
             if not self.is_checked:
                 require_valid_reward(source, tracks[0])
             learner = future.result()
+            if saved is None and folder.read_info().parent is not None:
+                begin_from(learner, folder.parent_checkpoint.load())
 
         with ExitStack() as stack:
             # A function that remembers something gets a memory for each car: on AWS one process drove one car.

@@ -13,6 +13,7 @@ from racecraft.reward import dry_run, validate_reward
 from racecraft.run import RunFolder, RunInfo
 from racecraft.run.training_params import TrainingParams
 from racecraft.track import Track, joint_digest, load_tracks
+from racecraft.training.parent import WEIGHTS, Parent
 from racecraft.training.settings import TrainSettings
 
 
@@ -24,6 +25,7 @@ def start_run(
     hyperparameters: Hyperparameters | None = None,
     root: str | Path = "runs",
     name: str | None = None,
+    parent: Parent | None = None,
 ) -> RunFolder:
     """Make a run folder that `Training` can train.
 
@@ -34,6 +36,7 @@ def start_run(
         hyperparameters: AWS's, when the run follows them.
         root: Where runs lie.
         name: Name of the run; by default a new one.
+        parent: The checkpoint whose weights it begins with; by default it begins with random ones.
 
     Raises:
         RewardError: The reward function has a mistake that can be seen before training.
@@ -42,6 +45,8 @@ def start_run(
         RunError: The folder cannot be made, or the name is taken.
     """
     require_trainable(settings, metadata)
+    if parent is not None:
+        parent.check(settings.network_spec(metadata), metadata)
     tracks = load_tracks(settings.track)
     track = tracks[0]
     require_valid_reward(reward, track)
@@ -56,7 +61,7 @@ def start_run(
         start_position_offset=settings.start.offset % 1.0,
         min_eval_trials=settings.evaluation_trials,
     )
-    write_run(folder, settings, tracks, reward, metadata, hyperparameters, params)
+    write_run(folder, settings, tracks, reward, metadata, hyperparameters, params, parent=parent)
     return folder
 
 
@@ -68,6 +73,8 @@ def write_run(
     metadata: ModelMetadata,
     hyperparameters: Hyperparameters | None,
     params: TrainingParams,
+    *,
+    parent: Parent | None = None,
 ) -> None:
     """Write everything that a run starts from; ``run.json``, which makes the folder a run, comes last."""
     folder.write_inputs(
@@ -80,7 +87,14 @@ def write_run(
     document = settings.to_dict()
     del document["seed"], document["track"]  # they have places of their own
     digest = joint_digest(tracks)
-    folder.write_info(RunInfo(seed=settings.seed, track=settings.track, track_digest=digest, settings=document))
+    record = None
+    if parent is not None:
+        saved, record = parent.saved, parent.record()
+        weights = {f"{WEIGHTS}{name}": array for name, array in parent.weights.items()}
+        folder.parent_checkpoint.save(saved.step, weights, metadata={"network": saved.metadata["network"], **record})
+    folder.write_info(
+        RunInfo(seed=settings.seed, track=settings.track, track_digest=digest, settings=document, parent=record)
+    )
 
 
 def aws_hyperparameters(ppo: PPOConfig, given: Hyperparameters | None = None) -> dict[str, Any]:

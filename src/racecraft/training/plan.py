@@ -1,0 +1,130 @@
+"""What a new run is made of: what the user says, what a parent run says otherwise, and the defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_space
+from racecraft.reward import load_reward
+from racecraft.run import RunFolder
+from racecraft.training.parent import Parent, open_parent
+from racecraft.training.settings import DEFAULT_REWARD, DEFAULT_TRACK, TrainSettings, make_settings
+from racecraft.training.start import read_settings, start_run
+from racecraft.training.stop import Until
+
+DEFAULT_UNTIL = Until(laps=5)
+DEFAULT_ACTIONS = "default"
+_OF_THE_TRACK = ("start", "evaluate_every", "evaluation_trials")
+"""Settings that follow from the tracks, so they are a parent's only on its tracks."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """A run to be started."""
+
+    settings: TrainSettings
+    reward: str
+    """Source of the reward function."""
+    metadata: ModelMetadata
+    hyperparameters: Hyperparameters | None
+    parent: Parent | None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences for the user about the files and the parent."""
+        files = (*self.metadata.notes, *(self.hyperparameters.notes if self.hyperparameters is not None else ()))
+        if self.parent is None:
+            return files
+        anew = self.parent.check(self.settings.network_spec(self.metadata), self.metadata)
+        return (*files, f"Begins with the weights of {self.parent.name}.", *anew)
+
+    def start(self, *, root: str | Path = "runs", name: str | None = None) -> RunFolder:
+        """Make the run folder; see `racecraft.training.start.start_run`."""
+        return start_run(
+            self.settings,
+            reward=self.reward,
+            metadata=self.metadata,
+            hyperparameters=self.hyperparameters,
+            root=root,
+            name=name,
+            parent=self.parent,
+        )
+
+
+def make_plan(
+    track: str | Path | Sequence[str | Path] | None = None,
+    *,
+    reward: str | Path | None = None,
+    until: str | Until = DEFAULT_UNTIL,
+    actions: ActionSpace | str | None = None,
+    model_metadata: str | Path | None = None,
+    hyperparameters: str | Path | None = None,
+    seed: int = 0,
+    parent: str | Path | Parent | None = None,
+    **settings: Any,
+) -> Plan:
+    """Everything a run needs, read and checked; the arguments are those of `racecraft.training.train`.
+
+    Raises:
+        RacecraftError: An input is wrong.
+    """
+    limit = Until.parse(until) if isinstance(until, str) else until
+    if parent is not None and not isinstance(parent, Parent):
+        parent = open_parent(parent)
+    theirs = None if parent is None else parent.folder
+    if reward is not None or theirs is None:
+        source = load_reward(DEFAULT_REWARD if reward is None else reward)
+    else:
+        source = theirs.read_reward_function()
+    if model_metadata is not None:
+        metadata = ModelMetadata.load(model_metadata)
+    elif theirs is None or actions is not None:
+        chosen = DEFAULT_ACTIONS if actions is None else actions
+        space = action_space(chosen) if isinstance(chosen, str) else chosen
+        if theirs is None:
+            metadata = ModelMetadata(action_space=space, neural_network="RACECRAFT_SMALL")
+        else:
+            metadata = replace(theirs.read_model_metadata(), action_space=space)
+    else:
+        metadata = theirs.read_model_metadata()
+    parameters = None if hyperparameters is None else Hyperparameters.load(hyperparameters)
+    if theirs is not None:
+        if parameters is None and "ppo" not in settings:
+            parameters = theirs.read_hyperparameters()
+        inherited = _inherited(theirs, metadata, is_new_track=track is not None, follows_aws=parameters is not None)
+        if model_metadata is not None:
+            inherited.pop("vehicle")  # the file's version decides
+        of_the_parent = inherited.pop("track")
+        track = of_the_parent if track is None else track
+        settings = {**inherited, **settings}
+    return Plan(
+        settings=make_settings(
+            metadata=metadata,
+            hyperparameters=parameters,
+            track=DEFAULT_TRACK if track is None else track,
+            until=limit,
+            seed=seed,
+            **settings,
+        ),
+        reward=source,
+        metadata=metadata,
+        hyperparameters=parameters,
+        parent=parent,
+    )
+
+
+def _inherited(folder: RunFolder, metadata: ModelMetadata, *, is_new_track: bool, follows_aws: bool) -> dict[str, Any]:
+    """The settings of a parent that its child has as well, unless the user says otherwise."""
+    theirs = read_settings(folder)
+    left_out = {"until", "seed", *(_OF_THE_TRACK if is_new_track else ())}
+    values = {setting.name: getattr(theirs, setting.name) for setting in fields(theirs) if setting.name not in left_out}
+    is_same_kind = folder.read_model_metadata().action_space.kind == metadata.action_space.kind
+    if follows_aws:
+        del values["ppo"]
+        values["num_envs"] = theirs.ppo.num_envs
+    elif not is_same_kind:
+        del values["ppo"]  # what suits a table of actions does not suit a Gaussian
+    return values

@@ -1,0 +1,146 @@
+"""A run that begins from another: what it takes over, what begins anew, what is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tiny_runs import Recorder, Train, assert_same, weights
+
+from racecraft.agent import ModelMetadata, action_space
+from racecraft.errors import CheckpointError, ConfigError, RunError
+from racecraft.learn import NetworkSpec, initial_weights
+from racecraft.run import RunFolder
+from racecraft.training import resume
+from racecraft.training.parent import fitting, open_parent
+from racecraft.training.plan import make_plan
+from racecraft.training.start import read_settings
+
+IDLE: dict[str, Any] = {"until": "64 steps", "evaluate_every": 64}
+
+
+@pytest.fixture
+def parent(tiny: Train) -> Path:
+    return tiny(name="parent", until="128 steps", evaluate_every=64, seed=5).run
+
+
+def test_a_child_begins_with_the_weights_and_settings_of_its_parent(tiny: Train, parent: Path, tmp_path: Path) -> None:
+    plan = make_plan(parent=parent, until="64 steps")
+    theirs = read_settings(RunFolder.open(parent))
+    assert (plan.settings.track, plan.settings.ppo, plan.settings.evaluation_trials) == ("oval", theirs.ppo, 2)
+    assert plan.reward == RunFolder.open(parent).read_reward_function()
+
+    child = plan.start(root=tmp_path / "children", name="child")
+    best = RunFolder.open(parent).checkpoints.load("best")
+    assert child.read_info().parent == {"run": str(parent), "step": best.step, "file": best.path.name}
+    copied = child.parent_checkpoint.load().arrays
+    given = {name: array for name, array in best.arrays.items() if name.startswith("weights/")}
+    assert copied.keys() == given.keys()
+    for name, array in given.items():
+        np.testing.assert_array_equal(copied[name], array, err_msg=name)
+
+
+def test_it_learns_on_from_them_and_not_from_random_ones(tiny: Train, parent: Path) -> None:
+    """One step of Adam moves no weight by more than a few learning rates; two random networks are far apart."""
+    child = tiny(parent=f"{parent}@last", reward="racing", **IDLE).run
+    before, after = weights(parent), weights(child)
+    name = "weights/policy.conv2.weight"
+    fresh = initial_weights(NetworkSpec(num_actions=10), seed=0)["policy.conv2.weight"]
+    moved = np.abs(after[name] - before[name]).max()
+    assert 0 < moved < 0.02 < np.abs(fresh - before[name]).max()
+
+
+def test_it_needs_its_parent_no_longer(tiny: Train, parent: Path, tmp_path: Path) -> None:
+    undisturbed = tiny(parent=parent, name="undisturbed", **IDLE).run
+    plan = make_plan("oval", parent=parent, until="64 steps", evaluate_every=64, num_threads=1)
+    child = plan.start(root=tmp_path / "runs", name="orphan")
+    shutil.rmtree(parent)
+    resume(child.path)  # a kill before the first checkpoint leaves this folder
+    assert weights(child.path).keys() == weights(undisturbed).keys()
+    later = tmp_path / "runs" / "again"
+    shutil.copytree(child.path, later)
+    resume(later, until="128 steps")
+    resume(child.path, until="128 steps")
+    assert_same(later, child.path)
+
+
+def test_another_action_space_gives_the_policy_a_new_last_layer_and_says_so(tiny: Train, parent: Path) -> None:
+    recorder = Recorder()
+    child = tiny(parent=parent, actions="continuous", reporter=recorder, **IDLE).run
+    assert any("the policy's last layer begins anew" in note for note in recorder.notes)
+    assert weights(child)["weights/policy.head.weight"].shape == (2, 128)
+
+    faster = Recorder()
+    tiny(parent=parent, actions="aws", reporter=faster, **IDLE)  # ten actions as well: only the speeds are others
+    assert not any("anew" in note for note in faster.notes)
+    assert any("Begins with the weights of" in note for note in faster.notes)
+
+
+def test_another_critic_begins_anew(tiny: Train, parent: Path) -> None:
+    recorder = Recorder()
+    tiny(parent=parent, critic="camera", reporter=recorder, **IDLE)
+    assert "The critic sees something else: it begins anew." in recorder.notes
+
+
+def test_only_what_fits_is_taken() -> None:
+    ten, five = NetworkSpec(num_actions=10, state_size=8), NetworkSpec(num_actions=5, state_size=9)
+    kept = fitting(initial_weights(ten, seed=1), five)
+    assert "policy.dense1.weight" in kept
+    assert not any(name.startswith(("policy.head", "critic.")) for name in kept)
+    with pytest.raises(ConfigError, match=r"do not fit the network RACECRAFT_SMALL: policy\.conv1"):
+        fitting({}, ten)
+
+
+def test_another_network_or_other_sensors_are_refused(parent: Path, tmp_path: Path) -> None:
+    name = "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
+    with pytest.raises(ConfigError, match=f"has the network RACECRAFT_SMALL, the new run is to have {name}") as caught:
+        make_plan(parent=parent, network=name).start(root=tmp_path)
+    assert "--network RACECRAFT_SMALL" in caught.value.hint
+
+    document = RunFolder.open(parent).read_model_metadata().to_dict()
+    file = tmp_path / "model_metadata.json"
+    file.write_text(json.dumps({**document, "sensor": ["LEFT_CAMERA"]}))
+    plan = make_plan(parent=parent)
+    seen = ModelMetadata.load(file)
+    assert plan.parent is not None
+    with pytest.raises(ConfigError, match="sees with FRONT_FACING_CAMERA, the new run is to see with LEFT_CAMERA"):
+        plan.parent.check(plan.settings.network_spec(seen), seen)
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "match"),
+    [
+        ("nowhere", RunError, "There is no run"),
+        ("{parent}@first", CheckpointError, "'first'"),
+        ("{parent}@77", CheckpointError, "no checkpoint of step 77"),
+        ("{parent}@", CheckpointError, "''"),
+        ("{parent}@²", CheckpointError, "²"),
+    ],
+)
+def test_what_is_no_checkpoint_is_refused(parent: Path, text: str, error: type[Exception], match: str) -> None:
+    with pytest.raises(error, match=match):
+        open_parent(text.format(parent=parent))
+
+
+def test_a_damaged_copy_of_the_weights_is_refused(parent: Path, tmp_path: Path) -> None:
+    child = make_plan(parent=parent, until="64 steps").start(root=tmp_path / "children")
+    file = next((child.path / "parent").glob("*.safetensors"))
+    file.write_bytes(file.read_bytes()[:-9])
+    with pytest.raises(CheckpointError, match=r"bytes instead of"):
+        resume(child.path)
+
+
+def test_an_aws_run_is_followed_by_one_as_aws_trains(tiny: Train, tmp_path: Path) -> None:
+    from racecraft.agent import Hyperparameters
+
+    file = tmp_path / "hyperparameters.json"
+    Hyperparameters(num_episodes_between_training=2, num_epochs=3).save(file)
+    first = tiny(hyperparameters=file, until="8 steps", evaluate_every=8).run
+    plan = make_plan(parent=first, actions=action_space("fast"))
+    assert plan.hyperparameters == Hyperparameters.load(file)
+    assert (plan.settings.ppo.episodes_per_iteration, plan.settings.ppo.num_envs) == (2, 2)
+    assert plan.metadata.action_space.size == 21
