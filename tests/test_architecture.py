@@ -23,6 +23,7 @@ LAYERS = (
     "race",
     "replay",
     "training",
+    "tuning",
     "importing",
     "serve",
     "bench",

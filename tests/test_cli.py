@@ -92,6 +92,7 @@ VERBS = (
     "reward check",
     "reward list",
     "reward show",
+    "tune",
     "replay",
     "calibrate",
     "serve",
@@ -126,8 +127,8 @@ def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:
     shown = {name: parameter.default for name, parameter in inspect.signature(cli.train.train).parameters.items()}
     public = {name: parameter.default for name, parameter in inspect.signature(train).parameters.items()}
     settings = training_settings.TrainSettings()
-    assert shown["track"] == [public["track"]] == [settings.track] == [training_settings.DEFAULT_TRACK]
-    assert shown["reward"] == public["reward"] == training_settings.DEFAULT_REWARD
+    assert shown["track"] == [settings.track] == [training_settings.DEFAULT_TRACK]
+    assert shown["reward"] == training_settings.DEFAULT_REWARD
     assert public["until"] == str(settings.until)
     for name in ("critic", "direction", "evaluate_every", "num_threads", "seed"):
         assert shown[name] == getattr(settings, name)

@@ -1,0 +1,75 @@
+"""`racecraft tune`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from racecraft.cli.app import INTERRUPTED, Json, app, print_json
+
+
+@app.command()
+def tune(
+    context: typer.Context,
+    track: Annotated[
+        list[str], typer.Option("--track", "-t", help="Track, file or generated:0..99; several by repeating it.")
+    ] = ["reinvent_2018"],  # noqa: B006 (Typer copies it)
+    reward: Annotated[str, typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py.")] = "racing",
+    search: Annotated[
+        list[str],
+        typer.Option("--search", help="Constant of the reward or hyperparameter, 'NAME' or 'NAME=LOW..HIGH'; repeat."),
+    ] = [],  # noqa: B006 (Typer copies it)
+    goal: Annotated[
+        str, typer.Option("--for", help="laps (learn them soonest) or lap_time (the fastest lap).")
+    ] = "laps",
+    minutes: Annotated[float, typer.Option("--minutes", "-m", help="How long to search.")] = 10.0,
+    trials: Annotated[int, typer.Option("--trials", help="Most trials; 0 for as many as the minutes hold.")] = 0,
+    trial_steps: Annotated[int, typer.Option("--trial-steps", help="Camera steps after which a trial ends.")] = 40_000,
+    actions: Annotated[
+        str, typer.Option("--actions", help="Action space: default, aws, fast, safe or continuous.")
+    ] = "default",
+    model_metadata: Annotated[
+        Path | None, typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions.")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", "-s", help="Of every trial and of the search.")] = 0,
+    num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
+    name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the search's folder.")] = None,
+    root: Annotated[Path, typer.Option("--root", help="Folder that holds the searches.")] = Path("tuning"),
+    resume: Annotated[Path | None, typer.Option("--resume", help="Go on with this search.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Tune a reward's constants and hyperparameters within minutes."""
+    if resume is not None:
+        for option in context.command.params:
+            source = context.get_parameter_source(str(option.name))
+            is_given = source is not None and source.name == "COMMANDLINE"
+            if is_given and option.name not in ("resume", "minutes", "trials", "as_json"):
+                context.fail(f"{option.opts[0]} does not go with --resume: a search keeps what it was started with.")
+    from racecraft.cli import tune_text
+    from racecraft.tuning import Tuning, start_tuning
+
+    folder = resume
+    if folder is None:
+        folder = start_tuning(
+            track,
+            search=search,
+            goal=goal,
+            trial_steps=trial_steps,
+            reward=reward,
+            actions=actions,
+            model_metadata=model_metadata,
+            seed=seed,
+            num_threads=num_threads,
+            name=name,
+            root=root,
+        )
+    tuning = Tuning(folder, on_trial=None if as_json else lambda trial: tune_text.say_trial(trial, tuning.goal))
+    outcome = tuning.run(minutes=minutes, max_trials=trials)
+    if as_json:
+        print_json(outcome.to_dict())
+    else:
+        tune_text.say_tuned(outcome)
+    if outcome.is_interrupted:
+        raise typer.Exit(INTERRUPTED)

@@ -1,0 +1,23 @@
+"""Search: better hyperparameters and constants of a reward function, by trials that are runs.
+
+Optuna (the extra ``tune``) is imported when a search begins, not before.
+"""
+
+from __future__ import annotations
+
+from racecraft.tuning.constants import find_constants, rewrite_constants
+from racecraft.tuning.outcome import Outcome, TrialOutcome
+from racecraft.tuning.space import HYPERPARAMETERS, Parameter, make_space
+from racecraft.tuning.study import Tuning, start_tuning
+
+__all__ = [
+    "HYPERPARAMETERS",
+    "Outcome",
+    "Parameter",
+    "TrialOutcome",
+    "Tuning",
+    "find_constants",
+    "make_space",
+    "rewrite_constants",
+    "start_tuning",
+]
