@@ -11,7 +11,7 @@ import pytest
 from tiny_runs import TINY, Recorder, Train, assert_same, logs
 
 from racecraft import load_track
-from racecraft.agent import Hyperparameters, ModelMetadata, action_space
+from racecraft.agent import Hyperparameters
 from racecraft.errors import ConfigError, RewardError, RunError, TrackNotFound
 from racecraft.run import RunFolder, read_metrics, read_simtrace
 from racecraft.training import Until, resume
@@ -270,13 +270,6 @@ def test_a_reward_that_cannot_be_right_leaves_no_folder(tiny: Train, tmp_path: P
     with pytest.raises(RewardError):
         tiny(reward=path)
     assert not (tmp_path / "runs").exists()
-
-
-def test_sac_is_refused(tiny: Train, tmp_path: Path) -> None:
-    metadata = ModelMetadata(action_space=action_space("continuous"), training_algorithm="sac")
-    metadata.save(tmp_path / "model_metadata.json")
-    with pytest.raises(ConfigError, match="clipped_ppo"):
-        tiny(model_metadata=tmp_path / "model_metadata.json")
 
 
 def test_a_taken_name_is_refused(tiny: Train) -> None:

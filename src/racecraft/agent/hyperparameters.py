@@ -153,6 +153,20 @@ class Hyperparameters:
             "epsilon_steps": self.epsilon_steps,
         }
 
+    def to_sac(self) -> dict[str, float | int | bool]:
+        """The same settings under the names of our SAC: one update for every step, targets copied, alpha fixed."""
+        return {
+            "learning_rate": self.lr,
+            "gamma": self.discount_factor,
+            "minibatch_size": self.batch_size,
+            "tau": 1.0,
+            "updates_per_step": 1.0,
+            "policy_frequency": 1,
+            "alpha": self.sac_alpha,
+            "learns_alpha": False,
+            "normalize_rewards": False,
+        }
+
 
 @cache
 def _file() -> type[AwsModel]:

@@ -45,6 +45,9 @@ def train(
     hyperparameters: Annotated[
         Path | None, typer.Option("--hyperparameters", help="AWS's hyperparameters.json; trains as AWS did.")
     ] = None,
+    algorithm: Annotated[
+        str, typer.Option("--algorithm", help="ppo, sac, or sb3:ppo, a2c, dqn, sac, td3 of Stable-Baselines3.")
+    ] = "",
     network: Annotated[str, typer.Option("--network", help="RACECRAFT_SMALL or one of AWS's three names.")] = "",
     critic: Annotated[str, typer.Option("--critic", help="What the critic sees: privileged or camera.")] = "privileged",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
@@ -108,6 +111,7 @@ def train(
                 "actions": actions,
                 "model_metadata": model_metadata,
                 "hyperparameters": hyperparameters,
+                "algorithm": algorithm,
                 "network": network,
                 "critic": critic,
                 "vehicle": vehicle,
@@ -132,6 +136,7 @@ def train(
                 name: value for name, value in options.items() if _is_given(context, *_OPTIONS_OF.get(name, (name,)))
             }
             if parent is None:
+                options["actions"] = None  # SAC's are others than PPO's
                 given = {**options, "evaluate_every": 0, **given}
             result = training.train(
                 **given,

@@ -4,9 +4,11 @@ Nothing here imports torch unless ``make_learner`` is asked for the torch backen
 """
 
 from racecraft.errors import ConfigError
+from racecraft.learn.algorithm import Algorithm
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats
 from racecraft.learn.networks import forward_operations, initial_weights, network_names, parameter_count
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
+from racecraft.learn.sac import SAC, SACConfig
 
 
 def make_learner(spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0, backend: str = "auto") -> Learner:
@@ -39,6 +41,8 @@ def make_learner(spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 
 
 __all__ = [
     "PPO",
+    "SAC",
+    "Algorithm",
     "Environment",
     "IterationStats",
     "Learner",
@@ -46,6 +50,7 @@ __all__ = [
     "NetworkSpec",
     "Objective",
     "PPOConfig",
+    "SACConfig",
     "UpdateStats",
     "forward_operations",
     "initial_weights",

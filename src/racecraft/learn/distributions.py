@@ -40,11 +40,12 @@ def sample(outputs: NDArray[np.float32], noise: NDArray[np.float64], *, is_discr
     return native_distributions.sample(outputs, noise, is_discrete=is_discrete)
 
 
-def most_likely(outputs: NDArray[np.float32], *, is_discrete: bool) -> NDArray[Any]:
-    """What evaluation drives: the most probable action, or the mean clipped to [-1, 1]."""
+def most_likely(outputs: NDArray[np.float32], *, is_discrete: bool, is_squashed: bool = False) -> NDArray[Any]:
+    """What evaluation drives: the most probable action, or the mean clipped or squashed to [-1, 1]."""
     if is_discrete:
         return np.asarray(outputs.argmax(axis=1), dtype=np.int64)
-    return np.asarray(outputs[:, : outputs.shape[1] // 2].clip(-1.0, 1.0), dtype=np.float32)
+    mean = outputs[:, : outputs.shape[1] // 2]
+    return np.asarray(np.tanh(mean) if is_squashed else mean.clip(-1.0, 1.0), dtype=np.float32)
 
 
 def log_prob(outputs: NDArray[np.float32], actions: NDArray[Any], *, is_discrete: bool) -> NDArray[np.float32]:

@@ -36,6 +36,8 @@ class NetworkSpec:
     """Columns of privileged state the critic sees; 0 gives it a camera tower of its own, as AWS does."""
     frame_shape: tuple[int, int] = (120, 160)
     """Height and width of the greyscale camera image, pixels."""
+    is_squashed: bool = False
+    """Whether the best continuous action is the hyperbolic tangent of the mean (SAC, TD3), not the mean itself."""
 
     @property
     def policy_size(self) -> int:

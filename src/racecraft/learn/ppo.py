@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
-from racecraft.learn.learner import Learner, Minibatch, Objective, UpdateStats, Weights
+from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights
 from racecraft.learn.rollout import Rollout
 
 _VALUE_BATCH = 4096  # observations whose values are computed at once
@@ -251,6 +251,11 @@ class PPO:
             policy_seconds=self._clocks["policy"],
             update_seconds=self._clocks["update"],
         )
+
+    @property
+    def spec(self) -> NetworkSpec:
+        """The network that drives."""
+        return self.learner.spec
 
     @property
     def driving_weights(self) -> Weights:

@@ -43,6 +43,14 @@ def camera_tower(
     parameters: Parameters, observations: Tensor, *, spec: NetworkSpec, tower: str, dtype: torch.dtype
 ) -> Tensor:
     """The head's outputs (B, outputs), float32, for encoded frames (B, *observation_shape) of uint8."""
+    x = camera_features(parameters, observations, spec=spec, tower=tower, dtype=dtype)
+    return _linear(parameters, x.float(), f"{tower}.head")
+
+
+def camera_features(
+    parameters: Parameters, observations: Tensor, *, spec: NetworkSpec, tower: str, dtype: torch.dtype
+) -> Tensor:
+    """What the head of a tower sees  (B, units of the last dense layer)."""
     arch, block = architecture(spec.name), block_size(spec)
     x = observations.permute(0, 3, 1, 2).to(dtype).mul_(1.0 / 255.0)  # a view of (B, H, W, C): channels last
     for i, conv in enumerate(arch.convs, 1):
@@ -53,7 +61,7 @@ def camera_tower(
     x = x.permute(0, 2, 3, 1).reshape(len(x), -1)
     for i in range(1, len(arch.dense) + 1):
         x = _linear(parameters, x, f"{tower}.dense{i}").relu_()
-    return _linear(parameters, x.float(), f"{tower}.head")
+    return x
 
 
 def policy(parameters: Parameters, observations: Tensor, *, spec: NetworkSpec, dtype: torch.dtype) -> Tensor:

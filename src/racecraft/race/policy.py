@@ -30,7 +30,7 @@ class NetworkPolicy:
         """Commands (N, 2), steering angle in rad and speed in m/s, for frames (N, H, W)."""
         spec = self.learner.spec
         outputs = self.learner.policy(self.learner.encode(frames))
-        actions = distributions.most_likely(outputs, is_discrete=spec.is_discrete)
+        actions = distributions.most_likely(outputs, is_discrete=spec.is_discrete, is_squashed=spec.is_squashed)
         return self.action_space.to_commands(actions if spec.is_discrete else actions.clip(-1.0, 1.0))
 
 
@@ -54,7 +54,8 @@ def load_policy(run: RunFolder, *, checkpoint: str | int = "best", num_threads: 
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"{saved.path} does not describe its network: {error}.") from error
     learner = make_learner(spec, seed=None, num_threads=num_threads)
-    learner.load_weights(
-        {name.removeprefix(WEIGHTS): array for name, array in saved.arrays.items() if name.startswith(WEIGHTS)}
-    )
+    given = {name.removeprefix(WEIGHTS): array for name, array in saved.arrays.items() if name.startswith(WEIGHTS)}
+    if not any(name.startswith("critic.") for name in given):  # of an algorithm that judges otherwise
+        given |= {name: array for name, array in learner.weights().items() if name.startswith("critic.")}
+    learner.load_weights(given)
     return saved.step, NetworkPolicy(learner, run.read_model_metadata().action_space)

@@ -25,7 +25,7 @@ import numpy as np
 
 from racecraft.agent import Hyperparameters
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RewardError, RunError
-from racecraft.learn import PPO, make_learner
+from racecraft.learn import Algorithm, make_learner
 from racecraft.race.policy import NetworkPolicy
 from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import (
@@ -42,6 +42,7 @@ from racecraft.run import (
 from racecraft.run.history import HistoryWriter
 from racecraft.sim import Simulation
 from racecraft.track import Track, joint_digest, load_tracks
+from racecraft.training.algorithms import make_algorithm
 from racecraft.training.environment import TrainingEnvironment
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
@@ -58,7 +59,7 @@ class _Session:
     """What a training works with while it runs."""
 
     environment: TrainingEnvironment
-    ppo: PPO
+    algorithm: Algorithm
     evaluator: Evaluator
     trace: SimTraceWriter
     metrics: TrainingMetrics
@@ -132,7 +133,6 @@ class Training:
     def _session(self) -> Iterator[_Session]:
         """Everything made, and brought to where the last checkpoint was; closed at the end, however that comes."""
         settings, folder = self.settings, self.folder
-        ppo_config = settings.ppo
         metadata = folder.read_model_metadata()
         require_trainable(settings, metadata)
         saved = self._last_checkpoint()
@@ -146,7 +146,7 @@ class Training:
             tracks = self._load_tracks()
             simulation = Simulation(
                 tracks,
-                num_envs=ppo_config.num_envs,
+                num_envs=settings.num_envs,
                 seed=settings.seed,
                 vehicle=settings.vehicle,
                 start=settings.start,
@@ -164,7 +164,7 @@ class Training:
 
         with ExitStack() as stack:
             # A function that remembers something gets a memory for each car: on AWS one process drove one car.
-            copies = ppo_config.num_envs if keeps_state(source) else 1
+            copies = settings.num_envs if keeps_state(source) else 1
             worker = stack.enter_context(
                 RewardWorker(
                     source, list(tracks), seed=settings.seed, num_cars=copies, num_objects=settings.objects.count
@@ -175,7 +175,7 @@ class Training:
             events = stack.enter_context(EventWriter(folder.events, after_step=after))
             history = stack.enter_context(HistoryWriter(folder.history, step=kept))
             episodes = int(resumed.get("episodes", 0))
-            counter = EpisodeCounter(ppo_config.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0)))
+            counter = EpisodeCounter(settings.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0)))
             hyperparameters = folder.read_hyperparameters()
             log = None
             if self.aws_log is not None:
@@ -183,12 +183,12 @@ class Training:
                 log.write_settings(
                     world=tracks[0].name,
                     metadata=metadata,
-                    hyperparameters=aws_hyperparameters(ppo_config, hyperparameters),
+                    hyperparameters=aws_hyperparameters(settings.ppo, hyperparameters),
                 )
-            per_iteration = ppo_config.episodes_per_iteration or AWS_EPISODES
+            per_iteration = settings.ppo.episodes_per_iteration or AWS_EPISODES
             trace = SimTraceWriter(
                 folder.training_simtrace,
-                num_envs=ppo_config.num_envs,
+                num_envs=settings.num_envs,
                 tracks=list(tracks),
                 action_space=metadata.action_space,
                 episodes_per_iteration=per_iteration,
@@ -207,7 +207,7 @@ class Training:
             )
             session = _Session(
                 environment=environment,
-                ppo=PPO(ppo_config, learner, environment, seed=settings.seed),
+                algorithm=make_algorithm(settings, learner, environment),
                 evaluator=Evaluator(NetworkPolicy(learner, metadata.action_space), tracks, settings),
                 trace=trace,
                 metrics=metrics,
@@ -219,7 +219,7 @@ class Training:
             if saved is not None:
                 self._load_state(session, saved)
                 forgotten = "; what the reward function remembered begins anew" if copies > 1 else ""
-                self.reporter.note(f"Resumed at step {session.ppo.total_steps:,}{forgotten}.")
+                self.reporter.note(f"Resumed at step {session.algorithm.total_steps:,}{forgotten}.")
             try:
                 yield session
             except BaseException:
@@ -232,21 +232,21 @@ class Training:
 
     def _train(self, session: _Session) -> str:
         """Train until a limit is reached; its name."""
-        ppo, meter = session.ppo, self.meter
-        meter.begin(steps=ppo.total_steps)
+        algorithm, meter = session.algorithm, self.meter
+        meter.begin(steps=algorithm.total_steps)
         self.reporter.begin(session.environment.simulation, session.evaluator.policy)
         reason = self._limit_reached(session)
         if reason in ("laps", "lap_time", "seconds", "steps"):
             self.reporter.note(f"The limit of {self.settings.until} was reached before; --until sets another.")
         while not reason:
-            stats = ppo.iterate()
+            stats = algorithm.iterate()
             self._account(session, stats.environment_seconds, stats.policy_seconds, stats.update_seconds)
             for episode in (finished := session.environment.take_finished()):
                 session.metrics.add(episode)
             meter.add(finished)
             report = meter.report(stats, episodes=session.counter.number)
             self.reporter.iteration(report)
-            session.events.add_scalars(_iteration_scalars(report), step=ppo.total_steps)
+            session.events.add_scalars(_iteration_scalars(report), step=algorithm.total_steps)
             session.history.add_iteration(report.point())
             if session.aws_log is not None:
                 session.aws_log.write_policy(
@@ -259,7 +259,7 @@ class Training:
                 session.aws_log.flush()
 
             reason = self._limit_reached(session)
-            is_due = ppo.total_steps - session.evaluator.evaluated_at >= self.settings.evaluate_every
+            is_due = algorithm.total_steps - session.evaluator.evaluated_at >= self.settings.evaluate_every
             if (is_due or reason) and reason != "interrupted":  # whoever interrupts does not want to wait
                 self._evaluate(session)
                 reason = reason or self._limit_reached(session)
@@ -269,7 +269,7 @@ class Training:
 
     def _limit_reached(self, session: _Session) -> str:
         """Why training is to end now, or an empty string."""
-        until, steps, last = self.settings.until, session.ppo.total_steps, session.evaluator.last
+        until, steps, last = self.settings.until, session.algorithm.total_steps, session.evaluator.last
         if self._stop.is_set():
             return "interrupted"
         if until.laps and last is not None and last.laps_completed >= until.laps:
@@ -303,14 +303,14 @@ class Training:
     def _evaluate(self, session: _Session) -> None:
         begun = time.perf_counter()
         evaluator = session.evaluator
-        ppo, counter = session.ppo, session.counter
-        ppo.prefers_average = evaluator.was_perfect
-        with ppo.driving():
-            trials = evaluator.evaluate(step=ppo.total_steps, seconds=self.meter.seconds, counter=counter)
+        algorithm, counter = session.algorithm, session.counter
+        algorithm.prefers_average = evaluator.was_perfect
+        with algorithm.driving():
+            trials = evaluator.evaluate(step=algorithm.total_steps, seconds=self.meter.seconds, counter=counter)
         for trial in trials:
             session.metrics.add(trial, phase="evaluation")
         assert evaluator.last is not None
-        session.events.add_scalars(_evaluation_scalars(evaluator.last), step=session.ppo.total_steps)
+        session.events.add_scalars(_evaluation_scalars(evaluator.last), step=session.algorithm.total_steps)
         session.history.add("evaluation", evaluator.last.point())
         self.reporter.evaluation(evaluator.last)
         self.meter.parts["evaluation"] += time.perf_counter() - begun
@@ -318,23 +318,23 @@ class Training:
     def _checkpoint(self, session: _Session) -> None:
         """Logs first: what a checkpoint counts is then on disk, whatever happens in between."""
         begun = time.perf_counter()
-        ppo, evaluator, counter = session.ppo, session.evaluator, session.counter
+        algorithm, evaluator, counter = session.algorithm, session.evaluator, session.counter
         session.trace.flush()
         session.metrics.write()
         last = evaluator.last
-        is_judged = last is not None and last.step == ppo.total_steps
+        is_judged = last is not None and last.step == algorithm.total_steps
         lap = last.best_lap if last is not None else None
         self.folder.checkpoints.save(
-            ppo.total_steps,
+            algorithm.total_steps,
             {
-                **ppo.state(),
+                **algorithm.state(),
                 **session.trace.state(),
                 "simulation": session.environment.simulation.save(),
                 "episode_rewards": counter.rewards,
                 "recent_episodes": self.meter.state(),
             },
             metadata={
-                "network": asdict(ppo.learner.spec),
+                "network": asdict(algorithm.spec),
                 "episodes": counter.number,
                 "clock": counter.clock,
                 "seconds": self.meter.seconds,
@@ -364,12 +364,12 @@ class Training:
     def _load_state(self, session: _Session, saved: Checkpoint) -> None:
         arrays, metadata = saved.arrays, saved.metadata
         try:
-            session.ppo.load_state(arrays)
+            session.algorithm.load_state(arrays)
             session.environment.simulation.load(arrays["simulation"])
             session.counter.rewards[:] = arrays["episode_rewards"]
             session.trace.load_state(arrays)
             session.evaluator.load_state(metadata["evaluator"])
-            session.ppo.prefers_average = session.evaluator.was_perfect
+            session.algorithm.prefers_average = session.evaluator.was_perfect
             self.meter.load_state(arrays["recent_episodes"], seconds=float(metadata["seconds"]))
         except RacecraftError:
             raise
@@ -406,7 +406,7 @@ class Training:
             run=self.folder.path,
             reason=reason,
             wall_seconds=time.monotonic() - self.meter.started,
-            steps=session.ppo.total_steps,
+            steps=session.algorithm.total_steps,
             laps_completed=last.laps_completed if last is not None else 0,
             evaluation_trials=self.settings.evaluation_trials,
             best_lap_seconds=session.evaluator.best_lap,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_space
+from racecraft.learn.sb3 import CONTINUOUS_ONLY
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
 from racecraft.training.parent import Parent, open_parent
@@ -64,6 +65,7 @@ def make_plan(
     hyperparameters: str | Path | None = None,
     seed: int = 0,
     parent: str | Path | Parent | None = None,
+    algorithm: str = "",
     **settings: Any,
 ) -> Plan:
     """Everything a run needs, read and checked; the arguments are those of `racecraft.training.train`.
@@ -82,7 +84,8 @@ def make_plan(
     if model_metadata is not None:
         metadata = ModelMetadata.load(model_metadata)
     elif theirs is None or actions is not None:
-        chosen = DEFAULT_ACTIONS if actions is None else actions
+        suited = "continuous" if algorithm.removeprefix("sb3:") in CONTINUOUS_ONLY else DEFAULT_ACTIONS
+        chosen = suited if actions is None else actions
         space = action_space(chosen) if isinstance(chosen, str) else chosen
         if theirs is None:
             metadata = ModelMetadata(action_space=space, neural_network="RACECRAFT_SMALL")
@@ -90,6 +93,8 @@ def make_plan(
             metadata = replace(theirs.read_model_metadata(), action_space=space)
     else:
         metadata = theirs.read_model_metadata()
+    if algorithm:
+        metadata = _with_algorithm(metadata, algorithm)
     parameters = None if hyperparameters is None else Hyperparameters.load(hyperparameters)
     if theirs is not None:
         if parameters is None and "ppo" not in settings:
@@ -107,6 +112,7 @@ def make_plan(
             track=DEFAULT_TRACK if track is None else track,
             until=limit,
             seed=seed,
+            algorithm=algorithm,
             **settings,
         ),
         reward=source,
@@ -116,10 +122,16 @@ def make_plan(
     )
 
 
+def _with_algorithm(metadata: ModelMetadata, algorithm: str) -> ModelMetadata:
+    """The metadata that says, as far as AWS's file can, what trains."""
+    is_sac = algorithm == "sac" and metadata.action_space.kind == "continuous"
+    return replace(metadata, training_algorithm="sac" if is_sac else "clipped_ppo")
+
+
 def _inherited(folder: RunFolder, metadata: ModelMetadata, *, is_new_track: bool, follows_aws: bool) -> dict[str, Any]:
     """The settings of a parent that its child has as well, unless the user says otherwise."""
     theirs = read_settings(folder)
-    left_out = {"until", "seed", *(_OF_THE_TRACK if is_new_track else ())}
+    left_out = {"until", "seed", "algorithm", *(_OF_THE_TRACK if is_new_track else ())}
     values = {setting.name: getattr(theirs, setting.name) for setting in fields(theirs) if setting.name not in left_out}
     is_same_kind = folder.read_model_metadata().action_space.kind == metadata.action_space.kind
     if follows_aws:

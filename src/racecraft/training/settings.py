@@ -9,7 +9,8 @@ from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError, RunError, did_you_mean
-from racecraft.learn import NetworkSpec, PPOConfig, network_names
+from racecraft.learn import NetworkSpec, PPOConfig, SACConfig, network_names
+from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3_ALGORITHMS, SB3Config
 from racecraft.sim import CameraSpec, Randomization, Start, Vehicle, load_randomization, load_vehicle
 from racecraft.sim.columns import state_width
 from racecraft.sim.objects import NO_OBJECTS, Objects
@@ -20,6 +21,11 @@ from racecraft.training.stop import Until
 DEFAULT_TRACK: Final = "reinvent_2018"
 DEFAULT_REWARD: Final = "racing"
 VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
+ALGORITHMS: Final = ("ppo", "sac", *(f"sb3:{name}" for name in SB3_ALGORITHMS))
+SQUASHED: Final = ("sac", "sb3:sac", "sb3:td3")
+"""Algorithms whose best action is the hyperbolic tangent of the policy's mean."""
+_ADDED: Final = ("algorithm", "sac", "sb3")
+"""Fields that runs of earlier versions lack."""
 CRITICS: Final = ("privileged", "camera")
 EVALUATE_EVERY: Final = 4096
 FAR_EVALUATE_EVERY: Final = 50_000
@@ -56,8 +62,14 @@ class TrainSettings:
     """From what ranges every episode draws its light, friction, camera pose, ..."""
     objects: Objects = NO_OBJECTS
     """Boxes and bot cars on the track; evaluations have them, too."""
+    algorithm: str = "ppo"
+    """What improves the policy, one of `ALGORITHMS`."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
-    """How the policy improves."""
+    """How PPO does it."""
+    sac: SACConfig = field(default_factory=SACConfig)
+    """How SAC does it."""
+    sb3: SB3Config = field(default_factory=SB3Config)
+    """How Stable-Baselines3 does it."""
     evaluate_every: int = EVALUATE_EVERY
     """Camera steps between two evaluations, each followed by a checkpoint."""
     evaluation_trials: int = 5
@@ -67,6 +79,7 @@ class TrainSettings:
 
     def __post_init__(self) -> None:
         for name, choice, allowed in (
+            ("algorithm", self.algorithm, ALGORITHMS),
             ("network", self.network, network_names()),
             ("critic", self.critic, CRITICS),
             ("direction", self.direction, DIRECTIONS),
@@ -75,7 +88,7 @@ class TrainSettings:
                 hint = did_you_mean(str(choice), allowed)
                 raise ConfigError(f"{name} is {choice!r}; allowed are {', '.join(allowed)}.", hint=hint)
         for name, value, low, high in (
-            ("num_envs", self.ppo.num_envs, 1, MAX_ENVS),
+            ("num_envs", self.num_envs, 1, MAX_ENVS),
             ("seed", self.seed, 0, 2**32 - 1),
             ("evaluate_every", self.evaluate_every, 1, 10**9),
             ("evaluation_trials", self.evaluation_trials, 1, 100),
@@ -91,6 +104,13 @@ class TrainSettings:
         if self.until.laps > self.evaluation_trials:
             object.__setattr__(self, "evaluation_trials", self.until.laps)
 
+    @property
+    def num_envs(self) -> int:
+        """Cars driven at once."""
+        if self.algorithm.startswith("sb3:"):
+            return self.sb3.num_envs
+        return self.sac.num_envs if self.algorithm == "sac" else self.ppo.num_envs
+
     def network_spec(self, metadata: ModelMetadata) -> NetworkSpec:
         """The network for a model's action space."""
         space = metadata.action_space
@@ -100,6 +120,7 @@ class TrainSettings:
             num_actions=space.size if is_discrete else 2,
             is_discrete=is_discrete,
             state_size=state_width(self.objects.count) if self.critic == "privileged" else 0,
+            is_squashed=self.algorithm in SQUASHED,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -116,7 +137,7 @@ class TrainSettings:
         """
         try:
             values = dict(document)
-            missing = [setting.name for setting in fields(cls) if setting.name not in values]
+            missing = [setting.name for setting in fields(cls) if setting.name not in (*values, *_ADDED)]
             if missing:
                 raise RunError(f"The settings in run.json lack {', '.join(missing)}.")
             values["until"] = Until.parse(values["until"])
@@ -124,7 +145,8 @@ class TrainSettings:
             values["start"] = Start(**values["start"])
             values["randomize"] = Randomization(**values["randomize"])
             values["objects"] = Objects.from_dict(values["objects"])
-            values["ppo"] = PPOConfig(**values["ppo"])
+            for name, config in (("ppo", PPOConfig), ("sac", SACConfig), ("sb3", SB3Config)):
+                values[name] = config(**values.get(name, {}))
             return cls(**values)
         except (TypeError, AttributeError) as error:
             raise RunError(f"The settings in run.json do not fit this version of Racecraft: {error}.") from error
@@ -139,6 +161,7 @@ def make_settings(
     track: str | Path | Sequence[str | Path] = DEFAULT_TRACK,
     randomize: Randomization | str | Path = "none",
     num_envs: int = 0,
+    algorithm: str = "",
     ppo: PPOConfig | None = None,
     **settings: Any,
 ) -> TrainSettings:
@@ -156,6 +179,7 @@ def make_settings(
             says otherwise.
         randomize: Preset, file or ranges of what differs from episode to episode.
         num_envs: Cars driven at once; 0 decides by itself.
+        algorithm: One of `ALGORITHMS`; by default the metadata's.
         ppo: How the policy improves, instead of hyperparameters.
         settings: Other fields of `TrainSettings`.
 
@@ -175,6 +199,23 @@ def make_settings(
         settings = {"start": SCATTERED, "evaluation_trials": FAR_TRIALS, **settings}
     if settings.get("evaluate_every", 0) == 0:
         settings["evaluate_every"] = FAR_EVALUATE_EVERY if is_far else EVALUATE_EVERY
+    algorithm = algorithm or ("sac" if metadata.training_algorithm == "sac" else "ppo")
+    _check_actions(algorithm, metadata)
+    if algorithm == "sac" and "sac" not in settings:
+        if hyperparameters is not None:
+            hyperparameters.check_algorithm("sac")
+        theirs: dict[str, Any] = {} if hyperparameters is None else hyperparameters.to_sac()
+        settings["sac"] = SACConfig(**theirs)
+    if hyperparameters is not None and algorithm.startswith("sb3:"):
+        raise ConfigError(
+            f"hyperparameters.json is for AWS's algorithms, {algorithm} is none of them.", hint="Leave it out."
+        )
+    for name in ("sac", "sb3"):
+        if num_envs and algorithm.split(":")[0] == name:
+            _check_num_envs(num_envs)
+            settings[name] = replace(
+                settings.get(name, SACConfig() if name == "sac" else SB3Config()), num_envs=num_envs
+            )
     if hyperparameters is not None:
         if ppo is not None:
             raise ConfigError("ppo and hyperparameters both say how the policy improves; give one of them.")
@@ -192,6 +233,7 @@ def make_settings(
         randomize=randomize,
         vehicle=vehicle,
         network=network or metadata.neural_network,
+        algorithm=algorithm,
         ppo=ppo,
         **settings,
     )
@@ -199,8 +241,30 @@ def make_settings(
 
 def _with_num_envs(ppo: PPOConfig, num_envs: int) -> PPOConfig:
     """The same PPO with other cars: rollouts of about as many samples."""
-    if not 1 <= num_envs <= MAX_ENVS:
-        raise ConfigError(f"num_envs is {num_envs!r}; allowed is a whole number from 1 to {MAX_ENVS}.")
+    _check_num_envs(num_envs)
     num_steps = max(1, round(ppo.num_envs * ppo.num_steps / num_envs))
     minibatch_size = min(ppo.minibatch_size, num_envs * num_steps)
     return replace(ppo, num_envs=num_envs, num_steps=num_steps, minibatch_size=minibatch_size)
+
+
+def _check_num_envs(num_envs: int) -> None:
+    if not 1 <= num_envs <= MAX_ENVS:
+        raise ConfigError(f"num_envs is {num_envs!r}; allowed is a whole number from 1 to {MAX_ENVS}.")
+
+
+def _check_actions(algorithm: str, metadata: ModelMetadata) -> None:
+    """Refuse an algorithm that cannot choose among these actions."""
+    kind, name = metadata.action_space.kind, algorithm.removeprefix("sb3:")
+    if algorithm not in ALGORITHMS:
+        raise ConfigError(
+            f"algorithm is {algorithm!r}; allowed are {', '.join(ALGORITHMS)}.",
+            hint=did_you_mean(str(algorithm), ALGORITHMS),
+        )
+    if kind == "discrete" and name in CONTINUOUS_ONLY:
+        raise ConfigError(
+            f"{algorithm} needs a continuous action space; this one is discrete.", hint="Give --actions continuous."
+        )
+    if kind == "continuous" and name in DISCRETE_ONLY:
+        raise ConfigError(
+            f"{algorithm} needs a discrete action space; this one is continuous.", hint="Give --actions default."
+        )

@@ -46,6 +46,8 @@ def start_run(
     """
     require_trainable(settings, metadata)
     if parent is not None:
+        if settings.algorithm != "ppo":
+            raise ConfigError(f"A run of {settings.algorithm} cannot begin from another one; only ppo can.")
         parent.check(settings.network_spec(metadata), metadata)
     tracks = load_tracks(settings.track)
     track = tracks[0]
@@ -128,14 +130,14 @@ def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:
     """Refuse what this version cannot train.
 
     Raises:
-        ConfigError: A sensor that is not simulated, another algorithm, or settings that exclude each other.
+        ConfigError: A sensor that is not simulated, or settings that exclude each other.
     """
     check_simulated(metadata.sensors)
-    if metadata.training_algorithm != "clipped_ppo":
-        raise ConfigError(
-            f"training_algorithm is {metadata.training_algorithm!r}; this version trains 'clipped_ppo' only."
-        )
-    if settings.ppo.exploration == "e-greedy" and metadata.action_space.kind != "discrete":
+    if (
+        settings.algorithm == "ppo"
+        and settings.ppo.exploration == "e-greedy"
+        and metadata.action_space.kind != "discrete"
+    ):
         raise ConfigError(
             "exploration is 'e-greedy', which needs a discrete action space; this one is continuous.",
             hint="Set exploration_type to 'categorical' in hyperparameters.json.",

@@ -1,0 +1,48 @@
+"""The algorithms by name, and how one is made for a run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from racecraft.errors import ConfigError
+from racecraft.learn import PPO, SAC, Algorithm, Environment, Learner
+from racecraft.training.settings import TrainSettings
+
+
+def make_algorithm(settings: TrainSettings, learner: Learner, environment: Environment) -> Algorithm:
+    """The algorithm of a run.
+
+    Args:
+        settings: Of the run.
+        learner: The network that drives; PPO learns with it.
+        environment: The cars.
+
+    Raises:
+        ConfigError: It needs a package that is not installed, or does not go with the actions.
+    """
+    seed, threads = settings.seed, settings.num_threads
+    if settings.algorithm == "sac":
+        torch_sac = _import("torch_sac", "sac", extra="torch")
+        state_size = learner.spec.state_size
+        backend = torch_sac.TorchSAC(learner.spec, settings.sac, state_size=state_size, seed=seed, num_threads=threads)
+        return SAC(settings.sac, backend, learner, environment, seed=seed)
+    if settings.algorithm.startswith("sb3:"):
+        torch_sb3 = _import("torch_sb3", settings.algorithm, extra="sb3")
+        name = settings.algorithm.removeprefix("sb3:")
+        made: Algorithm = torch_sb3.SB3(name, settings.sb3, learner, environment, seed=seed, num_threads=threads)
+        return made
+    return PPO(settings.ppo, learner, environment, seed=seed)
+
+
+def _import(module: str, algorithm: str, *, extra: str) -> Any:
+    """A backend that takes seconds to import, or may not be there."""
+    import importlib
+
+    try:
+        return importlib.import_module(f"racecraft.learn.{module}")
+    except ImportError as error:
+        needed = "PyTorch" if extra == "torch" else "Stable-Baselines3"
+        raise ConfigError(
+            f"--algorithm {algorithm} needs {needed}, which is not installed.",
+            hint=f"Install 'racecraft[{extra}]', or train with ppo.",
+        ) from error
