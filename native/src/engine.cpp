@@ -253,7 +253,9 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
         // Bots drive on around a car that stands as a penalty, so its view changes, too.
         const bool lives = objects_.has_bots() && !terminated()[env] && !truncated()[env];
         if (is_moving_[env] == 0.0f && !lives) continue;
-        objects_.advance(env, track_of(env), seeds_[env], streams_[env], episodes_[env], vehicle(env));
+        if (objects_.count() > 0) {
+            objects_.advance(env, track_of(env), seeds_[env], streams_[env], episodes_[env], vehicle(env));
+        }
         look(env);
     }
 }

@@ -149,4 +149,13 @@ TEST(square_root_is_correctly_rounded) {
     });
 }
 
+TEST(inverse_square_root_is_close) {
+    const auto check = [](float value) {
+        const double exact = 1.0 / std::sqrt(static_cast<double>(value));
+        CHECK_NEAR(static_cast<double>(inverse_sqrt_of(value)) / exact, 1.0, 2e-7);
+    };
+    for_floats(1e-30f, 1e30f, check);
+    for (float value = 1.0f; value < 4.0f; value += 1e-5f) check(value);  // every mantissa, both parities
+}
+
 }  // namespace racecraft

@@ -17,6 +17,7 @@ from racecraft.errors import ArchiveError, ConfigError, RacecraftError, RewardEr
 from racecraft.importing import ImportedRun, import_run
 from racecraft.importing import drfc as settings_of_drfc
 from racecraft.run import RunFolder
+from racecraft.sim import Bots, Objects, Obstacles, load_randomization
 from racecraft.track import load_track, save_route
 from racecraft.training.start import read_settings
 
@@ -137,8 +138,10 @@ def test_every_setting_is_accounted_for(tmp_path: Path) -> None:
         assert settings_of_drfc.ALIASES.get(name, name) in told, name
     assert found.unknown == {"DR_WORLD_NAM": "Did you mean 'DR_WORLD_NAME'?", "MY_OWN": ""}
     assert any("fresh" in note for note in found.notes)
-    assert "DR_RACE_TYPE=OBJECT_AVOIDANCE" in found.unused
-    assert "DR_ENABLE_DOMAIN_RANDOMIZATION=True" in found.unused
+    assert found.used["DR_RACE_TYPE=OBJECT_AVOIDANCE"] == "obstacles on the track"
+    assert found.used["DR_ENABLE_DOMAIN_RANDOMIZATION=True"] == "lamps of random colours"
+    assert found.used["DR_OA_NUMBER_OF_OBSTACLES=3"] == "objects on the track"
+    assert "DR_H2B_BOT_CAR_SPEED=0.2" in found.unused
     assert "DR_TRAIN_BEST_MODEL_METRIC=reward" in found.unused
 
     folder = RunFolder.open(found.run)
@@ -146,6 +149,10 @@ def test_every_setting_is_accounted_for(tmp_path: Path) -> None:
     settings = read_settings(folder)
     assert (settings.direction, settings.evaluation_trials) == ("reverse", 100)
     assert (settings.start.mode, settings.start.advance, settings.start.offset) == ("advance", 0.1, 0.5)
+    assert settings.objects == Objects(
+        obstacles=Obstacles(count=2, placement="fixed", positions=((0.23, -1), (0.46, 1)))
+    )
+    assert settings.randomize == load_randomization("aws")
     rules = json.loads(folder.race_rules.read_text())
     expected = {"laps": 4, "max_resets": 7, "offtrack_penalty": 2.5, "collision_penalty": 4.0, "direction": "forward"}
     assert {name: rules[name] for name in expected} == expected
@@ -161,6 +168,33 @@ def test_every_setting_is_accounted_for(tmp_path: Path) -> None:
         "OBJECT_POSITIONS": "0.23,-1;0.46,1",
         "BOT_CAR_SPEED": "0.2",
     }
+
+
+@pytest.mark.parametrize(
+    ("lines", "objects"),
+    [
+        ("RACE_TYPE: HEAD_TO_BOT\nNUMBER_OF_BOT_CARS: 2\nIS_LANE_CHANGE: true\n", Bots(count=2, changes_lane=True)),
+        (
+            "RACE_TYPE: OBJECT_AVOIDANCE\nOBJECT_POSITIONS: ['0.2,-1', '0.5,1']\n",
+            Obstacles(count=2, placement="fixed", positions=((0.2, -1), (0.5, 1))),
+        ),
+        ("RACE_TYPE: HEAD_TO_MODEL\nNUMBER_OF_OBSTACLES: 2\n", None),
+    ],
+)
+def test_objects_of_a_console_job(lines: str, objects: Bots | Obstacles | None, tmp_path: Path) -> None:
+    files = {**models.MODEL, "training_params.yaml": models.PARAMS + lines}
+    found = import_run(models.as_folder(files, tmp_path / "model"))
+    settings = read_settings(RunFolder.open(found.run))
+    expected = Objects(bots=objects) if isinstance(objects, Bots) else Objects(obstacles=objects)
+    assert settings.objects == expected
+    assert ("NUMBER_OF_OBSTACLES" in found.unused) == (objects is None)
+
+
+def test_a_wrong_setting_of_objects_leaves_no_run(tmp_path: Path) -> None:
+    env = "DR_WORLD_NAME=oval\nDR_RACE_TYPE=HEAD_TO_BOT\nDR_H2B_NUMBER_OF_BOT_CARS=many\n"
+    with pytest.raises(ConfigError, match="NUMBER_OF_BOT_CARS is 'many'; allowed is a whole number"):
+        import_run(models.as_folder({**models.DRFC, "run.env": env}, tmp_path / "drfc"), name="x")
+    assert not Path("runs/x").exists()
 
 
 def test_the_page_names_every_setting_that_is_known() -> None:
@@ -180,6 +214,7 @@ def test_the_page_names_every_setting_that_is_known() -> None:
     for name in named:
         concrete = name.replace("*", "X")
         known = {*settings_of_drfc.TRAINING, *settings_of_drfc.EVALUATION, *settings_of_drfc.FILES}
+        known |= settings_of_drfc.OBJECTS.keys()
         known |= {*settings_of_drfc.ALIASES, settings_of_drfc.MODEL_PREFIX, settings_of_drfc.PRETRAINED}
         assert name in known or settings_of_drfc.meaning(concrete) is not None, name
 

@@ -43,7 +43,7 @@ TRACKS = {
     "aws": ("reinvent_base", "2024_reinvent_champ_cw", "Straight_track"),
 }
 START = 0.37  # of the lap
-TOLERANCE = {"track_width": 0.03}  # the simulator reads it from a table along the track
+TOLERANCE = {"track_width": 0.01}  # the simulator reads it from a table along the track
 EXACT = 1e-5  # positions are float32
 ROUNDING = 1e-9  # m
 STRIDE = 5  # calls; every one would take half a minute

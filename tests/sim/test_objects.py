@@ -20,7 +20,7 @@ from racecraft.sim import (
     Simulation,
     Start,
     objects_for_race,
-    objects_from_drfc,
+    objects_from_aws,
 )
 from racecraft.sim.columns import OBJECT_STATE_COLUMNS, row_width, state_width
 from racecraft.sim.objects import OBJECT_KINDS
@@ -435,13 +435,13 @@ def test_settings_survive_json():
 
 
 def test_deepracer_for_cloud_settings():
-    assert objects_from_drfc({}) == Objects()
+    assert objects_from_aws({}) == Objects()
     avoidance = {"DR_RACE_TYPE": "OBJECT_AVOIDANCE", "DR_OA_NUMBER_OF_OBSTACLES": "4", "DR_H2B_BOT_CAR_SPEED": "9"}
-    assert objects_from_drfc(avoidance) == Objects(obstacles=Obstacles(count=4))
-    fixed = objects_from_drfc({**avoidance, "DR_OA_OBJECT_POSITIONS": '"0.23,-1;0.46,1"'})
+    assert objects_from_aws(avoidance) == Objects(obstacles=Obstacles(count=4))
+    fixed = objects_from_aws({**avoidance, "DR_OA_OBJECT_POSITIONS": '"0.23,-1;0.46,1"'})
     assert fixed == boxes((0.23, -1), (0.46, 1))
     cars = {"DR_OA_IS_OBSTACLE_BOT_CAR": "True", "DR_OA_RANDOMIZE_OBSTACLE_LOCATIONS": "True"}
-    assert objects_from_drfc({**avoidance, **cars}).obstacles == Obstacles(count=4, kind="car", placement="random")
+    assert objects_from_aws({**avoidance, **cars}).obstacles == Obstacles(count=4, kind="car", placement="random")
     bot_settings = {
         "DR_RACE_TYPE": "HEAD_TO_BOT",
         "DR_H2B_NUMBER_OF_BOT_CARS": "5",
@@ -453,7 +453,7 @@ def test_deepracer_for_cloud_settings():
         "DR_H2B_MIN_DISTANCE_BETWEEN_BOT_CARS": "3",
         "DR_H2B_RANDOMIZE_BOT_CAR_LOCATIONS": "true",
     }
-    assert objects_from_drfc(bot_settings).bots == Bots(
+    assert objects_from_aws(bot_settings).bots == Bots(
         count=5,
         speed=0.6,
         changes_lane=True,
@@ -469,6 +469,6 @@ def test_deepracer_for_cloud_settings():
         ("DR_H2B_NUMBER_OF_BOT_CARS", "-1"),
     ):
         with pytest.raises(ConfigError, match=f"{name} is '{value}'"):
-            objects_from_drfc({**bot_settings, name: value})
+            objects_from_aws({**bot_settings, name: value})
     with pytest.raises(ConfigError, match="DR_OA_OBJECT_POSITIONS"):
-        objects_from_drfc({**avoidance, "DR_OA_OBJECT_POSITIONS": "here"})
+        objects_from_aws({**avoidance, "DR_OA_OBJECT_POSITIONS": "here"})

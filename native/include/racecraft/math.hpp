@@ -61,6 +61,21 @@ RC_HD double sqrt_of(double value) {
     return sqrt(value);
 }
 
+// 1 / sqrt(value) for value in [1e-30, 1e30], within 2e-7 of itself: a first guess by halving the exponent
+// (error 0.034), then three Newton steps, each of which squares the error and multiplies it by 1.5. A third
+// of the time of a root and a division, which no vector unit pipelines.
+RC_HD float inverse_sqrt_of(float value) {
+#if defined(__CUDA_ARCH__)
+    float y = __int_as_float(0x5f3759df - (__float_as_int(value) >> 1));
+#else
+    float y = __builtin_bit_cast(float, 0x5f3759df - (__builtin_bit_cast(int32_t, value) >> 1));
+#endif
+    const float half = 0.5f * value;
+    y = y * (1.5f - half * y * y);
+    y = y * (1.5f - half * y * y);
+    return y * (1.5f - half * y * y);
+}
+
 // Angle in [-pi, pi] up to the rounding of the number of turns; error below 1e-6 for a few thousand turns,
 // none without.
 RC_HD float wrap_angle(float angle) {

@@ -136,19 +136,19 @@ RC_HD VehicleConstants vehicle_constants(const VehicleParameters& p) {
 }
 
 // Lateral acceleration, m/s^2, that a tyre carrying the whole car would give: the law above with s multiplied
-// out, so that it takes one division and one root.
+// out, so that one inverse root is all it takes.
 RC_HD float tyre_acceleration(float stiffness, float friction, float sideways, float forward,
                               float slip_speed) {
     const float wanted = stiffness * sideways;
     const float available = friction * max_of(forward, slip_speed);
-    return -(kGravity * friction) * wanted / sqrt_of(available * available + wanted * wanted);
+    return -(kGravity * friction) * wanted * inverse_sqrt_of(available * available + wanted * wanted);
 }
 
 // The same along, of a wheel that rolls at `forward` m/s.
 RC_HD float drive_acceleration(const VehicleConstants& c, float target, float forward) {
     const float wanted = (target - forward) * c.inverse_speed_time;
     const float share = wanted * (wanted > 0.0f ? c.inverse_drive_limit : c.inverse_brake_limit);
-    return wanted / sqrt_of(1.0f + share * share);
+    return wanted * inverse_sqrt_of(1.0f + share * share);
 }
 
 RC_HD VehicleRates vehicle_rates(const VehicleConstants& c, const VehicleState& state, float steering_command,

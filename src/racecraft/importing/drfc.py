@@ -78,7 +78,7 @@ OBJECTS: Final = {
     "DR_H2B_RANDOMIZE_BOT_CAR_LOCATIONS": "RANDOMIZE_BOT_CAR_LOCATIONS",
     "DR_H2B_BOT_CAR_PENALTY": "BOT_CAR_PENALTY",
 }
-"""Obstacles and bot cars: kept under AWS's names in ``training_params.yaml``."""
+"""Obstacles and bot cars, and what AWS calls them in ``training_params.yaml``."""
 
 NO_EFFECT: Final = {
     "DR_CAR_*": "looks and names do not change the driving",
@@ -126,7 +126,7 @@ class DrfcSettings:
     params: TrainingParams
     """The training job; obstacles and bots are in its ``extra``."""
     given: dict[str, str]
-    """Fields of `params` that were given, and as what: ``DR_WORLD_NAME=reinvent_base``."""
+    """Fields of `params` and of its ``extra`` that were given, and as what: ``DR_WORLD_NAME=reinvent_base``."""
     rules: RaceRules | None
     """Rules of its evaluations, where some are given; the direction is forward unless the file says otherwise."""
     rules_given: dict[str, str]
@@ -172,7 +172,6 @@ def read_drfc(env: EnvFile, *, name: str) -> DrfcSettings:
     )
     for key in unresolved:
         del without_effect[key]
-    used.update({f"{key}={values[key]}": "kept in training_params.yaml" for key in OBJECTS if key in values})
     if MODEL_PREFIX in values:
         used[f"{MODEL_PREFIX}={values[MODEL_PREFIX]}"] = "name of the run, and of the folder of its history"
     is_pretrained = values.get(PRETRAINED, "").lower() == "true"
@@ -225,7 +224,8 @@ def _params(values: Mapping[str, str], *, name: str) -> tuple[TrainingParams, di
     checked = validate(model, known, name=name)
     fields = {field: getattr(checked, key) for key, field in TRAINING.items()}
     extra = {OBJECTS[key]: value for key, value in values.items() if key in OBJECTS}
-    given = {TRAINING[key]: f"{key}={value}" for key, value in known.items()}
+    names = {**TRAINING, **OBJECTS}
+    given = {names[key]: f"{key}={value}" for key, value in values.items() if key in names}
     return TrainingParams(**fields, extra=extra), given
 
 

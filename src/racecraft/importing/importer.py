@@ -164,8 +164,8 @@ def _read_params(model: _Model) -> tuple[TrainingParams, dict[str, str]]:
         return TrainingParams(), {}
     params = TrainingParams.from_yaml(source.text(place), name=model.shown(place))
     given = {key: f"{key.upper()}: {getattr(params, key)}" for key in params.given}
+    given |= {str(key): str(key) for key in params.extra}
     model.used[model.shown(place)] = "settings of the training"
-    model.unused.update(dict.fromkeys(map(str, params.extra), "kept in training_params.yaml, means nothing here"))
     return params, given
 
 

@@ -2,7 +2,15 @@
 
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATE_COLUMNS, STATUS_NAMES
-from racecraft.sim.objects import Bots, Objects, Obstacles, objects_for_race, objects_from_drfc
+from racecraft.sim.objects import (
+    NO_OBJECTS,
+    Bots,
+    Objects,
+    Obstacles,
+    has_aws_meaning,
+    objects_for_race,
+    objects_from_aws,
+)
 from racecraft.sim.randomization import CONDITIONS, Randomization, load_randomization
 from racecraft.sim.simulation import CONTROL_DT, MAX_STEERING, Simulation, Start, instruction_set
 from racecraft.sim.vehicle import Vehicle, load_vehicle
@@ -11,6 +19,7 @@ __all__ = [
     "CONDITIONS",
     "CONTROL_DT",
     "MAX_STEERING",
+    "NO_OBJECTS",
     "OBJECT_COLUMNS",
     "OBJECT_HEADER",
     "ROW_COLUMNS",
@@ -24,9 +33,10 @@ __all__ = [
     "Simulation",
     "Start",
     "Vehicle",
+    "has_aws_meaning",
     "instruction_set",
     "load_randomization",
     "load_vehicle",
     "objects_for_race",
-    "objects_from_drfc",
+    "objects_from_aws",
 ]

@@ -2,7 +2,7 @@
 
     Objects -> *simulation* -> objects around every car, drawn, hit, and told to the reward function
 
-Settings and defaults are those of deepracer-for-cloud (``DR_OA_*``, ``DR_H2B_*``), read by `objects_from_drfc`.
+Settings and defaults are those of deepracer-for-cloud (``DR_OA_*``, ``DR_H2B_*``), read by `objects_from_aws`.
 """
 
 from __future__ import annotations
@@ -195,23 +195,28 @@ def objects_for_race(race_type: str, *, settings: Mapping[str, Any] | None = Non
     return Objects(obstacles=group) if isinstance(group, Obstacles) else Objects(bots=group)
 
 
-def objects_from_drfc(settings: Mapping[str, str]) -> Objects:
-    """The objects that deepracer-for-cloud's ``run.env`` describes by its ``DR_RACE_TYPE``.
+def objects_from_aws(settings: Mapping[str, Any]) -> Objects:
+    """The objects that AWS's settings describe by their race type.
 
     Args:
-        settings: Its lines, name to value; names that mean nothing here are left alone.
+        settings: Name to value, as in ``training_params.yaml`` (``RACE_TYPE``, ``NUMBER_OF_OBSTACLES``) or in
+            deepracer-for-cloud's ``run.env`` (``DR_RACE_TYPE``, ``DR_OA_NUMBER_OF_OBSTACLES``); what means nothing in
+            this race is left alone.
 
     Raises:
         ConfigError: Names the setting and its value.
     """
-    race_type = settings.get("DR_RACE_TYPE", "TIME_TRIAL")
+    named = {aws_object_setting(name): (name, value) for name, value in settings.items()}
+    race_type = str(named.get("RACE_TYPE", ("", "TIME_TRIAL"))[1])
     given: dict[str, Any] = {}
-    for name, (prefix, field, read) in _DRFC.items():
-        if race_type == prefix and settings.get(name, "") != "":
+    for setting, (race, field, read) in _AWS.items():
+        name, value = named.get(setting, ("", ""))
+        text = ";".join(map(str, value)) if isinstance(value, list) else str(value)
+        if race_type == race and text != "":
             try:
-                given[field] = read(settings[name])
+                given[field] = read(text)
             except ValueError as error:
-                raise ConfigError(f"{name} is {settings[name]!r}; {error}.") from error
+                raise ConfigError(f"{name} is {text!r}; {error}.") from error
     if given.get("positions"):
         given["placement"] = "fixed"
         given["count"] = len(given["positions"])
@@ -221,6 +226,19 @@ def objects_from_drfc(settings: Mapping[str, str]) -> Objects:
     if given.get("count") == 0:
         return NO_OBJECTS
     return objects_for_race(race_type, settings=given)
+
+
+def aws_object_setting(name: str) -> str:
+    """The name in ``training_params.yaml``: ``OBJECT_POSITIONS`` for ``DR_OA_OBJECT_POSITIONS``."""
+    for prefix in ("DR_OA_", "DR_H2B_", "DR_"):
+        name = name.removeprefix(prefix)
+    return name
+
+
+def has_aws_meaning(race_type: str, name: str) -> bool:
+    """Whether a setting places objects in a race of AWS's type."""
+    setting = aws_object_setting(name)
+    return setting in _AWS and _AWS[setting][0] == race_type
 
 
 def parse_positions(text: str) -> Positions:
@@ -260,20 +278,20 @@ def _obstacle_kind(text: str) -> str:
 
 
 _OA, _H2B = "OBJECT_AVOIDANCE", "HEAD_TO_BOT"
-_DRFC: Final[dict[str, tuple[str, str, Any]]] = {
-    "DR_OA_NUMBER_OF_OBSTACLES": (_OA, "count", _whole),
-    "DR_OA_MIN_DISTANCE_BETWEEN_OBSTACLES": (_OA, "min_distance", _number),
-    "DR_OA_RANDOMIZE_OBSTACLE_LOCATIONS": (_OA, "is_random", _truth),
-    "DR_OA_IS_OBSTACLE_BOT_CAR": (_OA, "kind", _obstacle_kind),
-    "DR_OA_OBJECT_POSITIONS": (_OA, "positions", parse_positions),
-    "DR_H2B_NUMBER_OF_BOT_CARS": (_H2B, "count", _whole),
-    "DR_H2B_MIN_DISTANCE_BETWEEN_BOT_CARS": (_H2B, "min_distance", _number),
-    "DR_H2B_RANDOMIZE_BOT_CAR_LOCATIONS": (_H2B, "is_random", _truth),
-    "DR_H2B_BOT_CAR_SPEED": (_H2B, "speed", _number),
-    "DR_H2B_IS_LANE_CHANGE": (_H2B, "changes_lane", _truth),
-    "DR_H2B_LOWER_LANE_CHANGE_TIME": (_H2B, "shortest_stay", _number),
-    "DR_H2B_UPPER_LANE_CHANGE_TIME": (_H2B, "longest_stay", _number),
-    "DR_H2B_LANE_CHANGE_DISTANCE": (_H2B, "change_distance", _number),
+_AWS: Final[dict[str, tuple[str, str, Any]]] = {
+    "NUMBER_OF_OBSTACLES": (_OA, "count", _whole),
+    "MIN_DISTANCE_BETWEEN_OBSTACLES": (_OA, "min_distance", _number),
+    "RANDOMIZE_OBSTACLE_LOCATIONS": (_OA, "is_random", _truth),
+    "IS_OBSTACLE_BOT_CAR": (_OA, "kind", _obstacle_kind),
+    "OBJECT_POSITIONS": (_OA, "positions", parse_positions),
+    "NUMBER_OF_BOT_CARS": (_H2B, "count", _whole),
+    "MIN_DISTANCE_BETWEEN_BOT_CARS": (_H2B, "min_distance", _number),
+    "RANDOMIZE_BOT_CAR_LOCATIONS": (_H2B, "is_random", _truth),
+    "BOT_CAR_SPEED": (_H2B, "speed", _number),
+    "IS_LANE_CHANGE": (_H2B, "changes_lane", _truth),
+    "LOWER_LANE_CHANGE_TIME": (_H2B, "shortest_stay", _number),
+    "UPPER_LANE_CHANGE_TIME": (_H2B, "longest_stay", _number),
+    "LANE_CHANGE_DISTANCE": (_H2B, "change_distance", _number),
 }
 
 

@@ -390,6 +390,7 @@ def native_track(track: Track) -> _native.NativeTrack:
     # On a closed track the sample after the last is the first again; an open one needs both ends.
     steps = count if track.is_closed else count - 1
     s = np.arange(count) * (track.length / steps)
+    widths = track.width_at(s).astype(np.float32)
     return _native.NativeTrack(
         track.centerline,
         track.inner,
@@ -397,9 +398,9 @@ def native_track(track: Track) -> _native.NativeTrack:
         twin.centerline,
         twin.inner,
         twin.outer,
-        track.width_at(s).astype(np.float32),
+        widths,
         track.curvature_at(s).astype(np.float32),
-        twin.width_at(s).astype(np.float32),
+        np.roll(widths[::-1], 1 if track.is_closed else 0),
         twin.curvature_at(s).astype(np.float32),
         steps / track.length,
         track.is_closed,

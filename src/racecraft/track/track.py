@@ -130,12 +130,10 @@ class Track:
     def widths(self) -> Floats:
         """Distance from the inner to the outer border at each waypoint, metres, (W,).
 
-        That of the row, unless the row is slanted, as those of some routes are: then, as AWS measures it, between the
-        places of both borders that are nearest to the waypoint.
+        That of the row, unless the row is slanted, as those of some routes are: then as `width_at` measures it.
         """
         widths: Floats = np.hypot(*(self.inner - self.outer).T)
-        inner, outer = (nearest(self.centerline, border) for border in (self.inner, self.outer))
-        across = np.hypot(*(inner - outer).T)
+        across = self._width_across(self.centerline)
         widths = np.where(across < SLANTED * widths, across, widths)
         widths.flags.writeable = False
         return widths
@@ -193,6 +191,12 @@ class Track:
         last = len(self.centerline) - 1
         return replace(self, **lines, repeats=tuple(last - row for row in reversed(self.repeats)))
 
+    def _width_across(self, points: Floats) -> Floats:
+        """From the nearest place of the inner border to that of the outer one, metres. Shape (..., 2) to (...,)."""
+        inner, outer = (nearest(points.reshape(-1, 2), border) for border in (self.inner, self.outer))
+        across = inner - outer
+        return np.asarray(np.sqrt((across * across).sum(axis=1)).reshape(points.shape[:-1]))
+
     # --- along the track; `s` is in metres, of any shape, taken round a closed track, clamped on an open one
 
     def point_at(self, s: ArrayLike) -> Floats:
@@ -205,8 +209,11 @@ class Track:
         return wrap_angle(self._headings[np.minimum(piece, len(self._headings) - 1)])
 
     def width_at(self, s: ArrayLike) -> Floats:
-        """Width of the road, metres, interpolated between waypoints."""
-        return np.asarray(np.interp(self._on_track(s), self.arc_length, self.widths))
+        """Width of the road, metres: as AWS measures it, between the places of both borders that are nearest to `s`.
+
+        Where a route's rows of waypoints are not square to the road, that is up to centimetres less than `widths`.
+        """
+        return self._width_across(self.point_at(s))
 
     def curvature_at(self, s: ArrayLike) -> Floats:
         """Curvature of the centre line, 1/metre, positive to the left.
