@@ -68,14 +68,6 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
     reset(nullptr);
 }
 
-VehicleState Engine::vehicle(size_t env) const {
-    float values[kNumVehicleFields];
-    for (size_t k = 0; k < kNumVehicleFields; ++k) values[k] = vehicles_[k * num_envs() + env];
-    VehicleState state;
-    std::memcpy(&state, values, sizeof(state));
-    return state;
-}
-
 void Engine::store_vehicle(size_t env, const VehicleState& state) {
     float values[kNumVehicleFields];
     std::memcpy(values, &state, sizeof(state));

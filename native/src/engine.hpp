@@ -89,7 +89,11 @@ class Engine {
 
     const TrackGeometry& track_of(size_t env) const { return tracks_[episodes_[env].track].geometry(); }
     bool is_reversed(size_t env) const { return static_cast<size_t>(episodes_[env].track) >= num_tracks(); }
-    VehicleState vehicle(size_t env) const;
+    VehicleState vehicle(size_t env) const {
+        const float* at = &vehicles_[env];
+        const size_t n = num_envs();
+        return {at[0], at[n], at[2 * n], at[3 * n], at[4 * n], at[5 * n], at[6 * n]};
+    }
     void store_vehicle(size_t env, const VehicleState& state);
     VehicleState start_pose(size_t env);
     void begin_episode(size_t env);

@@ -1,5 +1,7 @@
 #include "vehicle_kernel.hpp"
 
+#include <algorithm>
+
 namespace racecraft::RC_ISA {
 namespace {
 
@@ -24,30 +26,38 @@ void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int 
     alignas(64) float speed_command[kLanes];
     alignas(64) float earlier[4][kLanes];
     alignas(64) int32_t delay[kLanes];
-    size_t car[kLanes];  // unused lanes repeat the last car and are not stored
-    for (int i = 0; i < kLanes; ++i) car[i] = begin + static_cast<size_t>(i < count ? i : count - 1);
-    for (int i = 0; i < kLanes; ++i) {
-        lanes.x[i] = arrays.x[car[i]];
-        lanes.y[i] = arrays.y[car[i]];
-        lanes.heading[i] = arrays.heading[car[i]];
-        lanes.speed[i] = arrays.speed[car[i]];
-        lanes.lateral_speed[i] = arrays.lateral_speed[car[i]];
-        lanes.yaw_rate[i] = arrays.yaw_rate[car[i]];
-        lanes.steering[i] = arrays.steering[car[i]];
-        steering_command[i] = arrays.steering_command[car[i]];
-        speed_command[i] = arrays.speed_command[car[i]];
-        delay[i] = arrays.delay != nullptr ? arrays.delay[car[i]] : 0;
-        for (size_t k = 0; k < 4; ++k) {
-            earlier[k][i] = arrays.earlier != nullptr ? arrays.earlier[k * arrays.stride + car[i]] : 0.0f;
-        }
-    }
-    for (int i = 0; i < kLanes; ++i) {
-#define RC_LOAD(name) arrays.parameters[kVehicle_##name * arrays.stride + car[i]],
-        const VehicleConstants c = vehicle_constants({RC_VEHICLE_PARAMETERS(RC_LOAD)});
+    const auto load = [&](auto car_of) {
+        for (int i = 0; i < kLanes; ++i) {
+            const size_t car = car_of(i);
+            lanes.x[i] = arrays.x[car];
+            lanes.y[i] = arrays.y[car];
+            lanes.heading[i] = arrays.heading[car];
+            lanes.speed[i] = arrays.speed[car];
+            lanes.lateral_speed[i] = arrays.lateral_speed[car];
+            lanes.yaw_rate[i] = arrays.yaw_rate[car];
+            lanes.steering[i] = arrays.steering[car];
+            steering_command[i] = arrays.steering_command[car];
+            speed_command[i] = arrays.speed_command[car];
+#define RC_LOAD(name) arrays.parameters[kVehicle_##name * arrays.stride + car],
+            const VehicleConstants c = vehicle_constants({RC_VEHICLE_PARAMETERS(RC_LOAD)});
 #undef RC_LOAD
 #define RC_STORE(name) constants.name[i] = c.name;
-        RC_VEHICLE_CONSTANTS(RC_STORE)
+            RC_VEHICLE_CONSTANTS(RC_STORE)
 #undef RC_STORE
+        }
+        for (int i = 0; i < kLanes; ++i) {
+            const size_t car = car_of(i);
+            delay[i] = arrays.delay != nullptr ? arrays.delay[car] : 0;
+            for (size_t k = 0; k < 4; ++k) {
+                earlier[k][i] = arrays.earlier != nullptr ? arrays.earlier[k * arrays.stride + car] : 0.0f;
+            }
+        }
+    };
+    const size_t last = begin + static_cast<size_t>(count) - 1;
+    if (count == kLanes) {
+        load([&](int i) { return begin + static_cast<size_t>(i); });  // in a row: vector code
+    } else {  // unused lanes repeat the last car and are not stored
+        load([&](int i) { return std::min(begin + static_cast<size_t>(i), last); });
     }
 
     for (int substep = 0; substep < substeps; ++substep) {
@@ -75,14 +85,15 @@ void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int 
     }
 
     for (int i = 0; i < count; ++i) {
-        if (arrays.is_moving[car[i]] == 0.0f) continue;
-        arrays.x[car[i]] = lanes.x[i];
-        arrays.y[car[i]] = lanes.y[i];
-        arrays.heading[car[i]] = lanes.heading[i];
-        arrays.speed[car[i]] = lanes.speed[i];
-        arrays.lateral_speed[car[i]] = lanes.lateral_speed[i];
-        arrays.yaw_rate[car[i]] = lanes.yaw_rate[i];
-        arrays.steering[car[i]] = lanes.steering[i];
+        const size_t car = begin + static_cast<size_t>(i);
+        if (arrays.is_moving[car] == 0.0f) continue;
+        arrays.x[car] = lanes.x[i];
+        arrays.y[car] = lanes.y[i];
+        arrays.heading[car] = lanes.heading[i];
+        arrays.speed[car] = lanes.speed[i];
+        arrays.lateral_speed[car] = lanes.lateral_speed[i];
+        arrays.yaw_rate[car] = lanes.yaw_rate[i];
+        arrays.steering[car] = lanes.steering[i];
     }
 }
 

@@ -26,6 +26,7 @@ namespace racecraft {
 constexpr float kControlDt = 1.0f / 15.0f;    // seconds per control step: one camera image at 15 Hz
 constexpr float kGravity = 9.8f;              // m/s^2, as in the original's physics settings
 constexpr float kMaxSteering = 0.523598776f;  // rad, 30 degrees: hard clip of the steering command
+constexpr float kMostSteering = 0.9f;         // rad, more than any command and bias turn the wheels
 constexpr float kMinSpeedCommand = 0.1f;      // m/s; a command of exactly 0 (stop) is allowed below it
 constexpr float kMaxSpeedCommand = 4.0f;      // m/s
 // Drive and brakes give at most this many times what the slipperier axle gives across: a car that is pushed
@@ -156,7 +157,7 @@ RC_HD VehicleRates vehicle_rates(const VehicleConstants& c, const VehicleState& 
     VehicleRates rates;
     float sin_heading, cos_heading, sin_steering, cos_steering;
     sincos_of(state.heading, sin_heading, cos_heading);
-    sincos_of(state.steering, sin_steering, cos_steering);
+    small_sincos_of(clamp(state.steering, -kMostSteering, kMostSteering), sin_steering, cos_steering);
 
     const float front_sideways_body = state.lateral_speed + c.front_axle * state.yaw_rate;
     const float front_forward = state.speed * cos_steering + front_sideways_body * sin_steering;
