@@ -291,6 +291,9 @@ def test_hostile_numbers_are_refused(clean: Path, tmp_path: Path) -> None:
         bad.cars[0].recording.rows[5, column] = value
         with pytest.raises(ReplayError):
             read_replay(write_replay(bad, path))
+    far = replace(replay.conditions.track, outer=replay.conditions.track.outer + 1e8)
+    with pytest.raises(ReplayError, match="within 10,000"):
+        read_replay(write_replay(replace(replay, conditions=replace(replay.conditions, track=far)), path))
     replay.rewards[0][3] = np.nan
     with pytest.raises(ReplayError, match="finite"):
         write_replay(replay, path)

@@ -102,12 +102,12 @@ class Marshal:
             car.actions.append(np.array(actions[car.index], dtype=np.float32))
             if row[_STATUS] == _PAUSE:  # the core keeps the progress of the mistake; log where the car stands
                 row[_PROGRESS] = self._progress(row[_DISTANCE], near=row[_PROGRESS])
-            if is_event[car.index]:
-                self._event(car, row, clock)
-            # half a step of slack: the clock runs in steps of 1/15 s
-            if not car.status and limit > 0.0 and clock >= limit - 0.5 * CONTROL_DT:
+            # half a step of slack: the clock runs in steps of 1/15 s; time up comes before everything else
+            if limit > 0.0 and clock >= limit - 0.5 * CONTROL_DT:
                 row[_STATUS] = _TIME_UP
                 self._end(car, row, clock)
+            elif is_event[car.index]:
+                self._event(car, row, clock)
 
     def rows_of(self, car: int) -> Sequence[NDArray[np.float64]]:
         """The steps of a car that are logged by now, the ones that prepare a start included; each (row_width,)."""

@@ -27,6 +27,7 @@ from racecraft.run.atomic import write_file
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES, row_width
 from racecraft.sim.objects import OBJECT_KINDS
 from racecraft.track.track import Track
+from racecraft.track.validate import check_rows
 
 SUFFIX: Final = ".replay"
 MAX_CELLS: Final = 64_000_000
@@ -156,6 +157,7 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
     lines = columns.table(header.track.waypoints, header.track.types)
     try:
         track = Track(header.track.name, lines[:, :2], lines[:, 2:4], lines[:, 4:], tuple(header.track.repeats))
+        check_rows({"centerline": track.centerline, "inner": track.inner, "outer": track.outer}, name=track.name)
     except RacecraftError as error:
         raise ReplayError(f"The track in {name} is not one: {error}") from error
     if header.track.repeats and max(header.track.repeats) >= len(track.centerline):
