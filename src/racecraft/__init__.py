@@ -39,9 +39,13 @@ _HOME = {
     "load_reward": "reward",
     "load_track": "track",
     "load_tracks": "track",
+    "race_models": "race.run_race",
+    "rate_models": "race.run_ladder",
+    "read_replay": "race",
     "resume": "training",
     "track_names": "track",
     "train": "training",
+    "verify": "race",
 }
 """Where each public name lives below ``racecraft``, and after a colon what it is called there."""
 
@@ -53,8 +57,12 @@ if TYPE_CHECKING:
     from racecraft.env import RacecraftVectorEnv as RacecraftVectorEnv
     from racecraft.errors import RacecraftError as RacecraftError
     from racecraft.race import RaceRules as RaceRules
+    from racecraft.race import read_replay as read_replay
+    from racecraft.race import verify as verify
     from racecraft.race.run_evaluation import evaluate_run
     from racecraft.race.run_generalization import generalize_run
+    from racecraft.race.run_ladder import rate_models as rate_models
+    from racecraft.race.run_race import race_models as race_models
     from racecraft.reward import RewardWorker as RewardWorker
     from racecraft.reward import check_reward as check_reward
     from racecraft.reward import load_reward as load_reward

@@ -176,6 +176,15 @@ def test_settings_that_were_changed_lead_elsewhere(clean: Path, tmp_path: Path, 
     assert not verify(read_replay(path)).is_genuine
 
 
+def test_a_replay_of_another_version_says_so(clean: Path, tmp_path: Path) -> None:
+    replay = read_replay(clean)
+    assert verify(replay).version_note == ""
+    old = read_replay(write_replay(replace(replay, written_by="0.0.1"), tmp_path / "old.replay"))
+    found = verify(old)
+    assert found.is_genuine
+    assert "Racecraft 0.0.1" in found.version_note
+
+
 def test_a_wider_track_of_the_same_name_is_told(clean: Path) -> None:
     replay = read_replay(clean)
     assert verify(replay).track_note == "as in the library"

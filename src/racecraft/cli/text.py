@@ -206,6 +206,8 @@ def say_verified(found: Verification) -> None:
         _say(console, ("Genuine: ", "bold green"), f"all {found.num_steps:,} steps come out the same, bit for bit.")
     else:
         _say(console, ("Not genuine: ", "bold red"), found.difference.sentence)
+        if found.version_note:
+            _say(console, ("note: ", "bold"), _harmless(found.version_note))
 
 
 def say_limit(name: str, limit: TrackLimit) -> None:

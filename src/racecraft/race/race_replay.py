@@ -8,7 +8,7 @@ docs/replay-file.md describes the file. Reading trusts nothing in it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -55,6 +55,8 @@ class Replay:
     """Laps, results and recording of each car."""
     rewards: tuple[NDArray[np.float64], ...]
     """As stored, of each car  (T,)."""
+    written_by: str = field(default_factory=lambda: metadata.version("racecraft"))
+    """Version of Racecraft: another one may have other rules or physics."""
 
     @classmethod
     def of(cls, evaluation: Evaluation, *, title: str = "", names: tuple[str, ...] = ()) -> Replay:
@@ -107,7 +109,7 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
     columns: list[bytes] = []
     header: dict[str, Any] = {
         "title": replay.title[:200],
-        "racecraft": metadata.version("racecraft"),
+        "racecraft": replay.written_by[:200],
         "track": {
             "name": track.name[:200],
             "waypoints": len(track.centerline),
@@ -181,6 +183,7 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
         names=tuple(car.name for car in header.cars),
         cars=tuple(cars),
         rewards=tuple(rewards),
+        written_by=header.racecraft,
     )
 
 

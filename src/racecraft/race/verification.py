@@ -9,6 +9,7 @@ replay -> its conditions -> simulation, marshal <- its actions, step by step
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from importlib import metadata
 from typing import Any, Final
 
 import numpy as np
@@ -76,6 +77,14 @@ class Verification:
         return sum(len(car.recording) for car in self.replay.cars)
 
     @property
+    def version_note(self) -> str:
+        """Why a genuine replay may come out otherwise; empty where it was written by this version."""
+        here, there = metadata.version("racecraft"), self.replay.written_by
+        return (
+            "" if here == there else f"It was written by Racecraft {there}; this is {here}, which may drive otherwise."
+        )
+
+    @property
     def track_note(self) -> str:
         """Whether the track is the one that is known by its name: a file may hold a wider one."""
         return track_note(self.replay.conditions.track)
@@ -96,6 +105,7 @@ class Verification:
             "track": self.replay.conditions.track.name,
             "track_note": self.track_note,
             "vehicle": self.vehicle_note,
+            "written_by": self.replay.written_by,
             "difference": None
             if found is None
             else {field.name: getattr(found, field.name) for field in fields(found)} | {"sentence": found.sentence},
