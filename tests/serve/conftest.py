@@ -1,13 +1,42 @@
-"""A real console for each file of tests."""
+"""A real console for each file of tests, and a database of either kind for each test of the queue."""
+
+from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+from postgres_servers import PostgresServer, binaries, postgres_server
 from running_consoles import RunningConsole, running_console
 
+pytest.importorskip("fastapi")
 
-@pytest.fixture(scope="module")
-def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningConsole]:
-    pytest.importorskip("fastapi")
-    with running_console(tmp_path_factory.mktemp("console") / "runs") as running:
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[PostgresServer]:
+    """A PostgreSQL server; skips where there is none."""
+    pytest.importorskip("psycopg")
+    if binaries() is None:
+        pytest.skip("PostgreSQL is not installed: apt-get install postgresql")
+    with postgres_server() as server:
+        yield server
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """The URL of an empty database."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path / 'console.db'}"
+    server: PostgresServer = request.getfixturevalue("postgres")
+    return server.new_database()
+
+
+@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
+def console(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningConsole]:
+    """A console on either database."""
+    options = []
+    if request.param == "postgresql":
+        server: PostgresServer = request.getfixturevalue("postgres")
+        options = ["--database", server.new_database()]
+    with running_console(tmp_path_factory.mktemp("console") / "runs", *options) as running:
         yield running

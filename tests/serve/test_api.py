@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-import time
+import shutil
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import httpx
@@ -213,4 +214,47 @@ def test_the_garage_of_many_runs_is_read_once(console: RunningConsole) -> None:
     first = console.client.get("/api/models").json()
     assert len([model for model in first if model["name"].startswith("many-")]) == 20
     assert console.client.get("/api/models").json() == first
-    time.sleep(0.01)
+
+
+def test_two_who_look_at_new_models_at_the_same_time(console: RunningConsole) -> None:
+    for number in range(20):
+        shutil.copytree(console.runs / "many-0", console.runs / f"twin-{number}")
+    with ThreadPoolExecutor(8) as pool:
+        replies = list(pool.map(lambda _: console.client.get("/api/models"), range(16)))
+    assert {reply.status_code for reply in replies} == {200}
+    assert all(f"twin-{number}" in reply.text for reply in replies for number in range(20))
+
+
+def test_a_card_is_read_again_when_an_evaluation_has_ended(console: RunningConsole) -> None:
+    name = console.create(name="raced", train=False)
+
+    def card() -> Any:
+        return next(model for model in console.client.get("/api/models").json() if model["name"] == name)
+
+    folder = console.runs / name / "evaluation-20260101000000"
+    folder.mkdir()
+    assert card()["evaluations"] == 0
+    (folder / "racing-line.png").write_bytes(b"picture")
+    (folder / "evaluation.json").write_text("{}")
+    assert card()["evaluations"] == 1
+    assert card()["picture"] == "evaluation-20260101000000/racing-line.png"
+
+
+def test_a_model_in_use_is_not_moved_away(console: RunningConsole) -> None:
+    client = console.client
+    name = console.create(name="busy", train=False)
+    job = client.post(f"/api/models/{name}/evaluations", json={}).json()  # fails: there is no checkpoint
+    moved = client.patch(f"/api/models/{name}", json={"name": "elsewhere"})
+    if moved.status_code != 200:
+        assert "in use" in error(moved, 409)["message"]
+    ended = console.wait_for(console.job_ended(job["id"]))
+    assert ended["state"] == "failed"
+
+
+def test_a_new_model_by_the_name_of_one_in_the_trash_is_new(console: RunningConsole) -> None:
+    client = console.client
+    console.create(name="again", train=False, tags=["old"])
+    client.delete("/api/models/again")
+    console.create(name="again", train=False)
+    assert client.get("/api/models/again").json()["tags"] == []
+    error(client.post("/api/models/again/restore"), 409)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from datetime import timedelta
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -13,13 +14,14 @@ from running_consoles import running_console
 
 from racecraft.errors import RunError
 from racecraft.serve.database import Database
-from racecraft.serve.jobs import MAX_ATTEMPTS, JobQueue
+from racecraft.serve.jobs import MAX_LOSSES, JobQueue
+from racecraft.serve.kinds import KINDS, kinds_of
 from racecraft.serve.tables import Job, Table, now
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Iterator[Database]:
-    database = Database(f"sqlite:///{tmp_path / 'console.db'}")
+def database(database_url: str) -> Iterator[Database]:
+    database = Database(database_url)
     database.migrate()
     yield database
     database.close()
@@ -72,9 +74,10 @@ def test_many_workers_never_own_a_job_together(database: Database) -> None:
     claimed: list[str] = []
 
     def work(owner: str) -> None:
-        mine = JobQueue(Database(database.url))
-        while (job := mine.claim(("train",), owner=owner)) is not None:
+        mine = Database(database.url)
+        while (job := JobQueue(mine).claim(("train",), owner=owner)) is not None:
             claimed.append(job.id)
+        mine.close()
 
     threads = [threading.Thread(target=work, args=(str(number),)) for number in range(6)]
     for thread in threads:
@@ -101,11 +104,45 @@ def test_a_job_whose_worker_is_gone_is_another_s(database: Database, queue: JobQ
 
 def test_a_job_that_kills_its_workers_is_given_up(queue: JobQueue) -> None:
     job = queue.add("train", "a", {})
-    for attempt in range(MAX_ATTEMPTS):
+    for attempt in range(MAX_LOSSES):
         assert queue.claim(("train",), owner=str(attempt)) is not None
         queue.release(str(attempt))
     assert state(queue, job.id) == "failed"
     assert queue.claim(("train",), owner="x") is None
+
+
+def test_a_job_that_gets_further_each_time_is_not_given_up(queue: JobQueue) -> None:
+    job = queue.add("train", "a", {})
+    for attempt in range(3 * MAX_LOSSES):
+        assert queue.claim(("train",), owner=str(attempt)) is not None
+        queue.heartbeat(job.id, owner=str(attempt), has_progressed=attempt % 2 == 0)
+        queue.release(str(attempt))
+    assert state(queue, job.id) == "queued"
+
+
+def test_servers_that_are_stopped_do_not_count_as_losses(queue: JobQueue) -> None:
+    job = queue.add("train", "a", {})
+    for attempt in range(3 * MAX_LOSSES):
+        assert queue.claim(("train",), owner=str(attempt)) is not None
+        queue.hand_back(str(attempt))
+    assert state(queue, job.id) == "queued"
+
+
+def test_what_runs_is_counted_by_kind(queue: JobQueue) -> None:
+    for kind in ("train", "train", "evaluate"):
+        queue.add(kind, "a", {})
+    assert queue.num_running(("train", "evaluate")) == 0
+    queue.claim(("train",), owner="x")
+    queue.claim(("evaluate",), owner="y")
+    assert queue.num_running(("train",)) == 1
+    assert queue.num_running(("train", "evaluate")) == 2
+
+
+def test_every_kind_of_job_has_a_function() -> None:
+    for kind in KINDS.values():
+        module, _, function = kind.work.partition(":")
+        assert callable(getattr(import_module(module), function))
+    assert {name for slot in ("training", "other") for name in kinds_of(slot)} == set(KINDS)
 
 
 def test_cancelling(queue: JobQueue) -> None:

@@ -16,7 +16,18 @@ def serve(
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
     port: Annotated[int, typer.Option("--port", "-p", help="Of 127.0.0.1; 0 takes a free one.")] = 8321,
     database: Annotated[
-        str, typer.Option("--database", help="postgresql+psycopg://… instead of SQLite in the runs folder.")
+        str,
+        typer.Option(
+            "--database",
+            envvar="RACECRAFT_DATABASE",
+            help="postgresql+psycopg://… instead of SQLite in the runs folder.",
+        ),
+    ] = "",
+    artifacts: Annotated[
+        str,
+        typer.Option(
+            "--artifacts", envvar="RACECRAFT_ARTIFACTS", help="s3://BUCKET/PREFIX or file:///FOLDER to copy runs to."
+        ),
     ] = "",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the link in a browser.")] = True,
     as_json: Json = False,
@@ -40,4 +51,4 @@ def serve(
 
             webbrowser.open(link)
 
-    run_server(ServeSettings(runs=runs, port=port, database=database), on_ready=ready)
+    run_server(ServeSettings(runs=runs, port=port, database=database, artifacts=artifacts), on_ready=ready)

@@ -30,6 +30,7 @@ from racecraft.importing.layout import (
     TRAINING_PARAMS,
     find_root,
 )
+from racecraft.importing.own import read_own
 from racecraft.importing.report import ImportedRun, unused_files
 from racecraft.importing.source import Source, SourceFile, open_source
 from racecraft.race.rules import RaceRules
@@ -102,16 +103,25 @@ def import_run(
         params, given = _read_params(model)
         text = _read_reward(model, reward)
         metadata = _read_metadata(model)
-        hyperparameters = _read_hyperparameters(model)
+        own = None if track or reward or network else read_own(source, model.root)
+        hyperparameters = None if own is not None and not own.has_hyperparameters else _read_hyperparameters(model)
         if hyperparameters is not None:
             hyperparameters.check_algorithm(metadata.training_algorithm)
-        where, label = _find_track(model, params, given, track)
+        if own is not None:
+            tracks, label = list(own.tracks), own.settings.track
+            model.kind, model.used["run.json"] = "archive of Racecraft", f"every setting, track {label}"
+        else:
+            where, label = _find_track(model, params, given, track)
+            tracks = [where]
         job = job_settings(params, given)
         model.used.update(job.used)
         model.unused.update(job.unused)
-        settings = make_settings(
-            metadata=metadata, hyperparameters=hyperparameters, network=network, track=label, **job.values
-        )
+        if own is not None:
+            settings = own.settings
+        else:
+            settings = make_settings(
+                metadata=metadata, hyperparameters=hyperparameters, network=network, track=label, **job.values
+            )
         require_trainable(settings, metadata)
         if network:
             model.used[f"--network {network}"] = "network"
@@ -119,14 +129,17 @@ def import_run(
 
         folder = RunFolder.create(root, name=name, prefix=_prefix(model))
         try:
-            history = keep_history(_history_files(model), _history_root(model), folder.path / ORIGINAL)
-            report = _report(model, folder, where, history)
+            place = folder.path if own is not None else folder.path / ORIGINAL
+            history = keep_history(_history_files(model), _history_root(model), place)
+            if own is not None:
+                model.used.update(own.restore(folder, model.notes))
+            report = _report(model, folder, tracks[0], history)
             if rules is not None:
                 write_json(folder.race_rules, rules.to_dict())
             (folder.path / ORIGINAL).mkdir(exist_ok=True)
             write_json(folder.path / ORIGINAL / "import.json", {**report.to_dict(), "source": source.title})
-            params = replace(params, world_name=where.name)
-            write_run(folder, settings, [where], text, metadata, hyperparameters, params)
+            params = replace(params, world_name=tracks[0].name)
+            write_run(folder, settings, tracks, text, metadata, hyperparameters, params)
         except BaseException as error:
             shutil.rmtree(folder.path, ignore_errors=True)
             if isinstance(error, OSError):

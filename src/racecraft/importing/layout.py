@@ -13,7 +13,7 @@ from typing import Final, Literal
 from racecraft.errors import SourceError
 from racecraft.importing.archive import is_archive_name
 
-Role = Literal["settings", "trace", "metrics", "log", "weights", "video", "code", "archive", "other"]
+Role = Literal["settings", "trace", "metrics", "log", "weights", "video", "code", "archive", "own", "other"]
 
 REWARD: Final = "reward_function.py"
 METADATA: Final = "model_metadata.json"
@@ -22,6 +22,8 @@ TRAINING_PARAMS: Final = "training_params.yaml"
 RUN_ENV: Final = "run.env"
 SYSTEM_ENV: Final = "system.env"
 CUSTOM_FILES: Final = "custom_files"
+RUN: Final = "run.json"
+"""In an archive of Racecraft's own."""
 
 PLACES: Final[Mapping[str, tuple[str, ...]]] = {
     REWARD: (f"{CUSTOM_FILES}/{REWARD}", REWARD),
@@ -46,6 +48,10 @@ def role(name: str) -> Role:
     base, parent = parts[-1], parts[-2] if len(parts) > 1 else ""
     if base in PLACES or (parent == CUSTOM_FILES and base.endswith(".json")):
         return "settings"
+    if name == RUN or name.endswith((f"/{RUN}", "metrics/history.jsonl")):
+        return "own"
+    if parent == "checkpoints" and (base == "manifest.json" or base.endswith(".safetensors")):
+        return "own"
     if base.endswith("-iteration.csv") and parent in ("training-simtrace", "evaluation-simtrace"):
         return "trace"
     if base in _BOOKKEEPING or _WEIGHTS.fullmatch(base):

@@ -29,6 +29,7 @@ MAX_BYTES: Final[dict[Role, int]] = {
     "metrics": 1 << 25,
     "trace": 1 << 28,
     "log": 1 << 28,
+    "own": 1 << 28,
 }
 """Largest file of a role that is read; the other roles are not read at all."""
 _SKIPPED: Final = (".git", ".venv", "venv", "node_modules", "__pycache__", "__MACOSX")

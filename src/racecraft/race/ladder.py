@@ -194,7 +194,9 @@ def hold_ladder(
 
 
 def _hold_swiss(num_entries: int, rounds: int, plan: Sequence[Course], meet: Callable[[Pair, Course], Match]) -> None:
-    points, met, rested = [0.0] * num_entries, [], []
+    points = [0.0] * num_entries
+    met: list[Pair] = []
+    rested: list[int] = []
     for number in range(rounds):
         pairs = swiss_round(points, met, rested)
         playing = {car for pair in pairs for car in pair}

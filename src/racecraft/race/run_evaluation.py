@@ -115,6 +115,7 @@ def evaluate_run(
     video: bool = True,
     aws_log: str | Path | None = None,
     ghosts: Sequence[str] = (),
+    job: str = "",
     num_threads: int = 0,
 ) -> RunEvaluation:
     """Race a run's policy against the clock.
@@ -139,6 +140,7 @@ def evaluate_run(
         aws_log: File for the log lines that AWS's tools read, ``-`` for stdout.
         ghosts: Translucent cars in the film: replay files, ``RUN``, ``RUN@CHECKPOINT``, ``@CHECKPOINT`` of this run,
             ``best-lap``.
+        job: Written into ``evaluation.json``, by which whoever asked for the evaluation finds it again.
         num_threads: 0 takes one per core.
 
     Raises:
@@ -182,7 +184,7 @@ def evaluate_run(
         load_ghosts(ghosts, evaluation.conditions, run=folder.path, recordings=recordings) if video and ghosts else []
     )
     try:
-        files = _write(folder, evaluation, policy.action_space, is_filmed=video, aws_log=aws_log, ghosts=shown)
+        files = _write(folder, evaluation, policy.action_space, is_filmed=video, aws_log=aws_log, ghosts=shown, job=job)
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
     limit = known_limit(driven_track(where, rules), vehicle)
@@ -241,6 +243,7 @@ def _write(
     *,
     is_filmed: bool,
     aws_log: str | Path | None,
+    job: str,
     ghosts: Sequence[Ghost] = (),
 ) -> dict[str, Path]:
     stamp, inside = new_folder(folder)
@@ -272,7 +275,7 @@ def _write(
         path = videos / f"{number}-video.mp4"
         files["video"] = film(best.recording, path, laps=evaluation.rules.laps, name=folder.name, ghosts=ghosts)
     video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
-    write_json(inside / "evaluation.json", {**evaluation.summary(), "video": video})
+    write_json(inside / "evaluation.json", {**evaluation.summary(), "video": video, **({"job": job} if job else {})})
     return files
 
 

@@ -1,5 +1,6 @@
 """The run folder: what a run is made from, its checkpoints, logs and metrics, all safe against a kill."""
 
+from racecraft.run.archive import archive_chunks
 from racecraft.run.aws_log import AwsLog
 from racecraft.run.checkpoint import Checkpoint, CheckpointStore, CheckpointWarning
 from racecraft.run.episodes import Episode, EpisodeCounter
@@ -23,6 +24,7 @@ __all__ = [
     "SimTraceWriter",
     "TrainingMetrics",
     "Trial",
+    "archive_chunks",
     "list_runs",
     "read_metrics",
     "read_simtrace",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import shutil
+import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -13,15 +15,29 @@ from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
 
 from racecraft.serve import problems
+from racecraft.serve.artifacts import Artifacts
 from racecraft.serve.context import Context
 from racecraft.serve.courses import Courses
 from racecraft.serve.database import Database
 from racecraft.serve.drives import Drives
 from racecraft.serve.garage import Garage
 from racecraft.serve.ghosts import Ghosts
+from racecraft.serve.hub import Hub
 from racecraft.serve.jobs import JobQueue
+from racecraft.serve.mirror import Mirror
 from racecraft.serve.races import Races
-from racecraft.serve.routes import console, drives, evaluations, events, jobs, models, races, rewards, tracks
+from racecraft.serve.routes import (
+    archives,
+    console,
+    drives,
+    evaluations,
+    events,
+    jobs,
+    models,
+    races,
+    rewards,
+    tracks,
+)
 from racecraft.serve.schemas import ProblemReply
 from racecraft.serve.security import Guard, content_policy
 from racecraft.serve.settings import ServeSettings, version
@@ -44,25 +60,31 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     """
     settings.state.mkdir(parents=True, exist_ok=True)
     settings.tracks.mkdir(exist_ok=True)
+    shutil.rmtree(settings.state / archives.UPLOADS, ignore_errors=True)  # of a server that was killed
     database = Database(settings.database_url)
     database.migrate()
     queue = JobQueue(database)
     garage, courses = Garage(settings.runs, settings.state, database), Courses(settings.tracks)
+    supervisor = Supervisor(settings, database, queue)
+    artifacts = Artifacts(settings.artifacts) if settings.artifacts else None
     context = Context(
         settings=settings,
         database=database,
         queue=queue,
         garage=garage,
         courses=courses,
-        supervisor=Supervisor(settings, database, queue),
+        supervisor=supervisor,
         drives=Drives(),
         ghosts=Ghosts(settings.runs, database),
         races=Races(database, queue, garage, courses),
+        mirror=Mirror(artifacts, runs=settings.runs, state=settings.state, queue=queue, supervisor=supervisor),
+        hub=Hub(settings.runs, queue),
     )
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         tending = asyncio.create_task(context.supervisor.run())
+        threading.Thread(target=context.mirror.start, name="mirror", daemon=True).start()
         yield
         tending.cancel()
         with suppress(asyncio.CancelledError):
@@ -84,7 +106,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.state.guard = guard = Guard(database, hosts)
     app.add_middleware(guard.middleware)
     problems.install(app)
-    for part in (console, tracks, drives, rewards, models, evaluations, races, jobs, events):
+    for part in (console, tracks, drives, rewards, archives, models, evaluations, races, jobs, events):
         app.include_router(part.router)
 
     @app.get("/assets/{name}", include_in_schema=False)
@@ -98,7 +120,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
 
     @app.get("/{path:path}", include_in_schema=False)
     def page(path: str, request: Request) -> Response:
-        if path.startswith("api/"):
+        if path == "api" or path.startswith("api/"):
             return problems.problem(404, "NotFound", f"There is nothing at /{path[:80]}.")
         nonce = secrets.token_urlsafe(16)
         try:

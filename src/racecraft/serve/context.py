@@ -12,7 +12,9 @@ from racecraft.serve.database import Database
 from racecraft.serve.drives import Drives
 from racecraft.serve.garage import Garage
 from racecraft.serve.ghosts import Ghosts
+from racecraft.serve.hub import Hub
 from racecraft.serve.jobs import JobQueue
+from racecraft.serve.mirror import Mirror
 from racecraft.serve.races import Races
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.supervisor import Supervisor
@@ -31,6 +33,8 @@ class Context:
     drives: Drives
     ghosts: Ghosts
     races: Races
+    mirror: Mirror
+    hub: Hub
 
 
 def _context(request: Request) -> Context:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
-from alembic import command
-from alembic.config import Config
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session, sessionmaker
 
 from racecraft.errors import RunError
 from racecraft.serve.tables import User
 
+MIGRATIONS = Path(__file__).parent / "migrations"
 LOCAL_USER = "you"  # of a console of one's own
 
 
@@ -38,18 +38,32 @@ class Database:
 
     def migrate(self) -> None:
         """Bring the tables up to date; a fresh database gets them all."""
-        config = Config()
-        config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
         try:
-            with self.engine.begin() as connection:
-                config.attributes["connection"] = connection
-                command.upgrade(config, "head")
+            if self._version() != _newest():
+                self._upgrade()
             with self.transaction() as session:
                 if session.scalar(sa.select(User.id).limit(1)) is None:
                     session.add(User(name=LOCAL_USER))
         except SQLAlchemyError as error:
             reason = str(getattr(error, "orig", None) or error).splitlines()[0]
             raise RunError(f"The console's database cannot be opened: {reason}.") from error
+
+    def _version(self) -> str:
+        """Of the tables; empty for a fresh database."""
+        with self.engine.connect() as connection:
+            if not sa.inspect(connection).has_table("alembic_version"):
+                return ""
+            return str(connection.scalar(sa.text("SELECT version_num FROM alembic_version")))
+
+    def _upgrade(self) -> None:
+        from alembic import command  # takes its time to load, and most starts do without
+        from alembic.config import Config
+
+        config = Config()
+        config.set_main_option("script_location", str(MIGRATIONS))
+        with self.engine.begin() as connection:
+            config.attributes["connection"] = connection
+            command.upgrade(config, "head")
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
@@ -60,6 +74,13 @@ class Database:
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+def _newest() -> str:
+    """The newest migration's revision; their files are in order."""
+    newest = max((MIGRATIONS / "versions").glob("[0-9]*.py"), key=lambda path: path.name)
+    found = re.search(r'^revision = "(.+)"$', newest.read_text(encoding="utf-8"), re.MULTILINE)
+    return found[1] if found else ""
 
 
 def _prepare_sqlite(connection: Any, _: object) -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import sqlalchemy as sa
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.orm import Session
 
 from racecraft.errors import RacecraftError, RunError
 from racecraft.run import RunFolder, list_runs
@@ -17,10 +22,13 @@ from racecraft.run.history import read_history
 from racecraft.serve.database import Database
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.schemas import Checkpoint, ModelCard
-from racecraft.serve.tables import Job, Model, now
+from racecraft.serve.tables import Entry, Job, Model, now
 
-TRASH = "trash"  # inside the state folder
+TRASH: Final = "trash"  # inside the state folder
+PICTURE: Final = "racing-line.png"
+SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
 Status = Literal["training", "queued", "stopped", "finished", "failed", "new"]
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 
 class Garage:
@@ -46,36 +54,49 @@ class Garage:
         Raises:
             NotFound: There is none of this name; paths are no names.
         """
-        if name in {run.name for run in list_runs(self._runs)}:
+        if _NAME.fullmatch(name) and (self._runs / name / "run.json").is_file():
             return RunFolder(self._runs / name)
         raise NotFound(f"There is no model {name[:80]!r}.")
 
     def cards(self) -> list[ModelCard]:
         """All models, newest first."""
-        folders = list_runs(self._runs)
-        with self._database.transaction() as session:
-            rows = {row.name: row for row in session.scalars(sa.select(Model))}
-            jobs = _latest_trainings(session)
-            cards = []
-            for folder in folders:
-                row = rows.get(folder.name)
-                if row is None:
-                    row = Model(name=folder.name, owner_id=1, tags=[])
-                    session.add(row)
-                if (mark := _fingerprint(folder)) != row.fingerprint:
-                    row.fingerprint, row.summary = mark, _summary(folder)
-                if row.summary:
-                    status = _status(jobs.get(folder.name), row.summary)
-                    cards.append(ModelCard(name=folder.name, tags=row.tags, status=status, **row.summary))
-        return sorted(cards, key=lambda card: (card.created, card.name), reverse=True)
+        return sorted(self._cards(list_runs(self._runs)), key=lambda card: (card.created, card.name), reverse=True)
 
     def card(self, name: str) -> ModelCard:
         """One model."""
-        self.folder(name)
-        for card in self.cards():
-            if card.name == name:
-                return card
+        for card in self._cards([self.folder(name)]):
+            return card
         raise NotFound(f"Model {name!r} cannot be read: its run.json is damaged.")
+
+    def _cards(self, folders: list[RunFolder]) -> list[ModelCard]:
+        only = [folders[0].name] if len(folders) == 1 else None
+        with self._database.transaction() as session:
+            rows = _rows(session, only)
+            if fresh := [folder.name for folder in folders if folder.name not in rows]:
+                session.execute(_insert(session), [{"name": name, "owner_id": 1} for name in fresh])
+                rows = _rows(session, only)
+            trainings = _latest_trainings(session, only)
+            cards = []
+            for folder in folders:
+                row = rows[folder.name]
+                if row.deleted is not None:  # a new one by the name of one in the trash
+                    row.deleted, row.tags = None, []
+                if (mark := _fingerprint(folder)) != row.fingerprint:
+                    row.summary, is_settled = _summary(folder)
+                    row.fingerprint = mark if is_settled else ""
+                if row.summary:
+                    status = _status(*trainings.get(folder.name, ("", "")), has_steps=bool(row.summary["steps"]))
+                    cards.append(ModelCard(name=folder.name, tags=row.tags, status=status, **row.summary))
+        return cards
+
+    def require_new(self, name: str) -> None:
+        """Refuse a name that is taken.
+
+        Raises:
+            Conflict: There is something of that name.
+        """
+        if (self._runs / name).exists():
+            raise Conflict(f"There is a model {name!r} already.", hint="Choose another name.")
 
     def checkpoints(self, folder: RunFolder) -> list[Checkpoint]:
         """The states of a model's policy that are kept."""
@@ -104,14 +125,14 @@ class Garage:
             Conflict: The name is taken, or the model is in use.
         """
         folder = self.folder(old)
-        if (self._runs / new).exists():
-            raise Conflict(f"There is a model {new!r} already.", hint="Choose another name.")
+        self.require_new(new)
         with self._free(folder):
             folder.path.rename(self._runs / new)
         with self._database.transaction() as session:
             session.execute(sa.delete(Model).where(Model.name == new))
             session.execute(sa.update(Model).where(Model.name == old).values(name=new))
-            session.execute(sa.update(Job).where(Job.run == old).values(run=new))
+            for table in (Job, Entry):
+                session.execute(sa.update(table).where(table.run == old).values(run=new))
 
     def remove(self, name: str) -> None:
         """Put a model into the trash, from where `restore` brings it back.
@@ -134,7 +155,7 @@ class Garage:
             NotFound: It is not in the trash.
             Conflict: There is another of that name by now.
         """
-        if name not in {run.name for run in list_runs(self._trash)}:
+        if not _NAME.fullmatch(name) or not (self._trash / name / "run.json").is_file():
             raise NotFound(f"There is no model {name[:80]!r} in the trash.")
         if (self._runs / name).exists():
             raise Conflict(f"There is a model {name!r} again.", hint="Rename that one first.")
@@ -144,7 +165,13 @@ class Garage:
 
     @contextmanager
     def _free(self, folder: RunFolder) -> Iterator[None]:
-        """Hold the run's lock; Conflict when it is in use."""
+        """Hold the run's lock; Conflict when it is in use, or soon will be."""
+        with self._database.transaction() as session:
+            waiting = sa.select(Job.kind).where(Job.run == folder.name, Job.state.in_(("queued", "running")))
+            kind = session.scalar(waiting.limit(1))
+        if kind is not None:
+            hint = "Stop its training first." if kind == "train" else "Wait until it has ended."
+            raise Conflict(f"Model {folder.name!r} is in use: there is a job of kind {kind!r}.", hint=hint)
         with ExitStack() as stack:
             try:
                 stack.enter_context(folder.lock())
@@ -164,27 +191,37 @@ def _fingerprint(folder: RunFolder) -> str:
     return " ".join(marks)
 
 
-def _summary(folder: RunFolder) -> dict[str, Any]:
-    """What a card shows, as JSON; empty for a folder that cannot be read."""
+def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
+    """What a card shows, as JSON, empty for a folder that cannot be read; and whether it will stay so for now."""
     try:
         info = folder.read_info()
         best, last = folder.checkpoints.best, folder.checkpoints.last
-    except RacecraftError:
-        return {}
-    evaluations = sorted(folder.path.glob("evaluation-*/evaluation.json"))
-    pictures = sorted(folder.path.glob("evaluation-*/racing-line.png"))
+        created = datetime.fromisoformat(info.created).isoformat()
+    except (RacecraftError, ValueError, TypeError):
+        return {}, True
+    raced, is_settled = _evaluations(folder)
     metrics = best.metrics if best is not None else {}
     return {
         "track": Path(info.track).stem,
-        "created": datetime.fromisoformat(info.created).isoformat(),
+        "created": created,
         "steps": last.step if last is not None else 0,
         "seconds": _seconds(folder),
         "completion": metrics.get("completion"),
         "best_lap": metrics.get("best_lap_s"),
-        "evaluations": len(evaluations),
-        "picture": f"{pictures[-1].parent.name}/{pictures[-1].name}" if pictures else None,
+        "evaluations": len(raced),
+        "picture": next((f"{name}/{PICTURE}" for name in raced if (folder.path / name / PICTURE).is_file()), None),
         "until": str(info.settings.get("until", "")),
-    }
+    }, is_settled
+
+
+def _evaluations(folder: RunFolder) -> tuple[list[str], bool]:
+    """The folders of finished evaluations, newest first, and whether none is under way."""
+    with os.scandir(folder.path) as entries:
+        names = sorted((entry.name for entry in entries if entry.name.startswith("evaluation-")), reverse=True)
+    raced = [name for name in names if (folder.path / name / "evaluation.json").exists()]
+    unfinished = set(names).difference(raced)
+    youngest = max(((folder.path / name).stat().st_mtime for name in unfinished), default=0.0)
+    return raced, time.time() - youngest > SETTLED
 
 
 def _seconds(folder: RunFolder) -> float:
@@ -197,17 +234,30 @@ def _seconds(folder: RunFolder) -> float:
     return max((float(point.get("seconds") or 0.0) for point in points), default=0.0)
 
 
-def _latest_trainings(session: Any) -> dict[str, Job]:
-    """The newest training of each run."""
-    query = sa.select(Job).where(Job.kind == "train").order_by(Job.created)
-    return {job.run: job for job in session.scalars(query)}
+def _rows(session: Session, only: list[str] | None) -> dict[str, Model]:
+    query = sa.select(Model) if only is None else sa.select(Model).where(Model.name.in_(only))
+    return {row.name: row for row in session.scalars(query)}
 
 
-def _status(job: Job | None, summary: dict[str, Any]) -> Status:
-    if job is not None and job.state in ("queued", "running"):
-        return "training" if job.state == "running" else "queued"
-    if job is not None and job.state == "failed":
+def _insert(session: Session) -> sa.Insert:
+    """New rows; two who look at the same time do not collide."""
+    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
+    return insert(Model).values(tags=[], fingerprint="", summary={}).on_conflict_do_nothing()
+
+
+def _latest_trainings(session: Session, only: list[str] | None) -> dict[str, tuple[str, str]]:
+    """State and reason of the end of each run's newest training."""
+    query = sa.select(Job.run, Job.state, Job.result["reason"].as_string()).where(Job.kind == "train")
+    if only is not None:
+        query = query.where(Job.run.in_(only))
+    return {run: (state, reason or "") for run, state, reason in session.execute(query.order_by(Job.created))}
+
+
+def _status(state: str, reason: str, *, has_steps: bool) -> Status:
+    if state in ("queued", "running"):
+        return "training" if state == "running" else "queued"
+    if state == "failed":
         return "failed"
-    if job is not None and (job.state == "cancelled" or (job.result or {}).get("reason") == "interrupted"):
+    if state == "cancelled" or reason == "interrupted":
         return "stopped"
-    return "finished" if summary["steps"] else "new"
+    return "finished" if has_steps else "new"

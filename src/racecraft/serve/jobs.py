@@ -1,8 +1,8 @@
 """The queue of jobs: claimed under a lease, kept alive by heartbeats, taken over when the worker is gone.
 
     queued ──claim──▶ running ──finish──▶ done | failed | cancelled
-       ▲                 │ lease ran out (killed, machine off)
-       └─────────────────┘ again, at most `MAX_ATTEMPTS` times
+       ▲                 │ lease ran out (killed, machine off), or handed back (the server is stopped)
+       └─────────────────┘ again, unless it was lost `MAX_LOSSES` times in a row without having got any further
 
 Every step is one UPDATE whose WHERE says what it relies on, so two servers or workers never own a job together.
 """
@@ -23,8 +23,8 @@ LEASE: Final = timedelta(seconds=20)
 """How long a job without a heartbeat still counts as running."""
 FIRST_LEASE: Final = timedelta(seconds=60)
 """The same before the first heartbeat: a process needs its time to start."""
-MAX_ATTEMPTS: Final = 5
-KINDS: Final = ("train", "evaluate", "race")
+MAX_LOSSES: Final = 5
+"""How often a job's process may die before it is given up: it may be what kills it. Progress makes up for losses."""
 ENDED: Final = ("done", "failed", "cancelled")
 
 
@@ -60,6 +60,18 @@ class JobQueue:
         with self._database.transaction() as session:
             return session.scalars(query).first()
 
+    def is_busy(self, run: str) -> bool:
+        """Whether a job about this run is queued or running."""
+        query = sa.select(Job.id).where(Job.run == run, Job.state.in_(("queued", "running"))).limit(1)
+        with self._database.transaction() as session:
+            return session.scalar(query) is not None
+
+    def num_running(self, kinds: tuple[str, ...]) -> int:
+        """How many jobs of these kinds run, whoever started them."""
+        query = sa.select(sa.func.count()).where(Job.state == "running", Job.kind.in_(kinds))
+        with self._database.transaction() as session:
+            return session.scalar(query) or 0
+
     def claim(self, kinds: tuple[str, ...], *, owner: str) -> Job | None:
         """Take the oldest queued job of these kinds, or None."""
         oldest = (
@@ -81,11 +93,12 @@ class JobQueue:
             session.expire_all()
             return session.get_one(Job, job_id)
 
-    def heartbeat(self, job_id: str, *, owner: str) -> str:
+    def heartbeat(self, job_id: str, *, owner: str, has_progressed: bool = False) -> str:
         """Keep a job: ``go on``, ``stop`` when somebody cancelled it, or ``lost`` when it is another's now."""
         kept = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
+        kept = kept.values(lease_until=now() + LEASE, **({"losses": 0} if has_progressed else {}))
         with self._database.transaction() as session:
-            if session.execute(kept.values(lease_until=now() + LEASE)).rowcount != 1:  # type: ignore[attr-defined]
+            if session.execute(kept).rowcount != 1:  # type: ignore[attr-defined]
                 return "lost"
             return "stop" if session.scalar(sa.select(Job.is_cancelled).where(Job.id == job_id)) else "go on"
 
@@ -117,6 +130,10 @@ class JobQueue:
             waiting = sa.update(Job).where(Job.id == job_id, Job.state == "queued")
             session.execute(waiting.values(state="cancelled", finished=now()))
 
+    def hand_back(self, owner: str) -> None:
+        """Put back what an owner was asked to let go of; that is no fault of the job's."""
+        self._take_back(Job.owner == owner, is_lost=False)
+
     def release(self, owner: str) -> None:
         """Put back what an owner holds that has ended without a word."""
         self._take_back(Job.owner == owner)
@@ -125,11 +142,12 @@ class JobQueue:
         """Put back what nobody keeps alive."""
         self._take_back(Job.lease_until < now())
 
-    def _take_back(self, condition: sa.ColumnElement[bool]) -> None:
-        lost = sa.update(Job).where(Job.state == "running", condition)
-        gone = {"code": "WorkerLost", "message": f"The job's process died {MAX_ATTEMPTS} times.", "hint": ""}
+    def _take_back(self, condition: sa.ColumnElement[bool], *, is_lost: bool = True) -> None:
+        held = sa.update(Job).where(Job.state == "running", condition)
+        gone = {"code": "WorkerLost", "message": f"The job's process died {MAX_LOSSES} times.", "hint": ""}
         with self._database.transaction() as session:
-            session.execute(lost.where(Job.is_cancelled).values(state="cancelled", finished=now(), lease_until=None))
-            tired = lost.where(Job.attempts >= MAX_ATTEMPTS)
-            session.execute(tired.values(state="failed", error=gone, finished=now(), lease_until=None))
-            session.execute(lost.values(state="queued", owner="", lease_until=None))
+            session.execute(held.where(Job.is_cancelled).values(state="cancelled", finished=now(), lease_until=None))
+            if is_lost:
+                tired = held.where(Job.losses >= MAX_LOSSES - 1)
+                session.execute(tired.values(state="failed", error=gone, finished=now(), lease_until=None))
+            session.execute(held.values(state="queued", owner="", lease_until=None, losses=Job.losses + int(is_lost)))

@@ -8,7 +8,9 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from sqlalchemy.exc import DataError, DBAPIError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from racecraft.errors import RacecraftError, RunError, TrackNotFound
 
@@ -44,6 +46,19 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(HTTPException)
     async def refused(_: Request, error: HTTPException) -> JSONResponse:
         return problem(error.status_code, "Refused", str(error.detail))
+
+    @app.exception_handler(DataError)
+    async def not_storable(_: Request, error: DataError) -> JSONResponse:
+        return problem(422, "InvalidRequest", f"The database does not take this: {str(error.orig).splitlines()[0]}.")
+
+    @app.exception_handler(DBAPIError)
+    async def no_database(_: Request, error: DBAPIError) -> JSONResponse:
+        logging.getLogger("racecraft.serve").error("The database fails: %s", str(error).splitlines()[0])
+        return problem(503, "Database", "The console's database does not answer.", "Try again in a moment.")
+
+    @app.exception_handler(ClientDisconnect)
+    async def gone(_: Request, __: ClientDisconnect) -> JSONResponse:
+        return problem(400, "Disconnected", "The request broke off.")
 
     @app.exception_handler(Exception)
     async def broken(request: Request, error: Exception) -> JSONResponse:

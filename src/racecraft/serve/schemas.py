@@ -207,6 +207,21 @@ class ModelCard(Message):
     until: str
 
 
+class ImportedModel(Message):
+    """A model made from files of others, and what became of them."""
+
+    model: ModelCard
+    kind: str
+    """What was imported."""
+    used: dict[str, str]
+    """Files and settings that were understood, and what each became."""
+    unused: dict[str, str]
+    """Files and settings that have no effect, and why."""
+    unknown: dict[str, str]
+    """Settings that nobody knows, and a suggestion."""
+    notes: list[str]
+
+
 class ModelDetail(ModelCard):
     """A model, whole."""
 

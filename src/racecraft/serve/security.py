@@ -22,6 +22,8 @@ from racecraft.serve.tables import Session, User
 
 COOKIE: Final = "racecraft_session"
 MAX_BODY: Final = 8 << 20  # bytes
+LARGE: Final = {"/api/models/import": 1 << 30}
+"""Addresses that take more, as much as an archive may have; they write to disk what comes, as it comes."""
 SAFE: Final = ("GET", "HEAD", "OPTIONS")
 HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
@@ -68,6 +70,7 @@ class Guard:
                 await app(scope, receive, send)
                 return
             is_api = scope["path"].startswith("/api/")
+            most = LARGE.get(scope["path"], MAX_BODY)
             taken = 0
 
             async def send_with_headers(message: Message) -> None:
@@ -84,8 +87,8 @@ class Guard:
                 nonlocal taken
                 message = await receive()
                 taken += len(message.get("body", b""))
-                if taken > MAX_BODY:
-                    raise HTTPException(413, f"A request may have at most {MAX_BODY >> 20} MB.")
+                if taken > most:
+                    raise HTTPException(413, f"A request may have at most {most >> 20} MB.")
                 return message
 
             answer = self._refuse(Request(scope)) or app
@@ -102,8 +105,9 @@ class Guard:
         if request.headers.get("sec-fetch-site", "same-origin") == "cross-site" and request.method not in SAFE:
             return problem(403, "Refused", "Another site's pages may not use the console.")
         length = request.headers.get("content-length") or "0"
-        if not length.isdigit() or int(length) > MAX_BODY:
-            return problem(413, "TooLarge", f"A request may have at most {MAX_BODY >> 20} MB.")
+        most = LARGE.get(request.url.path, MAX_BODY)
+        if not (length.isascii() and length.isdigit() and len(length) < 16) or int(length) > most:
+            return problem(413, "TooLarge", f"A request may have at most {most >> 20} MB.")
         if request.url.path == "/" and (ticket := request.query_params.get("ticket")):
             return self._let_in(request, ticket)
         if request.url.path.startswith("/api/") and self._user(request) is None:

@@ -11,6 +11,12 @@ from racecraft.errors import ConfigError
 
 STATE_FOLDER: Final = ".racecraft"
 """Inside the runs folder: the database and the tracks that were drawn or imported."""
+DATABASE: Final = "RACECRAFT_DATABASE"
+"""Environment variable that may hold the database's URL: others can read a command line, and a password in it."""
+WORKERS: Final = "workers"
+"""Inside the state folder: a file for each process that does a job, locked as long as it lives."""
+ARTIFACTS: Final = "RACECRAFT_ARTIFACTS"
+"""The same for where runs are copied to."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +29,8 @@ class ServeSettings:
     """Of 127.0.0.1; 0 takes a free one."""
     database: str = ""
     """SQLAlchemy URL; by default SQLite in the state folder."""
+    artifacts: str = ""
+    """``s3://BUCKET/PREFIX`` or ``file:///FOLDER`` where runs are copied to; empty for nowhere."""
     training_slots: int = 1
     """Trainings at the same time."""
     other_slots: int = 1
@@ -35,6 +43,10 @@ class ServeSettings:
         for name in ("training_slots", "other_slots"):
             if not 1 <= getattr(self, name) <= 64:
                 raise ConfigError(f"{name} is {getattr(self, name)}; allowed is 1 to 64.")
+        if self.artifacts and not self.artifacts.startswith(("s3://", "file:///")):
+            raise ConfigError(
+                f"artifacts is {self.artifacts.split('://')[0]!r}; allowed are s3://BUCKET/PREFIX and file:///FOLDER."
+            )
         if self.database and not self.database.startswith(("sqlite", "postgresql+psycopg://")):
             raise ConfigError(
                 f"database is {self.database.split('://')[0]!r}; allowed are sqlite:///FILE and "

@@ -1,16 +1,28 @@
-"""Starts jobs as child processes, as many at once as there are slots, and notices when one has died."""
+"""Starts jobs as child processes, as many at once as there are slots, and notices when one has died.
+
+A child holds a lock on a file of its own, which the system drops with it. So a server sees at once that a child of the
+server before it is dead, too; what ran on another machine is taken over when its lease has run out.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import logging
+import os
 import secrets
 import subprocess
 import sys
+from contextlib import suppress
 from typing import Final
 
+from sqlalchemy.exc import SQLAlchemyError
+
+from racecraft.errors import RunError
+from racecraft.run.lock import exclusive_lock
 from racecraft.serve.database import Database
-from racecraft.serve.jobs import KINDS, JobQueue
-from racecraft.serve.settings import ServeSettings
+from racecraft.serve.jobs import JobQueue
+from racecraft.serve.kinds import Slot, kinds_of
+from racecraft.serve.settings import ARTIFACTS, DATABASE, WORKERS, ServeSettings
 
 POLL: Final = 0.5  # s between two looks at the queue; `wake` makes one at once
 GRACE: Final = 20.0  # s for a training to save itself when the server is stopped
@@ -27,64 +39,89 @@ class Supervisor:
 
     def __init__(self, settings: ServeSettings, database: Database, queue: JobQueue) -> None:
         self._settings, self._database, self._queue = settings, database, queue
-        self._children: dict[str, tuple[bool, subprocess.Popen[bytes]]] = {}  # by owner: is it a training, process
+        self._children: dict[str, subprocess.Popen[bytes]] = {}  # by owner
         self._awake = asyncio.Event()
+        self._is_stopping = False
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._log = settings.state / "jobs.log"
+        self._workers = settings.state / WORKERS
+        self._workers.mkdir(parents=True, exist_ok=True)
 
     def wake(self) -> None:
-        """There is something new in the queue."""
-        self._awake.set()
+        """There is something new in the queue; safe from any thread."""
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._awake.set)
 
     async def run(self) -> None:
         """Until cancelled."""
+        self._loop = asyncio.get_running_loop()
         while True:
-            await asyncio.to_thread(self._tend)
-            self._awake.clear()
             try:
+                await asyncio.to_thread(self._tend)
+            except (SQLAlchemyError, OSError) as error:  # the database is being restarted, the disk is full
+                logging.getLogger("racecraft.serve").error("Jobs cannot be tended: %s", str(error).splitlines()[0])
+            with suppress(TimeoutError):
                 await asyncio.wait_for(self._awake.wait(), POLL)
-            except TimeoutError:
-                continue
+            self._awake.clear()
 
     async def stop(self) -> None:
         """Let the children save themselves; what they were doing is queued again for the next server."""
-        for _, child in self._children.values():
+        self._is_stopping = True
+        for child in list(self._children.values()):
             child.terminate()
         deadline = asyncio.get_running_loop().time() + GRACE
-        while self._reap(is_stopping=True) and asyncio.get_running_loop().time() < deadline:
+        while any(child.poll() is None for child in self._children.values()):
+            if asyncio.get_running_loop().time() > deadline:
+                for child in self._children.values():
+                    child.kill()
             await asyncio.sleep(0.05)
-        for _, child in self._children.values():
-            child.kill()
+        for owner in self._children:
+            self._queue.hand_back(owner)
+        self._children.clear()
 
     def _tend(self) -> None:
         self._reap()
+        self._bury()
         self._queue.take_back_expired()
-        trainings = sum(is_training for is_training, _ in self._children.values())
-        others = len(self._children) - trainings
-        for _ in range(self._settings.training_slots - trainings):
-            self._start(("train",))
-        for _ in range(self._settings.other_slots - others):
-            self._start(tuple(kind for kind in KINDS if kind != "train"))
+        places: dict[Slot, int] = {"training": self._settings.training_slots, "other": self._settings.other_slots}
+        for slot, count in places.items():
+            kinds = kinds_of(slot)
+            while not self._is_stopping and self._queue.num_running(kinds) < count and self._start(kinds):
+                pass
 
-    def _start(self, kinds: tuple[str, ...]) -> None:
+    def _start(self, kinds: tuple[str, ...]) -> bool:
+        """Start the oldest job of these kinds; False when there is none."""
         owner = secrets.token_hex(8)
         job = self._queue.claim(kinds, owner=owner)
         if job is None:
-            return
-        arguments = [self._database.url, job.id, owner, str(self._settings.runs)]
+            return False
+        arguments = [job.id, owner, str(self._settings.runs)]
+        (self._workers / owner).touch()
         with self._log.open("ab") as log:
             child = subprocess.Popen(
-                [sys.executable, "-m", "racecraft.serve.work", *arguments],
+                # -P: a random.py in the user's folder is not to be taken for Python's
+                [sys.executable, "-P", "-m", "racecraft.serve.work", *arguments],
+                env={**os.environ, DATABASE: self._database.url, ARTIFACTS: self._settings.artifacts},
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
                 start_new_session=True,  # Ctrl-C in the server's terminal is not for it
             )
-        self._children[owner] = (job.kind == "train", child)
+        self._children[owner] = child
+        return True
 
-    def _reap(self, *, is_stopping: bool = False) -> bool:
-        """Take note of children that ended; whether there are others."""
-        for owner, (_, child) in list(self._children.items()):
+    def _reap(self) -> None:
+        """Take note of children that ended."""
+        for owner, child in list(self._children.items()):
             if child.poll() is not None:
-                del self._children[owner]
                 self._queue.release(owner)
-        return bool(self._children)
+                (self._workers / owner).unlink(missing_ok=True)
+                del self._children[owner]
+
+    def _bury(self) -> None:
+        """Take note of children of earlier servers that are dead."""
+        for path in self._workers.iterdir():
+            if path.name not in self._children:
+                with suppress(RunError), exclusive_lock(path):  # a living one holds it
+                    self._queue.release(path.name)
+                    path.unlink(missing_ok=True)

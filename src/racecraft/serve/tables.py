@@ -77,7 +77,7 @@ class Job(Table):
     """Work for a child process; see racecraft.serve.jobs."""
 
     __tablename__ = "jobs"
-    __table_args__ = (Index("jobs_by_state", "state", "created"),)
+    __table_args__ = (Index("jobs_by_state", "state", "created"), Index("jobs_by_kind", "kind", "run", "created"))
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     kind: Mapped[str] = mapped_column(String(16))
@@ -85,6 +85,7 @@ class Job(Table):
     payload: Mapped[dict[str, Any]] = mapped_column(default=dict)
     state: Mapped[str] = mapped_column(String(16), default="queued")
     attempts: Mapped[int] = mapped_column(default=0)
+    losses: Mapped[int] = mapped_column(default=0)
     owner: Mapped[str] = mapped_column(String(32), default="")
     lease_until: Mapped[datetime | None]
     is_cancelled: Mapped[bool] = mapped_column(default=False)

@@ -1,4 +1,4 @@
-"""A job's process: ``python -m racecraft.serve.work URL JOB OWNER RUNS``.
+"""A job's process: ``python -m racecraft.serve.work JOB OWNER RUNS``, and two URLs in the environment.
 
 It keeps its lease, works, and says how it ended.
 
@@ -15,117 +15,157 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from racecraft.errors import RacecraftError
-from racecraft.race.policy import NetworkPolicy
-from racecraft.run import RunFolder
-from racecraft.serve import race_tasks
+from sqlalchemy.exc import SQLAlchemyError
+
+from racecraft.errors import RacecraftError, RunError
+from racecraft.run.lock import exclusive_lock
+from racecraft.serve.artifacts import Artifacts
 from racecraft.serve.database import Database
-from racecraft.serve.jobs import JobQueue
-from racecraft.serve.live import LiveWriter
+from racecraft.serve.jobs import LEASE, JobQueue
+from racecraft.serve.kinds import KINDS
+from racecraft.serve.settings import ARTIFACTS, DATABASE, STATE_FOLDER, WORKERS
 from racecraft.serve.tables import Job
-from racecraft.sim import Simulation
-from racecraft.training import IterationReport, SilentReporter, TrainResult, Until
-from racecraft.training.job import Training
+from racecraft.serve.tasks import Task
 
-HEARTBEAT = 1.0  # s
+HEARTBEAT: Final = 1.0  # s
 
 
-class LiveReporter(SilentReporter):
-    """Shows a training's cars to whoever looks."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._writer: LiveWriter | None = None
-
-    def begin(self, simulation: Simulation, policy: NetworkPolicy) -> None:
-        """Open the window."""
-        self._writer = LiveWriter(self._folder, simulation, policy)
-        self._writer.look(step=0)
-
-    def iteration(self, report: IterationReport) -> None:
-        """Move the cars."""
-        if self._writer is not None:
-            self._writer.look(step=report.stats.total_steps)
-
-
-def work(job: Job, *, runs: Path, on_stop: Callable[[Callable[[], None]], None]) -> dict[str, Any]:
+def work(task: Task) -> dict[str, Any]:
     """Do a job.
-
-    Args:
-        job: What to do.
-        runs: Folder of the runs.
-        on_stop: Is given what to call when the job is to end early.
-
-    Returns:
-        Its result, as JSON.
 
     Raises:
         RacecraftError: It cannot be done.
     """
-    folder = RunFolder.open(runs / job.run)
-    if job.kind == "train":
-        until = job.payload.get("until")
-        training = Training(folder, until=Until.parse(until) if until else None, reporter=LiveReporter(folder.path))
-        on_stop(training.stop)
-        result: TrainResult = training.run()
-        return result.to_dict()
-    if job.kind == "race":
-        return race_tasks.race(folder, job.payload)
-    from racecraft.race.run_evaluation import evaluate_run
+    if task.job.kind not in KINDS:
+        raise RunError(f"Jobs of kind {task.job.kind!r} are not known here.", hint="Update Racecraft.")
+    module, _, function = KINDS[task.job.kind].work.partition(":")
+    result: dict[str, Any] = getattr(import_module(module), function)(task)
+    if task.artifacts is not None and task.job.run:
+        try:
+            task.artifacts.keep(task.folder)
+        except RunError as error:  # what was done is done; the next server copies what is missing
+            if task.job.kind == "store":
+                raise
+            result = {**result, "not_stored": f"{error} {error.hint}".strip()}
+    return result
 
-    return evaluate_run(folder.path, **job.payload).to_dict()
 
+class Worker:
+    """One job from beginning to end.
 
-def main(url: str, job_id: str, owner: str, runs: str) -> int:
-    """Do one job from beginning to end; the exit status is 0 unless the process itself failed."""
-    database = Database(url)
-    queue = JobQueue(database)
-    job = queue.get(job_id)
-    if job is None or job.owner != owner:
-        return 0
-    stops: list[Callable[[], None]] = []
-    asked = threading.Event()
+    Args:
+        database: Where the job is.
+        job: Claimed by `owner`.
+        owner: This process, by the name that it was started under.
+        runs: Folder of the runs.
+        artifacts: Where runs are copied to.
+    """
 
-    def stop(*_: object) -> None:
-        asked.set()
-        for call in stops:
-            call()
+    def __init__(
+        self, database: Database, job: Job, *, owner: str, runs: Path, artifacts: Artifacts | None = None
+    ) -> None:
+        self._queue = JobQueue(database)
+        self._job, self._owner = job, owner
+        self._stops: list[Callable[[], None]] = []
+        self._is_cancelled = False  # by the user
+        self._leaving = threading.Event()  # the server is going down
+        self._manifest = runs / job.run / "checkpoints" / "manifest.json"
+        self._task = Task(job=job, runs=runs, database=database, artifacts=artifacts, on_stop=self._stops.append)
 
-    def keep() -> None:
-        while True:
-            answer = queue.heartbeat(job_id, owner=owner)
-            if answer == "lost":
-                os._exit(3)  # it is another's now: touch nothing
-            if answer == "stop" and not asked.is_set():
-                if not stops:  # nothing to be saved
-                    queue.finish(job_id, owner=owner, state="cancelled")
-                    os._exit(0)
-                stop()
-            time.sleep(HEARTBEAT)
-
-    signal.signal(signal.SIGTERM, stop)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which then tells us
-    threading.Thread(target=keep, name="heartbeat", daemon=True).start()
-    try:
-        result = work(job, runs=Path(runs), on_stop=stops.append)
-        if result.get("reason") == "interrupted" and not asked.is_set():
-            queue.release(owner)  # the server is going down: the next one continues
+    def run(self) -> None:
+        """Do it, and say how it ended."""
+        signal.signal(signal.SIGTERM, lambda *_: self._leaving.set())
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which then tells us
+        threading.Thread(target=self._keep, name="heartbeat", daemon=True).start()
+        try:
+            result = work(self._task)
+        except Exception as error:
+            described = _described(error)
+            self._report(lambda: self._finish("failed", error=described))
+            return
+        if result.get("reason") == "interrupted" and not self._is_cancelled:
+            self._report(lambda: self._queue.hand_back(self._owner))  # the next server continues
         else:
-            queue.finish(job_id, owner=owner, state="done", result=result)
-    except Exception as error:
-        is_expected = isinstance(error, RacecraftError | OSError)
-        if not is_expected:
-            traceback.print_exc()
-        described = {
-            "code": type(error).__name__,
-            "message": str(error),
-            "hint": getattr(error, "hint", "") if is_expected else "This is a bug in Racecraft.",
-            "line": getattr(error, "line", None),
-        }
-        queue.finish(job_id, owner=owner, state="failed", error=described)
+            self._report(lambda: self._finish("done", result=result))
+
+    def _keep(self) -> None:
+        """Keep the lease, and hear of being cancelled."""
+        kept, begun = time.monotonic(), self._progress()
+        while True:
+            try:
+                answer = self._queue.heartbeat(
+                    self._job.id, owner=self._owner, has_progressed=self._progress() != begun
+                )
+                kept = time.monotonic()
+            except SQLAlchemyError:  # the database is being restarted, say
+                answer = "go on"
+            if answer == "lost" or time.monotonic() - kept > LEASE.total_seconds():
+                os._exit(3)  # it is another's now: touch nothing
+            if answer == "stop":
+                self._is_cancelled = True
+            if answer == "stop" or self._leaving.is_set():
+                self._stop()
+            self._leaving.wait(HEARTBEAT)
+            if self._leaving.is_set():
+                time.sleep(0.1)
+
+    def _stop(self) -> None:
+        for call in self._stops:
+            call()
+        if not self._stops:  # nothing to be saved
+            if self._is_cancelled:
+                self._finish("cancelled")
+            else:
+                self._queue.hand_back(self._owner)
+            os._exit(0)
+
+    def _finish(self, state: str, **outcome: Any) -> None:
+        self._queue.finish(self._job.id, owner=self._owner, state=state, **outcome)
+
+    def _report(self, tell: Callable[[], None]) -> None:
+        """Say how it ended; while the database is away, try again until the lease has run out."""
+        while True:
+            try:
+                return tell()
+            except SQLAlchemyError:
+                time.sleep(HEARTBEAT)
+
+    def _progress(self) -> float:
+        """Changes whenever something is kept for good, so that the next attempt does not begin at the start."""
+        try:
+            return self._manifest.stat().st_mtime
+        except OSError:
+            return 0.0
+
+
+def _described(error: Exception) -> dict[str, Any]:
+    is_expected = isinstance(error, RacecraftError | OSError)
+    if not is_expected:
+        traceback.print_exception(error)
+    return {
+        "code": type(error).__name__,
+        "message": str(error),
+        "hint": getattr(error, "hint", "") if is_expected else "This is a bug in Racecraft.",
+        "line": getattr(error, "line", None),
+    }
+
+
+def main(job_id: str, owner: str, runs: str) -> int:
+    """Do one job; the exit status is 0 unless the process itself failed."""
+    database = Database(os.environ.pop(DATABASE))
+    url = os.environ.pop(ARTIFACTS, "")
+    try:
+        with exclusive_lock(Path(runs) / STATE_FOLDER / WORKERS / owner):
+            job = JobQueue(database).get(job_id)
+            if job is not None and job.owner == owner:  # else it was taken for dead before it was there
+                artifacts = Artifacts(url) if url else None
+                Worker(database, job, owner=owner, runs=Path(runs), artifacts=artifacts).run()
+    except RunError:
+        return 1  # a server is just taking it for dead
     return 0
 
 

@@ -4,6 +4,7 @@ import type { components } from "./schema";
 type Schemas = components["schemas"];
 export type ModelCard = Schemas["ModelCard"];
 export type ModelDetail = Schemas["ModelDetail"];
+export type ImportedModel = Schemas["ImportedModel"];
 export type TrackFacts = Schemas["TrackFacts"];
 export type TrackGeometry = Schemas["TrackGeometry"];
 export type RewardPreset = Schemas["RewardPreset"];
@@ -68,6 +69,7 @@ export const api = {
   clone: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/clone`, {}),
   remove: (run: string) => ask<void>("DELETE", `/models/${name(run)}`),
   restore: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/restore`),
+  importModel: (file: File) => askBytes<ImportedModel>("POST", `/models/import?filename=${name(file.name)}`, file),
   train: (run: string, change: { until?: string; reward?: string }) =>
     ask<JobInfo>("POST", `/models/${name(run)}/train`, change),
   stop: (run: string) => ask<JobInfo>("POST", `/models/${name(run)}/stop`),
@@ -85,6 +87,9 @@ export const api = {
     ask<{ columns: Record<string, (number | string)[]> }>("GET", `/models/${name(run)}/evaluations/${stamp}/telemetry`),
   job: (id: string) => ask<JobInfo>("GET", `/jobs/${id}`),
 };
+
+/** Address of a model as one tar.gz, weights included. */
+export const archiveOf = (run: string) => `/api/models/${name(run)}/archive`;
 
 /** Address of one of a model's files. */
 export const fileOf = (run: string, path: string) =>

@@ -8,18 +8,15 @@ id: <offset>  event: points   points of the curves; Last-Event-ID goes on after 
 from __future__ import annotations
 
 import asyncio
-import base64
 import json
 from collections.abc import AsyncIterator
-from typing import Any, Final
+from typing import Final
 
 from fastapi import APIRouter, Header, Request
 from sse_starlette import EventSourceResponse, ServerSentEvent
 
 from racecraft.run.history import read_history
 from racecraft.serve.context import Context, InContext
-from racecraft.serve.live import LiveReader, Look
-from racecraft.serve.routes.jobs import job_info
 
 router = APIRouter(prefix="/api/events", tags=["events"])
 
@@ -33,46 +30,26 @@ async def follow(
 ) -> EventSourceResponse:
     """Follow a model: curves from an offset on, cars while it trains, its jobs."""
     context.garage.folder(name)
-    if last_event_id is not None and last_event_id.isdigit():
+    if last_event_id is not None and last_event_id.isascii() and last_event_id.isdigit() and len(last_event_id) < 19:
         offset = int(last_event_id)
     return EventSourceResponse(_stream(context, name, offset, request), ping=15)
 
 
-async def _stream(context: Context, name: str, offset: int, request: Request) -> AsyncIterator[ServerSentEvent]:
-    folder = context.garage.runs / name
-    reader, sequence, jobs_seen, tick = LiveReader(folder), -1, "", 0
+async def _stream(context: Context, name: str, offset: int, request: Request) -> AsyncIterator[ServerSentEvent | bytes]:
+    history = context.garage.runs / name / "metrics" / "history.jsonl"
+    sequence, jobs_seen, tick = -1, "", 0
     while not await request.is_disconnected():
         if tick % SLOW == 0:
-            points, end = await asyncio.to_thread(read_history, folder / "metrics" / "history.jsonl", offset=offset)
+            points, end = await asyncio.to_thread(read_history, history, offset=offset)
             if points:
                 offset = end
                 yield ServerSentEvent(json.dumps(points), event="points", id=str(end))
-            jobs = await asyncio.to_thread(_jobs, context, name)
-            if jobs != jobs_seen:
+            if (jobs := await context.hub.jobs(name)) != jobs_seen:
                 jobs_seen = jobs
                 yield ServerSentEvent(jobs, event="jobs")
-        look = reader.look(after=sequence)
+        look = context.hub.live(name, after=sequence)
         if look is not None:
-            sequence = look.sequence
-            yield ServerSentEvent(json.dumps(_live(look)), event="live")
+            sequence, event = look
+            yield event
         tick += 1
         await asyncio.sleep(TICK)
-
-
-def _jobs(context: Context, name: str) -> str:
-    listed = context.queue.list(run=name, limit=5)
-    return json.dumps([job_info(job).model_dump(mode="json") for job in listed])
-
-
-def _live(look: Look) -> dict[str, Any]:
-    """Millimetres and milliradians as whole numbers: a third of the bytes."""
-    poses = (look.poses * 1000).round().astype(int)
-    return {
-        "step": look.step,
-        "poses": poses.tolist(),
-        "steps": look.steps.tolist(),
-        "policy": look.policy.round(4).tolist(),
-        "is_discrete": look.is_discrete,
-        "frame": base64.b64encode(look.frame.tobytes()).decode(),
-        "frame_shape": list(look.frame.shape),
-    }

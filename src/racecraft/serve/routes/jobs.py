@@ -5,16 +5,12 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from racecraft.serve.context import InContext
+from racecraft.serve.hub import job_info
 from racecraft.serve.problems import NotFound
 from racecraft.serve.schemas import JobInfo
-from racecraft.serve.tables import Job
 
 router = APIRouter(prefix="/api/jobs", tags=["jobs"])
-
-
-def job_info(job: Job) -> JobInfo:
-    """A job as the browser sees it."""
-    return JobInfo.model_validate({name: getattr(job, name) for name in JobInfo.model_fields})
+__all__ = ["job_info", "router"]
 
 
 @router.get("")

@@ -64,8 +64,8 @@ def create_model(request: NewModel, context: InContext) -> ModelCard:
         seed=request.seed,
         until=Until.parse(request.until),
     )
-    if request.name is not None and (context.garage.runs / request.name).exists():
-        raise Conflict(f"There is a model {request.name!r} already.", hint="Choose another name.")
+    if request.name is not None:
+        context.garage.require_new(request.name)
     folder = start_run(
         settings,
         reward=source,
@@ -76,6 +76,7 @@ def create_model(request: NewModel, context: InContext) -> ModelCard:
     )
     if request.train:
         _train(context, folder, until=None)
+    context.mirror.copy(folder.name)
     card = context.garage.card(folder.name)
     if request.tags:
         context.garage.tag(folder.name, request.tags)
@@ -110,7 +111,9 @@ def change_model(name: str, request: ModelChange, context: InContext) -> ModelCa
         context.garage.tag(name, request.tags)
     if request.name is not None and request.name != name:
         context.garage.rename(name, request.name)
+        context.mirror.forget(name)
         name = request.name
+        context.mirror.copy(name)
     return context.garage.card(name)
 
 
@@ -118,6 +121,7 @@ def change_model(name: str, request: ModelChange, context: InContext) -> ModelCa
 def delete_model(name: str, context: InContext) -> Response:
     """Put a model into the trash."""
     context.garage.remove(name)
+    context.mirror.forget(name)
     return Response(status_code=204)
 
 
@@ -125,6 +129,7 @@ def delete_model(name: str, context: InContext) -> Response:
 def restore_model(name: str, context: InContext) -> ModelCard:
     """Bring a deleted model back."""
     context.garage.restore(name)
+    context.mirror.copy(name)
     return context.garage.card(name)
 
 
@@ -132,8 +137,8 @@ def restore_model(name: str, context: InContext) -> ModelCard:
 def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard:
     """A new model with the same settings, untrained."""
     folder = context.garage.folder(name)
-    if request.name is not None and (context.garage.runs / request.name).exists():
-        raise Conflict(f"There is a model {request.name!r} already.", hint="Choose another name.")
+    if request.name is not None:
+        context.garage.require_new(request.name)
     copy = start_run(
         read_settings(folder),
         reward=folder.read_reward_function(),
@@ -142,6 +147,7 @@ def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard
         root=context.garage.runs,
         name=request.name,
     )
+    context.mirror.copy(copy.name)
     return context.garage.card(copy.name)
 
 

@@ -1,0 +1,209 @@
+"""Copies of runs in an object store: S3, as moto's server plays it, and a folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from running_consoles import running_console
+
+from racecraft.errors import ConfigError, RunError
+from racecraft.run import RunFolder
+
+pytest.importorskip("obstore")
+from racecraft.serve.artifacts import Artifacts
+
+REWARD = "def reward_function(params):\n    return 1.0\n"
+
+
+@pytest.fixture(scope="session")
+def s3() -> Iterator[str]:
+    """The address of an S3 server on this machine, with the bucket "racing"."""
+    pytest.importorskip("moto.server")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    address = f"http://127.0.0.1:{port}"
+    try:
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                urllib.request.urlopen(urllib.request.Request(f"{address}/racing", method="PUT")).close()
+                break
+            except urllib.error.HTTPError as error:
+                error.close()
+                raise
+            except urllib.error.URLError:
+                assert process.poll() is None
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+        yield address
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+@pytest.fixture(params=["s3", "file"])
+def url(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    if request.param == "file":
+        return f"file://{tmp_path}/store"
+    address = request.getfixturevalue("s3")
+    for name, value in (
+        ("AWS_ENDPOINT_URL", address),
+        ("AWS_ACCESS_KEY_ID", "test"),
+        ("AWS_SECRET_ACCESS_KEY", "test"),
+        ("AWS_REGION", "us-east-1"),
+    ):
+        monkeypatch.setenv(name, value)
+    return f"s3://racing/{tmp_path.name}"
+
+
+def make_run(runs: Path, name: str = "a") -> RunFolder:
+    folder = RunFolder(runs / name)
+    for path, text in (
+        ("run.json", "{}"),
+        ("reward_function.py", REWARD),
+        ("metrics/history.jsonl", '{"step": 1}\n'),
+        ("evaluation-20260101000000/evaluation.json", '{"laps": 1}'),
+        ("mp4/camera-pip/0-video.mp4", "film" * 1000),
+        (".lock", "not kept"),
+        (".live", "not kept"),
+    ):
+        (folder.path / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder.path / path).write_text(text)
+    folder.checkpoints.save(100, {"w": np.arange(1000.0)})
+    (folder.path / "link").symlink_to("/etc/hostname")
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files if not path.name.startswith(".")}
+
+
+def test_a_run_comes_back_as_it_was(tmp_path: Path, url: str) -> None:
+    store, folder = Artifacts(url), make_run(tmp_path / "runs")
+    assert store.names() == []
+    assert store.keep(folder) == len(contents(folder.path))
+    assert store.names() == ["a"]
+    assert store.is_current(folder)
+    (tmp_path / "elsewhere").mkdir()
+    back = Artifacts(url).fetch("a", tmp_path / "elsewhere", incoming=tmp_path / "incoming")
+    assert contents(back.path) == contents(folder.path)
+    np.testing.assert_array_equal(back.checkpoints.load().arrays["w"], np.arange(1000.0))
+    assert store.is_current(back)
+    assert not list((tmp_path / "incoming").iterdir())
+
+
+def test_only_what_changed_is_copied_and_what_is_gone_is_removed(tmp_path: Path, url: str) -> None:
+    store, folder = Artifacts(url), make_run(tmp_path / "runs")
+    store.keep(folder)
+    assert store.keep(folder) == 0
+    (folder.path / "metrics" / "history.jsonl").write_text('{"step": 1}\n{"step": 2}\n')
+    shutil.rmtree(folder.path / "mp4")
+    assert not store.is_current(folder)
+    assert store.keep(folder) == 1
+    back = store.fetch("a", tmp_path, incoming=tmp_path / "incoming")
+    assert contents(back.path) == contents(folder.path)
+    store.forget("a")
+    assert store.names() == []
+    with pytest.raises(RunError, match="no run 'a'"):
+        store.fetch("a", tmp_path / "runs", incoming=tmp_path / "incoming")
+
+
+def test_a_damaged_copy_is_refused_whole(tmp_path: Path) -> None:
+    store, folder = Artifacts(f"file://{tmp_path}/store"), make_run(tmp_path / "runs")
+    store.keep(folder)
+    digest = hashlib.sha256(REWARD.encode()).hexdigest()
+    stored = tmp_path / "store" / "runs" / "a" / digest
+    for damage in (REWARD.replace("1.0", "2.0"), REWARD + "#" * 1000, REWARD[:-1]):
+        stored.write_text(damage)
+        with pytest.raises(RunError, match=r"reward_function.py of run 'a' is damaged"):
+            store.fetch("a", tmp_path, incoming=tmp_path / "incoming")
+        assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"../../up": {"size": 1, "time": 1, "sha256": "a" * 64}},
+        {"/etc/cron.d/x": {"size": 1, "time": 1, "sha256": "a" * 64}},
+        {"a/../../b": {"size": 1, "time": 1, "sha256": "a" * 64}},
+        {"x": {"size": -1, "time": 1, "sha256": "a" * 64}},
+        {"x": {"size": 1 << 60, "time": 1, "sha256": "a" * 64}},
+        {"x": {"size": 1, "time": 1, "sha256": "../../b"}},
+        {"x": {"size": 1, "time": 1e40, "sha256": "a" * 64}},
+        {"x": None},
+        [],
+        None,
+    ],
+)
+def test_a_hostile_list_of_files_is_refused(tmp_path: Path, files: Any) -> None:
+    store = Artifacts(f"file://{tmp_path}/store")
+    index = tmp_path / "store" / "runs" / "a.json"
+    index.parent.mkdir()
+    index.write_text(json.dumps({"format": 1, "files": files}))
+    with pytest.raises(RunError, match="not one of Racecraft's"):
+        store.fetch("a", tmp_path, incoming=tmp_path / "incoming")
+    index.write_text("{")
+    with pytest.raises(RunError, match="damaged"):
+        store.fetch("a", tmp_path, incoming=tmp_path / "incoming")
+    assert not (tmp_path / "up").exists()
+
+
+def test_a_store_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{nobody.getsockname()[1]}")
+        monkeypatch.setenv("AWS_ACCESS_KEY_ID", "x")
+        monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "x")
+        with pytest.raises(RunError, match="does not answer"):
+            Artifacts("s3://racing/x").names()
+
+
+@pytest.mark.parametrize("url", ["gs://x", "http://127.0.0.1", "file://relative", ""])
+def test_other_stores_are_refused(url: str) -> None:
+    with pytest.raises(ConfigError, match="s3://"):
+        Artifacts(url)
+
+
+@pytest.mark.slow
+def test_a_server_with_an_empty_folder_has_the_runs_again(tmp_path: Path, url: str) -> None:
+    with running_console(tmp_path / "first", "--artifacts", url) as console:
+        client = console.client
+        name = console.create(name="kept", until="2000 steps", track="oval")
+        job = client.get("/api/jobs", params={"run": name}).json()[-1]
+        assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+        console.create(name="dropped", train=False)
+        raced = client.post(f"/api/models/{name}/evaluations", json={"laps": 1, "num_trials": 1}).json()
+        ended = console.wait_for(console.job_ended(raced["id"]))
+        assert ended["state"] == "done"
+        assert "not_stored" not in ended["result"]
+        console.wait_for(lambda: all(job["state"] == "done" for job in client.get("/api/jobs").json()))
+        assert client.delete("/api/models/dropped").status_code == 204
+        console.kill()
+    shutil.rmtree(tmp_path / "first")
+    with running_console(tmp_path / "second", "--artifacts", url) as console:
+        client = console.client
+        console.wait_for(lambda: client.get("/api/models").json())
+        assert [model["name"] for model in client.get("/api/models").json()] == ["kept"]
+        card = client.get(f"/api/models/{name}/evaluations").json()[0]
+        video = client.get(f"/api/models/{name}/files/{card['video']}")
+        assert video.headers["content-type"] == "video/mp4"
+        assert len(video.content) > 1000
+        on = client.post(f"/api/models/{name}/train", json={"until": "4000 steps"}).json()
+        assert console.wait_for(console.job_ended(on["id"]))["result"]["steps"] >= 4000
