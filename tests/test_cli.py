@@ -123,13 +123,16 @@ def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:
     import inspect
 
     from racecraft import train
+    from racecraft.training import defaults
 
     shown = {name: parameter.default for name, parameter in inspect.signature(cli.train.train).parameters.items()}
     public = {name: parameter.default for name, parameter in inspect.signature(train).parameters.items()}
     settings = training_settings.TrainSettings()
     assert shown["track"] == [settings.track] == [training_settings.DEFAULT_TRACK]
-    assert shown["reward"] == training_settings.DEFAULT_REWARD
-    assert public["until"] == str(settings.until)
+    for name in ("reward", "actions", "until", "sensors"):
+        assert not shown[name]  # as the race has it
+        assert not public[name]
+    assert defaults.TIME_TRIAL.until == str(settings.until)
     for name in ("critic", "direction", "evaluate_every", "num_threads", "seed"):
         assert shown[name] == getattr(settings, name)
 

@@ -39,11 +39,8 @@ void require(bool is_met, const char* message) {
     if (!is_met) throw std::invalid_argument(message);
 }
 
-size_t checked_count(const Network& network, const In<uint8_t, 4>& observations) {
-    const NetworkSpec& spec = network.spec;
-    require(observations.shape(1) == static_cast<size_t>(spec.rows()) &&
-                observations.shape(2) == static_cast<size_t>(spec.columns()) &&
-                observations.shape(3) == static_cast<size_t>(spec.channels()),
+size_t checked_count(const Network& network, const In<uint8_t, 2>& observations) {
+    require(observations.shape(1) == network.spec.observation_size(),
             "The observations are not of this network's shape.");
     return observations.shape(0);
 }
@@ -55,7 +52,7 @@ void check_states(const Network& network, const In<float, 2>& states, size_t cou
 }
 
 std::tuple<double, double, double, double, double, double> update(
-    Learner& self, const In<uint8_t, 4>& observations, const In<float, 2>& states,
+    Learner& self, const In<uint8_t, 2>& observations, const In<float, 2>& states,
     const In<int64_t, 1>& action_indices, const In<float, 2>& actions, const In<float, 1>& log_probs,
     const In<float, 1>& advantages, const In<float, 1>& returns, const In<int64_t, 1>& rows,
     const Objective& objective) {
@@ -117,37 +114,36 @@ void bind_learner(nb::module_& m) {
             [](Learner* self, int height, int width, int top, int pool, int block,
                const std::vector<std::tuple<int, int, int>>& convs, const std::vector<int>& dense,
                int num_actions, bool is_discrete, int state_size, const std::vector<int>& critic_units,
+               int lenses, int lidar_size, const std::vector<int>& lidar_units, int camera_dense,
                int num_threads) {
-                NetworkSpec spec{height,      width,       pool,       block,        {}, dense,
-                                 num_actions, is_discrete, state_size, critic_units, top};
+                NetworkSpec spec{height, width,       pool,        block,       {},
+                                 dense,  num_actions, is_discrete, state_size,  critic_units,
+                                 top,    lenses,      lidar_size,  lidar_units, camera_dense};
                 for (const auto& [filters, kernel, stride] : convs) {
                     spec.convs.push_back({filters, kernel, stride});
                 }
                 new (self) Learner(spec, num_threads);
             },
             nb::kw_only(), "height"_a, "width"_a, "top"_a, "pool"_a, "block"_a, "convs"_a, "dense"_a,
-            "num_actions"_a, "is_discrete"_a, "state_size"_a, "critic_units"_a, "num_threads"_a)
+            "num_actions"_a, "is_discrete"_a, "state_size"_a, "critic_units"_a, "lenses"_a, "lidar_size"_a,
+            "lidar_units"_a, "camera_dense"_a, "num_threads"_a)
         .def(
             "encode",
-            [](Learner& self, In<uint8_t, 3> frames) {
+            [](Learner& self, In<uint8_t, 2> sight) {
                 const NetworkSpec& spec = self.network().spec;
-                require(frames.shape(1) == static_cast<size_t>(spec.height) &&
-                            frames.shape(2) == static_cast<size_t>(spec.width),
-                        "The frames are not of this network's size.");
-                const size_t count = frames.shape(0);
-                auto out = new_array<uint8_t, 4>({count, static_cast<size_t>(spec.rows()),
-                                                  static_cast<size_t>(spec.columns()),
-                                                  static_cast<size_t>(spec.channels())});
+                require(sight.shape(1) == spec.sight_size(), "The frames are not of this network's size.");
+                const size_t count = sight.shape(0);
+                auto out = new_array<uint8_t, 2>({count, spec.observation_size()});
                 uint8_t* data = out.data();
-                const uint8_t* pixels = frames.data();
+                const uint8_t* bytes = sight.data();
                 nb::gil_scoped_release release;
-                self.encode(pixels, count, data);
+                self.encode(bytes, count, data);
                 return out;
             },
-            "frames"_a)
+            "sight"_a)
         .def(
             "policy",
-            [](Learner& self, In<uint8_t, 4> observations) {
+            [](Learner& self, In<uint8_t, 2> observations) {
                 const size_t count = checked_count(self.network(), observations);
                 auto out = new_array<float, 2>({count, self.network().spec.policy_size()});
                 float* data = out.data();
@@ -159,7 +155,7 @@ void bind_learner(nb::module_& m) {
             "observations"_a)
         .def(
             "values",
-            [](Learner& self, In<uint8_t, 4> observations, In<float, 2> states) {
+            [](Learner& self, In<uint8_t, 2> observations, In<float, 2> states) {
                 const size_t count = checked_count(self.network(), observations);
                 check_states(self.network(), states, count);
                 auto out = new_array<float, 1>({count});

@@ -64,6 +64,9 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
         }
         const bool has_cameras = camera != nullptr && randomization->has_cameras();
         for (size_t env = 0; has_cameras && env < n; ++env) cameras_.emplace_back(*camera);
+        for (size_t env = 0; has_cameras && right_camera_ != nullptr && env < n; ++env) {
+            right_cameras_.emplace_back(*camera);
+        }
     }
     reset(nullptr);
 }
@@ -84,6 +87,9 @@ void Engine::draw_episode(size_t env) {
     const uint32_t number = static_cast<uint32_t>(episodes_[env].episode);
     conditions_[env] = draw_conditions(*randomization_, seeds_[env], streams_[env], number);
     if (!cameras_.empty()) cameras_[env].rebuild(camera_under(conditions_[env], camera_->spec()));
+    if (!right_cameras_.empty()) {
+        right_cameras_[env].rebuild(camera_under(conditions_[env], right_camera_->spec()));
+    }
     if (!delay_.empty()) {
         delay_[env] =
             static_cast<int32_t>(conditions_[env].latency * static_cast<float>(config_.substeps) + 0.5f);
@@ -154,7 +160,9 @@ void Engine::look(size_t env) {
     const size_t pixels = frames_.size() / (num_envs() * num_lenses());
     uint8_t* frame = &frames_[env * num_lenses() * pixels];
     render(cameras_.empty() ? *camera_ : cameras_[env], env, state, frame);
-    if (right_camera_ != nullptr) render(*right_camera_, env, state, frame + pixels);
+    if (right_camera_ != nullptr) {
+        render(right_cameras_.empty() ? *right_camera_ : right_cameras_[env], env, state, frame + pixels);
+    }
 }
 
 void Engine::render(const CameraModel& camera, size_t env, const VehicleState& state, uint8_t* frame) {
@@ -311,6 +319,7 @@ size_t Engine::num_bytes() const {
     const_cast<Engine*>(this)->visit_saved([&](const void*, size_t size) { bytes += size; });
     bytes += conditions_.size() * sizeof(Conditions) + delay_.size() * sizeof(int32_t);
     for (const CameraModel& camera : cameras_) bytes += camera.num_bytes();
+    for (const CameraModel& camera : right_cameras_) bytes += camera.num_bytes();
     return bytes;
 }
 

@@ -133,7 +133,7 @@ class Engine {
     RgbPalette colours_;
     VehicleParameters vehicle_;           // before randomisation
     std::vector<Conditions> conditions_;  // (N,)
-    std::vector<CameraModel> cameras_;    // (N,), empty unless cameras differ
+    std::vector<CameraModel> cameras_, right_cameras_;  // (N,), empty unless cameras differ, or lenses
     std::vector<int32_t> delay_;          // (N,) substeps, empty unless commands act late
     std::vector<float> earlier_;          // (4, N), see VehicleArrays
 

@@ -19,6 +19,39 @@ size_t num_blocks(size_t count) {
     return (count + kBlock - 1) / kBlock;
 }
 
+// What a layer reads; `before` is the output of the layer before it.
+const float* input_of(const Layer& layer, const float* image, const float* lidar, const float* state,
+                      const float* before) {
+    switch (layer.source) {
+        case Source::image:
+            return image;
+        case Source::lidar:
+            return lidar;
+        case Source::state:
+            return state;
+        default:
+            return before;
+    }
+}
+
+// Rows of `first` and of `second` side by side, and apart again.
+void join_rows(const float* first, size_t first_width, const float* second, size_t second_width, size_t rows,
+               float* out) {
+    for (size_t row = 0; row < rows; ++row) {
+        out = std::copy_n(first + row * first_width, first_width, out);
+        out = std::copy_n(second + row * second_width, second_width, out);
+    }
+}
+
+void split_rows(const float* in, size_t rows, float* first, size_t first_width, float* second,
+                size_t second_width) {
+    for (size_t row = 0; row < rows; ++row) {
+        std::copy_n(in, first_width, first + row * first_width);
+        std::copy_n(in + first_width, second_width, second + row * second_width);
+        in += first_width + second_width;
+    }
+}
+
 // base to the power of a whole number, by squaring: the same bits everywhere, unlike pow().
 double power(double base, int64_t exponent) {
     double result = 1.0;
@@ -47,7 +80,7 @@ Learner::Learner(const NetworkSpec& spec, int num_threads)
                         {tower, l, panel, i, std::min(layer.shape.num_inputs(), i + kDenseRows)});
                 }
             }
-            for (int run = 0; l > 0 && run < layer.shape.num_runs; ++run) {
+            for (int run = 0; !layer.is_first() && run < layer.shape.num_runs; ++run) {
                 for (size_t lane = 0; lane < static_cast<size_t>(layer.shape.run_length); lane += kPanel) {
                     transpose_tasks_.push_back({&layer, run, lane});
                 }
@@ -56,7 +89,8 @@ Learner::Learner(const NetworkSpec& spec, int num_threads)
     }
     squares_.resize(num_blocks(network_.num_grouped) + dense_tasks_.size());
     for (Worker& worker : workers_) {
-        worker.input = FloatBuffer(kChunk * spec.observation_size());
+        worker.input = FloatBuffer(kChunk * spec.image_size());
+        worker.lidar = FloatBuffer(kChunk * static_cast<size_t>(spec.lidar_size));
         for (const auto& [tower, buffers, at] :
              {std::tie(network_.policy, worker.policy, worker.policy_at),
               std::tie(network_.critic, worker.critic, worker.critic_at)}) {
@@ -77,13 +111,28 @@ void Learner::for_each_task(size_t count, const Body& body) {
     });
 }
 
-void Learner::encode(const uint8_t* frames, size_t count, uint8_t* out) {
+void Learner::encode(const uint8_t* sight, size_t count, uint8_t* out) {
     const std::lock_guard lock(mutex_);
     const NetworkSpec& spec = network_.spec;
-    const size_t pixels = static_cast<size_t>(spec.height) * spec.width;
     pool_.for_each(count, [&](size_t i) {
-        RC_DISPATCH(fold_frame, spec, frames + i * pixels, out + i * spec.observation_size());
+        const uint8_t* from = sight + i * spec.sight_size();
+        uint8_t* to = out + i * spec.observation_size();
+        for (int lens = 0; lens < spec.lenses; ++lens) {
+            RC_DISPATCH(fold_frame, spec, from + static_cast<size_t>(lens) * spec.lens_size(), lens, to);
+        }
+        std::copy_n(from + spec.lens_size() * static_cast<size_t>(spec.lenses), spec.lidar_size,
+                    to + spec.image_size());
     });
+}
+
+// Bytes of one observation as numbers from 0 to 1, at the sample's place in the worker's inputs.
+void Learner::read_sample(Worker& worker, const uint8_t* observation, size_t sample) const {
+    const NetworkSpec& spec = network_.spec;
+    const size_t image = spec.image_size(), lidar = static_cast<size_t>(spec.lidar_size);
+    RC_DISPATCH(bytes_to_unit, observation, image, worker.input.data() + sample * image);
+    if (lidar > 0) {
+        RC_DISPATCH(bytes_to_unit, observation + image, lidar, worker.lidar.data() + sample * lidar);
+    }
 }
 
 void Learner::policy(const uint8_t* observations, size_t count, float* out) {
@@ -94,10 +143,12 @@ void Learner::policy(const uint8_t* observations, size_t count, float* out) {
     const size_t stride = static_cast<size_t>(network_.policy.layers.back().shape.out_channels);
     for_each_task((count + chunk - 1) / chunk, [&](Worker& worker, size_t task) {
         const size_t first = task * chunk, samples = std::min(chunk, count - first);
-        const size_t size = spec.observation_size();
-        RC_DISPATCH(bytes_to_unit, observations + first * size, samples * size, worker.input.data());
+        for (size_t i = 0; i < samples; ++i) {
+            read_sample(worker, observations + (first + i) * spec.observation_size(), i);
+        }
+        const Inputs in{worker.input.data(), worker.lidar.data(), nullptr};
         point(network_.policy, worker.policy, nullptr, 0, worker.policy_at);
-        forward(network_.policy, worker.input.data(), samples, worker.policy_at);
+        forward(network_.policy, in, samples, worker.policy_at);
         for (size_t i = 0; i < samples; ++i) {
             float* outputs = out + (first + i) * spec.policy_size();
             std::copy_n(worker.policy_at.out.back() + i * stride, num_actions, outputs);
@@ -115,13 +166,11 @@ void Learner::values(const uint8_t* observations, const float* states, size_t co
     const size_t stride = static_cast<size_t>(network_.critic.layers.back().shape.out_channels);
     for_each_task((count + chunk - 1) / chunk, [&](Worker& worker, size_t task) {
         const size_t first = task * chunk, samples = std::min(chunk, count - first);
-        const float* in = worker.input.data();
-        if (network_.critic.sees_camera) {
-            const size_t size = spec.observation_size();
-            RC_DISPATCH(bytes_to_unit, observations + first * size, samples * size, worker.input.data());
-        } else {
-            in = states + first * static_cast<size_t>(spec.state_size);
+        for (size_t i = 0; network_.critic.sees_camera && i < samples; ++i) {
+            read_sample(worker, observations + (first + i) * spec.observation_size(), i);
         }
+        const Inputs in{worker.input.data(), worker.lidar.data(),
+                        states + first * static_cast<size_t>(spec.state_size)};
         point(network_.critic, worker.critic, nullptr, 0, worker.critic_at);
         forward(network_.critic, in, samples, worker.critic_at);
         for (size_t i = 0; i < samples; ++i) out[first + i] = worker.critic_at.out.back()[i * stride];
@@ -132,7 +181,7 @@ UpdateStats Learner::update(const Minibatch& minibatch, const Objective& objecti
     const std::lock_guard lock(mutex_);
     const size_t size = minibatch.size;
     prepare_training(size);
-    gather_states(minibatch);
+    gather(minibatch);
     transpose();
     const size_t num_groups = std::clamp((size + kMinGroupSize - 1) / kMinGroupSize, size_t{1}, kMaxGroups);
     for_each_task(num_groups, [&](Worker& worker, size_t group) {
@@ -191,7 +240,8 @@ void Learner::prepare_training(size_t size) {
         kept = {};
         for (size_t l = 0; l < tower.layers.size(); ++l) {
             const Layer& layer = tower.layers[l];
-            const bool feeds_dense = l + 1 < tower.layers.size() && tower.layers[l + 1].is_dense;
+            const bool feeds_dense = l + 1 < tower.layers.size() && tower.layers[l + 1].is_dense &&
+                                     !tower.layers[l + 1].is_first();
             kept.out.emplace_back(feeds_dense || layer.is_dense ? size * layer.shape.out_size() : 0);
             kept.grad.emplace_back(layer.is_dense ? size * layer.shape.out_size() : 0);
         }
@@ -210,42 +260,58 @@ void Learner::point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kep
     }
 }
 
-void Learner::forward(const Tower& tower, const float* in, size_t samples, const TowerPointers& at) const {
+void Learner::forward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at) const {
     for (size_t l = 0; l < tower.layers.size(); ++l) {
         const Layer& layer = tower.layers[l];
+        if (layer.is_join()) {
+            const size_t camera = tower.camera_end - 1;
+            join_rows(at.out[camera], tower.layers[camera].shape.out_size(), at.out[l - 1],
+                      tower.layers[l - 1].shape.out_size(), samples, at.out[l]);
+            continue;
+        }
+        const float* input = input_of(layer, in.image, in.lidar, in.state, l == 0 ? nullptr : at.out[l - 1]);
         RC_DISPATCH(layer_forward, layer.shape, layer.activation, weights_.data() + layer.weights,
-                    weights_.data() + layer.bias, in, samples, at.out[l]);
-        in = at.out[l];
+                    weights_.data() + layer.bias, input, samples, at.out[l]);
     }
 }
 
 // From the gradient at the head's outputs to those of all biases and of the convolutions' weights, which are
 // added to `gradient`; the dense layers' gradients stay behind in `at`.
-void Learner::backward(const Tower& tower, const float* in, size_t samples, const TowerPointers& at,
+void Learner::backward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at,
                        float* gradient) const {
     for (size_t l = tower.layers.size(); l-- > 0;) {
         const Layer& layer = tower.layers[l];
-        const float* input = l == 0 ? in : at.out[l - 1];
+        if (layer.is_join()) {
+            const size_t camera = tower.camera_end - 1;
+            split_rows(at.grad[l], samples, at.grad[camera], tower.layers[camera].shape.out_size(),
+                       at.grad[l - 1], tower.layers[l - 1].shape.out_size());
+            continue;
+        }
+        const float* input = input_of(layer, in.image, in.lidar, in.state, l == 0 ? nullptr : at.out[l - 1]);
         RC_DISPATCH(activation_gradient, layer.activation, at.out[l], samples * layer.shape.num_positions(),
                     layer.shape.out_channels, at.grad[l], gradient + layer.bias);
         for (int panel = 0; !layer.is_dense && panel * kPanel < layer.shape.out_channels; ++panel) {
             RC_DISPATCH(layer_weight_gradient, layer.shape, panel, 0, layer.shape.num_inputs(), input,
                         at.grad[l], samples, gradient + layer.weights);
         }
-        if (l > 0) {
+        if (!layer.is_first()) {
             RC_DISPATCH(layer_input_gradient, layer.shape, transposed_.data() + layer.transposed, at.grad[l],
                         samples, at.grad[l - 1]);
         }
     }
 }
 
-// Dense layers sum up over the whole minibatch, so its states must lie side by side.
-void Learner::gather_states(const Minibatch& minibatch) {
-    const size_t width = static_cast<size_t>(network_.spec.state_size);
-    if (width == 0) return;
+// Dense layers sum up over the whole minibatch, so what the first of them read must lie side by side.
+void Learner::gather(const Minibatch& minibatch) {
+    const NetworkSpec& spec = network_.spec;
+    const size_t width = static_cast<size_t>(spec.state_size), lidar = static_cast<size_t>(spec.lidar_size);
     kept_states_.resize(minibatch.size * width);
-    for (size_t i = 0; i < minibatch.size; ++i) {
-        std::copy_n(minibatch.states + minibatch.row(i) * width, width, kept_states_.data() + i * width);
+    kept_lidar_.resize(minibatch.size * lidar);
+    for (size_t i = 0; i < minibatch.size && width + lidar > 0; ++i) {
+        const size_t row = minibatch.row(i);
+        std::copy_n(minibatch.states + row * width, width, kept_states_.data() + i * width);
+        RC_DISPATCH(bytes_to_unit, minibatch.observations + row * spec.observation_size() + spec.image_size(),
+                    lidar, kept_lidar_.data() + i * lidar);
     }
 }
 
@@ -253,7 +319,7 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
                         size_t num_groups) {
     const NetworkSpec& spec = network_.spec;
     const size_t num_actions = static_cast<size_t>(spec.num_actions);
-    const size_t observation_size = spec.observation_size();
+    const size_t observation_size = spec.observation_size(), image_size = spec.image_size();
     const size_t policy_stride = static_cast<size_t>(network_.policy.layers.back().shape.out_channels);
     const size_t critic_stride = static_cast<size_t>(network_.critic.layers.back().shape.out_channels);
     const double weight = 1.0 / static_cast<double>(minibatch.size);
@@ -265,15 +331,16 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
         const size_t samples = std::min(kChunk, end - first);
         for (size_t i = 0; i < samples; ++i) {
             RC_DISPATCH(bytes_to_unit, minibatch.observations + minibatch.row(first + i) * observation_size,
-                        observation_size, worker.input.data() + i * observation_size);
+                        image_size, worker.input.data() + i * image_size);
         }
-        const float* critic_input =
-            network_.critic.sees_camera ? worker.input.data() : kept_states_.data() + first * spec.state_size;
+        const Inputs in{worker.input.data(),
+                        kept_lidar_.data() + first * static_cast<size_t>(spec.lidar_size),
+                        kept_states_.data() + first * static_cast<size_t>(spec.state_size)};
         TowerPointers &policy = worker.policy_at, &critic = worker.critic_at;
         point(network_.policy, worker.policy, &kept_policy_, first, policy);
         point(network_.critic, worker.critic, &kept_critic_, first, critic);
-        forward(network_.policy, worker.input.data(), samples, policy);
-        forward(network_.critic, critic_input, samples, critic);
+        forward(network_.policy, in, samples, policy);
+        forward(network_.critic, in, samples, critic);
 
         std::fill_n(policy.grad.back(), samples * policy_stride, 0.0f);  // padding included
         std::fill_n(critic.grad.back(), samples * critic_stride, 0.0f);
@@ -294,15 +361,16 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
             critic.grad.back()[i * critic_stride] = critic_loss(
                 critic.out.back()[i * critic_stride], minibatch.returns[row], weight, objective, terms);
         }
-        backward(network_.policy, worker.input.data(), samples, policy, gradient);
-        backward(network_.critic, critic_input, samples, critic, gradient);
+        backward(network_.policy, in, samples, policy, gradient);
+        backward(network_.critic, in, samples, critic, gradient);
     }
 }
 
 void Learner::sum_dense(const DenseTask& task, size_t size) {
     const Layer& layer = task.tower->layers[task.layer];
     TowerBuffers& kept = task.tower == &network_.policy ? kept_policy_ : kept_critic_;
-    const float* in = task.layer > 0 ? kept.out[task.layer - 1].data() : kept_states_.data();
+    const float* in = input_of(layer, nullptr, kept_lidar_.data(), kept_states_.data(),
+                               task.layer == 0 ? nullptr : kept.out[task.layer - 1].data());
     const size_t width = std::min(kPanel, layer.shape.out_channels - task.panel * kPanel);
     float* rows = gradient_.data() + layer.weights +
                   static_cast<size_t>(task.panel) * kPanel * layer.shape.num_inputs() + task.first * width;

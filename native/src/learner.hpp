@@ -25,7 +25,7 @@ namespace racecraft {
 struct Minibatch {
     size_t size;                    // B
     const int64_t* rows;            // (B,), null for the first B
-    const uint8_t* observations;    // (M, observation_size)
+    const uint8_t* observations;    // (M, observation_size): the image, then the LIDAR
     const float* states;            // (M, state_size)
     const int64_t* action_indices;  // (M,), discrete; each within [0, num_actions)
     const float* actions;           // (M, num_actions), continuous
@@ -47,8 +47,9 @@ class Learner {
 
     const Network& network() const { return network_; }
 
-    // frames (count, height, width) -> out (count, observation_size).
-    void encode(const uint8_t* frames, size_t count, uint8_t* out);
+    // What the sensors tell (count, sight_size), image by image and then the LIDAR -> out (count,
+    // observation_size).
+    void encode(const uint8_t* sight, size_t count, uint8_t* out);
 
     // Logits, or means and log standard deviations  (count, policy_size).
     void policy(const uint8_t* observations, size_t count, float* out);
@@ -76,9 +77,13 @@ class Learner {
     struct TowerPointers {
         std::vector<float*> out, grad;
     };
+    // What a tower's first layers read, of the samples at hand.
+    struct Inputs {
+        const float *image, *lidar, *state;
+    };
     // One thread's scratch.
     struct Worker {
-        FloatBuffer input;
+        FloatBuffer input, lidar;
         TowerBuffers policy, critic;
         TowerPointers policy_at, critic_at;
     };
@@ -99,14 +104,15 @@ class Learner {
     void prepare_training(size_t size);
     void point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kept, size_t first,
                TowerPointers& at);
-    void forward(const Tower& tower, const float* in, size_t samples, const TowerPointers& at) const;
-    void backward(const Tower& tower, const float* in, size_t samples, const TowerPointers& at,
+    void read_sample(Worker& worker, const uint8_t* observation, size_t sample) const;
+    void forward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at) const;
+    void backward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at,
                   float* gradient) const;
     void run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
                    size_t num_groups);
     void sum_dense(const DenseTask& task, size_t size);
     double sum_over_tasks(size_t num_groups, size_t size);
-    void gather_states(const Minibatch& minibatch);
+    void gather(const Minibatch& minibatch);
     void step(const Objective& objective, double norm);
     void transpose();
 
@@ -122,6 +128,7 @@ class Learner {
         kept_critic_;  // of the whole minibatch: what dense layers saw, and their gradients
     size_t kept_size_ = 0;
     std::vector<float> kept_states_;  // (B, state_size)
+    std::vector<float> kept_lidar_;   // (B, lidar_size)
     std::vector<LossTerms> terms_;    // (B,)
     std::vector<double> squares_;     // of the gradient, one sum per task
     std::vector<DenseTask> dense_tasks_;

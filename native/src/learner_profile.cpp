@@ -36,6 +36,7 @@ std::vector<LayerTime> profile_layers(const NetworkSpec& spec, size_t samples, i
     std::vector<LayerTime> times;
     for (const Tower* tower : {&network.policy, &network.critic}) {
         for (const Layer& layer : tower->layers) {
+            if (layer.is_join()) continue;
             const LayerShape& shape = layer.shape;
             FloatBuffer in(samples * shape.in_size), grad_in(samples * shape.in_size);
             FloatBuffer out(samples * shape.out_size()), grad_out(samples * shape.out_size());
@@ -57,7 +58,7 @@ std::vector<LayerTime> profile_layers(const NetworkSpec& spec, size_t samples, i
                                 grad_out.data(), samples, gradient.data() + layer.weights);
                 }
             });
-            if (&layer == &tower->layers.front()) continue;
+            if (layer.is_first()) continue;
             measure("input gradient", [&] {
                 RC_DISPATCH(layer_input_gradient, shape, transposed.data() + layer.transposed,
                             grad_out.data(), samples, grad_in.data());

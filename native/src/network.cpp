@@ -41,7 +41,8 @@ void for_each_weight(const Layer& layer, const Visit& visit) {
     const size_t fold = static_cast<size_t>(layer.fold);
     const size_t channels = static_cast<size_t>(layer.in_channels);
     const size_t kernel = static_cast<size_t>(layer.kernel_width) * fold;  // as published
-    const size_t per_output = static_cast<size_t>(layer.kernel_height) * layer.kernel_width * channels;
+    const size_t per_output = layer.inputs_published();
+    const size_t num_taps = static_cast<size_t>(layer.kernel_height) * layer.kernel_width;
     for (size_t out = 0; out < static_cast<size_t>(layer.num_outputs); ++out) {
         const size_t panel = out / kPanel * kPanel;
         const size_t width = std::min<size_t>(kPanel, static_cast<size_t>(layer.shape.out_channels) - panel);
@@ -54,13 +55,19 @@ void for_each_weight(const Layer& layer, const Visit& visit) {
                     if (layer.is_dense) {
                         published += tap * channels + c;
                     } else if (fold > 1) {
-                        published += (y * fold + c / fold) * kernel + x * fold + c % fold;
+                        const size_t lens = c / (fold * fold), pixel = c % (fold * fold);
+                        const size_t line = (lens * layer.kernel_height + y) * fold + pixel / fold;
+                        published += line * kernel + x * fold + pixel % fold;
                     } else {
                         published += (c * layer.kernel_height + y) * kernel + x;
                     }
                     visit(first + (tap * layer.padded_in_channels + c) * width, published);
                 }
             }
+        }
+        for (size_t i = 0; i < static_cast<size_t>(layer.joined_inputs); ++i) {
+            visit(first + (num_taps * layer.padded_in_channels + i) * width,
+                  out * per_output + num_taps * channels + i);
         }
     }
 }
@@ -71,10 +78,10 @@ void for_each_parameter(const Network& network, const Visit& visit) {
     size_t published = 0;
     for (const Tower* tower : {&network.policy, &network.critic}) {
         for (const Layer& layer : tower->layers) {
+            if (layer.is_join()) continue;
             for_each_weight(layer,
                             [&](size_t from, size_t to) { visit(layer.weights + from, published + to); });
-            published += static_cast<size_t>(layer.num_outputs) * layer.kernel_height * layer.kernel_width *
-                         layer.in_channels;
+            published += static_cast<size_t>(layer.num_outputs) * layer.inputs_published();
             for (size_t i = 0; i < static_cast<size_t>(layer.num_outputs); ++i)
                 visit(layer.bias + i, published++);
         }
@@ -102,6 +109,12 @@ Network::Network(const NetworkSpec& description) : spec(description) {
             "The network needs at least one action, and a state of 0 or more columns.");
     for (const int units : spec.dense) require(units > 0, "A dense layer needs at least one unit.");
     for (const int units : spec.critic_units) require(units > 0, "A dense layer needs at least one unit.");
+    for (const int units : spec.lidar_units) require(units > 0, "A dense layer needs at least one unit.");
+    require(spec.lenses == 1 || spec.lenses == 2, "A camera has one lens or two.");
+    require(spec.lidar_size >= 0 && (spec.lidar_size == 0 || !spec.lidar_units.empty()),
+            "A LIDAR of 0 or more values needs a branch of at least one dense layer.");
+    require(spec.camera_dense >= 0 && spec.camera_dense <= static_cast<int>(spec.dense.size()),
+            "The camera's branch cannot have more dense layers than there are.");
     add_camera_tower(policy, spec.num_actions);
     if (spec.state_size > 0) {
         add_state_tower(critic);
@@ -136,6 +149,7 @@ void Network::add_camera_tower(Tower& tower, int num_outputs) {
         layer.in_channels = channels;
         layer.padded_in_channels = padded_channels;
         layer.fold = fold;
+        layer.source = tower.layers.empty() ? Source::image : Source::layer;
         tower.layers.push_back(layer);
         height = out_height;
         width = out_width;
@@ -144,53 +158,91 @@ void Network::add_camera_tower(Tower& tower, int num_outputs) {
         fold = 1;
     }
     require(!spec.convs.empty(), "The network needs at least one convolution.");
-    add_dense_layers(tower, spec.dense, Activation::relu, num_outputs, height, width, channels);
+    const size_t camera_dense = static_cast<size_t>(spec.camera_dense);
+    int joined = 0;
+    const auto add = [&](int units, Activation activation) {
+        add_dense_layer(tower, Source::layer, activation, units, height, width, channels, joined);
+        height = width = 1;
+        channels = units;
+        joined = 0;
+    };
+    for (size_t i = 0; i < spec.dense.size(); ++i) {
+        if (i == camera_dense) joined = add_lidar_branch(tower);
+        add(spec.dense[i], Activation::relu);
+    }
+    if (spec.dense.size() == camera_dense) joined = add_lidar_branch(tower);
+    add(num_outputs, Activation::identity);
+}
+
+// Returns the inputs that the next layer has from it.
+int Network::add_lidar_branch(Tower& tower) {
+    if (spec.lidar_size == 0) return 0;
+    tower.camera_end = tower.layers.size();
+    int inputs = spec.lidar_size;
+    for (const int units : spec.lidar_units) {
+        const Source source = tower.layers.size() == tower.camera_end ? Source::lidar : Source::layer;
+        add_dense_layer(tower, source, Activation::relu, units, 1, 1, inputs, 0);
+        inputs = units;
+    }
+    Layer join{};
+    join.source = Source::join;
+    join.activation = Activation::identity;
+    join.fold = 1;
+    join.shape.out_height = join.shape.out_width = 1;
+    join.shape.out_channels = static_cast<int>(tower.layers[tower.camera_end - 1].shape.out_size() +
+                                               tower.layers.back().shape.out_size());
+    tower.layers.push_back(join);
+    return inputs;
 }
 
 void Network::add_state_tower(Tower& tower) {
     tower.sees_camera = false;
-    add_dense_layers(tower, spec.critic_units, Activation::tanh, 1, 1, 1, spec.state_size);
+    Source source = Source::state;
+    int inputs = spec.state_size;
+    for (const int units : spec.critic_units) {
+        add_dense_layer(tower, source, Activation::tanh, units, 1, 1, inputs, 0);
+        source = Source::layer;
+        inputs = units;
+    }
+    add_dense_layer(tower, source, Activation::identity, 1, 1, 1, inputs, 0);
 }
 
-void Network::add_dense_layers(Tower& tower, const std::vector<int>& units, Activation activation,
-                               int num_outputs, int height, int width, int channels) {
-    for (size_t i = 0; i <= units.size(); ++i) {
-        const bool is_head = i == units.size();
-        const int outputs = is_head ? num_outputs : units[i];
-        const int padded_channels = tower.layers.empty() ? channels : padded(channels);
-        const size_t in_size = static_cast<size_t>(height) * width * padded_channels;
-        Layer layer{};
-        layer.shape = shape_of(width, padded_channels, height, width, 1, 1, 1, outputs, in_size);
-        layer.activation = is_head ? Activation::identity : activation;
-        layer.is_dense = true;
-        layer.num_outputs = outputs;
-        layer.kernel_height = height;
-        layer.kernel_width = width;
-        layer.in_channels = channels;
-        layer.padded_in_channels = padded_channels;
-        layer.fold = 1;
-        tower.layers.push_back(layer);
-        height = width = 1;
-        channels = outputs;
-    }
+void Network::add_dense_layer(Tower& tower, Source source, Activation activation, int outputs, int height,
+                              int width, int channels, int joined_inputs) {
+    const int padded_channels = source == Source::layer ? padded(channels) : channels;
+    const int joined = padded(joined_inputs);
+    Layer layer{};
+    layer.shape = shape_of(width, padded_channels, height, width, 1, 1, 1, outputs,
+                           static_cast<size_t>(height) * width * padded_channels + joined);
+    layer.shape.run_length += joined;
+    layer.source = source;
+    layer.activation = activation;
+    layer.is_dense = true;
+    layer.num_outputs = outputs;
+    layer.kernel_height = height;
+    layer.kernel_width = width;
+    layer.in_channels = channels;
+    layer.padded_in_channels = padded_channels;
+    layer.fold = 1;
+    layer.joined_inputs = joined_inputs;
+    tower.layers.push_back(layer);
 }
 
 void Network::place() {
     for (Tower* tower : {&policy, &critic}) {
         for (Layer& layer : tower->layers) {
+            if (layer.is_join()) continue;
             if (!layer.is_dense) {
                 layer.weights = num_grouped;
                 num_grouped += layer.shape.num_weights();
             }
             layer.bias = num_grouped;
             num_grouped += static_cast<size_t>(layer.shape.out_channels);
-            if (&layer != &tower->layers.front()) {
+            if (!layer.is_first()) {
                 layer.transposed = num_transposed;
                 num_transposed += layer.shape.num_weights();
             }
-            num_public +=
-                static_cast<size_t>(layer.num_outputs) *
-                (1 + static_cast<size_t>(layer.kernel_height) * layer.kernel_width * layer.in_channels);
+            num_public += static_cast<size_t>(layer.num_outputs) * (1 + layer.inputs_published());
         }
     }
     if (!spec.is_discrete) {

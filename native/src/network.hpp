@@ -1,9 +1,14 @@
 // The networks that drive and judge, as plain tables: layers, where their parameters lie, and how those are
 // packed.
 //
-// A network is two towers over one vector of parameters: the policy sees the camera, the critic the
-// privileged state or the camera. Every layer is a convolution; a dense layer is one whose kernel covers its
-// whole input.
+// A network is two towers over one vector of parameters: the policy sees the sensors, the critic the
+// privileged state or the sensors. Every layer is a convolution; a dense layer is one whose kernel covers its
+// whole input. Where there is a LIDAR, a tower has a branch for it, and a layer without parameters that lays
+// the ends of both branches side by side:
+//
+//     image ─▶ convolutions [─▶ dense layers] ─┐
+//                                              join ─▶ dense layers ─▶ head
+//     LIDAR ─▶ dense layers ───────────────────┘
 //
 //     packed parameters:  | convolutions' weights, all biases, log_std | dense layers' weights |
 //                           summed up by groups of samples               summed up over all samples at once
@@ -45,11 +50,18 @@ struct NetworkSpec {
     int state_size;                 // 0: the critic sees the camera
     std::vector<int> critic_units;  // of the critic that sees the state
     int top = 0;                    // rows of the image, from its top, that the network does not see
+    int lenses = 1;                 // images of one camera, 2 for a stereo pair
+    int lidar_size = 0;             // values of the LIDAR sensor, a byte each; 0 without one
+    std::vector<int> lidar_units;   // of the LIDAR's branch
+    int camera_dense = 0;           // how many of the dense layers belong to the camera's branch
 
     int rows() const { return (height - top) / (pool * block); }
     int columns() const { return width / (pool * block); }
-    int channels() const { return block * block; }
-    size_t observation_size() const { return static_cast<size_t>(rows()) * columns() * channels(); }
+    int channels() const { return lenses * block * block; }
+    size_t lens_size() const { return static_cast<size_t>(height) * width; }
+    size_t sight_size() const { return lens_size() * lenses + lidar_size; }  // of what encode() takes
+    size_t image_size() const { return static_cast<size_t>(rows()) * columns() * channels(); }
+    size_t observation_size() const { return image_size() + lidar_size; }
     size_t policy_size() const { return static_cast<size_t>(is_discrete ? num_actions : 2 * num_actions); }
 };
 
@@ -71,8 +83,12 @@ struct LayerShape {
     size_t num_weights() const { return num_inputs() * out_channels; }
 };
 
+// Where a layer's inputs come from.
+enum class Source { image, lidar, state, layer, join };
+
 struct Layer {
     LayerShape shape;
+    Source source;
     Activation activation;
     size_t weights;     // offset among the packed parameters
     size_t bias;        // likewise
@@ -81,12 +97,21 @@ struct Layer {
     // the layer as it is published
     int num_outputs;
     int kernel_height, kernel_width, in_channels, padded_in_channels;
-    int fold;  // side of the blocks of pixels that the input's channels are; 1 where they are not
+    int fold;           // side of the blocks of pixels that the input's channels are; 1 where they are not
+    int joined_inputs;  // more inputs behind those, of the LIDAR's branch
+
+    bool is_join() const { return source == Source::join; }
+    bool is_first() const { return source != Source::layer && source != Source::join; }
+    size_t inputs_published() const {
+        return static_cast<size_t>(kernel_height) * kernel_width * in_channels + joined_inputs;
+    }
 };
 
 struct Tower {
     bool sees_camera;
     std::vector<Layer> layers;
+    size_t camera_end =
+        0;  // layers of the camera's branch, which come first; 0 where there is no other branch
 };
 
 class Network {
@@ -110,8 +135,9 @@ class Network {
   private:
     void add_camera_tower(Tower& tower, int num_outputs);
     void add_state_tower(Tower& tower);
-    void add_dense_layers(Tower& tower, const std::vector<int>& units, Activation activation, int num_outputs,
-                          int height, int width, int channels);
+    void add_dense_layer(Tower& tower, Source source, Activation activation, int outputs, int height,
+                         int width, int channels, int joined_inputs);
+    int add_lidar_branch(Tower& tower);
     void place();
 };
 

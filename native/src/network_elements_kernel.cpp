@@ -82,11 +82,12 @@ void bytes_to_unit(const uint8_t* bytes, size_t count, float* out) {
     for (size_t i = 0; i < count; ++i) out[i] = static_cast<float>(bytes[i]) * (1.0f / 255.0f);
 }
 
-void fold_frame(const NetworkSpec& spec, const uint8_t* frame, uint8_t* out) {
+void fold_frame(const NetworkSpec& spec, const uint8_t* frame, int lens, uint8_t* out) {
     const size_t width = static_cast<size_t>(spec.width), columns = static_cast<size_t>(spec.columns());
-    const size_t block = static_cast<size_t>(spec.block), channels = block * block;
+    const size_t block = static_cast<size_t>(spec.block), channels = static_cast<size_t>(spec.channels());
     const size_t line_width = width / static_cast<size_t>(spec.pool);
     frame += static_cast<size_t>(spec.top) * width;
+    out += static_cast<size_t>(lens) * block * block;
     uint8_t line[4096];
     for (size_t row = 0; row < static_cast<size_t>(spec.rows()); ++row) {
         for (size_t y = 0; y < block; ++y) {

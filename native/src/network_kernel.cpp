@@ -207,11 +207,15 @@ void weight_gradient_lanes(const Positions& positions, size_t channels, const fl
     step(weight_gradient_tile<1, kVectors>, 1);
 }
 
-// Calls lanes<vectors>(lane) for the vectors that cover a panel of `width` channels.
+// Calls lanes<vectors>(lane) for the vectors that cover a panel of `width` channels; `is_narrow` takes 16 of
+// them at a time, on every instruction set.
 template <typename Lanes>
-[[gnu::always_inline]] inline void for_each_vector_pair(size_t width, const Lanes& lanes) {
+[[gnu::always_inline]] inline void for_each_vector_pair(size_t width, const Lanes& lanes,
+                                                        bool is_narrow = false) {
     size_t lane = 0;
-    for (; lane + 2 * kLaneCount <= width; lane += 2 * kLaneCount) lanes.template operator()<2>(lane);
+    const bool is_paired = kLaneCount < kChannelMultiple || !is_narrow;
+    for (; is_paired && lane + 2 * kLaneCount <= width; lane += 2 * kLaneCount)
+        lanes.template operator()<2>(lane);
     if constexpr (kLaneCount == kChannelMultiple) {
         for (; lane < width; lane += kLaneCount) lanes.template operator()<1>(lane);
     }
@@ -251,16 +255,22 @@ void layer_input_gradient(const LayerShape& shape, const float* transposed, cons
                           size_t samples, float* grad_in) {
     const size_t length = static_cast<size_t>(shape.run_length);
     std::fill_n(grad_in, samples * shape.in_size, 0.0f);
+    // Neighbouring positions that share inputs within a panel would be added in an order that depends on the
+    // width of vectors.
+    const bool is_narrow = shape.num_positions() > 1 && shape.column_step < kPanel;
     for (size_t run = 0; run < static_cast<size_t>(shape.num_runs); ++run) {
         for (size_t first = 0; first < length; first += kPanel) {
             const size_t width = std::min<size_t>(kPanel, length - first);
             const float* panel =
                 transposed + (run * length + first) * static_cast<size_t>(shape.out_channels);
-            for_each_vector_pair(width, [&]<int kVectors>(size_t lane) {
-                const InputGradientTerms terms{shape, panel + lane, width, grad_out,
-                                               grad_in + run * shape.run_stride + first + lane};
-                input_gradient_lanes<kVectors>(terms, samples * shape.num_positions());
-            });
+            for_each_vector_pair(
+                width,
+                [&]<int kVectors>(size_t lane) {
+                    const InputGradientTerms terms{shape, panel + lane, width, grad_out,
+                                                   grad_in + run * shape.run_stride + first + lane};
+                    input_gradient_lanes<kVectors>(terms, samples * shape.num_positions());
+                },
+                is_narrow);
         }
     }
 }

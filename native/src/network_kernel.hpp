@@ -28,8 +28,8 @@ struct AdamStep {
 // layer_weight_gradient: adds to rows [first, last) of one panel of `gradient`; rows are the layer's inputs.
 // activation_gradient: multiplies grad by the activation's slope at `out`, and adds the positions' sum to
 // bias_gradient. transpose_weights: one panel of one run; panels of run_length lanes, (out_channels, lanes of
-// the panel) within each, run by run. fold_frame: pools the rows of an image that are seen and folds blocks
-// of pixels into channels.
+// the panel) within each, run by run. fold_frame: pools the rows of one lens's image that are seen and folds
+// blocks of pixels into channels.
 // sum_gradients: out = parts[0] + parts[1] + ..., each `stride` apart.
 // sum_of_squares: in double.
 // orthonormalize: makes `count` independent vectors orthonormal, each from itself and those before it (Gram
@@ -48,7 +48,7 @@ struct AdamStep {
     void transpose_weights(const LayerShape& shape, int run, size_t first_lane, const float* weights,    \
                            float* transposed);                                                           \
     void bytes_to_unit(const uint8_t* bytes, size_t count, float* out);                                  \
-    void fold_frame(const NetworkSpec& spec, const uint8_t* frame, uint8_t* out);                        \
+    void fold_frame(const NetworkSpec& spec, const uint8_t* frame, int lens, uint8_t* out);              \
     void sum_gradients(const float* parts, size_t num_parts, size_t stride, size_t count, float* out);   \
     double sum_of_squares(const float* values, size_t count);                                            \
     void adam(const AdamStep& step, const float* gradient, size_t count, float* moment1, float* moment2, \

@@ -4,6 +4,7 @@
 #include <functional>
 #include <random>
 #include <stdexcept>
+#include <utility>
 
 #include "../src/learner.hpp"
 #include "../src/network_math.hpp"
@@ -55,29 +56,38 @@ std::vector<float> random_parameters(size_t count, unsigned seed) {
 
 // A tower of the network as it is published, one number after the other.
 Values reference_tower(const Tower& tower, const NetworkSpec& spec, const double*& p, Values x,
-                       bool is_camera) {
+                       const Values& lidar, bool is_camera) {
     int height = spec.rows(), width = spec.columns(), channels = spec.channels();
     if (is_camera && spec.block > 1) {  // unfold the blocks of pixels again
-        const int block = spec.block;
+        const int block = spec.block, lenses = spec.lenses;
         Values image(x.size());
         for (int row = 0; row < height; ++row) {
             for (int column = 0; column < width; ++column) {
                 for (int c = 0; c < channels; ++c) {
-                    const int y = row * block + c / block, at = column * block + c % block;
-                    image[y * width * block + at] = x[(row * width + column) * channels + c];
+                    const int lens = c / (block * block), pixel = c % (block * block);
+                    const int y = row * block + pixel / block, at = column * block + pixel % block;
+                    image[(y * width * block + at) * lenses + lens] =
+                        x[(row * width + column) * channels + c];
                 }
             }
         }
         x = image;
         height *= block;
         width *= block;
-        channels = 1;
+        channels = lenses;
     }
+    Values camera;
     const size_t num_convs = is_camera ? spec.convs.size() : 0;
     for (size_t l = 0; l < tower.layers.size(); ++l) {
         const Layer& layer = tower.layers[l];
         const int outputs = layer.num_outputs;
         Values y;
+        if (layer.source == Source::lidar) camera = std::exchange(x, lidar);
+        if (layer.is_join()) {
+            camera.insert(camera.end(), x.begin(), x.end());
+            x = camera;
+            continue;
+        }
         if (l < num_convs) {
             const int kernel = spec.convs[l].kernel, stride = spec.convs[l].stride;
             const int rows = (height - kernel) / stride + 1, columns = (width - kernel) / stride + 1;
@@ -132,9 +142,11 @@ Outputs reference_outputs(const Network& network, const Values& parameters, cons
     const NetworkSpec& spec = network.spec;
     const double* p = parameters.data();
     const uint8_t* bytes = samples.observations.data() + row * spec.observation_size();
-    Values image;
-    for (size_t i = 0; i < spec.observation_size(); ++i) image.push_back(bytes[i] / 255.0);
-    Outputs outputs{reference_tower(network.policy, spec, p, image, true), 0.0};
+    Values image, lidar;
+    for (size_t i = 0; i < spec.observation_size(); ++i) {
+        (i < spec.image_size() ? image : lidar).push_back(bytes[i] / 255.0);
+    }
+    Outputs outputs{reference_tower(network.policy, spec, p, image, lidar, true), 0.0};
     if (!spec.is_discrete) {
         outputs.policy.insert(outputs.policy.end(), p, p + spec.num_actions);
         p += spec.num_actions;
@@ -142,7 +154,7 @@ Outputs reference_outputs(const Network& network, const Values& parameters, cons
     const size_t columns = static_cast<size_t>(spec.state_size);
     const float* state = samples.states.data() + row * columns;
     const Values critic_input = columns > 0 ? Values(state, state + columns) : image;
-    outputs.value = reference_tower(network.critic, spec, p, critic_input, columns == 0)[0];
+    outputs.value = reference_tower(network.critic, spec, p, critic_input, lidar, columns == 0)[0];
     return outputs;
 }
 
@@ -188,6 +200,9 @@ std::vector<NetworkSpec> odd_networks() {
         {7, 7, 1, 1, {{18, 7, 3}}, {34}, 19, true, 0, {}},  // a kernel as large as the image
         {6, 13, 1, 1, {{2, 3, 3}, {1, 1, 2}}, {1}, 2, true, 35, {33}},
         {26, 16, 2, 4, {{6, 4, 4}}, {5}, 3, true, 2, {4}, 10},  // its upper rows are not seen
+        {12, 16, 1, 4, {{5, 8, 4}}, {7, 6}, 3, true, 5, {6}, 0, 2, 9, {5, 3}, 1},  // two lenses and a LIDAR
+        {9, 11, 1, 1, {{3, 3, 2}, {4, 2, 1}}, {}, 2, false, 0, {}, 0, 2, 4, {18}, 0},  // the head joins them
+        {8, 8, 2, 1, {{3, 3, 1}}, {35}, 2, true, 0, {}, 0, 1, 33, {2}, 1},
     };
 }
 
@@ -376,6 +391,11 @@ TEST(impossible_networks_are_refused) {
         [](NetworkSpec& s) { s.convs[0].stride = 2; },
         [](NetworkSpec& s) { s.convs[0].filters = 0; },
         [](NetworkSpec& s) { s.convs.clear(); },
+        [](NetworkSpec& s) { s.lenses = 3; },
+        [](NetworkSpec& s) { s.lidar_size = -1; },
+        [](NetworkSpec& s) { s.lidar_size = 4; },  // without a branch
+        [](NetworkSpec& s) { s.lidar_units = {0}; },
+        [](NetworkSpec& s) { s.camera_dense = 2; },
     };
     Learner accepted(good, 1);
     for (const auto& fault : faults) {

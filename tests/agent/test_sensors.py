@@ -1,6 +1,6 @@
 import pytest
 
-from racecraft.agent import LidarConfig, check_sensors, check_simulated, observation_shape
+from racecraft.agent import LidarConfig, check_sensors, observation_shape
 from racecraft.agent.sensors import CAMERAS, LIDARS, SENSOR_NAMES
 from racecraft.errors import ConfigError
 
@@ -32,10 +32,3 @@ def test_shapes_are_those_of_aws_networks():
     assert observation_shape("DISCRETIZED_SECTOR_LIDAR", lidar=LidarConfig(16, 3)) == (48,)
     with pytest.raises(ConfigError):
         observation_shape("CAMERA")
-
-
-def test_only_the_front_camera_is_simulated():
-    check_simulated(["FRONT_FACING_CAMERA"])
-    check_simulated(["observation"])
-    with pytest.raises(ConfigError, match="'LIDAR' cannot be used for training"):
-        check_simulated(["FRONT_FACING_CAMERA", "LIDAR"])

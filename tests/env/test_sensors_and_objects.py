@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import gymnasium
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 import racecraft.env  # noqa: F401 (registers the environments)
 from racecraft.agent import LidarConfig, camera_of, observation_shape
 from racecraft.errors import ConfigError
-from racecraft.sim import Bots, CameraSpec, Objects, Obstacles, Simulation, Start
+from racecraft.sim import Bots, CameraSpec, Objects, Obstacles, Randomization, Simulation, Start
 
 OBJECTS = Objects(obstacles=Obstacles(count=2, placement="random"), bots=Bots(count=1, speed=0.5))
 SENSORS = [
@@ -61,6 +63,28 @@ def test_the_stereo_pair_is_two_cameras_beside_each_other():
         np.testing.assert_array_equal(stereo.frames[:, 0], left.frames)
         np.testing.assert_array_equal(stereo.frames[:, 1], right.frames)
     assert (left.frames != right.frames).mean() > 0.02
+
+
+def test_both_lenses_of_a_pair_have_the_pose_that_was_drawn():
+    """One bracket holds both: what is drawn for an episode moves them together."""
+    ranges = Randomization(camera_pitch=(0.05, 0.05), camera_left=(0.02, 0.02), camera_fov=(-0.1, -0.1))
+    settings = {"objects": OBJECTS, "start": Start(mode="fixed")}
+    pair = Simulation(_oval(), num_envs=2, camera=camera_of(["STEREO_CAMERAS"]), randomize=ranges, **settings)
+
+    def sum_of(first: float, second: float) -> float:
+        return float(np.float32(first) + np.float32(second))  # as the core adds
+
+    plain = CameraSpec()
+    moved = CameraSpec(pitch=sum_of(plain.pitch, 0.05), horizontal_fov=sum_of(plain.horizontal_fov, -0.1))
+    lenses = [
+        Simulation(_oval(), num_envs=2, camera=dataclasses.replace(moved, left=sum_of(side, 0.02)), **settings)
+        for side in (0.03, -0.03)
+    ]
+    for _ in range(4):
+        for simulation in (pair, *lenses):
+            simulation.step(np.tile(np.float32([0.1, 2.0]), (2, 1)))
+    for lens, alone in enumerate(lenses):
+        np.testing.assert_array_equal(pair.frames[:, lens], alone.frames)
 
 
 def test_the_state_of_a_world_with_objects_lies_in_its_space():

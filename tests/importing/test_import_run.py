@@ -16,6 +16,7 @@ from racecraft import evaluate, resume
 from racecraft.errors import ArchiveError, ConfigError, RacecraftError, RewardError, SourceError
 from racecraft.importing import ImportedRun, import_run
 from racecraft.importing import drfc as settings_of_drfc
+from racecraft.race.policy import load_policy
 from racecraft.run import RunFolder
 from racecraft.sim import Bots, Objects, Obstacles, load_randomization
 from racecraft.track import load_track, save_route
@@ -342,6 +343,19 @@ def test_the_printed_command_trains_and_evaluation_follows_the_rules(tmp_path: P
         evaluate(found.run, video=False)
 
 
+def test_a_model_with_two_lenses_and_a_lidar_is_imported_and_trained(tmp_path: Path) -> None:
+    document = {
+        **json.loads(models.METADATA),
+        "sensor": ["STEREO_CAMERAS", "DISCRETIZED_SECTOR_LIDAR"],
+        "lidar_config": {"num_sectors": 16, "num_values_per_sector": 4, "clipping_dist": 3.0},
+    }
+    files = {**models.MODEL, "model_metadata.json": json.dumps(document)}
+    found = import_run(models.as_tar(files, tmp_path / "model.tar.gz"), name="mine", network="RACECRAFT_SMALL")
+    assert resume(found.run, until="1 steps").steps > 0
+    _, policy = load_policy(RunFolder.open(found.run))
+    assert (policy.learner.spec.lenses, policy.learner.spec.lidar_size) == (2, 64)
+
+
 def test_nothing_foreign_runs_while_importing_and_a_bad_reward_stops_the_training_before_it_begins(
     tmp_path: Path,
 ) -> None:
@@ -375,10 +389,6 @@ BAD_MODELS: dict[str, tuple[dict[str, str], str]] = {
     "learning rate": (changed("hyperparameters.json", '{"lr": 7}'), "lr is 7"),
     "nan": (changed("hyperparameters.json", '{"lr": NaN}'), "NaN is not a number"),
     "deep": (changed("hyperparameters.json", "[" * 100_000), "nested too deeply"),
-    "lidar": (
-        changed("model_metadata.json", models.METADATA.replace('RA"]', 'RA", "LIDAR"]')),
-        "LIDAR",
-    ),
     "sac": (
         changed("model_metadata.json", models.METADATA[:-1] + ', "training_algorithm": "sac"}'),
         "sac",

@@ -12,9 +12,14 @@ OBJECTIVE = Objective(
 )
 
 
+def sight_for(spec: NetworkSpec, size: int, *, seed: int = 0) -> np.ndarray:
+    """What the sensors might tell."""
+    return np.random.default_rng(seed).integers(0, 256, (size, *networks.sight_shape(spec)), dtype=np.uint8)
+
+
 def minibatch_for(learner: Learner, size: int = 192, *, seed: int = 0) -> Minibatch:
     rng, spec = np.random.default_rng(seed), learner.spec
-    observations = learner.encode(rng.integers(0, 256, (size, *spec.frame_shape), dtype=np.uint8))
+    observations = learner.encode(rng.integers(0, 256, (size, *networks.sight_shape(spec)), dtype=np.uint8))
     if spec.is_discrete:
         actions = rng.integers(0, spec.num_actions, size)
     else:
@@ -29,13 +34,25 @@ def minibatch_for(learner: Learner, size: int = 192, *, seed: int = 0) -> Miniba
     )
 
 
-def reference_tower(spec: NetworkSpec, weights, frames, tower: str) -> np.ndarray:
-    """The camera tower in float64."""
-    arch = networks.architecture(spec.name)
+def parts_of(spec: NetworkSpec, sight) -> tuple[np.ndarray, np.ndarray]:
+    """Images (N, lenses, H, W) and the LIDAR's bytes (N, L)."""
+    size = spec.lenses * int(np.prod(spec.frame_shape))
+    flat = sight.reshape(len(sight), -1)
+    return flat[:, :size].reshape(-1, spec.lenses, *spec.frame_shape), flat[:, size:]
+
+
+def reference_tower(spec: NetworkSpec, weights, sight, tower: str) -> np.ndarray:
+    """The tower that sees the sensors, in float64."""
+    arch = networks.architecture(spec.name, lenses=spec.lenses)
     height, width = networks.pooled_shape(spec)
-    frames = frames[:, networks.sky_rows(spec) :]
-    pooled = frames.reshape(len(frames), height, arch.pool, width, arch.pool).mean((2, 4))
-    x = (np.floor(pooled + 0.5) / 255)[:, None]
+    frames, lidar = parts_of(spec, sight)
+    frames = frames[:, :, networks.sky_rows(spec) :]
+    pooled = frames.reshape(len(frames), spec.lenses, height, arch.pool, width, arch.pool).mean((3, 5))
+    x = np.floor(pooled + 0.5) / 255
+
+    def dense(layer: str, x):
+        return (x @ weights[f"{layer}.weight"].T + weights[f"{layer}.bias"]).clip(0)
+
     for i, conv in enumerate(arch.convs, 1):
         weight, bias = (weights[f"{tower}.conv{i}.{part}"].astype(float) for part in ("weight", "bias"))
         windows = np.lib.stride_tricks.sliding_window_view(x, (conv.kernel, conv.kernel), (2, 3))
@@ -43,28 +60,46 @@ def reference_tower(spec: NetworkSpec, weights, frames, tower: str) -> np.ndarra
         x = np.einsum("nchwij,fcij->nfhw", windows, weight, optimize=True) + bias[:, None, None]
         x = x.clip(0)
     x = x.transpose(0, 2, 3, 1).reshape(len(x), -1)
-    for i in range(1, len(arch.dense) + 1):
-        x = (x @ weights[f"{tower}.dense{i}.weight"].T + weights[f"{tower}.dense{i}.bias"]).clip(0)
+    for i in range(1, arch.camera_dense + 1):
+        x = dense(f"{tower}.dense{i}", x)
+    if spec.lidar_size:
+        y = lidar / 255
+        for i in range(1, len(arch.lidar) + 1):
+            y = dense(f"{tower}.lidar{i}", y)
+        x = np.concatenate([x, y], axis=1)
+    for i in range(arch.camera_dense + 1, len(arch.dense) + 1):
+        x = dense(f"{tower}.dense{i}", x)
     return x @ weights[f"{tower}.head.weight"].T + weights[f"{tower}.head.bias"]
 
 
-def reference_gradient(spec: NetworkSpec, weights, frames, minibatch: Minibatch, objective: Objective):
+def reference_gradient(spec: NetworkSpec, weights, sight, minibatch: Minibatch, objective: Objective):
     """The PPO loss and its gradient by name, by torch's autograd in float64."""
     import torch
     from torch.nn import functional
 
     p = {name: torch.from_numpy(array).double().requires_grad_() for name, array in weights.items()}
-    arch = networks.architecture(spec.name)
+    arch = networks.architecture(spec.name, lenses=spec.lenses)
+    frames, lidar = parts_of(spec, sight)
+
+    def dense(layer: str, x: torch.Tensor) -> torch.Tensor:
+        return functional.linear(x, p[f"{layer}.weight"], p[f"{layer}.bias"]).relu()
 
     def camera(tower: str) -> torch.Tensor:
-        seen = torch.from_numpy(frames[:, networks.sky_rows(spec) :]).double()[:, None]
+        seen = torch.from_numpy(frames[:, :, networks.sky_rows(spec) :]).double()
         x = functional.avg_pool2d(seen, arch.pool)
         x = torch.floor(x + 0.5) / 255
         for i, conv in enumerate(arch.convs, 1):
             x = functional.conv2d(x, p[f"{tower}.conv{i}.weight"], p[f"{tower}.conv{i}.bias"], conv.stride).relu()
         x = x.permute(0, 2, 3, 1).reshape(len(x), -1)
-        for i in range(1, len(arch.dense) + 1):
-            x = functional.linear(x, p[f"{tower}.dense{i}.weight"], p[f"{tower}.dense{i}.bias"]).relu()
+        for i in range(1, arch.camera_dense + 1):
+            x = dense(f"{tower}.dense{i}", x)
+        if spec.lidar_size:
+            y = torch.from_numpy(lidar).double() / 255
+            for i in range(1, len(arch.lidar) + 1):
+                y = dense(f"{tower}.lidar{i}", y)
+            x = torch.cat([x, y], 1)
+        for i in range(arch.camera_dense + 1, len(arch.dense) + 1):
+            x = dense(f"{tower}.dense{i}", x)
         return functional.linear(x, p[f"{tower}.head.weight"], p[f"{tower}.head.bias"])
 
     outputs, actions = camera("policy"), torch.from_numpy(minibatch.actions)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from minibatches import OBJECTIVE, minibatch_for, reference_gradient, reference_tower
+from minibatches import OBJECTIVE, minibatch_for, reference_gradient, reference_tower, sight_for
 
 from racecraft import _native
 from racecraft.errors import CheckpointError, ConfigError, ShapeError
@@ -19,6 +19,24 @@ from racecraft.learn.torch_learner import TorchLearner
 NAMES = networks.network_names()
 SMALL = NetworkSpec(num_actions=5, state_size=21)
 HEADS = [(True, 0), (False, 21)]  # is_discrete, state_size
+
+
+# Every branch a tower can have, and how AWS's networks put them together.
+BRANCHES = [
+    NetworkSpec(num_actions=5, lidar_size=64),
+    NetworkSpec(num_actions=2, is_discrete=False, lidar_size=7, state_size=21),
+    NetworkSpec(num_actions=3, lenses=2),
+    NetworkSpec(num_actions=3, lenses=2, lidar_size=8, frame_shape=(100, 96)),
+    NetworkSpec(name=NAMES[1], num_actions=4, lidar_size=64, state_size=5),
+    NetworkSpec(name=NAMES[2], num_actions=4, lidar_size=64, frame_shape=(60, 80)),
+    NetworkSpec(name=NAMES[3], num_actions=4, lidar_size=30, state_size=5),
+    NetworkSpec(name=NAMES[2], num_actions=4, lenses=2, lidar_size=8, frame_shape=(36, 40), state_size=5),
+    NetworkSpec(name=NAMES[3], num_actions=2, lenses=2, is_discrete=False, frame_shape=(36, 32), state_size=5),
+]
+
+
+def name_of(spec: NetworkSpec) -> str:
+    return f"{spec.name}-{spec.lenses}-{spec.lidar_size}-{spec.state_size}"
 
 
 @pytest.fixture
@@ -72,6 +90,51 @@ def test_forward_agrees_with_numpy(name):
     np.testing.assert_allclose(learner.values(observations, np.zeros((3, 0), np.float32)), critic[:, 0], atol=2e-5)
 
 
+@pytest.mark.parametrize("spec", BRANCHES, ids=name_of)
+def test_every_branch_agrees_with_numpy_and_torch(spec):
+    native = NativeLearner(spec, seed=None, num_threads=2)
+    torch = TorchLearner(spec, seed=None, precision="float32", num_threads=1)
+    randomize(native)
+    torch.load_weights(native.weights())
+    sight = sight_for(spec, 11)
+    observations, states = native.encode(sight), np.random.default_rng(1).random((11, spec.state_size), np.float32)
+    np.testing.assert_array_equal(observations, networks.encode(spec, sight))
+    outputs = native.policy(observations)
+    policy = reference_tower(spec, native.weights(), sight, "policy")
+    np.testing.assert_allclose(outputs[:, : spec.num_actions], policy, atol=2e-5)
+    np.testing.assert_allclose(outputs, torch.policy(observations), atol=2e-5)
+    np.testing.assert_allclose(native.values(observations, states), torch.values(observations, states), atol=2e-5)
+
+
+@pytest.mark.parametrize("spec", BRANCHES, ids=name_of)
+def test_gradient_of_every_branch_is_exact(spec):
+    assert_exact_gradient(spec, size=19, value_loss="mse")
+
+
+@pytest.mark.parametrize("spec", [BRANCHES[0], BRANCHES[3]], ids=name_of)
+def test_branches_have_the_same_bits_for_any_number_of_threads(spec):
+    states = []
+    for num_threads in (1, 3):
+        learner = NativeLearner(spec, seed=9, num_threads=num_threads)
+        stats = [learner.update(minibatch_for(learner, size, seed=size), OBJECTIVE) for size in (70, 33)]
+        states.append((stats, {**learner.weights(), **learner.optimizer_state()}))
+    assert states[0][0] == states[1][0]
+    assert_same_bits(states[0][1], states[1][1])
+
+
+def test_a_policy_looks_at_both_lenses_and_at_the_lidar():
+    spec = BRANCHES[3]
+    learner = NativeLearner(spec, seed=None)
+    randomize(learner)
+    sight = sight_for(spec, 1)
+    seen = learner.policy(learner.encode(sight))
+    pixels = spec.frame_shape[0] * spec.frame_shape[1]
+    for begin, end in ((0, pixels), (pixels, 2 * pixels), (2 * pixels, None)):
+        changed = sight.copy()
+        changed[:, begin:end] = 255 - changed[:, begin:end]
+        assert abs(learner.policy(learner.encode(changed)) - seen).max() > 1e-3
+
+
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(("is_discrete", "state_size"), HEADS)
 def test_outputs_agree_with_torch(name, is_discrete, state_size):
@@ -106,7 +169,7 @@ def assert_exact_gradient(spec: NetworkSpec, *, size: int, value_loss: str) -> N
     learner = NativeLearner(spec, seed=None, num_threads=2)
     randomize(learner)
     rng = np.random.default_rng(4)
-    frames = rng.integers(0, 256, (size, *spec.frame_shape), dtype=np.uint8)
+    frames = rng.integers(0, 256, (size, *networks.sight_shape(spec)), dtype=np.uint8)
     minibatch = minibatch_for(learner, size)
     shift = rng.normal(0, 0.3, size).astype(np.float32)
     minibatch = dataclasses.replace(

@@ -104,6 +104,36 @@ def test_racing_pays_for_metres_along_the_track():
     assert reward("racing", speed=3.0, is_crashed=True) == -1.0
 
 
+@pytest.mark.parametrize(
+    ("ahead", "across", "danger"),
+    [
+        *((2.0, 0.0, 0.0), (1.5, 0.0, 0.375), (1.0, 0.0, 0.75), (0.5, 0.0, 1.0), (-0.4, 0.0, 1.0), (-0.6, 0.0, 0.0)),
+        *((0.5, 0.45, 0.0), (0.5, 0.225, 0.5), (0.5, -0.225, 0.5), (1.0, 0.225, 0.375)),
+    ],
+)
+@pytest.mark.parametrize("side", [0.2, 0.0, -0.2])
+@pytest.mark.parametrize("at", [5.0, 19.9])  # near the line the lap's two ends meet
+def test_dodge_pays_less_the_nearer_and_the_more_squarely_an_object_is_ahead(ahead, across, danger, side, at):
+    """A car 0.2 m to either side of the centre line, an object `ahead` metres further, `across` metres to its left."""
+    there = side + across
+    objects = {
+        "objects_location": [(0.0, 0.0), (0.0, 0.0)],
+        "objects_distance": [(at + ahead) % 20.0, (at + 8.0) % 20.0],
+        "objects_distance_from_center": [abs(there), 0.0],
+        "objects_left_of_center": [there > 0, True],
+        "closest_objects": [1, 0],
+        "projection_distance": at,
+        "track_length": 20.0,
+        "distance_from_center": abs(side),
+        "is_left_of_center": side > 0,
+    }
+    free = reward("dodge", **{**objects, "objects_location": []})
+    assert free == pytest.approx(reward("racing", distance_from_center=abs(side)))
+    assert reward("dodge", **objects) == pytest.approx(free * (1.0 - danger), abs=1e-9)
+    assert reward("dodge", **{**objects, "closest_objects": [0, 1]}) == pytest.approx(free * (1.0 - danger), abs=1e-9)
+    assert reward("dodge", **{**objects, "is_crashed": True}) == -1.0
+
+
 def test_lap_time_pays_for_the_metres_gained_since_the_last_step_of_the_same_episode():
     namespace: dict = {}
     exec(compile(load_preset("lap_time"), "lap_time", "exec"), namespace)

@@ -14,6 +14,7 @@ def test_the_presets():
     assert preset_names() == [
         "anti_zigzag",
         "centerline",
+        "dodge",
         "heading",
         "lap_time",
         "object_avoidance",

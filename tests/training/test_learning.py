@@ -12,6 +12,7 @@ from tiny_runs import Recorder
 from racecraft import evaluate, train
 from racecraft.learn import PPOConfig
 from racecraft.learn.native_learner import NativeLearner
+from racecraft.sim import Bots, Objects
 
 BUDGET = 60_000  # camera steps; about 8,000 are usual
 
@@ -52,3 +53,25 @@ def test_paid_for_lap_time_a_continuous_car_beats_one_that_keeps_to_two_metres_a
     assert result.reason == "lap_time"
     assert result.best_lap_seconds is not None
     assert 4 < result.best_lap_seconds <= 7.6
+
+
+RACE = {
+    "objects": Objects(bots=Bots(count=2, speed=0.6, placement="random")),
+    "evaluate_every": 10_000,
+    "evaluation_trials": 10,
+    "seed": 1,
+}
+
+
+@pytest.mark.slow
+def test_a_car_learns_to_pass_bots_with_camera_and_lidar(tmp_path: Path) -> None:
+    """With the defaults of a race; 20,000 steps are usual."""
+    result = train("oval", until="8 laps or 80000 steps", root=tmp_path, **RACE)
+    assert (result.reason, result.laps_completed >= 8) == ("laps", True)
+
+
+@pytest.mark.slow
+def test_without_learning_bots_are_run_into(tmp_path: Path) -> None:
+    idle = replace(PPOConfig(), learning_rate=0.0)
+    result = train("oval", until="8 laps or 20000 steps", ppo=idle, root=tmp_path, **RACE)
+    assert result.reason == "steps"

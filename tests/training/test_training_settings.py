@@ -10,9 +10,21 @@ import pytest
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.errors import ConfigError, RunError
 from racecraft.learn import PPOConfig
-from racecraft.sim import Start, Vehicle
-from racecraft.training import Until
-from racecraft.training.settings import MAX_ENVS, VEHICLE_OF_VERSION, TrainSettings, make_settings
+from racecraft.reward import load_preset
+from racecraft.sim import Bots, Objects, Obstacles, Start, Vehicle
+from racecraft.sim.objects import NO_OBJECTS
+from racecraft.training import Until, train
+from racecraft.training.defaults import RACE, TIME_TRIAL, defaults_for
+from racecraft.training.settings import (
+    EVALUATE_EVERY,
+    MAX_ENVS,
+    RACE_EVALUATE_EVERY,
+    RACE_PPO,
+    RACE_TRIALS,
+    VEHICLE_OF_VERSION,
+    TrainSettings,
+    make_settings,
+)
 
 DISCRETE = ModelMetadata(neural_network="RACECRAFT_SMALL")
 SETTINGS = TrainSettings(
@@ -192,3 +204,29 @@ def test_aws_own_files_give_settings() -> None:
     assert settings.network == "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
     assert settings.network_spec(metadata).num_actions == 14
     assert (settings.ppo.gamma, settings.ppo.update_epochs, settings.ppo.value_loss) == (0.95, 3, "huber")
+
+
+@pytest.mark.parametrize("objects", [Objects(obstacles=Obstacles(count=2)), Objects(bots=Bots(count=1))])
+def test_among_objects_training_takes_its_time(objects: Objects) -> None:
+    """What is not said is chosen for the race; what is said stays."""
+    assert (defaults_for(objects), defaults_for(NO_OBJECTS)) == (RACE, TIME_TRIAL)
+    settings = make_settings(metadata=DISCRETE, objects=objects)
+    assert (settings.ppo, settings.evaluate_every, settings.evaluation_trials) == (
+        RACE_PPO,
+        RACE_EVALUATE_EVERY,
+        RACE_TRIALS,
+    )
+    chosen = make_settings(metadata=DISCRETE, objects=objects, ppo=PPOConfig(), evaluate_every=7, evaluation_trials=6)
+    assert (chosen.ppo, chosen.evaluate_every, chosen.evaluation_trials) == (PPOConfig(), 7, 6)
+    assert make_settings(metadata=DISCRETE).evaluate_every == EVALUATE_EVERY
+    with pytest.raises(ConfigError, match="5 or minutes"):
+        train("oval", objects=objects, until="5 or minutes")
+
+
+def test_a_training_among_objects_has_the_reward_and_the_actions_of_its_race(tmp_path: Path) -> None:
+    ppo = PPOConfig(num_envs=2, num_steps=8, minibatch_size=16, update_epochs=1)
+    boxes = Objects(obstacles=Obstacles(count=2))
+    result = train("oval", objects=boxes, until="16 steps", evaluation_trials=1, ppo=ppo, num_threads=1, root=tmp_path)
+    assert (result.run / "reward_function.py").read_text() == load_preset(RACE.reward)
+    metadata = ModelMetadata.load(result.run / "model_metadata.json")
+    assert (metadata.action_space, metadata.sensors) == (action_space(RACE.actions), RACE.sensors)

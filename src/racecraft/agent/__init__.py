@@ -13,13 +13,15 @@ from racecraft.agent.action_space import (
     action_space,
 )
 from racecraft.agent.lidar import observe_lidar
-from racecraft.agent.sensors import LidarConfig, camera_of, check_sensors, check_simulated, observation_shape
+from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
+from racecraft.agent.sensors import LidarConfig, camera_of, check_sensors, observation_shape
 
 if TYPE_CHECKING:
     from racecraft.agent.hyperparameters import Hyperparameters
     from racecraft.agent.model_metadata import ModelMetadata
 
 __all__ = [
+    "FRONT_CAMERA",
     "PRESETS",
     "ActionSpace",
     "ContinuousActionSpace",
@@ -27,10 +29,10 @@ __all__ = [
     "Hyperparameters",
     "LidarConfig",
     "ModelMetadata",
+    "SensorSuite",
     "action_space",
     "camera_of",
     "check_sensors",
-    "check_simulated",
     "observation_shape",
     "observe_lidar",
 ]

@@ -238,10 +238,11 @@ PRESETS: Mapping[str, Callable[[], ActionSpace]] = {
     "aws": _grid(5, 1.0, 2),
     "fast": _grid(7, 4.0, 3),
     "safe": _grid(7, 1.4, 2),
+    "steady": _grid(5, 1.0, 1),
     "continuous": lambda: ContinuousActionSpace([-math.radians(30), 0.5], [math.radians(30), 4.0]),
 }
 """Action spaces by name: ours at 1 and 2 m/s, AWS's own at 0.5 and 1, one up to 4, one
-that gets round everywhere (0.7 and 1.4), and a continuous one."""
+that gets round everywhere (0.7 and 1.4), one that keeps to 1 among objects, and a continuous one."""
 
 
 def action_space(name: str) -> ActionSpace:

@@ -30,6 +30,7 @@ from racecraft.agent.aws_file import (
     validate,
     write_json_object,
 )
+from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.agent.sensors import LIDAR_RAYS, LidarConfig, check_sensors
 from racecraft.errors import ConfigError
 
@@ -149,6 +150,11 @@ class ModelMetadata:
                 raise ConfigError(f"{name} is {value!r}, allowed: {', '.join(allowed)}.")
         if self.training_algorithm == "sac" and self.action_space.kind != "continuous":
             raise ConfigError("training_algorithm 'sac' needs action_space_type 'continuous', but it is 'discrete'.")
+
+    @property
+    def suite(self) -> SensorSuite:
+        """The sensors with their configuration."""
+        return SensorSuite(self.sensors, self.lidar)
 
     @classmethod
     def load(cls, path: str | Path) -> ModelMetadata:

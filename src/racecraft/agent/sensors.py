@@ -19,11 +19,7 @@ STEREO_BASELINE = 0.06  # m between the lenses of the stereo pair; LEFT_CAMERA i
 CAMERAS = ("FRONT_FACING_CAMERA", "observation", "LEFT_CAMERA", "STEREO_CAMERAS")
 LIDARS = ("LIDAR", "SECTOR_LIDAR", "DISCRETIZED_SECTOR_LIDAR")
 SENSOR_NAMES = CAMERAS + LIDARS
-SIMULATED = ("FRONT_FACING_CAMERA", "observation")
-"""Sensors that networks are trained with; environments give all of them.
-
-``observation`` is what the front camera was called before 2019.
-"""
+"""Every sensor of the original; ``observation`` is what the front camera was called before 2019."""
 
 
 @dataclass(frozen=True)
@@ -57,20 +53,6 @@ def check_sensors(names: Sequence[str]) -> tuple[str, ...]:
     if len(lidars) > 1:
         raise ConfigError(f"sensor has {len(lidars)} LIDARs {lidars}, allowed: at most one of {', '.join(LIDARS)}.")
     return tuple(names)
-
-
-def check_simulated(names: Sequence[str]) -> None:
-    """Refuse sensors that files may name but the networks do not see yet.
-
-    Raises:
-        ConfigError: Names the sensor.
-    """
-    for name in names:
-        if name not in SIMULATED:
-            raise ConfigError(
-                f"sensor {name!r} cannot be used for training: networks here see the front camera.",
-                hint='Set "sensor": ["FRONT_FACING_CAMERA"] in model_metadata.json.',
-            )
 
 
 def camera_of(names: Sequence[str], *, camera: CameraSpec | None = None) -> CameraSpec:

@@ -29,7 +29,10 @@ def train(
         list[str],
         typer.Option("--track", "-t", help="Track, file, folder, library or generated:0..99; several by repeating it."),
     ] = [DEFAULT_TRACK],  # noqa: B006 (Typer copies it)
-    reward: Annotated[str, typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py.")] = "racing",
+    reward: Annotated[
+        str,
+        typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py; racing, or dodge in a race."),
+    ] = "",
     until: Annotated[
         str,
         typer.Option(
@@ -37,10 +40,14 @@ def train(
         ),
     ] = "",
     actions: Annotated[
-        str, typer.Option("--actions", help="Action space: default, aws, fast, safe or continuous.")
-    ] = "default",
+        str, typer.Option("--actions", help="default, aws, fast, safe, continuous, or steady, which races take.")
+    ] = "",
+    sensors: Annotated[
+        str, typer.Option("--sensors", help="AWS's names, joined by +; FRONT_FACING_CAMERA, in a race with LIDAR.")
+    ] = "",
     model_metadata: Annotated[
-        Path | None, typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions.")
+        Path | None,
+        typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions and --sensors."),
     ] = None,
     hyperparameters: Annotated[
         Path | None, typer.Option("--hyperparameters", help="AWS's hyperparameters.json; trains as AWS did.")
@@ -67,7 +74,10 @@ def train(
     num_envs: Annotated[int, typer.Option("--num-envs", help="Cars driven at once; 0 decides by itself.")] = 0,
     seed: Annotated[int, typer.Option("--seed", "-s", help="The same seed repeats a run on the same machine.")] = 0,
     evaluate_every: Annotated[
-        int, typer.Option("--evaluate-every", help="Camera steps between evaluations; 50,000 on several tracks.")
+        int,
+        typer.Option(
+            "--evaluate-every", help="Camera steps between evaluations; 25,000 in a race, 50,000 on several tracks."
+        ),
     ] = 4096,
     num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the run.")] = None,
@@ -92,9 +102,21 @@ def train(
     if resume is not None:
         _refuse_beside_resume(context)
     from racecraft import training
+    from racecraft.training.defaults import defaults_for
     from racecraft.training.progress import SilentReporter
     from racecraft.training.terminal import TerminalReporter
 
+    on_track = race_options.objects_of(
+        race,
+        objects=objects,
+        bots=bots,
+        bot_speed=bot_speed,
+        lane_changes=lane_changes,
+        parked_cars=parked_cars,
+        placement=placement,
+        positions=positions,
+    )
+    reward = reward or defaults_for(on_track).reward
     where = Path(track[0]).stem if len(track) == 1 else f"{len(track)} tracks"
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
     if parent is not None:
@@ -108,7 +130,8 @@ def train(
             options: dict[str, Any] = {
                 "track": track,
                 "reward": reward,
-                "actions": actions,
+                "actions": actions or None,
+                "sensors": tuple(name.strip() for name in sensors.split("+")) if sensors else (),
                 "model_metadata": model_metadata,
                 "hyperparameters": hyperparameters,
                 "algorithm": algorithm,
@@ -117,16 +140,7 @@ def train(
                 "vehicle": vehicle,
                 "direction": direction,
                 "randomize": randomize,
-                "objects": race_options.objects_of(
-                    race,
-                    objects=objects,
-                    bots=bots,
-                    bot_speed=bot_speed,
-                    lane_changes=lane_changes,
-                    parked_cars=parked_cars,
-                    placement=placement,
-                    positions=positions,
-                ),
+                "objects": on_track,
                 "num_envs": num_envs,
                 "num_threads": num_threads,
                 "evaluate_every": evaluate_every,
@@ -136,11 +150,10 @@ def train(
                 name: value for name, value in options.items() if _is_given(context, *_OPTIONS_OF.get(name, (name,)))
             }
             if parent is None:
-                options["actions"] = None  # SAC's are others than PPO's
                 given = {**options, "evaluate_every": 0, **given}
             result = training.train(
                 **given,
-                until=until or "5 laps",
+                until=until,
                 seed=seed,
                 parent=parent,
                 root=runs,

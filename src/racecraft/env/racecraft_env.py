@@ -37,8 +37,8 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
 
     ## Action Space
 
-    With `action_space="default"`, `"aws"`, `"fast"`, `"safe"` or a discrete `model_metadata.json`, a `Discrete(n)`
-    of table rows:
+    With `action_space="default"`, `"aws"`, `"fast"`, `"safe"`, `"steady"` or a discrete `model_metadata.json`, a
+    `Discrete(n)` of table rows:
 
     | Preset    | n  | Steering (degrees, left positive) | Speed (m/s)          |
     |-----------|----|-----------------------------------|----------------------|
@@ -46,6 +46,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | `aws`     | 10 | -30, -15, 0, 15, 30               | 0.5, 1               |
     | `fast`    | 21 | -30, -20, -10, 0, 10, 20, 30      | 1.33333, 2.66667, 4  |
     | `safe`    | 14 | -30, -20, -10, 0, 10, 20, 30      | 0.7, 1.4             |
+    | `steady`  | 5  | -30, -15, 0, 15, 30               | 1                    |
 
     Row `i` is steering `i // speeds` with speed `i % speeds`; `env.unwrapped.commands` lists them. With
     `action_space="continuous"` or a continuous file, a `Box(-1.0, 1.0, (2,), float32)`, scaled linearly:

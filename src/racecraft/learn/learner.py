@@ -36,6 +36,10 @@ class NetworkSpec:
     """Columns of privileged state the critic sees; 0 gives it a camera tower of its own, as AWS does."""
     frame_shape: tuple[int, int] = (120, 160)
     """Height and width of the greyscale camera image, pixels."""
+    lenses: int = 1
+    """Images of one camera: 2 for a stereo pair."""
+    lidar_size: int = 0
+    """Values of the LIDAR sensor; 0 without one."""
     is_squashed: bool = False
     """Whether the best continuous action is the hyperbolic tangent of the mean (SAC, TD3), not the mean itself."""
 
@@ -70,7 +74,7 @@ class Minibatch:
     """Samples for one gradient step: all of M, or those of `rows`. Arrays are C-contiguous."""
 
     observations: NDArray[np.uint8]
-    """Encoded frames  (M, *observation_shape)."""
+    """What the sensors told, encoded  (M, *observation_shape)."""
     states: NDArray[np.float32]
     """Privileged state  (M, S)."""
     actions: NDArray[Any]
@@ -114,13 +118,14 @@ class Learner(Protocol):
 
     @property
     def observation_shape(self) -> tuple[int, ...]:
-        """Shape of one encoded frame."""
+        """Shape of one observation."""
 
     def encode(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Do once per frame what no gradient reaches: pool the image and lay it out for the first layer.
 
         Args:
-            frames: Camera images  (N, H, W).
+            frames: What the sensors tell: camera images  (N, H, W), those of two lenses  (N, 2, H, W), or, with a
+                LIDAR, their bytes and behind them the LIDAR's  (N, `racecraft.learn.networks.sight_shape`).
 
         Returns:
             New array  (N, *observation_shape).

@@ -39,7 +39,7 @@ class NativeLearner:
         self.spec = spec
         self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
         self._shapes = networks.weight_shapes(spec)
-        arch = networks.architecture(spec.name)
+        arch = networks.architecture(spec.name, lenses=spec.lenses)
         height, width = spec.frame_shape
         try:
             self._native = _native.Learner(
@@ -54,6 +54,10 @@ class NativeLearner:
                 is_discrete=spec.is_discrete,
                 state_size=spec.state_size,
                 critic_units=list(networks.CRITIC_UNITS),
+                lenses=spec.lenses,
+                lidar_size=spec.lidar_size,
+                lidar_units=list(arch.lidar),
+                camera_dense=arch.camera_dense,
                 num_threads=num_threads,
             )
         except ValueError as error:
@@ -63,13 +67,10 @@ class NativeLearner:
             self.load_weights(networks.initial_weights(spec, seed=seed, orthonormalize=_native.orthonormalize))
 
     def encode(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Pool and lay out camera images (N, H, W) as (N, *observation_shape)."""
-        height, width = self.spec.frame_shape
-        if frames.dtype != np.uint8 or frames.ndim != 3 or frames.shape[1:] != (height, width):
-            raise ShapeError(
-                f"frames are {frames.dtype} of shape {frames.shape}, expected uint8 of (N, {height}, {width})."
-            )
-        return self._native.encode(np.ascontiguousarray(frames))
+        """Pool and lay out what the sensors tell (N, *sight_shape) as (N, *observation_shape)."""
+        networks.check_sight(self.spec, frames)
+        sight = _flat(np.ascontiguousarray(frames))
+        return self._native.encode(sight).reshape(len(frames), *self.observation_shape)
 
     def policy(self, observations: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Logits, or means and log standard deviations  (N, P)."""
@@ -169,13 +170,18 @@ class NativeLearner:
 
     def _observations(self, observations: NDArray[np.uint8], size: int | None = None) -> NDArray[np.uint8]:
         shape = (len(observations) if size is None else size, *self.observation_shape)
-        return self._column("observations", observations, shape, np.uint8)
+        return _flat(self._column("observations", observations, shape, np.uint8))
 
     @staticmethod
     def _column(name: str, array: NDArray[Any], shape: tuple[int, ...], dtype: type = np.float32) -> NDArray[Any]:
         if array.shape != shape:
             raise ShapeError(f"{name} has shape {array.shape}, expected {shape}.")
         return np.ascontiguousarray(array, dtype)
+
+
+def _flat(array: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Every row as plain bytes."""
+    return array.reshape(len(array), int(np.prod(array.shape[1:])))
 
 
 def _native_objective(objective: Objective) -> Any:

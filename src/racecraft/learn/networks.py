@@ -1,9 +1,14 @@
 """The networks by name, in NumPy: layers, weight shapes, initial weights, the layout of a frame for them.
 
-Every network is two separate towers, as AWS's are: a policy that sees the camera, and a critic that sees
-either the privileged state (a small perceptron, training only) or the camera through a tower of its own.
+Every network is two separate towers, as AWS's are: a policy that sees what the sensors tell, and a critic that sees
+either the privileged state (a small perceptron, training only) or the same through a tower of its own. A LIDAR has
+dense layers of its own, and what comes of them is laid behind what comes of the camera.
+
+    image -> convolutions [-> dense layers] -> (camera, LIDAR) -> dense layers -> head
+    LIDAR -> dense layers -----------------------^
+
 Weights are named ``policy.conv1.weight`` (filters, channels, kernel, kernel), ``policy.dense1.weight`` (out, in),
-``policy.head.weight``; the last convolution is flattened in the order row, column, channel.
+``policy.lidar1.weight``, ``policy.head.weight``; the last convolution is flattened in the order row, column, channel.
 A backend needs nothing but this file.
 """
 
@@ -34,7 +39,7 @@ class Conv:
 
 @dataclass(frozen=True)
 class Architecture:
-    """A camera tower: the image without its sky, average pooling, convolutions, dense layers with ReLU."""
+    """A tower: the image without its sky, average pooling, convolutions, dense layers with ReLU."""
 
     convs: tuple[Conv, ...]
     dense: tuple[int, ...]
@@ -45,20 +50,30 @@ class Architecture:
     """Share of the image's rows, from the top, that the tower does not see."""
     log_std: float = 0.0
     """Log standard deviation that a Gaussian policy begins with; 0 as AWS's."""
+    camera_dense: int = 0
+    """How many of the dense layers come before the LIDAR's values are laid beside the camera's."""
+    lidar: tuple[int, ...] = (256, 256)
+    """Units of the LIDAR's own dense layers, where there is one."""
 
 
 ARCHITECTURES: dict[str, Architecture] = {
     "RACECRAFT_SMALL": Architecture(
-        (Conv(16, 8, 4), Conv(32, 4, 2), Conv(32, 3, 2)), (128,), pool=2, sky=0.2, log_std=-1.0
+        (Conv(16, 8, 4), Conv(32, 4, 2), Conv(32, 3, 2)), (128,), pool=2, sky=0.2, log_std=-1.0, lidar=(64, 64)
     ),
     "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW": Architecture((Conv(32, 8, 4), Conv(64, 4, 2), Conv(64, 3, 1)), (512,)),
     "DEEP_CONVOLUTIONAL_NETWORK": Architecture(
-        (Conv(32, 5, 2), Conv(32, 3, 1), Conv(64, 3, 2), Conv(64, 3, 1)), (64, 512)
+        (Conv(32, 5, 2), Conv(32, 3, 1), Conv(64, 3, 2), Conv(64, 3, 1)), (64, 512), camera_dense=1
     ),
     "DEEP_CONVOLUTIONAL_NETWORK_DEEP": Architecture(
-        (Conv(32, 8, 4), Conv(32, 4, 2), Conv(64, 4, 2), Conv(64, 3, 1)), (512, 512, 256, 128)
+        (Conv(32, 8, 4), Conv(32, 4, 2), Conv(64, 4, 2), Conv(64, 3, 1)), (512, 512, 256, 128), camera_dense=2
     ),
 }
+_STEREO_CONVS = (Conv(32, 3, 1), Conv(64, 3, 2), Conv(64, 3, 1), Conv(128, 3, 2), Conv(128, 3, 1))
+STEREO: dict[str, Architecture] = {
+    "DEEP_CONVOLUTIONAL_NETWORK": Architecture(_STEREO_CONVS, (512,)),
+    "DEEP_CONVOLUTIONAL_NETWORK_DEEP": Architecture(_STEREO_CONVS, (256, 128)),
+}
+"""What AWS builds under these names for a stereo camera; the others are the same for both."""
 CRITIC_UNITS = (64, 64)
 """Dense layers (tanh) of the critic that sees the privileged state."""
 
@@ -68,12 +83,18 @@ def network_names() -> tuple[str, ...]:
     return tuple(ARCHITECTURES)
 
 
-def architecture(name: str) -> Architecture:
+def architecture(name: str, *, lenses: int = 1) -> Architecture:
     """The layers behind a name.
+
+    Args:
+        name: One of `network_names()`.
+        lenses: 2 for a stereo camera, which two of AWS's networks look at with other layers.
 
     Raises:
         ConfigError: No network has this name.
     """
+    if lenses == 2 and name in STEREO:
+        return STEREO[name]
     try:
         return ARCHITECTURES[name]
     except KeyError:
@@ -88,12 +109,12 @@ def sky_rows(spec: NetworkSpec) -> int:
     The default camera looks 15 degrees down and has its horizon in row 29 of 120. What is above it tells nothing of
     the road but differs from track to track, and a third of the network's arithmetic would go there.
     """
-    return int(architecture(spec.name).sky * spec.frame_shape[0])
+    return int(_architecture(spec).sky * spec.frame_shape[0])
 
 
 def pooled_shape(spec: NetworkSpec) -> tuple[int, int]:
     """Height and width of what the first convolution sees, pixels."""
-    pool = architecture(spec.name).pool
+    pool = _architecture(spec).pool
     return (spec.frame_shape[0] - sky_rows(spec)) // pool, spec.frame_shape[1] // pool
 
 
@@ -103,52 +124,84 @@ def block_size(spec: NetworkSpec) -> int:
     A convolution whose stride divides its kernel and the image equals one of stride 1 over squares of
     `stride` pixels, `stride`² channels each. On a CPU that is twice as fast as one channel of grey.
     """
-    first = architecture(spec.name).convs[0]
+    first = _architecture(spec).convs[0]
     height, width = pooled_shape(spec)
     divides = first.kernel % first.stride == 0 and height % first.stride == 0 and width % first.stride == 0
     return first.stride if divides else 1
 
 
-def observation_shape(spec: NetworkSpec) -> tuple[int, int, int]:
-    """Rows, columns and channels of an encoded frame."""
+def sight_shape(spec: NetworkSpec) -> tuple[int, ...]:
+    """Shape of what `encode` takes for one car: an image, the images of two lenses, or, with a LIDAR, plain bytes.
+
+    The bytes are the image, or the images of the lenses, and behind them the LIDAR's values times 255.
+    """
+    height, width = spec.frame_shape
+    if spec.lidar_size:
+        return (spec.lenses * height * width + spec.lidar_size,)
+    return (height, width) if spec.lenses == 1 else (spec.lenses, height, width)
+
+
+def image_shape(spec: NetworkSpec) -> tuple[int, int, int]:
+    """Rows, columns and channels of an encoded image: block by block of the first lens, then of the second."""
     block = block_size(spec)
     height, width = pooled_shape(spec)
-    return height // block, width // block, block * block
+    return height // block, width // block, spec.lenses * block * block
 
 
-def encode(spec: NetworkSpec, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def observation_shape(spec: NetworkSpec) -> tuple[int, ...]:
+    """Shape of an observation as `encode` makes it: that of the image, or its bytes and behind them the LIDAR's."""
+    shape = image_shape(spec)
+    return (int(np.prod(shape)) + spec.lidar_size,) if spec.lidar_size else shape
+
+
+def check_sight(spec: NetworkSpec, sight: NDArray[np.uint8]) -> None:
+    """Refuse what is not what this network's sensors tell.
+
+    Raises:
+        ShapeError: Another type or shape.
+    """
+    shape = sight_shape(spec)
+    if sight.dtype != np.uint8 or sight.shape[1:] != shape:
+        expected = ", ".join(("N", *map(str, shape)))
+        raise ShapeError(f"frames are {sight.dtype} of shape {sight.shape}, expected uint8 of ({expected}).")
+
+
+def encode(spec: NetworkSpec, sight: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Cut off the sky, pool (mean of each square, halves rounded up) and fold blocks of pixels into channels.
 
     Args:
         spec: The network the frames are for.
-        frames: Camera images  (N, H, W).
+        sight: What the sensors tell  (N, *sight_shape(spec)).
 
     Returns:
         New array  (N, *observation_shape(spec)).
 
     Raises:
-        ShapeError: The frames are not uint8 images of the network's size.
+        ShapeError: It is not uint8 of that shape.
     """
-    height, width = spec.frame_shape
-    if frames.dtype != np.uint8 or frames.ndim != 3 or frames.shape[1:] != (height, width):
-        raise ShapeError(
-            f"frames are {frames.dtype} of shape {frames.shape}, expected uint8 of (N, {height}, {width})."
-        )
+    check_sight(spec, sight)
+    count, (height, width) = len(sight), spec.frame_shape
+    size = spec.lenses * height * width
+    flat = sight.reshape(count, size + spec.lidar_size)
+    frames = flat[:, :size].reshape(count * spec.lenses, height, width)
     pixels = np.ascontiguousarray(frames[:, sky_rows(spec) :])
-    if architecture(spec.name).pool == 2:
+    if _architecture(spec).pool == 2:
         pairs = pixels.view(np.uint16)  # two neighbours in one word: sums of whole rows at SIMD speed
         sums = (pairs & 255) + (pairs >> 8)
         pixels = ((sums[:, 0::2] + sums[:, 1::2] + 2) >> 2).astype(np.uint8)
-    rows, columns, channels = observation_shape(spec)
+    rows, columns, channels = image_shape(spec)
     block = block_size(spec)
-    folded = pixels.reshape(len(pixels), rows, block, columns, block).transpose(0, 1, 3, 2, 4)
+    folded = pixels.reshape(count, spec.lenses, rows, block, columns, block).transpose(0, 2, 4, 1, 3, 5)
     # ascontiguousarray would return the frames themselves where nothing moves; the caller wants its own copy
-    return np.array(folded, order="C").reshape(len(pixels), rows, columns, channels)
+    images = np.array(folded, order="C").reshape(count, rows, columns, channels)
+    if not spec.lidar_size:
+        return images
+    return np.concatenate([images.reshape(count, rows * columns * channels), flat[:, size:]], axis=1)
 
 
 def flat_size(spec: NetworkSpec) -> int:
-    """Inputs of the first dense layer after the camera's convolutions."""
-    arch = architecture(spec.name)
+    """Numbers that the camera's convolutions end in."""
+    arch = _architecture(spec)
     height, width = pooled_shape(spec)
     for conv in arch.convs:
         height = (height - conv.kernel) // conv.stride + 1
@@ -160,30 +213,37 @@ def flat_size(spec: NetworkSpec) -> int:
 
 def weight_shapes(spec: NetworkSpec) -> dict[str, tuple[int, ...]]:
     """Name and shape of every parameter, in the fixed order of the towers."""
-    arch = architecture(spec.name)
+    arch = _architecture(spec)
     shapes: dict[str, tuple[int, ...]] = {}
 
-    def dense(tower: str, inputs: int, units: tuple[int, ...], outputs: int) -> None:
-        for i, size in enumerate(units, 1):
-            shapes[f"{tower}.dense{i}.weight"], shapes[f"{tower}.dense{i}.bias"] = (size, inputs), (size,)
+    def dense(layer: str, inputs: int, units: tuple[int, ...], *, first: int = 1) -> int:
+        for i, size in enumerate(units, first):
+            shapes[f"{layer}{i}.weight"], shapes[f"{layer}{i}.bias"] = (size, inputs), (size,)
             inputs = size
+        return inputs
+
+    def head(tower: str, inputs: int, outputs: int) -> None:
         shapes[f"{tower}.head.weight"], shapes[f"{tower}.head.bias"] = (outputs, inputs), (outputs,)
 
-    def camera(tower: str, outputs: int) -> None:
-        channels = 1
+    def sensors(tower: str, outputs: int) -> None:
+        channels = spec.lenses
         for i, conv in enumerate(arch.convs, 1):
             shapes[f"{tower}.conv{i}.weight"] = (conv.filters, channels, conv.kernel, conv.kernel)
             shapes[f"{tower}.conv{i}.bias"] = (conv.filters,)
             channels = conv.filters
-        dense(tower, flat_size(spec), arch.dense, outputs)
+        before, after = arch.dense[: arch.camera_dense], arch.dense[arch.camera_dense :]
+        inputs = dense(f"{tower}.dense", flat_size(spec), before)
+        if spec.lidar_size:
+            inputs += dense(f"{tower}.lidar", spec.lidar_size, arch.lidar)
+        head(tower, dense(f"{tower}.dense", inputs, after, first=arch.camera_dense + 1), outputs)
 
-    camera("policy", spec.num_actions)
+    sensors("policy", spec.num_actions)
     if not spec.is_discrete:
         shapes["policy.log_std"] = (spec.num_actions,)
     if spec.state_size:
-        dense("critic", spec.state_size, CRITIC_UNITS, 1)
+        head("critic", dense("critic.dense", spec.state_size, CRITIC_UNITS), 1)
     else:
-        camera("critic", 1)
+        sensors("critic", 1)
     return shapes
 
 
@@ -207,7 +267,7 @@ def initial_weights(
     weights: Weights = {}
     for name, shape in weight_shapes(spec).items():
         if not name.endswith(".weight"):
-            begin = architecture(spec.name).log_std if name == "policy.log_std" else 0.0
+            begin = _architecture(spec).log_std if name == "policy.log_std" else 0.0
             weights[name] = np.full(shape, begin, np.float32)
             continue
         gain = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}.get(name, 2.0**0.5)
@@ -226,7 +286,7 @@ def parameter_count(spec: NetworkSpec, *, tower: str = "") -> int:
 
 def forward_operations(spec: NetworkSpec) -> int:
     """Floating-point operations of one forward pass for one car, both towers; biases and activations not counted."""
-    arch = architecture(spec.name)
+    arch = _architecture(spec)
     total = 0
     for name, shape in weight_shapes(spec).items():
         if not name.endswith(".weight"):
@@ -239,3 +299,7 @@ def forward_operations(spec: NetworkSpec) -> int:
             places = height * width
         total += 2 * places * int(np.prod(shape))
     return total
+
+
+def _architecture(spec: NetworkSpec) -> Architecture:
+    return architecture(spec.name, lenses=spec.lenses)

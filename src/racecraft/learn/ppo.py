@@ -122,7 +122,7 @@ class Environment(Protocol):
         """N, the number of cars."""
 
     def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Camera frames (N, H, W) and privileged state (N, S) at the current poses; views are fine."""
+        """What the sensors tell (N, ...), as the learner encodes it, and privileged state (N, S); views are fine."""
 
     def step(self, actions: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.bool_]]:
         """Drive one step: rewards, terminated, truncated, each (N,).

@@ -62,7 +62,7 @@ class TorchLearner:
             self.load_weights(networks.initial_weights(spec, seed=seed))
 
     def encode(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Pool and lay out camera images (N, H, W) as (N, *observation_shape)."""
+        """Pool and lay out what the sensors tell (N, *sight_shape) as (N, *observation_shape)."""
         return networks.encode(self.spec, frames)
 
     def policy(self, observations: NDArray[np.uint8]) -> NDArray[np.float32]:

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from racecraft.learn.learner import NetworkSpec
-from racecraft.learn.networks import CRITIC_UNITS, architecture, block_size
+from racecraft.learn.networks import CRITIC_UNITS, architecture, block_size, image_shape
 
 Parameters = dict[str, Tensor]
 
@@ -39,34 +39,50 @@ class _ConvRelu(torch.autograd.Function):
         return grad_x, grad_weight.float(), grad_bias.float(), None
 
 
-def camera_tower(
+def sensor_tower(
     parameters: Parameters, observations: Tensor, *, spec: NetworkSpec, tower: str, dtype: torch.dtype
 ) -> Tensor:
     """The head's outputs (B, outputs), float32, for encoded frames (B, *observation_shape) of uint8."""
-    x = camera_features(parameters, observations, spec=spec, tower=tower, dtype=dtype)
+    x = sensor_features(parameters, observations, spec=spec, tower=tower, dtype=dtype)
     return _linear(parameters, x.float(), f"{tower}.head")
 
 
-def camera_features(
+def sensor_features(
     parameters: Parameters, observations: Tensor, *, spec: NetworkSpec, tower: str, dtype: torch.dtype
 ) -> Tensor:
     """What the head of a tower sees  (B, units of the last dense layer)."""
-    arch, block = architecture(spec.name), block_size(spec)
-    x = observations.permute(0, 3, 1, 2).to(dtype).mul_(1.0 / 255.0)  # a view of (B, H, W, C): channels last
+    arch, block = architecture(spec.name, lenses=spec.lenses), block_size(spec)
+    rows, columns, channels = image_shape(spec)
+    size = rows * columns * channels
+    flat = observations.flatten(1)
+    images = flat[:, :size].reshape(len(flat), rows, columns, channels)
+    x = images.permute(0, 3, 1, 2).to(dtype).mul_(1.0 / 255.0)  # a view of (B, H, W, C): channels last
     for i, conv in enumerate(arch.convs, 1):
         weight, stride = parameters[f"{tower}.conv{i}.weight"], conv.stride
         if i == 1 and block > 1:
             weight, stride = _fold(weight, block), 1
         x = _ConvRelu.apply(x, weight, parameters[f"{tower}.conv{i}.bias"], stride)
-    x = x.permute(0, 2, 3, 1).reshape(len(x), -1)
+    x = x.permute(0, 2, 3, 1).flatten(1)
     for i in range(1, len(arch.dense) + 1):
+        if i == arch.camera_dense + 1:
+            x = _beside_lidar(parameters, x, flat[:, size:], arch.lidar, tower=tower)
         x = _linear(parameters, x, f"{tower}.dense{i}").relu_()
     return x
 
 
+def _beside_lidar(parameters: Parameters, x: Tensor, lidar: Tensor, units: tuple[int, ...], *, tower: str) -> Tensor:
+    """What the camera gave, and behind it what the LIDAR's layers give, where there is one."""
+    if not lidar.shape[1]:
+        return x
+    y = lidar.to(x.dtype).mul_(1.0 / 255.0)
+    for i in range(1, len(units) + 1):
+        y = _linear(parameters, y, f"{tower}.lidar{i}").relu_()
+    return torch.cat([x, y], dim=1)
+
+
 def policy(parameters: Parameters, observations: Tensor, *, spec: NetworkSpec, dtype: torch.dtype) -> Tensor:
     """Logits, or means followed by log standard deviations  (B, P)."""
-    outputs = camera_tower(parameters, observations, spec=spec, tower="policy", dtype=dtype)
+    outputs = sensor_tower(parameters, observations, spec=spec, tower="policy", dtype=dtype)
     if spec.is_discrete:
         return outputs
     return torch.cat([outputs, parameters["policy.log_std"].expand_as(outputs)], dim=1)
@@ -75,9 +91,9 @@ def policy(parameters: Parameters, observations: Tensor, *, spec: NetworkSpec, d
 def critic(
     parameters: Parameters, observations: Tensor, states: Tensor, *, spec: NetworkSpec, dtype: torch.dtype
 ) -> Tensor:
-    """Values  (B,), from the privileged state where the network has it, else from the camera."""
+    """Values  (B,), from the privileged state where the network has it, else from the sensors."""
     if not spec.state_size:
-        return camera_tower(parameters, observations, spec=spec, tower="critic", dtype=dtype)[:, 0]
+        return sensor_tower(parameters, observations, spec=spec, tower="critic", dtype=dtype)[:, 0]
     x = states
     for i in range(1, len(CRITIC_UNITS) + 1):
         x = _linear(parameters, x, f"critic.dense{i}").tanh()
@@ -85,10 +101,11 @@ def critic(
 
 
 def _fold(weight: Tensor, block: int) -> Tensor:
-    """A kernel over the blocks that ``networks.encode`` makes: (F, 1, K, K) -> (F, b², K/b, K/b)."""
-    filters, _, kernel, _ = weight.shape
+    """A kernel over the blocks that ``networks.encode`` makes: (F, L, K, K) -> (F, L b², K/b, K/b)."""
+    filters, lenses, kernel, _ = weight.shape
     steps = kernel // block
-    return weight.view(filters, steps, block, steps, block).permute(0, 2, 4, 1, 3).reshape(filters, -1, steps, steps)
+    folded = weight.view(filters, lenses, steps, block, steps, block).permute(0, 1, 3, 5, 2, 4)
+    return folded.reshape(filters, -1, steps, steps)
 
 
 def _linear(parameters: Parameters, x: Tensor, layer: str) -> Tensor:

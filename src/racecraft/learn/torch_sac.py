@@ -182,7 +182,7 @@ class TorchSAC:
 
     def _draw(self, observations: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
         """Actions (B, A), and their log-densities (B,) after squashing."""
-        outputs = torch_networks.camera_tower(
+        outputs = torch_networks.sensor_tower(
             self._actor, observations, spec=self._tower, tower="policy", dtype=torch.float32
         )
         mean, log_std = outputs.chunk(2, dim=1)
@@ -199,7 +199,7 @@ class TorchSAC:
         for critic in ("q1", "q2"):
             seen = states[:, : self.state_size]
             if not self.state_size:
-                seen = torch_networks.camera_tower(
+                seen = torch_networks.sensor_tower(
                     critics, observations, spec=self._camera, tower=critic, dtype=torch.float32
                 ).relu()
             x = torch.cat([seen, actions], dim=1)

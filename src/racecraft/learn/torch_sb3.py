@@ -221,7 +221,7 @@ class CameraTower(BaseFeaturesExtractor):
         """What the head sees  (B, units), for frames (B, bytes)."""
         frames = observations.view(len(observations), *networks.observation_shape(self.spec))
         parameters: torch_networks.Parameters = {f"policy.{name}": array for name, array in self.named_parameters()}
-        return torch_networks.camera_features(parameters, frames, spec=self.spec, tower="policy", dtype=torch.float32)
+        return torch_networks.sensor_features(parameters, frames, spec=self.spec, tower="policy", dtype=torch.float32)
 
 
 class _Cars(VecEnv):

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.race.conditions import Conditions
 from racecraft.race.default_reward import centerline_rewards
@@ -52,6 +53,7 @@ def evaluate(
     camera: CameraSpec = CameraSpec(),
     objects: Objects = NO_OBJECTS,
     sees: str = "frames",
+    sensors: SensorSuite | None = None,
     randomize: Randomization | str = "none",
     num_threads: int = 0,
 ) -> Evaluation:
@@ -62,7 +64,8 @@ def evaluate(
     repeats it exactly, as far as the policy gives one car the same commands in any batch.
 
     Args:
-        policy: What drives: called with a view of all frames uint8 (N, 120, 160), or with the state.
+        policy: What drives: called with what its sensors read, of the front camera alone a view of all frames uint8
+            (N, 120, 160), or with the state.
         track: Where.
         rules: Laps, resets, penalties, starts.
         num_trials: Cars side by side, 1 to 1000.
@@ -71,6 +74,8 @@ def evaluate(
         camera: What the cars see with.
         objects: Boxes and bot cars on the track, around every car of its own; random places differ by trial.
         sees: ``frames``, or ``state`` for a policy that drives by the privileged state, without a camera.
+        sensors: What ``frames`` are read from; by default what the policy was trained with, and the front camera for
+            one that does not say.
         randomize: Preset, file or ranges of what differs between the trials.
         num_threads: Of the simulation; 0 takes one per core.
 
@@ -79,24 +84,27 @@ def evaluate(
         ShapeError: The policy's commands do not have the shape (N, 2).
         NonFiniteAction: A command is NaN or infinite.
     """
+    sensors = sensors or getattr(policy, "sensors", FRONT_CAMERA)
     conditions = Conditions(
         track=track,
         rules=rules,
         seed=seed,
         vehicle=vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle),
-        camera=_needed(camera, sees),
+        camera=_needed(sensors.camera(camera), sees),
         objects=objects,
         randomize=randomize if isinstance(randomize, Randomization) else load_randomization(randomize),
     )
-    simulation = race_simulation(conditions, num_cars=num_trials, num_threads=num_threads)
-    sight = simulation.frames if sees == "frames" else simulation.state
+    has_lidar = bool(sensors.lidar_name) and sees == "frames"
+    simulation = race_simulation(conditions, num_cars=num_trials, has_lidar=has_lidar, num_threads=num_threads)
     marshal = Marshal(simulation, rules, seed=seed)
     while marshal.is_racing:
-        marshal.step(_checked(policy(sight), num_trials))
+        marshal.step(_checked(policy(_sight(simulation, sees, sensors)), num_trials))
     return Evaluation(conditions=conditions, trials=marshal.trials())
 
 
-def race_simulation(conditions: Conditions, *, num_cars: int, num_threads: int = 0) -> Simulation:
+def race_simulation(
+    conditions: Conditions, *, num_cars: int, has_lidar: bool = False, num_threads: int = 0
+) -> Simulation:
     """The simulation of a race against the clock: what `evaluate` drives and what verifying a replay drives again."""
     return trial_simulation(
         conditions.track,
@@ -105,6 +113,7 @@ def race_simulation(conditions: Conditions, *, num_cars: int, num_threads: int =
         seed=conditions.seed,
         vehicle=conditions.vehicle,
         camera=conditions.camera,
+        has_lidar=has_lidar,
         randomize=conditions.randomize,
         objects=conditions.objects,
         num_threads=num_threads,
@@ -119,6 +128,7 @@ def trial_simulation(
     seed: int = 0,
     vehicle: Vehicle | str = "v5",
     camera: CameraSpec | None = CameraSpec(),
+    has_lidar: bool = False,
     randomize: Randomization | str = "none",
     objects: Objects = NO_OBJECTS,
     num_threads: int = 0,
@@ -139,6 +149,7 @@ def trial_simulation(
         seed=seed,
         vehicle=vehicle,
         camera=camera,
+        lidar=has_lidar,
         start=Start(mode="fixed", offset=rules.start_offset),
         direction=rules.direction,
         randomize=randomize,
@@ -185,6 +196,7 @@ def completion(
     rules: RaceRules = RULE_SETS["first_lap"],
     seed: int = 0,
     sees: str = "frames",
+    sensors: SensorSuite | None = None,
     max_seconds: float = 0.0,
 ) -> Completion:
     """How far a policy gets on the first lap with nobody to put it back: the judgement used during training.
@@ -195,6 +207,7 @@ def completion(
         rules: Its starts are used: jitter as in `evaluate`, so equal seeds mean equal starts.
         seed: Of the starts.
         sees: ``frames`` or ``state``, as for `evaluate`.
+        sensors: What ``frames`` are read from, as for `evaluate`.
         max_seconds: Simulated seconds after which a slow car is stopped; 0 for none.
 
     Raises:
@@ -206,16 +219,23 @@ def completion(
     if simulation.laps != 1:
         raise ConfigError(f"completion judges one lap; the simulation was made for {simulation.laps}.")
     line_up(simulation, rules, seed=seed)
-    return drive_lap(policy, simulation, sees=sees, max_seconds=max_seconds)
+    return drive_lap(policy, simulation, sees=sees, sensors=sensors, max_seconds=max_seconds)
 
 
-def drive_lap(policy: Driver, simulation: Simulation, *, sees: str = "frames", max_seconds: float = 0.0) -> Completion:
+def drive_lap(
+    policy: Driver,
+    simulation: Simulation,
+    *,
+    sees: str = "frames",
+    sensors: SensorSuite | None = None,
+    max_seconds: float = 0.0,
+) -> Completion:
     """The same from where the cars stand."""
-    sight = simulation.frames if sees == "frames" else simulation.state
+    sensors = sensors or getattr(policy, "sensors", FRONT_CAMERA)
     rewards = np.zeros(simulation.num_envs)
     is_running = np.ones(simulation.num_envs, dtype=np.bool_)
     for _ in range(round(max_seconds / CONTROL_DT) if max_seconds > 0.0 else MAX_STEPS):
-        simulation.step(_checked(policy(sight), simulation.num_envs))
+        simulation.step(_checked(policy(_sight(simulation, sees, sensors)), simulation.num_envs))
         rewards += is_running * centerline_rewards(simulation.rows)
         is_running = ~(simulation.terminated | simulation.truncated)
         if not is_running.any():
@@ -228,6 +248,10 @@ def drive_lap(policy: Driver, simulation: Simulation, *, sees: str = "frames", m
         rewards=rewards,
         statuses=tuple(STATUS_NAMES[code] for code in status),
     )
+
+
+def _sight(simulation: Simulation, sees: str, sensors: SensorSuite) -> NDArray[Any]:
+    return sensors.read(simulation) if sees == "frames" else simulation.state
 
 
 def _needed(camera: CameraSpec | None, sees: str) -> CameraSpec | None:

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.errors import ConfigError
 from racecraft.race.evaluation import MAX_STEPS, Driver, drive_lap
 from racecraft.race.placement import start_pose
@@ -131,19 +132,22 @@ def generalize(
     seed: int = 0,
     vehicle: Vehicle | str = "v5",
     camera: CameraSpec = CameraSpec(),
+    sensors: SensorSuite = FRONT_CAMERA,
     randomize: Randomization | str = "none",
     num_threads: int = 0,
 ) -> Generalization:
     """Let a policy try one lap on each of many tracks.
 
     Args:
-        policy: What drives: called with the frames of the cars that still do, uint8 (N, 120, 160).
+        policy: What drives: called with what the sensors of the cars that still do tell, frames uint8 (N, 120, 160) of
+            the front camera alone.
         tracks: Where.
         directions: ``forward``, ``reverse`` or both.
         num_trials: Laps to try on each track in each direction, 1 to 100; the first starts exactly on the line.
         seed: Of the starts and of the randomisation.
         vehicle: Preset name, vehicle file or `Vehicle`.
         camera: What the cars see with.
+        sensors: Which camera it is, and the LIDAR.
         randomize: Preset, file or ranges of what differs from trial to trial.
         num_threads: Of the simulation; 0 takes one per core.
 
@@ -164,17 +168,17 @@ def generalize(
             roads,
             num_envs=_checked(num_trials) * len(roads),
             vehicle=vehicle,
-            camera=camera,
             direction="alternate",
             randomize=randomize,
             num_threads=num_threads,
             max_steps=MAX_STEPS,
             start=Start(mode="fixed"),
+            **sensors.simulation_settings(camera),
         )
         for direction in directions:
             _line_up(simulation, direction, seed=seed)
             patience = max(road.length for road in roads) / SLOWEST
-            outcome = drive_lap(_awake(policy, simulation), simulation, max_seconds=patience)
+            outcome = drive_lap(_awake(policy, simulation), simulation, sensors=sensors, max_seconds=patience)
             for course, index in enumerate(group):
                 times = outcome.lap_times[course :: len(roads)]
                 results[index, direction] = TrackResult(
@@ -216,9 +220,9 @@ def _awake(policy: Driver, simulation: Simulation) -> Driver:
     """A policy that is asked for the cars under way only: most of a group's time a few slow ones are."""
     commands = np.zeros((simulation.num_envs, 2), dtype=np.float32)
 
-    def drive(frames: NDArray[Any]) -> NDArray[np.float32]:
+    def drive(sight: NDArray[Any]) -> NDArray[np.float32]:
         awake = ~(simulation.terminated | simulation.truncated)
-        commands[awake] = policy(frames[awake])
+        commands[awake] = policy(sight[awake])
         return commands
 
     return drive

@@ -1,4 +1,4 @@
-"""A driver: what turns camera frames into commands, and how one is loaded from a run."""
+"""A driver: what turns what the sensors tell into commands, and how one is loaded from a run."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.action_space import ActionSpace
+from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.errors import CheckpointError
 from racecraft.learn import Learner, NetworkSpec, distributions, make_learner
 from racecraft.run.folder import RunFolder
@@ -15,19 +16,21 @@ WEIGHTS = "weights/"
 
 
 class NetworkPolicy:
-    """A network's best action for every frame, as in evaluation; it draws no random numbers.
+    """A network's best action for what its sensors tell, as in evaluation; it draws no random numbers.
 
     Args:
         learner: Holds the network; it may go on learning.
         action_space: Turns its actions into commands.
+        sensors: What it sees through.
     """
 
-    def __init__(self, learner: Learner, action_space: ActionSpace) -> None:
+    def __init__(self, learner: Learner, action_space: ActionSpace, *, sensors: SensorSuite = FRONT_CAMERA) -> None:
         self.learner = learner
         self.action_space = action_space
+        self.sensors = sensors
 
     def __call__(self, frames: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Commands (N, 2), steering angle in rad and speed in m/s, for frames (N, H, W)."""
+        """Commands (N, 2), steering angle in rad and speed in m/s, for what `sensors` read  (N, ...)."""
         spec = self.learner.spec
         outputs = self.learner.policy(self.learner.encode(frames))
         actions = distributions.most_likely(outputs, is_discrete=spec.is_discrete, is_squashed=spec.is_squashed)
@@ -58,4 +61,5 @@ def load_policy(run: RunFolder, *, checkpoint: str | int = "best", num_threads: 
     if not any(name.startswith("critic.") for name in given):  # of an algorithm that judges otherwise
         given |= {name: array for name, array in learner.weights().items() if name.startswith("critic.")}
     learner.load_weights(given)
-    return saved.step, NetworkPolicy(learner, run.read_model_metadata().action_space)
+    metadata = run.read_model_metadata()
+    return saved.step, NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite)

@@ -17,7 +17,6 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from racecraft.agent import ActionSpace
 from racecraft.agent.aws_file import read_json_object
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.limits import TrackLimit, known_limit
@@ -26,7 +25,7 @@ from racecraft.race.evaluation import evaluate
 from racecraft.race.ghost import Ghost
 from racecraft.race.ghost_source import check_sources, load_ghosts
 from racecraft.race.placement import driven_track
-from racecraft.race.policy import load_policy
+from racecraft.race.policy import NetworkPolicy, load_policy
 from racecraft.race.race_replay import Replay, write_replay
 from racecraft.race.racing_line import draw_racing_line
 from racecraft.race.results import Evaluation
@@ -184,7 +183,7 @@ def evaluate_run(
         load_ghosts(ghosts, evaluation.conditions, run=folder.path, recordings=recordings) if video and ghosts else []
     )
     try:
-        files = _write(folder, evaluation, policy.action_space, is_filmed=video, aws_log=aws_log, ghosts=shown, job=job)
+        files = _write(folder, evaluation, policy, is_filmed=video, aws_log=aws_log, ghosts=shown, job=job)
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
     limit = known_limit(driven_track(where, rules), vehicle)
@@ -239,7 +238,7 @@ def _trained_track(info: RunInfo) -> Track:
 def _write(
     folder: RunFolder,
     evaluation: Evaluation,
-    action_space: ActionSpace,
+    policy: NetworkPolicy,
     *,
     is_filmed: bool,
     aws_log: str | Path | None,
@@ -258,7 +257,7 @@ def _write(
                 metadata=folder.read_model_metadata(),
                 hyperparameters=folder.read_aws_hyperparameters(),
             )
-        write_simtrace(evaluation, inside / "evaluation-simtrace", action_space=action_space, log=log)
+        write_simtrace(evaluation, inside / "evaluation-simtrace", action_space=policy.action_space, log=log)
     best = evaluation.best_trial
     files = {
         "metrics": metrics,
@@ -273,7 +272,14 @@ def _write(
         videos.mkdir(parents=True, exist_ok=True)
         number = next(n for n in range(10**6) if not (videos / f"{n}-video.mp4").exists())
         path = videos / f"{number}-video.mp4"
-        files["video"] = film(best.recording, path, laps=evaluation.rules.laps, name=folder.name, ghosts=ghosts)
+        files["video"] = film(
+            best.recording,
+            path,
+            laps=evaluation.rules.laps,
+            name=folder.name,
+            ghosts=ghosts,
+            sensors=policy.sensors,
+        )
     video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
     write_json(inside / "evaluation.json", {**evaluation.summary(), "video": video, **({"job": job} if job else {})})
     return files

@@ -80,6 +80,7 @@ def generalize_run(
         seed=seed,
         vehicle=vehicle,
         randomize=randomize,
+        sensors=policy.sensors,
         num_threads=num_threads,
     )
     try:

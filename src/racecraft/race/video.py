@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.errors import ConfigError, RunError
 from racecraft.race.ghost import LIVERY, Ghost
 from racecraft.race.overlay import HEIGHT, INSET, WIDTH, Overlay
@@ -21,7 +23,7 @@ from racecraft.race.recording import Recording
 from racecraft.race.rules import RESET_STATUSES
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.simulation import CONTROL_DT
-from racecraft.sim.views import CarView, Scene
+from racecraft.sim.views import CarView, ObjectView, Scene
 from racecraft.track.canvas import Color
 
 FRAME_RATE: Final = 15
@@ -46,6 +48,7 @@ def film(
     color: Color = LIVERY[0],
     palette: str = "2018",
     ghosts: Sequence[Ghost] = (),
+    sensors: SensorSuite = FRONT_CAMERA,
 ) -> Path:
     """Write the video of a trial.
 
@@ -57,6 +60,7 @@ def film(
         color: Of the car.
         palette: Colours of the world: ``2018`` or ``2020``.
         ghosts: Translucent cars that drove at another time; the driver does not see them.
+        sensors: Of the car, for the driver's view: of a stereo camera an anaglyph, the left lens in red.
 
     Raises:
         ConfigError: Nothing was recorded, the palette is unknown, or the path does not end in .mp4.
@@ -72,7 +76,10 @@ def film(
         with av.open(str(unfinished), "w", options={"movflags": "faststart"}) as container:
             stream = container.add_stream("h264", rate=FRAME_RATE, options={"preset": "veryfast", "crf": QUALITY})
             stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
-            for pixels in frames(recording, name=name, laps=laps, color=color, palette=palette, ghosts=ghosts):
+            pictures = frames(
+                recording, name=name, laps=laps, color=color, palette=palette, ghosts=ghosts, sensors=sensors
+            )
+            for pixels in pictures:
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
             container.mux(stream.encode())
         os.replace(unfinished, path)
@@ -83,6 +90,35 @@ def film(
     return path
 
 
+class DriverView:
+    """What the driver sees, in colour: of a stereo camera an anaglyph, the left lens in red, the right one in cyan.
+
+    Args:
+        scene: The track.
+        sensors: Of the car.
+        width: Pixels.
+        height: Pixels.
+    """
+
+    def __init__(self, scene: Scene, sensors: SensorSuite, *, width: int, height: int) -> None:
+        camera = sensors.camera(CameraSpec(width=width, height=height))
+        sides = (0.5, -0.5) if camera.baseline > 0.0 else (0.0,)
+        lenses = [replace(camera, left=camera.left + side * camera.baseline, baseline=0.0) for side in sides]
+        self._views = [scene.driver_view(lens) for lens in lenses]
+        self._pictures = [np.empty((height, width, 3), dtype=np.uint8) for _ in lenses]
+
+    def draw(self, x: float, y: float, heading: float, objects: Sequence[ObjectView]) -> NDArray[np.uint8]:
+        """The picture of a car with its origin at (x, y) m, RGB (height, width, 3); the next call overwrites it."""
+        for view, picture in zip(self._views, self._pictures, strict=True):
+            view.draw(x, y, heading, cars=objects, out=picture)
+        seen = self._pictures[-1]
+        if len(self._views) == 2:
+            grey = (0.2989, 0.587, 0.114)
+            left, right = (np.asarray(picture @ np.array(grey), np.uint8) for picture in self._pictures)
+            seen[..., 0], seen[..., 1], seen[..., 2] = left, right, right
+        return seen
+
+
 def frames(
     recording: Recording,
     *,
@@ -91,6 +127,7 @@ def frames(
     color: Color = LIVERY[0],
     palette: str = "2018",
     ghosts: Sequence[Ghost] = (),
+    sensors: SensorSuite = FRONT_CAMERA,
 ) -> Iterator[NDArray[np.uint8]]:
     """The frames of `film`, RGB (480, 640, 3), each in the same array: copy what must last.
 
@@ -102,13 +139,12 @@ def frames(
     left, top, width, height = INSET
     scene = Scene(recording.track, palette=palette)
     chase = scene.chase_view(width=WIDTH, height=HEIGHT)
-    driver = scene.driver_view(CameraSpec(width=width, height=height))
+    driver = DriverView(scene, sensors, width=width, height=height)
     overlay = Overlay(recording, name=name, laps=laps, ghosts=ghosts)
     places, headings = recording.origins, recording.column("heading")
     steering = recording.column("actual_steering_angle")
     directions, alphas = follow(recording), blink(recording)
     frame = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
-    inset = np.empty((height, width, 3), dtype=np.uint8)
     step = 0
     for step in range(len(recording)):
         (x, y), heading = places[step].tolist(), float(headings[step])
@@ -116,7 +152,7 @@ def frames(
         objects = recording.objects(step)
         around = [view for view in overlay.ghosts_at(step) if view is not None]
         chase.draw(x, y, float(directions[step]), cars=[car, *objects, *around], out=frame)
-        frame[top : top + height, left : left + width] = driver.draw(x, y, heading, cars=objects, out=inset)
+        frame[top : top + height, left : left + width] = driver.draw(x, y, heading, objects)
         if step == len(recording) - 1:
             break
         overlay.draw(frame, step)

@@ -68,7 +68,7 @@ class LiveWriter:
         self._count = min(simulation.num_envs, MAX_CARS)
         self._is_discrete = policy.learner.spec.is_discrete
         size = policy.learner.spec.num_actions
-        height, width = simulation.frames.shape[1:3]
+        height, width = simulation.frames.shape[-2:]
         header = np.array([0, 0, 0, self._count, height, width, size, not self._is_discrete], np.int64)
         fresh = folder / f"{NAME}.new"
         length = _length(self._count, height, width, size)
@@ -91,13 +91,15 @@ class LiveWriter:
         self._poses[:, 5] = simulation.rows[:count, _ROWS[0]]
         self._steps[:] = simulation.rows[:count, _ROWS[1]]
         self._outputs[:] = self._decide()
-        self._frame[:] = simulation.frames[0]
+        frames = simulation.frames
+        self._frame[:] = frames[0] if frames.ndim == 3 else frames[0, 0]  # of two lenses the left one
         self._header[1], self._header[2] = step, time.time_ns()
         self._header[0] += 1
 
     def _decide(self) -> NDArray[np.float32]:
         learner = self._policy.learner
-        outputs = learner.policy(learner.encode(self._simulation.frames[:1]))[0]
+        sight = self._policy.sensors.read(self._simulation)
+        outputs = learner.policy(learner.encode(sight[:1]))[0]
         if not self._is_discrete:
             return np.asarray(outputs[: learner.spec.num_actions].clip(-1.0, 1.0), np.float32)
         shares = np.exp(outputs - outputs.max())

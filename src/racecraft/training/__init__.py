@@ -35,8 +35,9 @@ def train(
     track: str | Path | Sequence[str | Path] | None = None,
     *,
     reward: str | Path | None = None,
-    until: str | Until = "5 laps",
+    until: str | Until = "",
     actions: ActionSpace | str | None = None,
+    sensors: Sequence[str] = (),
     model_metadata: str | Path | None = None,
     hyperparameters: str | Path | None = None,
     seed: int = 0,
@@ -53,11 +54,14 @@ def train(
     Args:
         track: Name of a track, or path of a track file; or several, as `racecraft.track.load_tracks` reads them; by
             default ``reinvent_2018``.
-        reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``.
-        until: When to stop: ``"5 laps"``, ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or several joined by
-            ``or``.
-        actions: Action space or name of a preset, where no `model_metadata` is given; by default ``default``.
-        model_metadata: AWS's file: action space, network, version.
+        reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``, among objects ``dodge``.
+        until: When to stop: ``"5 laps"`` (the default), ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or
+            several joined by ``or``; among objects by default ``"20 laps or 5 minutes"``.
+        actions: Action space or name of a preset, where no `model_metadata` is given; by default ``default``, among
+            objects ``steady``.
+        sensors: AWS's names, one camera and at most one LIDAR, where no `model_metadata` is given; by default the front
+            camera, among objects with a ``LIDAR``.
+        model_metadata: AWS's file: action space, sensors, network, version.
         hyperparameters: AWS's file; by default Racecraft's own settings, tuned for speed.
         seed: The same seed repeats a run exactly on the same machine.
         parent: Run whose weights it begins with, ``RUN`` or ``RUN@checkpoint`` (``best``, ``last`` or steps); what is
@@ -83,6 +87,7 @@ def train(
         reward=reward,
         until=until,
         actions=actions,
+        sensors=sensors,
         model_metadata=model_metadata,
         hyperparameters=hyperparameters,
         seed=seed,

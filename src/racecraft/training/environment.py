@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.action_space import ActionSpace
+from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.errors import RewardError, RunError
 from racecraft.reward.worker import RewardWorker
 from racecraft.run import Episode, EpisodeCounter, PrintLog, SimTraceWriter
@@ -28,6 +29,7 @@ class TrainingEnvironment:
         worker: Pays them.
         action_space: Turns the policy's actions into commands.
         counter: Numbers the episodes.
+        sensors: What the policy sees through.
         trace: Logs every step; None for no log.
         prints: Keeps what the reward function prints; None drops it.
     """
@@ -39,6 +41,7 @@ class TrainingEnvironment:
         action_space: ActionSpace,
         *,
         counter: EpisodeCounter,
+        sensors: SensorSuite = FRONT_CAMERA,
         trace: SimTraceWriter | None = None,
         prints: PrintLog | None = None,
     ) -> None:
@@ -46,6 +49,7 @@ class TrainingEnvironment:
         self.worker = worker
         self.action_space = action_space
         self.counter = counter
+        self.sensors = sensors
         self.trace = trace
         self.prints = prints
         self.reward_seconds = 0.0
@@ -59,8 +63,8 @@ class TrainingEnvironment:
         return self.simulation.num_envs
 
     def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Frames (N, H, W) and privileged state (N, S) at the current poses, views."""
-        return self.simulation.frames, self.simulation.state
+        """What the sensors tell, as `SensorSuite.read` has it, and privileged state (N, S) at the current poses."""
+        return self.sensors.read(self.simulation), self.simulation.state
 
     def step(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Drive one step: rewards, terminated, truncated, each (N,), the caller's to keep.

@@ -155,6 +155,7 @@ class Training:
                 randomize=settings.randomize,
                 objects=settings.objects,
                 num_threads=settings.num_threads,
+                **metadata.suite.simulation_settings(),
             )
             if not self.is_checked:
                 require_valid_reward(source, tracks[0])
@@ -203,12 +204,20 @@ class Training:
             )
             prints = stack.enter_context(PrintLog(folder.reward_log))
             environment = TrainingEnvironment(
-                simulation, worker, metadata.action_space, counter=counter, trace=trace, prints=prints
+                simulation,
+                worker,
+                metadata.action_space,
+                counter=counter,
+                sensors=metadata.suite,
+                trace=trace,
+                prints=prints,
             )
             session = _Session(
                 environment=environment,
                 algorithm=make_algorithm(settings, learner, environment),
-                evaluator=Evaluator(NetworkPolicy(learner, metadata.action_space), tracks, settings),
+                evaluator=Evaluator(
+                    NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite), tracks, settings
+                ),
                 trace=trace,
                 metrics=metrics,
                 events=events,
@@ -304,7 +313,7 @@ class Training:
         begun = time.perf_counter()
         evaluator = session.evaluator
         algorithm, counter = session.algorithm, session.counter
-        algorithm.prefers_average = evaluator.was_perfect
+        algorithm.prefers_average = evaluator.was_good
         with algorithm.driving():
             trials = evaluator.evaluate(step=algorithm.total_steps, seconds=self.meter.seconds, counter=counter)
         for trial in trials:
@@ -369,7 +378,7 @@ class Training:
             session.counter.rewards[:] = arrays["episode_rewards"]
             session.trace.load_state(arrays)
             session.evaluator.load_state(metadata["evaluator"])
-            session.algorithm.prefers_average = session.evaluator.was_perfect
+            session.algorithm.prefers_average = session.evaluator.was_good
             self.meter.load_state(arrays["recent_episodes"], seconds=float(metadata["seconds"]))
         except RacecraftError:
             raise

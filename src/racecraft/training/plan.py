@@ -11,13 +11,13 @@ from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_
 from racecraft.learn.sb3 import CONTINUOUS_ONLY
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
+from racecraft.sim.objects import NO_OBJECTS
+from racecraft.training.defaults import TIME_TRIAL, defaults_for
 from racecraft.training.parent import Parent, open_parent
-from racecraft.training.settings import DEFAULT_REWARD, DEFAULT_TRACK, TrainSettings, make_settings
+from racecraft.training.settings import DEFAULT_TRACK, TrainSettings, make_settings
 from racecraft.training.start import read_settings, start_run
 from racecraft.training.stop import Until
 
-DEFAULT_UNTIL = Until(laps=5)
-DEFAULT_ACTIONS = "default"
 _OF_THE_TRACK = ("start", "evaluate_every", "evaluation_trials")
 """Settings that follow from the tracks, so they are a parent's only on its tracks."""
 
@@ -59,8 +59,9 @@ def make_plan(
     track: str | Path | Sequence[str | Path] | None = None,
     *,
     reward: str | Path | None = None,
-    until: str | Until = DEFAULT_UNTIL,
+    until: str | Until = "",
     actions: ActionSpace | str | None = None,
+    sensors: Sequence[str] = (),
     model_metadata: str | Path | None = None,
     hyperparameters: str | Path | None = None,
     seed: int = 0,
@@ -73,26 +74,30 @@ def make_plan(
     Raises:
         RacecraftError: An input is wrong.
     """
-    limit = Until.parse(until) if isinstance(until, str) else until
     if parent is not None and not isinstance(parent, Parent):
         parent = open_parent(parent)
     theirs = None if parent is None else parent.folder
-    if reward is not None or theirs is None:
-        source = load_reward(DEFAULT_REWARD if reward is None else reward)
-    else:
-        source = theirs.read_reward_function()
+    objects = settings.get("objects", NO_OBJECTS if theirs is None else read_settings(theirs).objects)
+    defaults = defaults_for(objects)
+    limit = Until.parse(until or defaults.until) if isinstance(until, str) else until
+    source = load_reward(reward or defaults.reward) if reward or theirs is None else theirs.read_reward_function()
     if model_metadata is not None:
         metadata = ModelMetadata.load(model_metadata)
     elif theirs is None or actions is not None:
-        suited = "continuous" if algorithm.removeprefix("sb3:") in CONTINUOUS_ONLY else DEFAULT_ACTIONS
+        suited = "continuous" if algorithm.removeprefix("sb3:") in CONTINUOUS_ONLY else defaults.actions
         chosen = suited if actions is None else actions
         space = action_space(chosen) if isinstance(chosen, str) else chosen
         if theirs is None:
-            metadata = ModelMetadata(action_space=space, neural_network="RACECRAFT_SMALL")
+            suite = TIME_TRIAL.sensors if algorithm.startswith("sb3:") else defaults.sensors
+            metadata = ModelMetadata(
+                action_space=space, neural_network="RACECRAFT_SMALL", sensors=tuple(sensors or suite)
+            )
         else:
             metadata = replace(theirs.read_model_metadata(), action_space=space)
     else:
         metadata = theirs.read_model_metadata()
+    if theirs is not None and model_metadata is None and sensors:
+        metadata = replace(metadata, sensors=tuple(sensors))
     if algorithm:
         metadata = _with_algorithm(metadata, algorithm)
     parameters = None if hyperparameters is None else Hyperparameters.load(hyperparameters)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from racecraft.agent import Hyperparameters, ModelMetadata, check_simulated
+from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError
 from racecraft.learn import PPOConfig
 from racecraft.reward import dry_run, validate_reward
@@ -130,9 +130,14 @@ def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:
     """Refuse what this version cannot train.
 
     Raises:
-        ConfigError: A sensor that is not simulated, or settings that exclude each other.
+        ConfigError: Settings exclude each other.
     """
-    check_simulated(metadata.sensors)
+    suite = metadata.suite
+    if settings.algorithm.startswith("sb3:") and (suite.lenses != 1 or suite.lidar_name):
+        raise ConfigError(
+            f"sensor is {', '.join(suite.names)}; allowed with {settings.algorithm} is one camera of one lens.",
+            hint="Train with ppo or sac, which see every sensor.",
+        )
     if (
         settings.algorithm == "ppo"
         and settings.ppo.exploration == "e-greedy"

@@ -31,6 +31,7 @@ DESCRIPTIONS: Final = {
     "aws": "AWS's own: five steering angles at 0.5 and 1 m/s.",
     "fast": "Seven steering angles at up to 4 m/s: for records.",
     "safe": "Seven steering angles at 0.7 and 1.4 m/s: gets round everywhere.",
+    "steady": "Five steering angles at 1 m/s: among boxes and other cars.",
     "continuous": "Any steering angle, any speed from 0.5 to 4 m/s.",
 }
 

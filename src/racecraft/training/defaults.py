@@ -1,0 +1,32 @@
+"""What a training does where nothing else is said: against the clock, and among boxes and other cars."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from racecraft.sim.objects import Objects
+
+
+@dataclass(frozen=True)
+class Defaults:
+    """The choices a user need not make."""
+
+    reward: str
+    """Preset of the reward."""
+    actions: str
+    """Preset of the action space."""
+    until: str
+    """When to stop."""
+    sensors: tuple[str, ...]
+    """AWS's names of what the policy sees through."""
+
+
+TIME_TRIAL: Final = Defaults("racing", "default", "5 laps", ("FRONT_FACING_CAMERA",))
+RACE: Final = Defaults("dodge", "steady", "20 laps or 5 minutes", ("FRONT_FACING_CAMERA", "LIDAR"))
+"""Among objects: 1 m/s, a reward that knows what is ahead, and a LIDAR, which sees what is beside the car."""
+
+
+def defaults_for(objects: Objects) -> Defaults:
+    """The choices for a training with these objects on its track."""
+    return RACE if objects.count else TIME_TRIAL
