@@ -168,10 +168,10 @@ class TorchSAC:
         for name, optimizer in self._optimizers.items():
             document = optimizer.state_dict()
             found: dict[int, dict[str, Tensor]] = {}
-            for key, array in state.items():
+            for key, saved in state.items():
                 if key.startswith(f"adam/{name}/"):
                     i, what = key.split("/")[2:]
-                    found.setdefault(int(i), {})[what] = torch.from_numpy(np.array(array))
+                    found.setdefault(int(i), {})[what] = torch.from_numpy(np.array(saved))
             optimizer.load_state_dict({**document, "state": found})
 
     def _parts(self) -> Parameters:
