@@ -20,6 +20,20 @@ describe("curves", () => {
     expect(curves.last!.step).toBeGreaterThan(19990);
   });
 
+  it("keep few evaluations and notes, the best among them", () => {
+    const curves = new Curves();
+    for (let step = 1; step <= 9000; step++) {
+      curves.add([
+        { kind: "evaluation", step, seconds: step, is_best: step === 2 },
+        { kind: "note", step, seconds: step, text: "" },
+      ]);
+    }
+    expect(curves.evaluations.length).toBeLessThanOrEqual(4001);
+    expect(curves.best!.step).toBe(2);
+    expect(curves.notes.length).toBe(500);
+    expect(curves.notes[499]!.step).toBe(9000);
+  });
+
   it("know the best evaluation", () => {
     const curves = new Curves();
     const judged = (step: number, is_best: boolean): Point => ({ kind: "evaluation", step, seconds: step, completions: [1, 0.5], lap_times: [9.5], is_best });

@@ -6,7 +6,8 @@ export interface Point {
   [name: string]: unknown;
 }
 
-const MAX_POINTS = 4000; // of iterations; beyond it every other one is dropped, so that a tab open for hours stays small
+const MAX_POINTS = 4000; // of a kind; beyond it every other one is dropped, so that a tab open for hours stays small
+const MAX_NOTES = 500; // the newest
 
 export class Curves {
   iterations: Point[] = [];
@@ -21,6 +22,11 @@ export class Curves {
       list.push(point);
     }
     if (this.iterations.length > MAX_POINTS) this.iterations = this.iterations.filter((_, index) => index % 2 === 0);
+    if (this.evaluations.length > MAX_POINTS) {
+      const best = this.best;
+      this.evaluations = this.evaluations.filter((point, index) => index % 2 === 0 || point === best);
+    }
+    if (this.notes.length > MAX_NOTES) this.notes.splice(0, this.notes.length - MAX_NOTES);
   }
 
   get last(): Point | undefined {
