@@ -25,6 +25,7 @@ LAYERS = (
     "training",
     "tuning",
     "importing",
+    "analysis",
     "serve",
     "bench",
     "cli",

@@ -84,6 +84,7 @@ VERBS = (
     "race",
     "ladder",
     "verify",
+    "report",
     "tracks",
     "tracks show",
     "tracks sheet",

@@ -44,7 +44,8 @@ def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path:
     assert len(list(run.glob("evaluation-*"))) == 2
     traces = [found.files["sim-trace"].read_text() for found in (first, again)]
     assert traces[0] == traces[1]
-    assert json.loads(first.files["summary"].read_text()) == {**first.evaluation.summary(), "video": None}
+    expected = {**first.evaluation.summary(), "step": first.step, "video": None}
+    assert json.loads(first.files["summary"].read_text()) == expected
 
 
 def test_a_track_that_changed_since_must_be_named(tmp_path: Path) -> None:

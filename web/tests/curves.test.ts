@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { bestLapOf, completionOf, Curves, hints, smooth, type Point } from "../src/lib/curves";
+import { bestLapOf, completionOf, Curves, hints, logOf, smooth, type Point } from "../src/lib/curves";
 
 const iteration = (step: number, more: object = {}): Point => ({ kind: "iteration", step, seconds: step / 1000, ...more });
 
@@ -71,6 +71,19 @@ describe("hints", () => {
   });
   it("see a reward that is earned without driving", () => {
     expect(run((share) => ({ reward: 1 + 50 * share, completion: 0.1 }))).toEqual(["exploit"]);
+  });
+  it("see steps that are too large", () => {
+    expect(run((share) => ({ reward: 10 * share, completion: share, approx_kl: 0.4 }))).toEqual(["kl"]);
+  });
+  it("see a policy that forgets what it could", () => {
+    const curves = new Curves();
+    for (let index = 0; index < 30; index++) curves.add([iteration(1000 * (index + 1), { entropy: 2, value_loss: 1, reward: 1, completion: 0.9 })]);
+    const judged = (step: number, share: number, is_best: boolean): Point => ({ kind: "evaluation", step, seconds: step / 1000, completions: [share], lap_times: [], is_best });
+    curves.add([judged(5000, 1, true), judged(10000, 0.5, false), judged(20000, 0.4, false)]);
+    expect(hints(curves, 10)).toEqual([]);
+    curves.add([judged(30000, 0.6, false)]);
+    expect(hints(curves, 10)).toEqual([{ key: "forgot", values: { best: "100 %", step: "5000", now: "60 %" } }]);
+    expect(logOf(curves).map((entry) => entry.kind)).toEqual(["evaluation", "evaluation", "evaluation", "best"]);
   });
   it("see a car that is stuck", () => {
     expect(run(() => ({ reward: 1, completion: 0.05 }))).toEqual(["stuck"]);

@@ -3,7 +3,6 @@ import { scale, span } from "../src/lib/colors";
 import { viewBox } from "../src/lib/geometry";
 import { clock, percent, seconds } from "../src/lib/numbers";
 import { between, turn, type Look } from "../src/lib/poses";
-import { resample, splitLaps } from "../src/lib/telemetry";
 import { de } from "../src/i18n/de";
 import { en } from "../src/i18n/en";
 
@@ -45,32 +44,6 @@ describe("what is drawn", () => {
   });
   it("reads well", () => {
     expect([clock(75), clock(3700), clock(null), percent(0.126), seconds(9.3)]).toEqual(["1:15", "1:01:40", "–", "13 %", "9.30 s"]);
-  });
-});
-
-describe("telemetry", () => {
-  it("takes complete laps only, on one axis of place", () => {
-    const rows = 30;
-    const column = (make: (row: number) => number | string) => Array.from({ length: 2 * rows }, (_, row) => make(row));
-    const laps = splitLaps({
-      episode: column((row) => Math.floor(row / rows)),
-      progress: column((row) => (100 * (row % rows)) / (rows - 1)),
-      X: column((row) => row % rows),
-      Y: column(() => 0),
-      tstamp: column((row) => row / 15),
-      throttle: column((row) => row % rows),
-      steer: column(() => 0),
-      reward: column(() => 1),
-      episode_status: column((row) => (row === rows - 1 ? "lap_complete" : row === 2 * rows - 1 ? "off_track" : "in_progress")),
-    });
-    expect(laps.length).toBe(1);
-    expect(laps[0]!.seconds).toBeCloseTo(29 / 15);
-    expect(laps[0]!.speed[0]).toBe(0);
-    expect(laps[0]!.speed.at(-1)).toBe(29);
-  });
-  it("keeps a value until the next one is reached", () => {
-    const values = resample([0, 0.5, 1], [1, 2, 3]);
-    expect([values[0], values[98], values[101], values[199]]).toEqual([1, 1, 2, 3]);
   });
 });
 

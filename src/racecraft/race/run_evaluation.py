@@ -183,7 +183,7 @@ def evaluate_run(
         load_ghosts(ghosts, evaluation.conditions, run=folder.path, recordings=recordings) if video and ghosts else []
     )
     try:
-        files = _write(folder, evaluation, policy, is_filmed=video, aws_log=aws_log, ghosts=shown, job=job)
+        files = _write(folder, evaluation, policy, step=step, is_filmed=video, aws_log=aws_log, ghosts=shown, job=job)
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
     limit = known_limit(driven_track(where, rules), vehicle)
@@ -240,6 +240,7 @@ def _write(
     evaluation: Evaluation,
     policy: NetworkPolicy,
     *,
+    step: int,
     is_filmed: bool,
     aws_log: str | Path | None,
     job: str,
@@ -281,7 +282,8 @@ def _write(
             sensors=policy.sensors,
         )
     video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
-    write_json(inside / "evaluation.json", {**evaluation.summary(), "video": video, **({"job": job} if job else {})})
+    summary = {**evaluation.summary(), "step": step, "video": video, **({"job": job} if job else {})}
+    write_json(inside / "evaluation.json", summary)
     return files
 
 

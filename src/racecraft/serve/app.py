@@ -27,7 +27,9 @@ from racecraft.serve.jobs import JobQueue
 from racecraft.serve.mirror import Mirror
 from racecraft.serve.races import Races
 from racecraft.serve.routes import (
+    analysis,
     archives,
+    choices,
     console,
     drives,
     evaluations,
@@ -106,7 +108,8 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.state.guard = guard = Guard(database, hosts)
     app.add_middleware(guard.middleware)
     problems.install(app)
-    for part in (console, tracks, drives, rewards, archives, models, evaluations, races, jobs, events):
+    parts = (console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, races, jobs, events)
+    for part in parts:
         app.include_router(part.router)
 
     @app.get("/assets/{name}", include_in_schema=False)

@@ -117,6 +117,8 @@ class RewardCheck(Message):
 
     source: str = Field(max_length=140_000)
     track: str = Field(max_length=200)
+    run: RunName | None = None
+    """Of a model whose last laps are to be paid anew."""
 
 
 class RewardProblem(Message):
@@ -152,6 +154,15 @@ class RewardPainting(Message):
     """(P, O)"""
 
 
+class RewardLap(Message):
+    """A lap that was driven, and what the function would have paid for every step of it."""
+
+    number: int
+    status: str
+    points: list[list[float]]
+    rewards: list[float | None]
+
+
 class RewardVerdict(Message):
     """What is known about a reward function in under a second."""
 
@@ -159,9 +170,22 @@ class RewardVerdict(Message):
     problems: list[RewardProblem]
     situations: list[RewardSituation]
     painting: RewardPainting | None
+    laps: list[RewardLap] = []
+    """Of the model that was asked for, where it was evaluated on this track."""
 
 
 # ---- models
+
+
+class Tuning(Message):
+    """Racecraft's own way of learning, turned a little; by AWS's names, within wider ranges."""
+
+    lr: float | None = Field(None, ge=1e-6, le=1e-2)
+    beta_entropy: float | None = Field(None, ge=0, le=1)
+    discount_factor: float | None = Field(None, ge=0.5, le=0.9999)
+    num_epochs: int | None = Field(None, ge=1, le=20)
+    batch_size: int | None = Field(None, ge=16, le=512)
+    loss_type: Literal["huber", "mean squared error"] | None = None
 
 
 class NewModel(Message):
@@ -178,6 +202,22 @@ class NewModel(Message):
     """AWS's document; replaces actions."""
     hyperparameters: dict[str, Any] | None = None
     """AWS's document; Racecraft's own settings otherwise."""
+    tuning: Tuning | None = None
+    """Without hyperparameters: what is to differ from Racecraft's own settings."""
+    sensors: list[Annotated[str, Field(max_length=40)]] | None = Field(None, max_length=4)
+    """AWS's names; the front camera otherwise. Not beside model_metadata, which says it itself."""
+    race: str = Field("time-trial", max_length=40)
+    """``time-trial``, ``object-avoidance`` or ``head-to-bot``."""
+    objects: int | None = Field(None, ge=1, le=32)
+    """How many boxes or bot cars; 6 and 3 otherwise."""
+    bot_speed: float | None = Field(None, ge=0, le=4)
+    lane_changes: bool = False
+    randomize: str = Field("none", max_length=40)
+    """A preset of what differs from episode to episode."""
+    algorithm: str = Field("", max_length=40)
+    """``ppo`` or ``sac``, which needs a continuous action space; by default the metadata's."""
+    critic: str = Field("privileged", max_length=40)
+    """What the critic sees while training: ``privileged`` state, or the ``camera``."""
     network: str = ""
     vehicle: str = ""
     seed: int = Field(0, ge=0, le=2**32 - 1)

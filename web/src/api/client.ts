@@ -15,6 +15,13 @@ export type EvaluationCard = Schemas["EvaluationCard"];
 export type JobInfo = Schemas["JobInfo"];
 export type NewModel = Partial<Schemas["NewModel"]>;
 export type HistoryPage = Schemas["HistoryPage"];
+export type EvaluationLaps = Schemas["EvaluationLaps"];
+export type TrainingMaps = Schemas["TrainingMaps"];
+export type SaliencyPicture = Schemas["SaliencyPicture"];
+export type Choices = Schemas["Choices"];
+export type NumberChoice = Schemas["NumberChoice"];
+export type RewardLap = Schemas["RewardLap"];
+export type Action = Schemas["Action"];
 export type ConsoleFacts = Schemas["Console"];
 
 export class Problem extends Error {
@@ -78,18 +85,24 @@ export const api = {
   track: (track: string) => ask<TrackGeometry>("GET", `/tracks/${name(track)}`),
   rewards: () => ask<RewardPreset[]>("GET", "/rewards"),
   actions: () => ask<ActionPreset[]>("GET", "/actions"),
-  checkReward: (source: string, track: string) =>
-    ask<RewardVerdict>("POST", "/rewards/check", { source, track }),
+  checkReward: (source: string, track: string, run?: string) =>
+    ask<RewardVerdict>("POST", "/rewards/check", { source, track, ...(run ? { run } : {}) }),
+  choices: () => ask<Choices>("GET", "/choices"),
   evaluations: (run: string) => ask<EvaluationCard[]>("GET", `/models/${name(run)}/evaluations`),
   evaluate: (run: string, request: Record<string, unknown>) =>
     ask<JobInfo>("POST", `/models/${name(run)}/evaluations`, request),
-  telemetry: (run: string, stamp: string) =>
-    ask<{ columns: Record<string, (number | string)[]> }>("GET", `/models/${name(run)}/evaluations/${stamp}/telemetry`),
+  laps: (run: string, stamp: string) => ask<EvaluationLaps>("GET", `/models/${name(run)}/evaluations/${stamp}/laps`),
+  saliency: (run: string, stamp: string, lap: number, row: number, target?: number) =>
+    ask<SaliencyPicture>("GET", `/models/${name(run)}/evaluations/${stamp}/saliency?lap=${lap}&row=${row}${target === undefined ? "" : `&target=${target}`}`),
+  maps: (run: string, first: number, last: number) => ask<TrainingMaps>("GET", `/models/${name(run)}/maps?first=${first}&last=${last}`),
   job: (id: string) => ask<JobInfo>("GET", `/jobs/${id}`),
 };
 
 /** Address of a model as one tar.gz, weights included. */
 export const archiveOf = (run: string) => `/api/models/${name(run)}/archive`;
+
+/** Address of a model's report. */
+export const reportOf = (run: string) => `/api/models/${name(run)}/report`;
 
 /** Address of one of a model's files. */
 export const fileOf = (run: string, path: string) =>

@@ -58,36 +58,69 @@ export function smooth(values: (number | null)[], reach: number): (number | null
   });
 }
 
+export type HintKey = "entropy" | "value" | "exploit" | "stuck" | "kl" | "forgot";
+
 export interface Hint {
-  key: "entropy" | "value" | "exploit" | "stuck";
-  evidence: string;
+  key: HintKey;
+  /** The numbers that say it, for the sentence of evidence. */
+  values: Record<string, string>;
 }
+
+const FEW = 20; // iterations before which nothing is said
+const percent = (share: number) => `${Math.round(100 * share)} %`;
 
 /** What the curves say when something goes wrong, with the numbers that say it. */
 export function hints(curves: Curves, numActions: number): Hint[] {
   const found: Hint[] = [];
   const points = curves.iterations;
   const last = points[points.length - 1];
-  if (!last || points.length < 20) return found;
+  if (!last || points.length < FEW) return found;
   const number = (point: Point, name: string) => (typeof point[name] === "number" ? (point[name] as number) : null);
   const entropy = number(last, "entropy");
   const completion = number(last, "completion") ?? 0;
-  if (entropy !== null && numActions > 1 && entropy < 0.05 * Math.log(numActions) && completion < 0.5)
-    found.push({ key: "entropy", evidence: `${entropy.toFixed(3)} / ${Math.log(numActions).toFixed(2)}` });
+  const most = Math.log(Math.max(numActions, 1));
+  if (entropy !== null && numActions > 1 && entropy < 0.05 * most && completion < 0.5)
+    found.push({ key: "entropy", values: { now: entropy.toFixed(3), most: most.toFixed(2), completion: percent(completion) } });
+
   const losses = points.slice(-40).map((point) => number(point, "value_loss") ?? 0);
   const before = Math.max(...losses.slice(0, 20), 1e-9);
   const after = losses[losses.length - 1]!;
-  if (losses.length === 40 && after > 50 * before) found.push({ key: "value", evidence: `${before.toPrecision(2)} → ${after.toPrecision(2)}` });
+  if (losses.length === 40 && after > 50 * before) found.push({ key: "value", values: { before: before.toPrecision(2), after: after.toPrecision(2) } });
+
+  const steps = points.slice(-FEW).map((point) => Math.abs(number(point, "approx_kl") ?? 0)).sort((a, b) => a - b);
+  const usual = steps[steps.length >> 1]!;
+  if (usual > 0.15) found.push({ key: "kl", values: { now: usual.toFixed(2) } });
+
   if (points.length >= 60) {
-    const third = Math.floor(points.length / 3);
-    const [early, late] = [points[third]!, last];
-    const [r0, r1] = [number(early, "reward"), number(late, "reward")];
-    const [c0, c1] = [number(early, "completion"), number(late, "completion")];
+    const early = points[Math.floor(points.length / 3)]!;
+    const [r0, r1] = [number(early, "reward"), number(last, "reward")];
+    const [c0, c1] = [number(early, "completion"), number(last, "completion")];
     if (r0 !== null && r1 !== null && c0 !== null && c1 !== null) {
       if (r1 > r0 + 0.5 * Math.abs(r0) && c1 < c0 + 0.02 && c1 < 0.5)
-        found.push({ key: "exploit", evidence: `${r0.toFixed(1)} → ${r1.toFixed(1)}, ${Math.round(100 * c0)} → ${Math.round(100 * c1)} %` });
-      else if (last.step > 60000 && c1 < 0.15) found.push({ key: "stuck", evidence: `${Math.round(100 * c1)} %` });
+        found.push({ key: "exploit", values: { r0: r0.toFixed(1), r1: r1.toFixed(1), c0: percent(c0), c1: percent(c1) } });
+      else if (last.step > 60000 && c1 < 0.15) found.push({ key: "stuck", values: { completion: percent(c1), steps: String(last.step) } });
     }
   }
+
+  const best = curves.best;
+  const recent = curves.evaluations.slice(-3).map(completionOf);
+  if (best && recent.length === 3 && completionOf(best) >= 0.9 && Math.max(...recent) < completionOf(best) - 0.3)
+    found.push({ key: "forgot", values: { best: percent(completionOf(best)), step: String(best.step), now: percent(Math.max(...recent)) } });
   return found;
+}
+
+export interface LogEntry {
+  kind: "best" | "evaluation" | "note";
+  step: number;
+  seconds: number;
+  point: Point;
+}
+
+/** What happened, newest first. */
+export function logOf(curves: Curves, most = 60): LogEntry[] {
+  const entries: LogEntry[] = [
+    ...curves.evaluations.map((point): LogEntry => ({ kind: point["is_best"] ? "best" : "evaluation", step: point.step, seconds: point.seconds, point })),
+    ...curves.notes.map((point): LogEntry => ({ kind: "note", step: point.step, seconds: point.seconds, point })),
+  ];
+  return entries.sort((a, b) => b.seconds - a.seconds).slice(0, most);
 }

@@ -5,7 +5,22 @@ import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import type { TrackGeometry } from "../api/client";
 import { between, type Look } from "./poses";
 
-export type View = "orbit" | "follow" | "top" | "chase";
+export type View = "orbit" | "follow" | "top" | "chase" | "driver";
+
+/** A car that is put somewhere, rather than streamed. */
+export interface PlacedCar {
+  x: number;
+  y: number;
+  heading: number;
+  /** CSS colour of its body. */
+  color: string;
+}
+
+/** A line on the ground with a colour at every point. */
+export interface Trail {
+  points: number[][];
+  colors: string[];
+}
 
 const LINE = 0.0762; // m, width of the white lines
 const MAX_CARS = 256;
@@ -94,6 +109,8 @@ export class Scene {
   private view: View = "orbit";
   private frame = 0;
   private isDirty = true;
+  private placed: PlacedCar[] | undefined;
+  private readonly trails = new three.Group();
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -128,6 +145,7 @@ export class Scene {
     this.cars.frustumCulled = false;
     this.scene.add(this.cars);
 
+    this.scene.add(this.trails);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 1.5;
     this.controls.addEventListener("change", () => (this.isDirty = true));
@@ -144,6 +162,33 @@ export class Scene {
     if (this.now) this.interval += 0.2 * (Math.min(time - this.arrived, 1000) - this.interval);
     [this.before, this.now, this.arrived] = [this.now, look, time];
     this.isDirty = true;
+  }
+
+  /** Put cars somewhere at once; the camera follows the first one. */
+  put(cars: PlacedCar[]): void {
+    this.placed = cars;
+    this.isDirty = true;
+  }
+
+  /** Draw lines on the ground, instead of those before. */
+  drawTrails(trails: Trail[]): void {
+    this.clearTrails();
+    for (const { points, colors } of trails) {
+      const geometry = new three.BufferGeometry();
+      geometry.setAttribute("position", new three.Float32BufferAttribute(points.flatMap(([x, y]) => [x!, y!, 4 * RISE]), 3));
+      const tints = colors.flatMap((css) => new three.Color(css).toArray() as number[]);
+      geometry.setAttribute("color", new three.Float32BufferAttribute(tints, 3));
+      this.trails.add(new three.Line(geometry, new three.LineBasicMaterial({ vertexColors: true })));
+    }
+    this.isDirty = true;
+  }
+
+  private clearTrails(): void {
+    for (const line of [...this.trails.children] as three.Line[]) {
+      line.geometry.dispose();
+      (line.material as three.Material).dispose();
+      this.trails.remove(line);
+    }
   }
 
   /** From where to look. */
@@ -165,6 +210,7 @@ export class Scene {
     cancelAnimationFrame(this.frame);
     this.watcher.disconnect();
     this.controls.dispose();
+    this.clearTrails();
     this.scene.traverse((thing) => {
       if (thing instanceof three.Mesh) {
         thing.geometry.dispose();
@@ -199,7 +245,8 @@ export class Scene {
     const isMoving = this.now !== undefined && time - this.arrived < this.interval + 50;
     if (!isMoving && !this.isDirty) return;
     this.isDirty = false;
-    if (this.now) this.place(between(this.before, this.now, share));
+    if (this.placed) this.placeCars(this.placed);
+    else if (this.now) this.place(between(this.before, this.now, share));
     this.renderer.render(this.scene, this.camera);
   };
 
@@ -217,17 +264,39 @@ export class Scene {
     leader = this.now?.focus ?? leader;
     this.cars.instanceMatrix.needsUpdate = true;
     if (this.cars.instanceColor) this.cars.instanceColor.needsUpdate = true;
-    if (this.view === "chase" && poses[leader]) {
-      const { x, y, heading } = poses[leader]!;
+    if (poses[leader]) this.ride(leader, poses[leader]!);
+  }
+
+  private placeCars(cars: PlacedCar[]): void {
+    this.cars.count = Math.min(cars.length, MAX_CARS);
+    const colour = new three.Color();
+    cars.slice(0, MAX_CARS).forEach((car, index) => {
+      this.matrix.makeRotationZ(car.heading).setPosition(car.x, car.y, (2 + index) * RISE);
+      this.cars.setMatrixAt(index, this.matrix);
+      this.cars.setColorAt(index, colour.set(car.color));
+    });
+    this.cars.instanceMatrix.needsUpdate = true;
+    if (this.cars.instanceColor) this.cars.instanceColor.needsUpdate = true;
+    if (cars[0]) this.ride(0, cars[0]);
+  }
+
+  /** Move the camera with a car, where the view asks for it. */
+  private ride(car: number, { x, y, heading }: { x: number; y: number; heading: number }): void {
+    if (this.view === "driver") {
+      this.matrix.makeScale(0, 0, 0);
+      this.cars.setMatrixAt(car, this.matrix); // the driver does not see the own car
+      this.camera.position.set(x + 0.05 * Math.cos(heading), y + 0.05 * Math.sin(heading), 0.2);
+      this.camera.lookAt(x + 1.2 * Math.cos(heading), y + 1.2 * Math.sin(heading), 0.02);
+    } else if (this.view === "chase") {
       const wanted = new three.Vector3(x - 0.85 * Math.cos(heading), y - 0.85 * Math.sin(heading), 0.42);
       this.camera.position.lerp(wanted, this.isCalm || this.camera.position.distanceTo(wanted) > 4 ? 1 : 0.3);
       this.camera.lookAt(x + 1.3 * Math.cos(heading), y + 1.3 * Math.sin(heading), 0.05);
-    }
-    if (this.view === "follow" && poses[leader]) {
-      const { x, y, heading } = poses[leader]!;
+    } else if (this.view === "follow") {
       const wanted = new three.Vector3(x - 1.5 * Math.cos(heading), y - 1.5 * Math.sin(heading), 0.85);
-      this.camera.position.lerp(wanted, this.isCalm ? 1 : 0.12);
+      const away = this.camera.position.distanceTo(wanted);
+      this.camera.position.lerp(wanted, this.isCalm || away > 4 ? 1 : 0.12);
       this.camera.lookAt(x + 0.5 * Math.cos(heading), y + 0.5 * Math.sin(heading), 0.1);
+      if (away > 0.02) this.isDirty = true; // until it has arrived, also where the car stands
     }
   }
 }

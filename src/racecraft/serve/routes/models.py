@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +12,7 @@ from fastapi.responses import FileResponse
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.errors import ConfigError
+from racecraft.learn import PPOConfig
 from racecraft.reward import load_preset, preset_names
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file
@@ -27,7 +29,11 @@ from racecraft.serve.schemas import (
     ModelDetail,
     NewModel,
     TrainOn,
+    Tuning,
 )
+from racecraft.sim import Objects
+from racecraft.sim.objects import objects_for_race
+from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.track import load_track
 from racecraft.training import Until
 from racecraft.training.settings import make_settings
@@ -49,10 +55,7 @@ def list_models(context: InContext) -> list[ModelCard]:
 def create_model(request: NewModel, context: InContext) -> ModelCard:
     """A new model from settings that may all be left out; training starts at once unless told otherwise."""
     source = load_preset(request.reward) if request.reward in preset_names() else request.reward
-    if request.model_metadata is not None:
-        metadata = ModelMetadata.from_dict(request.model_metadata)
-    else:
-        metadata = ModelMetadata(action_space=action_space(request.actions), neural_network="RACECRAFT_SMALL")
+    metadata = _metadata(request)
     parameters = None if request.hyperparameters is None else Hyperparameters.from_dict(request.hyperparameters)
     settings = make_settings(
         metadata=metadata,
@@ -63,7 +66,17 @@ def create_model(request: NewModel, context: InContext) -> ModelCard:
         vehicle=_vehicle(request.vehicle),
         seed=request.seed,
         until=Until.parse(request.until),
+        objects=_objects(request),
+        randomize=_randomization(request.randomize),
+        critic=request.critic,
+        algorithm=request.algorithm,
     )
+    if request.tuning is not None:
+        if parameters is not None:
+            raise ConfigError("tuning and hyperparameters both say how the policy improves; give one of them.")
+        if settings.algorithm != "ppo":
+            raise ConfigError(f"tuning is for ppo; the algorithm is {settings.algorithm!r}.")
+        settings = replace(settings, ppo=_tuned(settings.ppo, request.tuning))
     if request.name is not None:
         context.garage.require_new(request.name)
     folder = start_run(
@@ -200,6 +213,48 @@ def _train(context: Context, folder: RunFolder, *, until: str | None) -> JobInfo
     job = context.queue.add("train", folder.name, {"until": until})
     context.supervisor.wake()
     return job_info(job)
+
+
+def _metadata(request: NewModel) -> ModelMetadata:
+    if request.model_metadata is None:
+        sensors = tuple(request.sensors or ("FRONT_FACING_CAMERA",))
+        return ModelMetadata(
+            action_space=action_space(request.actions), sensors=sensors, neural_network="RACECRAFT_SMALL"
+        )
+    if request.sensors is not None:
+        raise ConfigError("sensors and model_metadata both name sensors; give one of them.")
+    return ModelMetadata.from_dict(request.model_metadata)
+
+
+def _objects(request: NewModel) -> Objects:
+    settings: dict[str, Any] = {} if request.race == "time-trial" else {"placement": "random"}
+    if request.objects is not None:
+        settings["count"] = request.objects
+    if request.race == "head-to-bot":
+        settings["changes_lane"] = request.lane_changes
+        if request.bot_speed is not None:
+            settings["speed"] = request.bot_speed
+    if request.race == "time-trial" and settings:
+        raise ConfigError("objects go with the races object-avoidance and head-to-bot; this one is a time-trial.")
+    return objects_for_race(request.race, settings=settings)
+
+
+def _randomization(name: str) -> str:
+    if name not in RANDOMIZATIONS:  # never a path
+        raise ConfigError(f"randomize is {name[:40]!r}; allowed are {', '.join(RANDOMIZATIONS)}.")
+    return name
+
+
+def _tuned(ppo: PPOConfig, tuning: Tuning) -> PPOConfig:
+    changes: dict[str, Any] = {
+        "learning_rate": tuning.lr,
+        "ent_coef": tuning.beta_entropy,
+        "gamma": tuning.discount_factor,
+        "update_epochs": tuning.num_epochs,
+        "minibatch_size": tuning.batch_size,
+        "value_loss": None if tuning.loss_type is None else "huber" if tuning.loss_type == "huber" else "mse",
+    }
+    return replace(ppo, **{name: value for name, value in changes.items() if value is not None})
 
 
 def _vehicle(name: str) -> str:

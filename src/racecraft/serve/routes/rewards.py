@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import ast
 import math
+from contextlib import suppress
 from typing import Final
 
 from fastapi import APIRouter
 
 from racecraft.agent import action_space
 from racecraft.agent.action_space import PRESETS, DiscreteActionSpace
+from racecraft.agent.aws_file import read_json_object
+from racecraft.analysis import pay_laps
+from racecraft.errors import RacecraftError
 from racecraft.reward import check_reward, dry_run, load_preset, preset_names
 from racecraft.reward.painting import paint_reward
-from racecraft.serve.context import InContext
+from racecraft.serve.context import Context, InContext
 from racecraft.serve.schemas import (
     Action,
     ActionPreset,
     RewardCheck,
+    RewardLap,
     RewardPainting,
     RewardPreset,
     RewardProblem,
@@ -118,4 +123,25 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
         points=painted.points.round(3).tolist(),
         rewards=[[value if math.isfinite(value) else None for value in row] for row in painted.rewards.tolist()],
     )
-    return RewardVerdict(ok=True, problems=found, situations=situations, painting=painting)
+    laps = _laps(context, request) if request.run is not None else []
+    return RewardVerdict(ok=True, problems=found, situations=situations, painting=painting, laps=laps)
+
+
+def _laps(context: Context, request: RewardCheck) -> list[RewardLap]:
+    """The last laps of the model that was asked for, where it was evaluated on the track."""
+    folder = context.garage.folder(str(request.run))
+    track = context.courses.load(request.track)
+    for path in sorted(folder.path.glob("evaluation-*/evaluation.json"), reverse=True)[:20]:
+        trace = path.parent / "evaluation-simtrace" / "0-iteration.csv"
+        with suppress(RacecraftError):
+            if read_json_object(path).get("track") == track.name and trace.is_file():
+                return [
+                    RewardLap(
+                        number=lap.number,
+                        status=lap.status,
+                        points=lap.points.round(3).tolist(),
+                        rewards=[value if math.isfinite(value) else None for value in lap.rewards.tolist()],
+                    )
+                    for lap in pay_laps(request.source, track, trace)
+                ]
+    return []

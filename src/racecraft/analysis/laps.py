@@ -1,0 +1,127 @@
+"""Laps read back from a sim-trace: where a car was when, so that two laps can be laid over each other.
+
+A trace holds commands; the speed that a car really had comes from its places a control step apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.run.simtrace import read_simtrace
+from racecraft.sim.simulation import CONTROL_DT
+from racecraft.track import Track
+
+Floats = NDArray[np.float64]
+
+MAX_ROWS: Final = 60_000
+"""Of one file; an evaluation of 20 trials of 20 laps has as many."""
+MIN_ROWS: Final = 5
+JUMP: Final = 1.0  # m between two steps: the car was put somewhere else
+
+
+@dataclass(frozen=True, eq=False)
+class TracedLap:
+    """One lap of a trace, or the attempt at one; R rows, SI units and radians."""
+
+    number: int
+    """Within the trace, from 1, as AWS counts trials."""
+    status: str
+    """Of its last row."""
+    time: Floats
+    """s since its first row  (R,)."""
+    share: Floats
+    """Of the lap driven, 0 to 1, never falling  (R,)."""
+    points: Floats
+    """x, y of the point 0.14 m ahead of the car's origin  (R, 2)."""
+    heading: Floats
+    steering_angle: Floats
+    """Commanded."""
+    throttle: Floats
+    """Commanded speed, m/s."""
+    reward: Floats
+    penalty_seconds: float = 0.0
+    """s that it stood for its mistakes."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether it crossed the line."""
+        return self.status == "lap_complete"
+
+    @property
+    def seconds(self) -> float:
+        """How long it took; a lap's row of preparation counts."""
+        return float(self.time[-1]) + CONTROL_DT
+
+    @cached_property
+    def speed(self) -> Floats:
+        """Driven speed, m/s, from the places of neighbouring steps; 0 where the car was put elsewhere  (R,)."""
+        step = np.hypot(*np.diff(self.points, axis=0).T)
+        step[step > JUMP] = 0.0
+        pace = step / np.maximum(np.diff(self.time), 0.5 * CONTROL_DT)
+        return np.asarray(0.5 * (np.concatenate([pace[:1], pace]) + np.concatenate([pace, pace[-1:]])))
+
+    def time_at(self, shares: Floats) -> Floats:
+        """When it reached some shares of the lap, s."""
+        return np.interp(shares, self.share, self.time)
+
+
+def read_laps(path: str | Path) -> list[TracedLap]:
+    """The laps of a sim-trace file.
+
+    Raises:
+        RunError: It is not readable, no sim-trace, or too long.
+    """
+    return split_laps(read_simtrace(path, max_rows=MAX_ROWS))
+
+
+def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
+    """The laps in the columns of a sim-trace; AWS calls each an episode. Stubs of a few rows are left out."""
+    episode = columns["episode"]
+    if not len(episode):
+        return []
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(episode)) + 1, [len(episode)]])
+    statuses = columns.get("episode_status")
+    laps = []
+    for begin, end in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        if end - begin < MIN_ROWS:
+            continue
+        rows = slice(begin, end)
+        time = columns["tstamp"][rows].astype(np.float64)
+        laps.append(
+            TracedLap(
+                number=int(episode[begin]) + 1,
+                status=str(statuses[end - 1]) if statuses is not None else "",
+                time=time - time[0],
+                share=np.maximum.accumulate(np.clip(columns["progress"][rows] / 100.0, 0.0, 1.0)),
+                points=np.column_stack([columns["X"][rows], columns["Y"][rows]]).astype(np.float64),
+                heading=np.radians(columns["yaw"][rows]),
+                steering_angle=np.radians(columns["steer"][rows]),
+                throttle=columns["throttle"][rows].astype(np.float64),
+                reward=columns["reward"][rows].astype(np.float64),
+                penalty_seconds=0.0 if statuses is None else CONTROL_DT * int((statuses[rows] == "pause").sum()),
+            )
+        )
+    return laps
+
+
+def start_place(track: Track, lap: TracedLap) -> float:
+    """Place on the centre line, m, where a lap's shares count from."""
+    place = float(track.project(lap.points[0])[0])
+    return place - float(lap.share[0]) * track.length
+
+
+def driven_direction(track: Track, laps: Sequence[TracedLap]) -> Track:
+    """The track in the direction in which most of the laps drive it."""
+    forward = 0.0
+    for lap in laps:
+        places = track.project(lap.points)[0]
+        step = np.diff(places)
+        forward += float(np.sign(step[np.abs(step) < JUMP]).sum())
+    return track if forward >= 0 else track.reversed()

@@ -1,0 +1,107 @@
+"""Laps, corners and maps of traces made by hand, where everything is known."""
+
+from __future__ import annotations
+
+import csv
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from racecraft.analysis import draw_maps, driven_direction, iterations_of, passages, read_laps, sectors_of, start_place
+from racecraft.errors import RunError
+from racecraft.run.simtrace import WRITTEN
+from racecraft.track import Track, load_track
+
+DT = 1 / 15
+
+
+def write_trace(path: Path, track: Track, laps: list[tuple[float, str, float]]) -> None:
+    """Laps at a constant speed on the centre line: speed in m/s, status at the end, share driven."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    clock = 0.0
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(WRITTEN)
+        for number, (speed, status, share) in enumerate(laps):
+            steps = round(share * track.length / speed / DT)
+            for step in range(steps + 1):
+                place = min(step * speed * DT, track.length)
+                x, y = track.point_at(place).tolist()
+                yaw = float(np.degrees(track.heading_at(place)))
+                ended = step == steps
+                row: list[Any] = [number, step + 1.0, x, y, yaw, 15.0, speed, step % 2, speed, ended, True]
+                done = 100 if ended and share == 1 else min(100 * place / track.length, 100)
+                row += [done, 0, track.length, round(clock, 3), status if ended else "in_progress", 0, 0]
+                writer.writerow(row)
+                clock += DT
+
+
+@pytest.fixture(scope="module")
+def oval() -> Track:
+    return load_track("oval")
+
+
+def test_laps_are_read_back(tmp_path: Path, oval: Track) -> None:
+    path = tmp_path / "0-iteration.csv"
+    write_trace(path, oval, [(2.0, "lap_complete", 1.0), (1.0, "off_track", 0.4)])
+    whole, part = read_laps(path)
+    assert (whole.number, whole.is_complete, part.is_complete) == (1, True, False)
+    assert whole.seconds == pytest.approx(oval.length / 2.0, abs=2 * DT)
+    assert np.median(whole.speed) == pytest.approx(2.0, rel=0.02)
+    assert part.share[-1] == pytest.approx(0.4, abs=0.01)
+    assert whole.time_at(np.array([0.5]))[0] == pytest.approx(oval.length / 4.0, abs=0.1)
+    assert start_place(oval, whole) == pytest.approx(0.0, abs=0.01)
+    assert driven_direction(oval, [whole, part]) is oval
+    assert driven_direction(oval.reversed(), [whole]).point_at(1.0) == pytest.approx(oval.point_at(1.0), abs=0.05)
+
+
+@pytest.mark.parametrize("name", ["oval", "reinvent_2018", "hairpin"])
+def test_sectors_are_the_whole_lap_and_their_times_add_up(tmp_path: Path, name: str) -> None:
+    track = load_track(name)
+    sectors = sectors_of(track)
+    assert sum(sector.end - sector.start for sector in sectors) == pytest.approx(track.length)
+    for before, after in pairwise(sectors):
+        assert before.end == pytest.approx(after.start)
+    write_trace(tmp_path / "t.csv", track, [(1.5, "lap_complete", 1.0), (1.5, "off_track", 0.5)])
+    whole, part = read_laps(tmp_path / "t.csv")
+    found = passages(track, whole, sectors)
+    assert all(passage is not None for passage in found)
+    assert sum(p.seconds for p in found if p is not None) == pytest.approx(whole.time[-1], abs=0.01)
+    for passage, sector in zip(found, sectors, strict=True):
+        assert passage is not None
+        assert passage.seconds == pytest.approx((sector.end - sector.start) / 1.5, abs=0.15)
+        assert passage.slowest <= min(passage.entry_speed, passage.exit_speed)
+    assert any(passage is None for passage in passages(track, part, sectors))
+
+
+def test_maps_count_where_cars_were(tmp_path: Path, oval: Track) -> None:
+    write_trace(tmp_path / "0-iteration.csv", oval, [(2.0, "lap_complete", 1.0), (1.0, "off_track", 0.4)])
+    (tmp_path / "1-iteration.csv").write_text("damaged\n")
+    (tmp_path / "x-iteration.csv").write_text("")
+    assert iterations_of(tmp_path) == [0, 1]
+    assert iterations_of(tmp_path / "nothing") == []
+    maps = draw_maps(oval, tmp_path, [0, 1])
+    assert maps.visits.sum() == maps.rows
+    assert maps.episodes == 2
+    assert maps.usage == pytest.approx([0.5, 0.5], abs=0.02)
+    assert maps.exits.shape == (1, 2)
+    assert maps.exits[0] == pytest.approx(oval.point_at(0.4 * oval.length), abs=0.1)
+    middle = slice(4, 6)
+    assert maps.visits[:, middle].sum() == maps.rows  # all of it beside the centre line
+    half = len(maps.visits) // 2
+    assert np.nanmean(maps.reward[half + 4 :]) == pytest.approx(2.0)
+    assert np.nanmean(maps.reward[1 : half // 2]) == pytest.approx(
+        1.33, abs=0.1
+    )  # twice as many steps at half the pace
+    assert np.nanmean(maps.steering_angle) == pytest.approx(np.radians(15))
+    assert maps.grid.shape == (len(maps.visits) + 1, maps.visits.shape[1] + 1, 2)
+    assert not draw_maps(oval, tmp_path, []).rows
+
+
+def test_what_is_no_trace_is_told(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(RunError):
+        read_laps(tmp_path / "t.csv")

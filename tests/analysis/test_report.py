@@ -1,0 +1,100 @@
+"""The report of real runs: whole, self-contained, and safe against names and code that look like HTML."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from racecraft.agent import ModelMetadata, action_space
+from racecraft.analysis import pay_laps, write_report
+from racecraft.analysis.svg import Chart, Curve, line_chart, nice_ticks
+from racecraft.errors import RewardError, RunError
+from racecraft.race.run_evaluation import evaluate_run
+from racecraft.run import RunFolder
+from racecraft.track import load_track
+from racecraft.training import Until
+from racecraft.training.job import Training
+from racecraft.training.settings import make_settings
+from racecraft.training.start import start_run
+
+REWARD = "def reward_function(params):\n    # <script>alert(1)</script> & more\n    return params['speed']\n"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    metadata = ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
+    settings = make_settings(metadata=metadata, track="oval", until=Until(steps=3000), seed=1, num_threads=1)
+    root = tmp_path_factory.mktemp("runs")
+    folder = start_run(settings, reward=REWARD, metadata=metadata, root=root, name="a-run")
+    Training(folder).run()
+    evaluate_run(folder.path, laps=1, num_trials=2, rules="first_lap", video=False, num_threads=1)
+    return folder.path
+
+
+def test_a_report_needs_nothing_else(run: Path) -> None:
+    path = write_report(run)
+    assert path == run / "report.html"
+    text = path.read_text()
+    assert "<script" not in text
+    assert "&lt;script&gt;" in text
+    assert re.search(r"(?:src|href)=", text) is None
+    assert "http" not in text.replace("http-equiv", "")
+    assert "default-src 'none'" in text
+    for heading in ("Learning", "Laps of the last evaluation", "Where it was paid", "Actions", "Settings"):
+        assert f"<h2>{heading}</h2>" in text
+    assert str(run.parent) not in text
+    for picture in re.findall(r"<svg.*?</svg>", text, re.DOTALL):
+        ElementTree.fromstring(picture)
+        assert "nan" not in picture
+    assert len(text) < 2_000_000
+
+
+def test_a_run_that_was_never_trained_has_a_report_too(run: Path, tmp_path: Path) -> None:
+    metadata = RunFolder(run).read_model_metadata()
+    settings = make_settings(metadata=metadata, track="oval")
+    folder = start_run(settings, reward=REWARD, metadata=metadata, root=tmp_path, name="new")
+    text = write_report(folder.path, tmp_path / "deep" / "r.html").read_text()
+    assert "Reward function" in text
+    assert "<h2>Learning</h2>" not in text
+
+
+def test_what_cannot_be_reported_is_told(run: Path, tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="There is no run"):
+        write_report(tmp_path / "none")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunError, match="cannot be written"):
+        write_report(run, tmp_path / "file" / "r.html")
+
+
+def test_laps_are_paid_anew(run: Path) -> None:
+    (trace,) = run.glob("evaluation-*/evaluation-simtrace/0-iteration.csv")
+    track = load_track("oval")
+    laps = pay_laps("def reward_function(params):\n    return params['x']\n", track, trace)
+    assert len(laps) == 2
+    for lap in laps:
+        assert lap.rewards == pytest.approx(lap.points[:, 0], abs=1e-4)
+    with pytest.raises(RewardError):
+        pay_laps("def reward_function(params):\n    return 1 / 0\n", track, trace)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [(0, 1, [0, 0.2, 0.4, 0.6, 0.8, 1.0]), (3, 3, [3]), (-10, 90, [0, 20, 40, 60, 80])],
+)
+def test_ticks_are_round_numbers(low: float, high: float, expected: list[float]) -> None:
+    assert nice_ticks(low, high) == pytest.approx(expected)
+
+
+def test_charts_know_gaps_and_emptiness() -> None:
+    x = np.arange(4.0)
+    curve = Curve(label="<a>", x=x, y=np.array([1.0, np.nan, 2.0, 3.0]))
+    drawn = line_chart(Chart(curves=[curve], x_label="x", y_label="y"))
+    (path,) = re.findall(r'class="curve first" d="([^"]*)"', drawn)
+    assert path.count("M") == 2
+    assert "&lt;a&gt;" in drawn
+    nothing = Curve(label="", x=x, y=np.full(4, np.nan))
+    assert line_chart(Chart(curves=[nothing], x_label="x", y_label="y")) == ""

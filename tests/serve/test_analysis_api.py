@@ -1,0 +1,154 @@
+"""Laps, maps, saliency, report and the choices of a new model, from a real console."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import httpx
+import pytest
+from running_consoles import RunningConsole
+
+GATE = "def reward_function(params):\n    return params['speed']\n"
+
+
+def refused(reply: httpx.Response, status: int, text: str = "") -> None:
+    assert reply.status_code == status, reply.text
+    assert text in reply.json()["error"]["message"]
+
+
+@pytest.fixture(scope="module")
+def raced(console: RunningConsole) -> tuple[RunningConsole, str, str]:
+    """A model that was trained a little and raced once; its name and the race's stamp."""
+    client = console.client
+    name = console.create(name="raced", track="oval", until="3000 steps", seed=1)
+    job = client.get("/api/jobs", params={"run": name}).json()[0]
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    request = {"laps": 1, "num_trials": 2, "rules": "first_lap"}
+    job = client.post(f"/api/models/{name}/evaluations", json=request).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    return console, name, client.get(f"/api/models/{name}/evaluations").json()[0]["stamp"]
+
+
+def test_laps_with_their_sectors(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, stamp = raced
+    found = console.client.get(f"/api/models/{name}/evaluations/{stamp}/laps").json()
+    assert found["track"] == "oval"
+    assert sum(s["end"] - s["start"] for s in found["sectors"]) == pytest.approx(found["length"])
+    assert [lap["number"] for lap in found["laps"]] == [1, 2]
+    for lap in found["laps"]:
+        assert len(lap["passages"]) == len(found["sectors"])
+        columns = ("time", "share", "x", "y", "heading", "speed", "throttle", "steering", "reward")
+        assert len({len(lap[column]) for column in columns}) == 1
+    for wrong in ("20200101000000", "x", "..", "٣"):
+        refused(console.client.get(f"/api/models/{name}/evaluations/{wrong}/laps"), 404)
+
+
+def test_saliency_of_one_moment(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, stamp = raced
+    path = f"/api/models/{name}/evaluations/{stamp}/saliency"
+    seen = console.client.get(path, params={"lap": 1, "row": 3}).json()
+    assert (seen["method"], seen["layer"]) == ("Grad-CAM", "conv2")
+    size = seen["height"] * seen["width"]
+    frame, picture = (base64.b64decode(seen[key]) for key in ("frame", "saliency"))
+    assert len(frame) == len(picture) == size
+    assert len(set(frame)) > 10
+    assert max(picture) == 255
+    assert sum(seen["policy"]) == pytest.approx(1, abs=1e-3)
+    assert seen["target"] == max(range(len(seen["policy"])), key=seen["policy"].__getitem__)
+    other = console.client.get(path, params={"lap": 1, "row": 3, "target": 0}).json()
+    assert other["target"] == 0
+    refused(console.client.get(path, params={"lap": 9, "row": 3}), 404, "no step 3 in lap 9")
+    refused(console.client.get(path, params={"lap": 1, "row": 10**6}), 404)
+    refused(console.client.get(path, params={"lap": 1, "row": 3, "target": 50}), 404, "no output 50")
+    refused(console.client.get(path, params={"lap": 1}), 422, "row")
+
+
+def test_maps_of_a_training(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, _ = raced
+    maps = console.client.get(f"/api/models/{name}/maps").json()
+    assert maps["shown"] == maps["iterations"]
+    assert sum(map(sum, maps["visits"])) == maps["rows"] > 100
+    assert len(maps["grid"]) == len(maps["visits"]) + 1
+    assert sum(maps["usage"]) == pytest.approx(1, abs=1e-3)
+    none = console.client.get(f"/api/models/{name}/maps", params={"first": 999}).json()
+    assert none["shown"] == []
+    assert none["rows"] == 0
+    fresh = console.create(name="fresh", train=False)
+    assert console.client.get(f"/api/models/{fresh}/maps").json()["iterations"] == []
+
+
+def test_the_report_is_a_file_to_keep(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, _ = raced
+    reply = console.client.get(f"/api/models/{name}/report")
+    assert reply.headers["content-type"].startswith("text/html")
+    assert reply.headers["content-disposition"] == f'attachment; filename="{name}-report.html"'
+    assert "Laps of the last evaluation" in reply.text
+
+
+def test_a_reward_pays_the_last_laps_of_a_model_anew(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, _ = raced
+    request = {"source": GATE, "track": "oval", "run": name}
+    laps = console.client.post("/api/rewards/check", json=request).json()["laps"]
+    assert len(laps) == 2
+    assert all(len(lap["points"]) == len(lap["rewards"]) > 3 for lap in laps)
+    assert {round(reward, 3) for lap in laps for reward in lap["rewards"]} <= {1.0, 2.0}
+    elsewhere = {**request, "track": "hairpin"}
+    assert console.client.post("/api/rewards/check", json=elsewhere).json()["laps"] == []
+    refused(console.client.post("/api/rewards/check", json={**request, "run": "nobody"}), 404)
+
+
+def test_choices_can_all_be_chosen(console: RunningConsole) -> None:
+    choices = console.client.get("/api/choices").json()
+    assert {"lr", "batch_size", "beta_entropy"} <= {number["name"] for number in choices["hyperparameters"]}
+    for number in choices["hyperparameters"]:
+        assert number["low"] <= number["safe_low"] < number["safe_high"] <= number["high"]
+        assert number["low"] <= number["default"] <= number["high"]
+    for key, field in (
+        ("vehicles", "vehicle"),
+        ("races", "race"),
+        ("randomizations", "randomize"),
+        ("critics", "critic"),
+    ):
+        for choice in choices[key]:
+            console.create(track="oval", train=False, **{field: choice})
+    console.create(track="oval", train=False, sensors=[choices["sensors"][0]], network=choices["networks"][0])
+    for algorithm in choices["algorithms"]:
+        actions = "continuous" if algorithm == "sac" else "default"
+        console.create(track="oval", train=False, algorithm=algorithm, actions=actions)
+    console.create(track="oval", train=False, hyperparameters=choices["aws"])
+    console.create(track="oval", train=False, tuning=choices["fast"])
+
+
+def test_a_race_among_bots_tuned_by_hand(console: RunningConsole) -> None:
+    tuning = {"lr": 0.002, "discount_factor": 0.97, "loss_type": "huber"}
+    race = {"race": "head-to-bot", "objects": 2, "bot_speed": 0.4, "lane_changes": True}
+    actions = [{"steering_angle": angle, "speed": 1.5} for angle in (-20, 0, 20)]
+    metadata = {"action_space": actions, "neural_network": "RACECRAFT_SMALL", "sensor": ["FRONT_FACING_CAMERA"]}
+    name = console.create(track="oval", train=False, tuning=tuning, model_metadata=metadata, **race)
+    detail = console.client.get(f"/api/models/{name}").json()
+    assert detail["settings"]["ppo"]["learning_rate"] == 0.002
+    assert detail["settings"]["ppo"]["gamma"] == 0.97
+    assert detail["settings"]["ppo"]["value_loss"] == "huber"
+    assert detail["settings"]["objects"]["bots"]["count"] == 2
+    assert len(detail["model_metadata"]["action_space"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({"objects": 3}, "time-trial"),
+        ({"race": "demolition"}, "demolition"),
+        ({"randomize": "/etc/passwd"}, "randomize"),
+        ({"critic": "film"}, "film"),
+        ({"algorithm": "luck"}, "luck"),
+        ({"algorithm": "sac"}, "continuous"),
+        ({"algorithm": "sac", "actions": "continuous", "tuning": {}}, "tuning"),
+        ({"sensors": ["NOSE"]}, "NOSE"),
+        ({"tuning": {"lr": 1.0}}, "lr"),
+        ({"tuning": {"lr": 0.001}, "hyperparameters": {}}, "tuning"),
+        ({"sensors": ["FRONT_FACING_CAMERA"], "model_metadata": {}}, "sensors"),
+    ],
+)
+def test_choices_that_do_not_go_together(console: RunningConsole, settings: dict[str, Any], text: str) -> None:
+    refused(console.client.post("/api/models", json={"train": False, **settings}), 422, text)

@@ -1,0 +1,204 @@
+"""Create, watch, race, analyse and compare in real headless Chromium, against a real server and short trainings."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from running_consoles import PATIENCE, RunningConsole, running_console
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+ROOT = Path(__file__).parents[2]
+AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+PAGES = ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html"
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not PAGES.exists(), reason="the pages are not built: make console builds them"),
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
+]
+
+
+@pytest.fixture(scope="module")
+def studio() -> Iterator[tuple[RunningConsole, Page]]:
+    """A console with two small models that have raced, and a page in it; complaints of the page fail the tests."""
+    from playwright.sync_api import sync_playwright
+
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        running_console(Path(folder) / "runs") as console,
+        sync_playwright() as playwright,
+    ):
+        for name, reward in (("left", "racing"), ("right", "centerline")):
+            console.create(name=name, track="oval", until="6000 steps", seed=1, reward=reward)
+            job = console.client.get("/api/jobs", params={"run": name}).json()[0]
+            assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+            request = {"laps": 1, "num_trials": 2, "rules": "first_lap"}
+            job = console.client.post(f"/api/models/{name}/evaluations", json=request).json()
+            assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+        arguments = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        page = browser.new_page()
+        page.set_default_timeout(1000 * PATIENCE)
+        cookie = console.client.cookies["racecraft_session"]
+        page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
+        complaints: list[str] = []
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        yield console, page
+        browser.close()
+        assert complaints == []
+
+
+def visit(studio: tuple[RunningConsole, Any], path: str) -> Any:
+    console, page = studio
+    page.goto(f"{console.client.base_url}{path}")
+    page.locator("h1").wait_for()
+    return page
+
+
+def test_an_action_is_pulled_and_pushed_and_the_model_is_made_of_it(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/create")
+    page.get_by_text("The function is fine.").wait_for()
+    first = page.get_by_role("button", name="Action 0: right 30°")
+    first.focus()
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("ArrowUp")
+    page.get_by_role("button", name="Action 0: right 29°, 1.10 m/s").wait_for()
+    assert page.get_by_role("spinbutton", name="Speed 0").input_value() == "1.1"
+    page.get_by_role("spinbutton", name="Steering 1", exact=True).fill("-12.5")
+    page.keyboard.press("Tab")
+    box = page.get_by_role("button", name="Action 5: straight").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2 - 60, box["y"] + box["height"] / 2 + 20, steps=5)
+    page.mouse.up()
+    assert page.get_by_role("button", name="Action 5: straight").count() == 0
+    page.get_by_role("button", name="Add an action").click()
+    page.get_by_role("button", name="Head to bot").click()
+    page.get_by_role("spinbutton", name="Bot cars").fill("2")
+    page.get_by_role("group", name="Train until").get_by_role("button", name="Steps").click()
+    page.get_by_role("spinbutton", name="Steps").fill("2000")
+    page.locator("summary", has_text="Learning").click()
+    rate = page.locator("#hp-lr")
+    rate.fill("0.005")
+    rate.press("Tab")
+    page.get_by_text("Outside of what is safe").wait_for()
+    page.locator("summary", has_text="More settings").click()
+    page.get_by_role("textbox", name="Name").fill("mine")
+    page.get_by_role("radio", name="Paperclip").click()
+    page.get_by_role("button", name="Train now").first.click()
+    page.get_by_text("cars learning at once").or_(page.locator(".badge.finished")).first.wait_for()
+    made = studio[0].client.get("/api/models/mine").json()
+    actions = made["model_metadata"]["action_space"]
+    assert len(actions) == 11
+    assert (actions[0]["steering_angle"], actions[0]["speed"]) == (-29, 1.1)
+    assert actions[1]["steering_angle"] == -12.5
+    assert actions[5]["steering_angle"] > 0
+    assert made["settings"]["objects"]["bots"]["count"] == 2
+    assert made["settings"]["ppo"]["learning_rate"] == 0.005
+    page.locator(".badge.finished").wait_for()
+
+
+def test_a_reward_is_painted_along_the_last_laps_of_a_model(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/create/oval")
+    page.get_by_text("The function is fine.").wait_for()
+    page.get_by_label("Paint it along the last laps of").select_option("left")
+    page.get_by_text("Paid for these laps").wait_for()
+
+
+def test_a_lap_is_scrubbed_with_a_ghost_beside_it(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/models/left/race")
+    page.get_by_role("slider", name="Moment of the lap").wait_for()
+    page.get_by_label("Add a ghost").select_option(label="right")
+    page.get_by_role("button", name="Remove the ghost: right").wait_for()
+    page.get_by_text("Time behind the chosen lap").first.wait_for()
+    slider = page.get_by_role("slider", name="Moment of the lap")
+    slider.fill("1")
+    assert slider.get_attribute("aria-valuetext") == "1.00 s"
+    place = page.locator(".now").get_attribute("cx")
+    page.get_by_role("img", name="Speed, m/s").click(position={"x": 300, "y": 60})
+    page.wait_for_function("place => document.querySelector('.now').getAttribute('cx') !== place", arg=place)
+    page.get_by_role("button", name="Driver").click()
+    page.get_by_role("button", name="Play", exact=True).click()
+    page.get_by_role("button", name="Pause", exact=True).wait_for()
+    assert page.get_by_role("region", name="Results").locator("tbody tr").count() == 2
+
+
+@pytest.mark.parametrize(("kind", "begins"), [("CSV", b'"Place'), ("SVG", b"<svg"), ("PNG", b"\x89PNG")])
+def test_a_chart_is_kept_as_a_file(studio: tuple[RunningConsole, Any], kind: str, begins: bytes) -> None:
+    page = visit(studio, "/models/left/race")
+    page.locator(".u-over").first.wait_for()
+    page.locator("summary[aria-label*='Speed, m/s']").click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name=kind, exact=True).locator("visible=true").click()
+    assert download.value.suggested_filename == f"speed-m-s.{kind.lower()}"
+    assert Path(download.value.path()).read_bytes().startswith(begins)
+
+
+def test_maps_and_saliency(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/models/left/analysis")
+    map_of = page.get_by_role("img", name="Where it happened: Reward")
+    map_of.wait_for()
+    assert page.locator("section[aria-label='Where it happened'] svg path").count() > 50
+    page.get_by_role("button", name="Action", exact=True).click()
+    page.get_by_role("img", name="Where it happened: Action").wait_for()
+    page.get_by_role("checkbox", name="The whole training").uncheck()
+    page.get_by_text("Iteration 0").wait_for()
+    page.get_by_text("Grad-CAM on conv2").wait_for()
+    before = page.locator("canvas").screenshot()
+    page.get_by_role("slider", name="Moment of the lap").fill("30")
+    page.wait_for_timeout(1500)
+    assert page.locator("canvas").screenshot() != before
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download the report").click()
+    assert b"Laps of the last evaluation" in Path(download.value.path()).read_bytes()
+
+
+def test_models_are_compared(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/compare/left")
+    page.get_by_role("button", name="right oval").click()
+    page.wait_for_url("**/compare/left/right")
+    page.get_by_role("region", name="Reward code").wait_for()
+    assert page.locator("tr.removed").count() > 3
+    assert page.get_by_role("region", name="Results").locator("tbody tr").count() == 2
+
+
+def test_training_goes_on_with_a_changed_reward(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/models/right/setup")
+    editor = page.locator(".cm-content")
+    editor.click()
+    page.keyboard.press("ControlOrMeta+a")
+    page.keyboard.insert_text("def reward_function(params):\n    return params['speed']\n")
+    page.get_by_label("Go on until").last.fill("7000 steps")
+    page.get_by_role("button", name="Go on with this reward").click()
+    page.wait_for_url("**/models/right/watch")
+    page.locator(".badge.finished").wait_for()
+    assert studio[0].client.get("/api/models/right").json()["reward"].endswith("return params['speed']\n")
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="web/node_modules is not installed")
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_serious_in_the_studio(studio: tuple[RunningConsole, Any], theme: str) -> None:
+    page = studio[1].context.new_page()  # axe itself tries what the page's policy forbids
+    page.add_init_script(f"localStorage.setItem('racecraft-theme', '{theme}')")
+    found = {}
+    own = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "setup")]
+    for path in ("/create", "/compare/left/right", *own):
+        visit((studio[0], page), path)
+        page.wait_for_timeout(1500)
+        page.evaluate("document.querySelectorAll('details:not(.keep)').forEach(part => { part.open = true; })")
+        page.evaluate(AXE.read_text())
+        result = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
+        for violation in result["violations"]:
+            if violation["impact"] in ("serious", "critical"):
+                found[f"{path}: {violation['id']}"] = [node["html"][:160] for node in violation["nodes"][:3]]
+    page.close()
+    assert found == {}

@@ -1,0 +1,61 @@
+/** Action spaces as people edit them: degrees and m/s, within what the car can do. */
+import type { Action, ActionPreset } from "../api/client";
+
+export const MAX_STEERING = 30;
+export const [MIN_SPEED, MAX_SPEED] = [0.1, 4];
+export const [MIN_ACTIONS, MAX_ACTIONS] = [2, 30];
+export const REACH = 92; // px of the fastest arrow
+
+export const clamp = (value: number, low: number, high: number) => Math.min(Math.max(value, low), high);
+
+/** An action the car can do, in half degrees and twentieths of a metre a second. */
+export const tidy = (action: Action): Action => ({
+  steering_angle: clamp(Math.round(action.steering_angle * 2) / 2, -MAX_STEERING, MAX_STEERING) + 0,
+  speed: clamp(Math.round(action.speed * 20) / 20, MIN_SPEED, MAX_SPEED),
+});
+
+/** The speed that the longest arrow stands for: room to pull beyond the fastest action. */
+export const scaleOf = (actions: Action[]): number => [1, 1.5, 2.5].find((top) => actions.every((action) => action.speed <= top)) ?? MAX_SPEED;
+
+/** Where an arrow ends on the picture; steering is drawn twice as wide as it is. */
+export function tip(action: Action, top: number): [number, number] {
+  const turn = (2 * action.steering_angle * Math.PI) / 180;
+  const length = (REACH * action.speed) / top;
+  return [100 - Math.sin(turn) * length, 108 - Math.cos(turn) * length];
+}
+
+/** The action whose arrow ends at a place. */
+export function actionAt(x: number, y: number, top: number): Action {
+  const [left, up] = [100 - x, 108 - y];
+  const turn = Math.atan2(left, Math.max(up, 1e-6));
+  return tidy({ steering_angle: (turn * 90) / Math.PI, speed: (Math.hypot(left, up) / REACH) * top });
+}
+
+/** Every angle with every speed, as the original's console makes them. */
+export function grid(maxSteering: number, angles: number, maxSpeed: number, speeds: number): Action[] {
+  const found: Action[] = [];
+  for (let angle = 0; angle < angles; angle++)
+    for (let speed = 1; speed <= speeds; speed++)
+      found.push({ steering_angle: angles > 1 ? +(-maxSteering + (2 * maxSteering * angle) / (angles - 1)).toFixed(3) : 0, speed: +((maxSpeed * speed) / speeds).toFixed(3) });
+  return found;
+}
+
+const near = (a: number, b: number) => Math.abs(a - b) < 1e-3;
+
+export const sameSpace = (a: ActionPreset, b: ActionPreset): boolean =>
+  a.kind === b.kind &&
+  a.actions.length === b.actions.length &&
+  a.actions.every((action, index) => near(action.steering_angle, b.actions[index]!.steering_angle) && near(action.speed, b.actions[index]!.speed)) &&
+  (a.kind === "discrete" || [...(a.steering_angle ?? []), ...(a.speed ?? [])].every((value, index) => near(value, [...(b.steering_angle ?? []), ...(b.speed ?? [])][index]!)));
+
+/** The original's document of an action space. */
+export const metadataOf = (space: ActionPreset): Record<string, unknown> =>
+  space.kind === "discrete"
+    ? { action_space_type: "discrete", action_space: space.actions.map((action, index) => ({ ...action, index })) }
+    : {
+        action_space_type: "continuous",
+        action_space: {
+          steering_angle: { low: space.steering_angle![0], high: space.steering_angle![1] },
+          speed: { low: space.speed![0], high: space.speed![1] },
+        },
+      };

@@ -1,0 +1,92 @@
+/** Laps of an evaluation: where a car was at a moment, and two laps on one axis of place. */
+import type { components } from "../api/schema";
+
+export type LapTrace = components["schemas"]["LapTrace"];
+export type EvaluationLaps = components["schemas"]["EvaluationLaps"];
+
+export const PLACES = 241;
+
+/** Index of the last entry that is not above a value, in a list that never falls. */
+export function before(list: number[], value: number): number {
+  let [low, high] = [0, list.length - 1];
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (list[middle]! <= value) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
+
+/** Value of a column where another one, which never falls, has a value; straight in between. */
+export function interpolate(at: number, along: number[], values: number[]): number {
+  const row = before(along, at);
+  const next = Math.min(row + 1, along.length - 1);
+  const width = along[next]! - along[row]!;
+  const share = width > 0 ? Math.min(Math.max((at - along[row]!) / width, 0), 1) : 0;
+  return values[row]! + (values[next]! - values[row]!) * share;
+}
+
+/** Where a lap's car is so many seconds after its start; it waits at the end. */
+export function poseAt(lap: LapTrace, seconds: number): { x: number; y: number; heading: number; share: number } {
+  const row = before(lap.time, seconds);
+  const next = Math.min(row + 1, lap.time.length - 1);
+  const jump = Math.hypot(lap.x[next]! - lap.x[row]!, lap.y[next]! - lap.y[row]!) > 1;
+  const width = lap.time[next]! - lap.time[row]!;
+  const share = jump || width <= 0 ? 0 : Math.min(Math.max((seconds - lap.time[row]!) / width, 0), 1);
+  const turn = Math.atan2(Math.sin(lap.heading[next]! - lap.heading[row]!), Math.cos(lap.heading[next]! - lap.heading[row]!));
+  const heading = lap.heading[row]! + turn * share;
+  const [x, y] = [lap.x[row]! + (lap.x[next]! - lap.x[row]!) * share, lap.y[row]! + (lap.y[next]! - lap.y[row]!) * share];
+  // a trace speaks of the point 0.14 m ahead of the car's middle
+  return { x: x - 0.14 * Math.cos(heading), y: y - 0.14 * Math.sin(heading), heading, share: interpolate(seconds, lap.time, lap.share) };
+}
+
+/** Values of a column at equal shares of the lap, null beyond where it ended. */
+export function alongLap(lap: LapTrace, values: number[]): (number | null)[] {
+  const last = lap.share[lap.share.length - 1]!;
+  return Array.from({ length: PLACES }, (_, index) => {
+    const share = index / (PLACES - 1);
+    return share > last + 1e-6 ? null : interpolate(share, lap.share, values);
+  });
+}
+
+/** Seconds by which a lap is behind another at equal shares of the lap. */
+export function timeDelta(lap: LapTrace, against: LapTrace): (number | null)[] {
+  const [mine, theirs] = [alongLap(lap, lap.time), alongLap(against, against.time)];
+  return mine.map((value, index) => (value === null || theirs[index] == null ? null : value - theirs[index]!));
+}
+
+/** Laps from the fastest complete one on; those that were not completed by how far they came. */
+export const byPace = (laps: LapTrace[]): LapTrace[] =>
+  [...laps].sort((a, b) => Number(b.is_complete) - Number(a.is_complete) || (a.is_complete ? a.seconds - b.seconds : b.share.at(-1)! - a.share.at(-1)!));
+
+export interface CornerRow {
+  number: number;
+  turn: number;
+  apex: number;
+  seconds: number | null;
+  best: number | null;
+  lost: number | null;
+  entry: number | null;
+  slowest: number | null;
+  exit: number | null;
+}
+
+/** A lap corner by corner, against the best passage of all laps. */
+export function cornerReport(laps: EvaluationLaps, lap: LapTrace): CornerRow[] {
+  return laps.sectors.map((sector, index) => {
+    const times = laps.laps.map((other) => other.passages[index]?.seconds).filter((seconds) => seconds !== undefined);
+    const mine = lap.passages[index];
+    const best = times.length ? Math.min(...times) : null;
+    return {
+      number: sector.number,
+      turn: sector.turn,
+      apex: sector.apex,
+      seconds: mine?.seconds ?? null,
+      best,
+      lost: mine && best !== null ? mine.seconds - best : null,
+      entry: mine?.entry_speed ?? null,
+      slowest: mine?.slowest ?? null,
+      exit: mine?.exit_speed ?? null,
+    };
+  });
+}
