@@ -101,7 +101,7 @@ def test_translation_and_interpreter_agree(source, device, rows):
     text = PYTHON if source == "python" else (PRESETS / f"{source}.py").read_text()
     with RewardWorker(text, list(TRACKS)) as worker:
         reward_of(text, device).prove(worker, rows)
-        assert len(set(worker(rows).tolist())) > 2
+        assert len(set(worker(rows).tolist())) > 1
 
 
 def test_what_python_raises_is_not_a_number():

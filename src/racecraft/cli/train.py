@@ -80,6 +80,7 @@ def train(
         ),
     ] = 4096,
     num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
+    device: Annotated[str, typer.Option("--device", help="cpu, or cuda: simulator and learner on a GPU.")] = "cpu",
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the run.")] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
     resume: Annotated[Path | None, typer.Option("--resume", help="Continue this run from its last checkpoint.")] = None,
@@ -143,6 +144,7 @@ def train(
                 "objects": on_track,
                 "num_envs": num_envs,
                 "num_threads": num_threads,
+                "device": device,
                 "evaluate_every": evaluate_every,
             }
             # What is not given is the parent's, or follows from the rest.

@@ -3,6 +3,8 @@
 Nothing here imports torch unless ``make_learner`` is asked for the torch backend.
 """
 
+from typing import Any
+
 from racecraft.errors import ConfigError
 from racecraft.learn.algorithm import Algorithm
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats
@@ -11,7 +13,9 @@ from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 from racecraft.learn.sac import SAC, SACConfig
 
 
-def make_learner(spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0, backend: str = "auto") -> Learner:
+def make_learner(
+    spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0, backend: str = "auto", device: str = "cpu"
+) -> Learner:
     """The learner for this machine.
 
     Args:
@@ -19,10 +23,19 @@ def make_learner(spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 
         seed: Decides the initial weights; None leaves them zero, for others to be loaded.
         num_threads: Threads for forward and backward passes; 0 takes every core the process may use.
         backend: ``"native"``, ``"torch"`` (the reference, needs the extra ``torch``), or ``"auto"``: native.
+        device: ``"cpu"``, or a GPU such as ``"cuda"``, which needs the extra ``cuda``.
 
     Raises:
         ConfigError: There is no such backend, or torch is not installed.
     """
+    if device != "cpu":
+        try:
+            from racecraft.learn.torch_cuda_learner import CudaLearner  # takes seconds
+        except ImportError as error:
+            raise ConfigError(
+                f"Device {device!r} needs PyTorch, which is not installed.", hint="Install 'racecraft[cuda]'."
+            ) from error
+        return CudaLearner(spec, seed=seed, device=device)
     if backend in ("auto", "native"):
         from racecraft.learn.native_learner import NativeLearner  # loads the native core
 
@@ -37,6 +50,25 @@ def make_learner(spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 
             hint="Use backend 'native', or install 'racecraft[torch]'.",
         ) from error
     return TorchLearner(spec, seed=seed, num_threads=num_threads)
+
+
+def make_cuda_ppo(config: PPOConfig, learner: Learner, environment: Any, *, seed: int = 0) -> PPO:
+    """PPO whose rollout stays on the learner's device.
+
+    Args:
+        config: Settings.
+        learner: Made by ``make_learner`` for a device.
+        environment: A ``racecraft.learn.torch_cuda_ppo.DeviceEnvironment``.
+        seed: Decides all sampling and shuffling, together with the number of the iteration.
+
+    Raises:
+        ConfigError: The settings do not fit.
+    """
+    from racecraft.learn.torch_cuda_learner import CudaLearner
+    from racecraft.learn.torch_cuda_ppo import CudaPPO
+
+    assert isinstance(learner, CudaLearner)
+    return CudaPPO(config, learner, environment, seed=seed)
 
 
 __all__ = [
@@ -54,6 +86,7 @@ __all__ = [
     "UpdateStats",
     "forward_operations",
     "initial_weights",
+    "make_cuda_ppo",
     "make_learner",
     "network_names",
     "parameter_count",

@@ -164,7 +164,7 @@ class TorchLearner:
             )
         )
         outputs = torch_networks.policy(parameters, observations, spec=self.spec, dtype=self._dtype)
-        log_probs, entropy = _log_probs_and_entropy(outputs, actions, is_discrete=self.spec.is_discrete)
+        log_probs, entropy = log_probs_and_entropy(outputs, actions, is_discrete=self.spec.is_discrete)
         log_ratio = log_probs - old_log_probs
         ratio = log_ratio.exp()
         clipped = ratio.clamp(1 - objective.clip_coef, 1 + objective.clip_coef)
@@ -219,7 +219,7 @@ class TorchLearner:
             view.copy_(torch.from_numpy(np.asarray(arrays[name], np.float32)))
 
 
-def _log_probs_and_entropy(outputs: Tensor, actions: Tensor, *, is_discrete: bool) -> tuple[Tensor, Tensor]:
+def log_probs_and_entropy(outputs: Tensor, actions: Tensor, *, is_discrete: bool) -> tuple[Tensor, Tensor]:
     """Log-probability of each action (B,), and the sum of the distributions' entropies ()."""
     if is_discrete:
         log_probs = functional.log_softmax(outputs, dim=1)

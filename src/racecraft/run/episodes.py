@@ -67,7 +67,9 @@ class EpisodeCounter:
             done: Which episodes end with this step, terminated or truncated   (N,).
         """
         self.rewards += np.asarray(rewards, dtype=np.float64)
-        return [self._end(int(env), rows[env]) for env in np.flatnonzero(done)]
+        ended = [self.end(int(env), rows[env], reward=float(self.rewards[env])) for env in np.flatnonzero(done)]
+        self.rewards[done] = 0.0
+        return ended
 
     def abandon(self, mask: NDArray[np.bool_]) -> None:
         """Forget the episodes that the cars of the mask (N,) have under way; they get no number."""
@@ -79,18 +81,18 @@ class EpisodeCounter:
         self.clock = start + duration + STEP_SECONDS
         return start
 
-    def _end(self, env: int, row: NDArray[np.float64]) -> Episode:
+    def end(self, env: int, row: NDArray[np.float64], *, reward: float) -> Episode:
+        """Number an episode by its last judged row and the sum of its rewards."""
         duration = float(row[_TIME])
         episode = Episode(
             number=self.number,
             env=env,
             steps=int(row[_STEPS]),
-            reward=float(self.rewards[env]),
+            reward=reward,
             progress=float(row[_PROGRESS]),
             status=STATUS_NAMES[int(row[_STATUS])],
             start_time=self.place(duration),
             duration=duration,
         )
         self.number += 1
-        self.rewards[env] = 0.0
         return episode

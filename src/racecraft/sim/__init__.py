@@ -2,6 +2,7 @@
 
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATE_COLUMNS, STATUS_NAMES
+from racecraft.sim.cuda_simulation import CudaSimulation
 from racecraft.sim.objects import (
     NO_OBJECTS,
     Bots,
@@ -27,6 +28,7 @@ __all__ = [
     "STATUS_NAMES",
     "Bots",
     "CameraSpec",
+    "CudaSimulation",
     "Objects",
     "Obstacles",
     "Randomization",

@@ -164,6 +164,10 @@ class CudaSimulation:
         self._launch("reset_cars", self._car_blocks, _native.CAR_THREADS, address, keys)
         self.draw()
 
+    def address(self, name: str) -> int:
+        """Where an array of the batch (native/include/racecraft/batch.hpp) lies on the device."""
+        return self._addresses[name]
+
     # ---- the parts of a step, for who needs what lies between
 
     def move(self, actions: OnDevice | NDArray[np.float32]) -> None:

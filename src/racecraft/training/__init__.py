@@ -94,6 +94,10 @@ def train(
         parent=parent,
         **settings,
     )
+    if plan.settings.device != "cpu":
+        from racecraft.gpu import open_device
+
+        open_device(plan.settings.device)  # before anything is written
     run = plan.start(root=root, name=name)
     if reporter is not None:
         for note in plan.notes:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from racecraft.errors import ConfigError
-from racecraft.learn import PPO, SAC, Algorithm, Environment, Learner
+from racecraft.learn import PPO, SAC, Algorithm, Environment, Learner, make_cuda_ppo
+from racecraft.training.cuda_environment import CudaTrainingEnvironment
 from racecraft.training.settings import TrainSettings
 
 
-def make_algorithm(settings: TrainSettings, learner: Learner, environment: Environment) -> Algorithm:
+def make_algorithm(
+    settings: TrainSettings, learner: Learner, environment: Environment | CudaTrainingEnvironment
+) -> Algorithm:
     """The algorithm of a run.
 
     Args:
@@ -21,6 +24,8 @@ def make_algorithm(settings: TrainSettings, learner: Learner, environment: Envir
         ConfigError: It needs a package that is not installed, or does not go with the actions.
     """
     seed, threads = settings.seed, settings.num_threads
+    if isinstance(environment, CudaTrainingEnvironment):
+        return make_cuda_ppo(settings.ppo, learner, environment, seed=seed)
     if settings.algorithm == "sac":
         torch_sac = _import("torch_sac", "sac", extra="torch")
         state_size = learner.spec.state_size

@@ -7,6 +7,7 @@ actions -> *action space* -> commands -> *simulation* -> rows -> *reward worker*
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -18,7 +19,9 @@ from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.errors import RewardError, RunError
 from racecraft.reward.worker import RewardWorker
 from racecraft.run import Episode, EpisodeCounter, PrintLog, SimTraceWriter
-from racecraft.sim.simulation import Simulation
+from racecraft.sim import CudaSimulation, Simulation
+from racecraft.track import Track
+from racecraft.training.settings import TrainSettings
 
 
 class TrainingEnvironment:
@@ -56,6 +59,11 @@ class TrainingEnvironment:
         self.trace_seconds = 0.0
         self._finished: list[Episode] = []
         self._is_driving = np.ones(simulation.num_envs, bool)  # not between an episode's end and the next reset
+
+    @property
+    def shown(self) -> Simulation:
+        """The cars that somebody may watch."""
+        return self.simulation
 
     @property
     def num_envs(self) -> int:
@@ -110,3 +118,27 @@ class TrainingEnvironment:
         """The episodes that ended since the last call."""
         finished, self._finished = self._finished, []
         return finished
+
+
+def open_simulation(
+    settings: TrainSettings, tracks: Sequence[Track], sensors: SensorSuite
+) -> Simulation | CudaSimulation:
+    """The cars of a training, on its device.
+
+    Raises:
+        ConfigError: There is no such device.
+    """
+    common: dict[str, Any] = {
+        "num_envs": settings.num_envs,
+        "seed": settings.seed,
+        "vehicle": settings.vehicle,
+        "start": settings.start,
+        "direction": settings.direction,
+        "track_order": "random" if len(tracks) > 1 else "fixed",
+        "randomize": settings.randomize,
+        "objects": settings.objects,
+        **sensors.simulation_settings(),
+    }
+    if settings.device == "cpu":
+        return Simulation(tracks, num_threads=settings.num_threads, **common)
+    return CudaSimulation(tracks, device=settings.device, **common)

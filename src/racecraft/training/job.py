@@ -43,7 +43,8 @@ from racecraft.run.history import HistoryWriter
 from racecraft.sim import Simulation
 from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.algorithms import make_algorithm
-from racecraft.training.environment import TrainingEnvironment
+from racecraft.training.cuda_environment import CudaTrainingEnvironment
+from racecraft.training.environment import TrainingEnvironment, open_simulation
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
 from racecraft.training.parent import begin_from
@@ -58,7 +59,7 @@ AWS_EPISODES = 20  # between two trainings at AWS; its metrics and sim-traces ar
 class _Session:
     """What a training works with while it runs."""
 
-    environment: TrainingEnvironment
+    environment: TrainingEnvironment | CudaTrainingEnvironment
     algorithm: Algorithm
     evaluator: Evaluator
     trace: SimTraceWriter
@@ -142,21 +143,11 @@ class Training:
         # The learner's backend takes longest to import, so it starts first, beside everything else.
         with ThreadPoolExecutor(1) as pool:
             spec = settings.network_spec(metadata)
-            future = pool.submit(make_learner, spec, seed=settings.seed, num_threads=settings.num_threads)
-            tracks = self._load_tracks()
-            simulation = Simulation(
-                tracks,
-                num_envs=settings.num_envs,
-                seed=settings.seed,
-                vehicle=settings.vehicle,
-                start=settings.start,
-                direction=settings.direction,
-                track_order="random" if len(tracks) > 1 else "fixed",
-                randomize=settings.randomize,
-                objects=settings.objects,
-                num_threads=settings.num_threads,
-                **metadata.suite.simulation_settings(),
+            future = pool.submit(
+                make_learner, spec, seed=settings.seed, num_threads=settings.num_threads, device=settings.device
             )
+            tracks = self._load_tracks()
+            simulation = open_simulation(settings, tracks, metadata.suite)
             if not self.is_checked:
                 require_valid_reward(source, tracks[0])
             learner = future.result()
@@ -203,15 +194,21 @@ class Training:
                 clock=counter.clock,
             )
             prints = stack.enter_context(PrintLog(folder.reward_log))
-            environment = TrainingEnvironment(
-                simulation,
-                worker,
-                metadata.action_space,
-                counter=counter,
-                sensors=metadata.suite,
-                trace=trace,
-                prints=prints,
-            )
+            environment: TrainingEnvironment | CudaTrainingEnvironment
+            if isinstance(simulation, Simulation):
+                environment = TrainingEnvironment(
+                    simulation,
+                    worker,
+                    metadata.action_space,
+                    counter=counter,
+                    sensors=metadata.suite,
+                    trace=trace,
+                    prints=prints,
+                )
+            else:
+                environment = CudaTrainingEnvironment(
+                    simulation, worker, source, metadata.action_space, counter=counter, note=self.reporter.note
+                )
             session = _Session(
                 environment=environment,
                 algorithm=make_algorithm(settings, learner, environment),
@@ -243,7 +240,7 @@ class Training:
         """Train until a limit is reached; its name."""
         algorithm, meter = session.algorithm, self.meter
         meter.begin(steps=algorithm.total_steps)
-        self.reporter.begin(session.environment.simulation, session.evaluator.policy)
+        self.reporter.begin(session.environment.shown, session.evaluator.policy)
         reason = self._limit_reached(session)
         if reason in ("laps", "lap_time", "seconds", "steps"):
             self.reporter.note(f"The limit of {self.settings.until} was reached before; --until sets another.")

@@ -23,7 +23,7 @@ VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v
 ALGORITHMS: Final = ("ppo", "sac", *(f"sb3:{name}" for name in SB3_ALGORITHMS))
 SQUASHED: Final = ("sac", "sb3:sac", "sb3:td3")
 """Algorithms whose best action is the hyperbolic tangent of the policy's mean."""
-_ADDED: Final = ("algorithm", "sac", "sb3")
+_ADDED: Final = ("algorithm", "sac", "sb3", "device")
 """Fields that runs of earlier versions lack."""
 CRITICS: Final = ("privileged", "camera")
 EVALUATE_EVERY: Final = 4096
@@ -42,6 +42,10 @@ RACE_GOOD: Final = 0.6
 SCATTERED: Final = Start(mode="random", lateral_jitter=0.12, heading_jitter=0.2)
 """Where episodes on several tracks start: what the car meets there, no single line prepares it for."""
 MAX_ENVS: Final = 4096  # cars; 80 MB of frames, and more would only wait for each other
+MAX_CUDA_ENVS: Final = 65536  # on a GPU
+CUDA_PPO: Final = PPOConfig(num_envs=1024, num_steps=8, minibatch_size=1024)
+"""A GPU is fast when it has much to do at once; minibatches and steps are a compromise with learning."""
+CUDA_EVALUATE_EVERY: Final = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +86,8 @@ class TrainSettings:
     """Cars that drive one lap in each evaluation."""
     num_threads: int = 0
     """Threads of simulator and learner; 0 takes one per core. Results repeat for the same number."""
+    device: str = "cpu"
+    """Where cars drive and the policy learns: ``cpu``, ``cuda``, or ``cuda:1`` of several GPUs."""
 
     def __post_init__(self) -> None:
         for name, choice, allowed in (
@@ -94,7 +100,7 @@ class TrainSettings:
                 hint = did_you_mean(str(choice), allowed)
                 raise ConfigError(f"{name} is {choice!r}; allowed are {', '.join(allowed)}.", hint=hint)
         for name, value, low, high in (
-            ("num_envs", self.num_envs, 1, MAX_ENVS),
+            ("num_envs", self.num_envs, 1, MAX_ENVS if self.device == "cpu" else MAX_CUDA_ENVS),
             ("seed", self.seed, 0, 2**32 - 1),
             ("evaluate_every", self.evaluate_every, 1, 10**9),
             ("evaluation_trials", self.evaluation_trials, 1, 100),
@@ -105,6 +111,11 @@ class TrainSettings:
         self.randomize.check(self.vehicle, CameraSpec())
         if not isinstance(self.objects, Objects):
             raise ConfigError(f"objects is {self.objects!r}; use racecraft.sim.Objects(...).")
+        kind, _, number = self.device.partition(":") if isinstance(self.device, str) else ("", "", "")
+        if self.device != "cpu" and (kind != "cuda" or (":" in self.device and not number.isdecimal())):
+            raise ConfigError(f"device is {self.device!r}; allowed are 'cpu', 'cuda', and 'cuda:1' for the second GPU.")
+        if self.device != "cpu" and self.algorithm != "ppo":
+            raise ConfigError(f"algorithm is {self.algorithm!r}; device {self.device!r} trains 'ppo' only.")
         if not isinstance(self.until, Until):
             raise ConfigError(f"until is {self.until!r}; allowed is a text such as '5 laps'.")
         if self.until.laps > self.evaluation_trials:
@@ -208,10 +219,10 @@ def make_settings(
     is_race = settings.get("objects", NO_OBJECTS) != NO_OBJECTS
     if is_race:
         settings = {"evaluation_trials": RACE_TRIALS, **settings}
+    is_cuda = settings.get("device", "cpu") != "cpu"
     if settings.get("evaluate_every", 0) == 0:
-        settings["evaluate_every"] = (
-            FAR_EVALUATE_EVERY if is_far else RACE_EVALUATE_EVERY if is_race else EVALUATE_EVERY
-        )
+        often = FAR_EVALUATE_EVERY if is_far else RACE_EVALUATE_EVERY if is_race else EVALUATE_EVERY
+        settings["evaluate_every"] = max(often, CUDA_EVALUATE_EVERY) if is_cuda else often
     algorithm = algorithm or ("sac" if metadata.training_algorithm == "sac" else "ppo")
     _check_actions(algorithm, metadata)
     if algorithm == "sac" and "sac" not in settings:
@@ -225,7 +236,7 @@ def make_settings(
         )
     for name in ("sac", "sb3"):
         if num_envs and algorithm.split(":")[0] == name:
-            _check_num_envs(num_envs)
+            _check_num_envs(num_envs, MAX_ENVS)
             settings[name] = replace(
                 settings.get(name, SACConfig() if name == "sac" else SB3Config()), num_envs=num_envs
             )
@@ -235,12 +246,12 @@ def make_settings(
         learning: dict[str, Any] = hyperparameters.to_ppo()
         ppo = PPOConfig(**learning, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
     elif ppo is None:
-        ppo = FAR_PPO if is_far else RACE_PPO if is_race else PPOConfig()
+        ppo = CUDA_PPO if is_cuda else FAR_PPO if is_far else RACE_PPO if is_race else PPOConfig()
         if metadata.action_space.kind == "continuous":
             # A Gaussian keeps its spread by itself; a bonus for entropy would make it grow and the car restless.
             ppo = replace(ppo, ent_coef=0.0)
     if hyperparameters is None and num_envs:
-        ppo = _with_num_envs(ppo, num_envs)
+        ppo = _with_num_envs(ppo, num_envs, most=MAX_CUDA_ENVS if is_cuda else MAX_ENVS)
     return TrainSettings(
         track=join_names(track),
         randomize=randomize,
@@ -252,17 +263,17 @@ def make_settings(
     )
 
 
-def _with_num_envs(ppo: PPOConfig, num_envs: int) -> PPOConfig:
+def _with_num_envs(ppo: PPOConfig, num_envs: int, *, most: int) -> PPOConfig:
     """The same PPO with other cars: rollouts of about as many samples."""
-    _check_num_envs(num_envs)
+    _check_num_envs(num_envs, most)
     num_steps = max(1, round(ppo.num_envs * ppo.num_steps / num_envs))
     minibatch_size = min(ppo.minibatch_size, num_envs * num_steps)
     return replace(ppo, num_envs=num_envs, num_steps=num_steps, minibatch_size=minibatch_size)
 
 
-def _check_num_envs(num_envs: int) -> None:
-    if not 1 <= num_envs <= MAX_ENVS:
-        raise ConfigError(f"num_envs is {num_envs!r}; allowed is a whole number from 1 to {MAX_ENVS}.")
+def _check_num_envs(num_envs: int, most: int) -> None:
+    if not 1 <= num_envs <= most:
+        raise ConfigError(f"num_envs is {num_envs!r}; allowed is a whole number from 1 to {most}.")
 
 
 def _check_actions(algorithm: str, metadata: ModelMetadata) -> None:
