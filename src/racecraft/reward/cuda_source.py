@@ -228,7 +228,8 @@ class _Function:
     def value(self, node: ast.expr) -> Value:
         match node:
             case ast.Constant(value=value) if isinstance(value, bool | int | float):
-                if not math.isfinite(value) or abs(value) > 2.0**53:
+                is_exact = isinstance(value, float) or abs(value) <= 2**53
+                if not is_exact or not math.isfinite(value):
                     raise NotNumeric(f"it holds the number {value!r}")
                 return f"({float(value)!r})", NUMBER
             case ast.Name(id=name):
