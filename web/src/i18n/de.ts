@@ -447,6 +447,7 @@ export const de: Record<Key, string> = {
   drive_brake: "Bremsen",
   drive_view: "Die Strecke und dein Auto",
   drive_back_to_drawing: "Zurück zur Zeichnung",
+  drive_no_draft: "Es gibt keine Zeichnung, auf der man fahren könnte. Zeichne erst eine Strecke.",
   drive_keep: "Daran weiterzeichnen",
   drive_model_teach: "Ein Modell lernen lassen",
 

@@ -445,6 +445,7 @@ export const en = {
   drive_brake: "Brake",
   drive_view: "The track and your car",
   drive_back_to_drawing: "Back to the drawing",
+  drive_no_draft: "There is no drawing to drive on. Draw a track first.",
   drive_keep: "Draw on it",
   drive_model_teach: "Let a model learn it",
 
