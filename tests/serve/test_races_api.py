@@ -136,7 +136,7 @@ def test_a_race_from_beginning_to_end(console: RunningConsole) -> None:
         console.create(name=name, track="oval", until="3000 steps", seed=len(name) + ord(name[0]))
     for job in client.get("/api/jobs").json():
         assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
-    race = make(console, laps=1, offtrack_penalty=1.0, max_resets=20)
+    race = make(console, laps=1, offtrack_penalty=1.0, max_resets=3)
     assert race["state"] == "open"
     entered = client.post(f"/api/races/{race['id']}/entries", json={"models": ["ada", "bob", "ada"]})
     assert entered.status_code == 202, entered.text
