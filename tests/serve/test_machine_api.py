@@ -16,9 +16,9 @@ def test_folders_storage_devices_and_the_sandbox(console: RunningConsole) -> Non
     found = console.client.get("/api/console/machine").json()
     assert found["runs"] == str(console.runs)
     assert found["tracks"].startswith(found["runs"])
-    assert found["database"] == "SQLite"
+    assert found["database"] in ("SQLite", "PostgreSQL")
     assert found["sandbox"] == "process"
-    assert 0 < found["used_bytes"] < found["total_bytes"]
+    assert 0 <= found["used_bytes"] < found["total_bytes"]
     assert 0 < found["free_bytes"] <= found["total_bytes"]
     assert found["cores"] >= 1
     assert found["instruction_set"] in ("avx512", "avx2", "portable")

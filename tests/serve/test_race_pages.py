@@ -7,16 +7,16 @@ from typing import Any
 
 import pytest
 from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
-from running_consoles import RunningConsole
+from running_consoles import running_console
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 
 @pytest.fixture(scope="module")
-def visit(console: RunningConsole) -> Iterator[Visit]:
-    for name in ("ada", "bob"):
-        console.create(name=name, track="oval", until="3000 steps", seed=ord(name[0]))
-    with visiting(console) as visit:
+def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
+    with running_console(tmp_path_factory.mktemp("pages") / "runs") as console, visiting(console) as visit:
+        for name in ("ada", "bob"):
+            console.create(name=name, track="oval", until="3000 steps", seed=ord(name[0]))
         for job in console.client.get("/api/jobs").json():
             assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
         yield visit

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import pytest
 from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
-from running_consoles import RunningConsole
+from running_consoles import running_console
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 
 @pytest.fixture(scope="module")
-def visit(console: RunningConsole) -> Iterator[Visit]:
-    with visiting(console) as visit:
+def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
+    with running_console(tmp_path_factory.mktemp("pages") / "runs") as console, visiting(console) as visit:
         yield visit
         assert visit.complaints == []
 
