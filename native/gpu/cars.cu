@@ -54,6 +54,6 @@ RC_KERNEL(scan_lidar, kLidarRays) {
                          static_cast<uint32_t>(episode.steps == 1 ? 0 : episode.steps)};
     RC_EACH(ray, kLidarRays) {
         batch.lidar[static_cast<size_t>(env) * kLidarRays + static_cast<size_t>(ray)] =
-            measure_ray(track_of(batch, env).room, pose, objects_of(batch, env), batch.num_objects, ray);
+            measure_ray(track_of(batch, env).room, pose, around(batch, env), ray);
     }
 }

@@ -18,6 +18,11 @@ RC_HD ObjectState* objects_of(const Batch& batch, int32_t env) {
     return batch.objects + static_cast<size_t>(env) * static_cast<size_t>(batch.num_objects);
 }
 
+// What the car has around it; on a GPU every car races alone.
+RC_HD ObjectsAround around(const Batch& batch, int32_t env) {
+    return {objects_of(batch, env), batch.num_objects, batch.num_objects, batch.num_objects};
+}
+
 RC_HD double* row_of(const Batch& batch, int32_t env) {
     return batch.rows + static_cast<size_t>(env) * static_cast<size_t>(batch.row_width);
 }
@@ -43,17 +48,16 @@ RC_HD void store_vehicle(const Batch& batch, int32_t env, const VehicleState& st
 RC_HD void write_objects_of(const Batch& batch, int32_t env, const VehicleState& car, int32_t crashed) {
     if (batch.num_objects == 0) return;
     const Episode& episode = batch.episodes[env];
-    const ObjectState* objects = objects_of(batch, env);
+    const ObjectsAround seen = around(batch, env);
     const float lens_x = car.x + batch.lens_forward * episode.cosine - batch.lens_left * episode.sine;
     const float lens_y = car.y + batch.lens_forward * episode.sine + batch.lens_left * episode.cosine;
     bool in_camera = false;
-    for (int32_t i = 0; i < batch.num_objects && !in_camera; ++i) {
-        in_camera =
-            is_object_in_view(objects[i], lens_x, lens_y, episode.sine, episode.cosine, batch.half_tangent);
+    for (int32_t i = 0; i < seen.count && !in_camera; ++i) {
+        in_camera = is_object_in_view(object_at(seen, i), lens_x, lens_y, episode.sine, episode.cosine,
+                                      batch.half_tangent);
     }
-    const Neighbours closest = closest_objects(objects, batch.num_objects, episode.projection.arc_length);
-    write_objects(objects, batch.num_objects, closest, in_camera, crashed,
-                  row_of(batch, env) + kNumRowColumns);
+    const Neighbours closest = closest_objects(seen, episode.projection.arc_length);
+    write_objects(seen, closest, in_camera, crashed, row_of(batch, env) + kNumRowColumns);
 }
 
 // What a critic sees, and where the car is for the rules of the next step. Frame and LIDAR follow in kernels
@@ -64,8 +68,7 @@ RC_HD void look(const Batch& batch, int32_t env, const VehicleState& car) {
     const TrackGeometry& track = track_of(batch, env);
     observe(track, car, episode, seen);
     if (batch.num_objects > 0) {
-        observe_objects(track, objects_of(batch, env), batch.num_objects, episode.projection.arc_length,
-                        seen + kNumStateColumns);
+        observe_objects(track, around(batch, env), episode.projection.arc_length, seen + kNumStateColumns);
     }
     batch.is_changed[env] = 1;
 }
@@ -125,7 +128,7 @@ RC_HD void begin_episode(const Batch& batch, int32_t env) {
     }
     const VehicleState car =
         start_pose(batch.start, track, static_cast<size_t>(env), static_cast<size_t>(batch.num_envs), draws,
-                   objects, batch.num_objects, episode.start);
+                   around(batch, env), episode.start);
     store_vehicle(batch, env, car);
     look(batch, env, car);
 
@@ -204,8 +207,8 @@ RC_HD void step_car(const Batch& batch, int32_t env, float steering_angle, float
     const float wanted = speed == 0.0f ? 0.0f : clamp(speed, kMinSpeedCommand, kMaxSpeedCommand);
     int32_t crashed = -1;
     if (batch.num_objects > 0) {
-        crashed = find_crash(track, car_footprint(car.x, car.y, episode.sine, episode.cosine),
-                             objects_of(batch, env), batch.num_objects);
+        crashed =
+            find_crash(track, car_footprint(car.x, car.y, episode.sine, episode.cosine), around(batch, env));
     }
     double* row = row_of(batch, env);
     const Verdict verdict = judge(track, batch.limits, car, steering, wanted, is_reversed(batch, env),

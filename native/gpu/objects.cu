@@ -17,7 +17,6 @@ RC_KERNEL(draw_objects, kRowThreads) {
     uint8_t* out = frame_of(batch, RC_BLOCK);
     RC_EACH(row, camera.spec.height) {
         const LensPose lens = lens_of(batch, env, camera, ground_of(batch, env));
-        paint_objects<RC_IMAGE_WIDTH>(camera.spec, lens, objects_of(batch, env), batch.num_objects, row,
-                                      row + 1, out);
+        paint_objects<RC_IMAGE_WIDTH>(camera.spec, lens, around(batch, env), row, row + 1, out);
     }
 }

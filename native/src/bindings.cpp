@@ -259,7 +259,8 @@ void bind_engine(nb::module_& m) {
                int substeps, int num_threads, int laps, int max_steps, double time_limit, int start_mode,
                double start_offset, double start_advance, bool start_spread, float lateral_jitter,
                float heading_jitter, int direction, const ObjectRule& objects, bool has_lidar, float baseline,
-               bool draws_tracks, const std::vector<float>& randomization, const std::string& world) {
+               bool draws_tracks, const std::vector<float>& randomization, const std::string& world,
+               size_t cars_per_race, bool shuffle) {
                 std::vector<TrackStore> stores;
                 for (const bool reversed : {false, true}) {
                     for (const NativeTrack* track : tracks) stores.push_back(track->store(reversed));
@@ -271,12 +272,13 @@ void bind_engine(nb::module_& m) {
                     num_threads,
                     RuleLimits{laps, max_steps, time_limit},
                     StartRule{static_cast<StartMode>(start_mode), start_offset, start_advance, start_spread,
-                              lateral_jitter, heading_jitter},
+                              lateral_jitter, heading_jitter, shuffle},
                     static_cast<Direction>(direction),
                     objects,
                     has_lidar,
                     baseline,
-                    draws_tracks};
+                    draws_tracks,
+                    cars_per_race};
                 std::optional<Randomization> ranges;
                 if (!randomization.empty()) ranges = randomization_of(randomization);
                 new (self) Engine(
@@ -288,7 +290,8 @@ void bind_engine(nb::module_& m) {
             "substeps"_a, "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a,
             "start_offset"_a, "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a,
             "direction"_a, "objects"_a, "has_lidar"_a, "baseline"_a, "draws_tracks"_a = false,
-            "randomization"_a = std::vector<float>(), "world"_a = "2018")
+            "randomization"_a = std::vector<float>(), "world"_a = "2018", "cars_per_race"_a = size_t{1},
+            "shuffle"_a = false)
         .def(
             "reset",
             [](Engine& self, Mask mask, std::optional<Seeds> seeds) {
@@ -453,6 +456,11 @@ NB_MODULE(_native, m) {
     for (const racecraft::Rgb& colour : racecraft::kCarColours)
         colours.append(nb::make_tuple(colour.red, colour.green, colour.blue));
     m.attr("CAR_COLOURS") = nb::tuple(colours);
+    nb::list racers;
+    for (const racecraft::Rgb& colour : racecraft::kRacerColours)
+        racers.append(nb::make_tuple(colour.red, colour.green, colour.blue));
+    m.attr("RACER_COLOURS") = nb::tuple(racers);
+    m.attr("MAX_CARS_PER_RACE") = racecraft::kMaxCarsPerRace;
     m.attr("VEHICLE_PARAMETERS") = racecraft::names_of(racecraft::kVehicleNames);
     m.def("isa", [] { return std::string(racecraft::isa_name(racecraft::current_isa())); });
     m.def("available_isas", [] {

@@ -19,7 +19,7 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
     : config_(config),
       tracks_(std::move(tracks)),
       grounds_(std::move(grounds)),
-      objects_(config.objects, config.num_envs, camera),
+      objects_(config.objects, config.num_envs, config.cars_per_race, camera),
       pool_(config.num_threads),
       colours_(colours),
       vehicle_(vehicle) {
@@ -37,13 +37,14 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
     seeds_.assign(n, config_.seed);
     streams_.resize(n);
     palettes_.assign(n, palette);
+    if (config_.cars_per_race > 1) races_.assign(n / config_.cars_per_race, -1);
     flags_ = std::make_unique<bool[]>(2 * n);
 
     float values[kNumVehicleParameters];
     std::memcpy(values, &vehicle, sizeof(values));
     for (size_t env = 0; env < n; ++env) {
         for (int k = 0; k < kNumVehicleParameters; ++k) parameters_[k * n + env] = values[k];
-        track_choice_[env] = static_cast<int32_t>(env % num_tracks());
+        track_choice_[env] = static_cast<int32_t>(env / config_.cars_per_race % num_tracks());
         streams_[env] = static_cast<uint32_t>(env);
         episodes_[env].episode = -1;
     }
@@ -77,65 +78,35 @@ void Engine::store_vehicle(size_t env, const VehicleState& state) {
     for (size_t k = 0; k < kNumVehicleFields; ++k) vehicles_[k * num_envs() + env] = values[k];
 }
 
-VehicleState Engine::start_pose(size_t env) {
-    const Draws draws{seeds_[env], streams_[env], static_cast<uint32_t>(episodes_[env].episode)};
-    return racecraft::start_pose(config_.start, track_of(env), env, num_envs(), draws,
-                                 objects_.objects_of(env), objects_.count(), episodes_[env].start);
+void Engine::publish(size_t env) {
+    if (!objects_.has_racers()) return;
+    const ObjectKind kind = is_over(env)                      ? ObjectKind::gone_racer
+                            : episodes_[env].frozen_steps > 0 ? ObjectKind::frozen_racer
+                                                              : ObjectKind::racer;
+    objects_.publish(env, track_of(env), vehicle(env), kind);
 }
 
-void Engine::draw_episode(size_t env) {
-    const uint32_t number = static_cast<uint32_t>(episodes_[env].episode);
-    conditions_[env] = draw_conditions(*randomization_, seeds_[env], streams_[env], number);
-    if (!cameras_.empty()) cameras_[env].rebuild(camera_under(conditions_[env], camera_->spec()));
-    if (!right_cameras_.empty()) {
-        right_cameras_[env].rebuild(camera_under(conditions_[env], right_camera_->spec()));
-    }
-    if (!delay_.empty()) {
-        delay_[env] =
-            static_cast<int32_t>(conditions_[env].latency * static_cast<float>(config_.substeps) + 0.5f);
+void Engine::show_others(size_t env) {
+    if (!objects_.has_racers()) return;
+    publish(env);
+    const size_t first = env / config_.cars_per_race * config_.cars_per_race;
+    for (size_t other = first; other < first + config_.cars_per_race; ++other) {
+        if (other != env && !is_over(other)) look(other);
     }
 }
 
-void Engine::begin_episode(size_t env) {
-    Episode& episode = episodes_[env];
-    const int32_t number = episode.episode + 1;
-    episode = Episode{};
-    episode.episode = number;
-    const uint32_t draw = static_cast<uint32_t>(number);
-    if (config_.draws_tracks) {
-        const uint64_t word = philox(seeds_[env], streams_[env], draw, 0, Purpose::track).words[0];
-        track_choice_[env] = static_cast<int32_t>((word * num_tracks()) >> 32);
+void Engine::move_bots(size_t first) {
+    Footprint cars[kMaxCarsPerRace];
+    int32_t num_cars = 0;
+    for (size_t env = first; env < first + config_.cars_per_race; ++env) {
+        const bool is_gone = objects_.has_racers() && is_over(env);
+        if (is_gone || episodes_[env].frozen_steps > 0) continue;
+        const VehicleState car = vehicle(env);
+        float sine, cosine;
+        sincos_of(car.heading, sine, cosine);
+        cars[num_cars++] = car_footprint(car.x, car.y, sine, cosine);
     }
-    if (randomization_ != nullptr) {
-        draw_episode(env);
-        const VehicleParameters car = vehicle_under(conditions_[env], vehicle_);
-        float values[kNumVehicleParameters];
-        std::memcpy(values, &car, sizeof(values));
-        for (size_t k = 0; k < kNumVehicleParameters; ++k) parameters_[k * num_envs() + env] = values[k];
-        palettes_[env] =
-            palette_under(conditions_[env], *randomization_, colours_, seeds_[env], streams_[env], draw);
-        forget_commands(env);
-    }
-    const bool reversed = config_.direction == Direction::reverse ||
-                          (config_.direction == Direction::alternate && (number & 1) != 0);
-    episode.track = track_choice_[env] + (reversed ? static_cast<int32_t>(num_tracks()) : 0);
-    objects_.place(env, track_of(env), seeds_[env], streams_[env], static_cast<uint32_t>(number));
-    const VehicleState state = start_pose(env);
-    store_vehicle(env, state);
-    look(env);
-
-    // The prepare step: the car stands at its start and the row carries no command.
-    const TrackGeometry& track = track_of(env);
-    episode.steps = 1;
-    episode.status = Status::prepare;
-    episode.progress = lap_difference(track, episode.projection.arc_length / track.length, episode.start);
-    episode.last_x = episode.reference_x;
-    episode.last_y = episode.reference_y;
-    write_row(track, episode, state, 0.0f, 0.0f, wheels_on_road(track, state, episode), is_reversed(env),
-              &rows_[env * row_width()]);
-    objects_.write_row(env, episode, state, -1, &rows_[env * row_width() + kNumRowColumns]);
-    terminated()[env] = false;
-    truncated()[env] = false;
+    objects_.advance(first / config_.cars_per_race, track_of(first), draws_of_race(first), cars, num_cars);
 }
 
 void Engine::look(size_t env) {
@@ -153,8 +124,7 @@ void Engine::look(size_t env) {
                              streams_[env],
                              static_cast<uint32_t>(episode.episode),
                              static_cast<uint32_t>(episode.steps)};
-        RC_DISPATCH(scan_lidar, track_of(env).room, pose, objects_.objects_of(env), objects_.count(),
-                    &lidar_[env * kLidarRays]);
+        RC_DISPATCH(scan_lidar, track_of(env).room, pose, objects_.around(env), &lidar_[env * kLidarRays]);
     }
     if (camera_ == nullptr) return;
     const size_t pixels = frames_.size() / (num_envs() * num_lenses());
@@ -170,7 +140,7 @@ void Engine::render(const CameraModel& camera, size_t env, const VehicleState& s
     render_grey(camera, ground, palettes_[env], state.x, state.y, state.heading, frame);
     if (objects_.count() > 0) {
         const LensPose lens = place_lens(camera.view(), ground.view(), state.x, state.y, state.heading);
-        draw_objects(camera.spec(), lens, objects_.objects_of(env), objects_.count(), frame);
+        draw_objects(camera.spec(), lens, objects_.around(env), frame);
     }
     if (randomization_ != nullptr) {
         const Conditions& light = conditions_[env];
@@ -179,24 +149,26 @@ void Engine::render(const CameraModel& camera, size_t env, const VehicleState& s
     }
 }
 
+// Cars to a portion of work: whole races.
 size_t Engine::chunk_size(size_t most) const {
     const size_t parts = 4 * static_cast<size_t>(pool_.num_threads());
-    return std::clamp((num_envs() + parts - 1) / parts, size_t{1}, most);
+    const size_t cars = std::clamp((num_envs() + parts - 1) / parts, size_t{1}, most);
+    return (cars + config_.cars_per_race - 1) / config_.cars_per_race * config_.cars_per_race;
 }
 
 void Engine::reset(const bool* mask, const uint64_t* seeds) {
     const std::lock_guard lock(mutex_);
     const size_t chunk = chunk_size(kLanes);
     pool_.for_each((num_envs() + chunk - 1) / chunk, [&](size_t part) {
-        for (size_t env = part * chunk; env < std::min((part + 1) * chunk, num_envs()); ++env) {
+        const size_t end = std::min((part + 1) * chunk, num_envs());
+        for (size_t env = part * chunk; env < end && seeds != nullptr; ++env) {
             if (mask != nullptr && !mask[env]) continue;
-            if (seeds != nullptr) {
-                seeds_[env] = seeds[env];
-                streams_[env] = 0;
-                episodes_[env].episode = -1;
-            }
-            begin_episode(env);
+            seeds_[env] = seeds[env];
+            streams_[env] = static_cast<uint32_t>(env % config_.cars_per_race);
+            episodes_[env].episode = -1;
+            if (!races_.empty()) races_[env / config_.cars_per_race] = -1;
         }
+        for (size_t env = part * chunk; env < end; env += config_.cars_per_race) begin_race(env, mask);
     });
 }
 
@@ -222,7 +194,7 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
         is_moving_[env] = verdict.moves ? 1.0f : 0.0f;
         any_moving |= verdict.moves;
     }
-    if (!any_moving && !objects_.has_bots()) return;
+    if (!any_moving && !objects_.has_bots() && !objects_.has_racers()) return;
 
     float* fields = vehicles_.data();
     const VehicleArrays arrays{fields,
@@ -250,13 +222,19 @@ void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
             earlier_[env] = steering_command_[env];
             earlier_[n + env] = speed_command_[env];
         }
-        // Bots drive on around a car that stands as a penalty, so its view changes, too.
-        const bool lives = objects_.has_bots() && !terminated()[env] && !truncated()[env];
-        if (is_moving_[env] == 0.0f && !lives) continue;
-        if (objects_.count() > 0) {
-            objects_.advance(env, track_of(env), seeds_[env], streams_[env], episodes_[env], vehicle(env));
+        publish(env);
+    }
+    // Others drive on around a car that stands as a penalty, so its view changes, too.
+    const bool is_lively = objects_.has_bots() || objects_.has_racers();
+    for (size_t first = begin; first < end; first += config_.cars_per_race) {
+        bool is_any = false;
+        for (size_t env = first; env < first + config_.cars_per_race; ++env) {
+            is_any |= is_moving_[env] != 0.0f || !is_over(env);
         }
-        look(env);
+        if (is_any && objects_.has_bots()) move_bots(first);
+        for (size_t env = first; env < first + config_.cars_per_race; ++env) {
+            if (is_moving_[env] != 0.0f || (is_lively && !is_over(env))) look(env);
+        }
     }
 }
 
@@ -286,6 +264,7 @@ void Engine::set_pose(size_t env, float x, float y, float heading, float speed) 
     look(env);
     episode.last_x = episode.reference_x;
     episode.last_y = episode.reference_y;
+    show_others(env);
 }
 
 void Engine::forget_commands(size_t env) {
@@ -295,6 +274,7 @@ void Engine::forget_commands(size_t env) {
 void Engine::freeze(size_t env, int steps) {
     const std::lock_guard lock(mutex_);
     episodes_[env].frozen_steps = steps;
+    show_others(env);
 }
 
 template <typename Visitor>
@@ -305,6 +285,7 @@ void Engine::visit_saved(Visitor&& visit) {
     visit(rows_.data(), rows_.size() * sizeof(double));
     visit(episodes_.data(), episodes_.size() * sizeof(Episode));
     visit(track_choice_.data(), track_choice_.size() * sizeof(int32_t));
+    visit(races_.data(), races_.size() * sizeof(int32_t));
     visit(seeds_.data(), seeds_.size() * sizeof(uint64_t));
     visit(streams_.data(), streams_.size() * sizeof(uint32_t));
     visit(palettes_.data(), palettes_.size() * sizeof(GreyPalette));
@@ -372,7 +353,8 @@ const char* Engine::find_fault() const {
         const Episode& episode = episodes_[env];
         const bool has_tracks = episode.track >= 0 && static_cast<size_t>(episode.track) < tracks_.size() &&
                                 track_choice_[env] >= 0 &&
-                                static_cast<size_t>(track_choice_[env]) < num_tracks();
+                                static_cast<size_t>(track_choice_[env]) < num_tracks() &&
+                                episode.track == episodes_[env - env % config_.cars_per_race].track;
         if (!has_tracks) return "names a track that this simulation lacks.";
         const int status = static_cast<int>(episode.status);
         if (status < 0 || status > static_cast<int>(Status::park))

@@ -1,5 +1,8 @@
 // Steps a batch of cars: judge, move, observe, render. One call, no allocation, any number of threads, same
 // bits.
+//
+// Consecutive cars make a race: they share a track, obstacles and bots, and see and hit each other. A step
+// does each of these things for every car of a race before the next, so the order of the cars means nothing.
 #pragma once
 
 #include <memory>
@@ -29,6 +32,7 @@ struct EngineConfig {
     float baseline =
         0.0f;  // m between the two lenses of a stereo camera, left and right of its place; 0 for one
     bool draws_tracks = false;  // a track for every episode by chance, instead of track_choice
+    size_t cars_per_race = 1;   // num_envs is a multiple of it
 };
 
 // Calls from several threads wait for each other; the arrays are shared all the same.
@@ -42,15 +46,16 @@ class Engine {
            const CameraSpec* camera, const GreyPalette& palette, const Randomization* randomization = nullptr,
            const RgbPalette& colours = kPalette2018);
 
-    // Puts the masked cars (all of them without a mask) at the start of their next episode. With seeds (N,)
-    // they begin anew: each draws from now on as the first car of an engine with its seed, and its next
-    // episode is its first.
+    // Puts the masked cars (all of them without a mask) at the start of their next episode. Where that is all
+    // cars of a race, a new race begins, with objects placed anew; else they come back into the one that goes
+    // on. With seeds (N,), for whole races, they begin anew: each race draws from now on as the first of an
+    // engine with the seed of its first car, and its next episode is its first.
     void reset(const bool* mask, const uint64_t* seeds = nullptr);
     // actions: steering angle in rad and speed in m/s, interleaved (N, 2), finite.
     void step(const float* actions);
     // Puts one car somewhere else within its episode; counters of standstill and reversing begin anew.
     void set_pose(size_t env, float x, float y, float heading, float speed);
-    // Keeps one car standing for so many steps from now on, as a penalty.
+    // Keeps one car standing for so many steps from now on, as a penalty; nobody can run into it.
     void freeze(size_t env, int steps);
 
     size_t num_envs() const { return config_.num_envs; }
@@ -95,9 +100,16 @@ class Engine {
         return {at[0], at[n], at[2 * n], at[3 * n], at[4 * n], at[5 * n], at[6 * n]};
     }
     void store_vehicle(size_t env, const VehicleState& state);
-    VehicleState start_pose(size_t env);
-    void begin_episode(size_t env);
+    bool is_over(size_t env) const { return flags_[env] || flags_[num_envs() + env]; }
+    Draws draws_of_race(size_t env) const;  // of the race that a car is in
+    VehicleState start_pose(size_t env, int32_t slot, bool is_new_race);
+    void begin_race(size_t first, const bool* mask);
+    void begin_episode(size_t env, int32_t slot, bool is_new_race, int32_t track);
+    void write_prepare_row(size_t env);
     void draw_episode(size_t env);  // conditions and camera of an episode
+    void publish(size_t env);       // a car to the others of its race
+    void show_others(size_t env);   // the others of its race what has changed about a car between two steps
+    void move_bots(size_t first);
     void forget_commands(size_t env);
     void render(const CameraModel& camera, size_t env, const VehicleState& state, uint8_t* frame);
     void look(size_t env);  // observes and renders the current pose
@@ -124,6 +136,7 @@ class Engine {
     std::vector<uint8_t> frames_;
     std::vector<Episode> episodes_;
     std::vector<int32_t> track_choice_;
+    std::vector<int32_t> races_;     // (N / cars_per_race,) number of each race, empty where cars race alone
     std::vector<uint64_t> seeds_;    // (N,) with its stream, the key of each car's random numbers
     std::vector<uint32_t> streams_;  // (N,)
     std::vector<GreyPalette> palettes_;

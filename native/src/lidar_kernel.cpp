@@ -37,8 +37,7 @@ void draw_noise(const LidarPose& pose, float* noise) {
 
 }  // namespace
 
-void scan_lidar(const Room& room, const LidarPose& pose, const ObjectState* objects, int32_t count,
-                float* out) {
+void scan_lidar(const Room& room, const LidarPose& pose, const ObjectsAround& around, float* out) {
     static const RayTable rays;
     const float x = pose.x + kLidarForward * pose.cosine;
     const float y = pose.y + kLidarForward * pose.sine;
@@ -49,8 +48,9 @@ void scan_lidar(const Room& room, const LidarPose& pose, const ObjectState* obje
         dy[i] = pose.sine * rays.cosine[i] + pose.cosine * rays.sine[i];
         distance[i] = distance_to_walls(room, x, y, dx[i], dy[i]);
     }
-    for (int32_t k = 0; k < count; ++k) {
-        const ObjectState& object = objects[k];
+    for (int32_t k = 0; k < around.count; ++k) {
+        const ObjectState& object = object_at(around, k);
+        if (!is_there(object)) continue;
         const float from_x = x - object.x;
         const float from_y = y - object.y;
         const float half_x = half_length(object.kind);

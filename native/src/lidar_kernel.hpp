@@ -7,10 +7,9 @@
 namespace racecraft {
 
 // Distances of all rays into out (kLidarRays,), m.
-#define RC_DECLARE(isa)                                                                                 \
-    namespace isa {                                                                                     \
-    void scan_lidar(const Room& room, const LidarPose& pose, const ObjectState* objects, int32_t count, \
-                    float* out);                                                                        \
+#define RC_DECLARE(isa)                                                                                \
+    namespace isa {                                                                                    \
+    void scan_lidar(const Room& room, const LidarPose& pose, const ObjectsAround& around, float* out); \
     }
 RC_FOR_EACH_ISA(RC_DECLARE)
 #undef RC_DECLARE

@@ -23,11 +23,18 @@ void check_group(const ObjectGroup& group) {
 
 }  // namespace
 
-ObjectField::ObjectField(const ObjectRule& rule, size_t num_envs, const CameraSpec* camera)
-    : rule_(rule), count_(num_objects(rule)) {
+ObjectField::ObjectField(const ObjectRule& rule, size_t num_envs, size_t cars_per_race,
+                         const CameraSpec* camera)
+    : rule_(rule),
+      cars_per_race_(cars_per_race),
+      first_racer_(num_objects(rule)),
+      num_racers_(cars_per_race > 1 ? static_cast<int32_t>(cars_per_race) : 0),
+      count_(first_racer_ + static_cast<int32_t>(cars_per_race) - 1) {
+    check(cars_per_race >= 1 && cars_per_race <= kMaxCarsPerRace && num_envs % cars_per_race == 0,
+          "A race has 1 to 8 cars, and a batch whole races.");
     check_group(rule.obstacles);
     check_group(rule.bots);
-    check(count_ <= kMaxObjects, "A track takes 0 to 32 objects.");
+    check(first_racer_ <= kMaxObjects, "A track takes 0 to 32 objects.");
     const BotRule& bot = rule.bot;
     check(bot.speed >= 0.0f && bot.speed <= 10.0f, "A bot car drives 0 to 10 m/s.");
     check(bot.shortest_stay > 0.0f && bot.longest_stay >= bot.shortest_stay && bot.longest_stay <= 1e6f,
@@ -40,30 +47,30 @@ ObjectField::ObjectField(const ObjectRule& rule, size_t num_envs, const CameraSp
     float sine, cosine;
     sincos_of(0.5f * spec.hfov, sine, cosine);
     half_tangent_ = sine / cosine;
-    objects_.resize(num_envs * static_cast<size_t>(count_));
+    objects_.resize(num_envs / cars_per_race * width());
 }
 
-void ObjectField::place(size_t env, const TrackGeometry& track, uint64_t seed, uint32_t stream,
-                        uint32_t episode) {
-    if (count_ == 0) return;
-    ObjectState* objects = objects_of(env);
-    place_group(track, rule_.obstacles, rule_.bot, seed, stream, episode, 0, objects);
-    place_group(track, rule_.bots, rule_.bot, seed, stream, episode, rule_.obstacles.count, objects);
+void ObjectField::place(size_t race, const TrackGeometry& track, const Draws& draws) {
+    if (first_racer_ == 0) return;
+    ObjectState* objects = world(race);
+    place_group(track, rule_.obstacles, rule_.bot, draws.seed, draws.stream, draws.episode, 0, objects);
+    place_group(track, rule_.bots, rule_.bot, draws.seed, draws.stream, draws.episode, rule_.obstacles.count,
+                objects);
 }
 
-void ObjectField::advance(size_t env, const TrackGeometry& track, uint64_t seed, uint32_t stream,
-                          const Episode& episode, const VehicleState& car) {
+void ObjectField::advance(size_t race, const TrackGeometry& track, const Draws& draws, const Footprint* cars,
+                          int32_t num_cars) {
     if (!has_bots()) return;
-    ObjectState* objects = objects_of(env);
-    float sine, cosine;
-    sincos_of(car.heading, sine, cosine);
-    const Footprint body = car_footprint(car.x, car.y, sine, cosine);
-    const bool is_solid = episode.frozen_steps == 0;
-    for (int32_t i = rule_.obstacles.count; i < count_; ++i) {
+    ObjectState* objects = world(race);
+    for (int32_t i = rule_.obstacles.count; i < first_racer_; ++i) {
         ObjectState next = objects[i];
-        advance_bot(track, rule_.bot, seed, stream, static_cast<uint32_t>(episode.episode), i, kControlDt,
-                    next);
-        if (is_solid && do_touch(body, object_footprint(next)) && !is_ahead(track, next.distance, body)) {
+        advance_bot(track, rule_.bot, draws.seed, draws.stream, draws.episode, i, kControlDt, next);
+        const Footprint body = object_footprint(next);
+        bool has_to_wait = false;
+        for (int32_t car = 0; car < num_cars; ++car) {
+            has_to_wait |= do_touch(cars[car], body) && !is_ahead(track, next.distance, cars[car]);
+        }
+        if (has_to_wait) {
             objects[i].speed = 0.0f;
         } else {
             objects[i] = next;
@@ -71,31 +78,53 @@ void ObjectField::advance(size_t env, const TrackGeometry& track, uint64_t seed,
     }
 }
 
+void ObjectField::publish(size_t env, const TrackGeometry& track, const VehicleState& car, ObjectKind kind) {
+    if (num_racers_ == 0) return;
+    ObjectState& object = world(env / cars_per_race_)[around(env).own];
+    object = ObjectState{};
+    object.kind = kind;
+    if (!is_there(object)) {  // parked far outside, as the original does it
+        object.x = track.room.min_x - kParkDistance;
+        object.y = track.room.min_y - kParkDistance;
+        object.cosine = 1.0f;
+        object.offset = static_cast<double>(kParkDistance);
+        return;
+    }
+    const Projection at = project(track, static_cast<double>(car.x), static_cast<double>(car.y));
+    object.x = car.x;
+    object.y = car.y;
+    object.heading = car.heading;
+    sincos_of(car.heading, object.sine, object.cosine);
+    object.speed = car.speed;
+    object.offset = at.offset;
+    object.distance = object.arc_length = at.arc_length;
+}
+
 int32_t ObjectField::find_crash(size_t env, const TrackGeometry& track, const Episode& episode,
                                 const VehicleState& car) const {
     if (count_ == 0) return -1;
     return racecraft::find_crash(track, car_footprint(car.x, car.y, episode.sine, episode.cosine),
-                                 objects_of(env), count_);
+                                 around(env));
 }
 
 void ObjectField::write_row(size_t env, const Episode& episode, const VehicleState& car, int32_t crashed,
                             double* out) const {
     if (count_ == 0) return;
-    const ObjectState* objects = objects_of(env);
+    const ObjectsAround seen = around(env);
     const float lens_x = car.x + lens_forward_ * episode.cosine - lens_left_ * episode.sine;
     const float lens_y = car.y + lens_forward_ * episode.sine + lens_left_ * episode.cosine;
     bool in_camera = false;
     for (int32_t i = 0; i < count_ && !in_camera; ++i) {
-        in_camera =
-            is_object_in_view(objects[i], lens_x, lens_y, episode.sine, episode.cosine, half_tangent_);
+        const ObjectState& object = object_at(seen, i);
+        in_camera = is_there(object) &&
+                    is_object_in_view(object, lens_x, lens_y, episode.sine, episode.cosine, half_tangent_);
     }
-    write_objects(objects, count_, closest_objects(objects, count_, episode.projection.arc_length), in_camera,
-                  crashed, out);
+    write_objects(seen, closest_objects(seen, episode.projection.arc_length), in_camera, crashed, out);
 }
 
 void ObjectField::observe(size_t env, const TrackGeometry& track, const Episode& episode, float* out) const {
     if (count_ == 0) return;
-    observe_objects(track, objects_of(env), count_, episode.projection.arc_length, out);
+    observe_objects(track, around(env), episode.projection.arc_length, out);
 }
 
 const char* ObjectField::find_fault() const {

@@ -4,9 +4,8 @@
 
 namespace racecraft {
 
-void draw_objects(const CameraSpec& spec, const LensPose& lens, const ObjectState* objects, int32_t count,
-                  uint8_t* out) {
-    paint_objects<kMaxImageWidth>(spec, lens, objects, count, 0, spec.height, out);
+void draw_objects(const CameraSpec& spec, const LensPose& lens, const ObjectsAround& around, uint8_t* out) {
+    paint_objects<kMaxImageWidth>(spec, lens, around, 0, spec.height, out);
 }
 
 }  // namespace racecraft

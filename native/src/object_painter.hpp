@@ -9,7 +9,6 @@ namespace racecraft {
 // Draws over `out` (height, width), which shows the room from the same lens. Objects are convex in plan and
 // stand apart, so far to near is their right order; the room is convex, so no wall hides one. Allocates
 // nothing.
-void draw_objects(const CameraSpec& spec, const LensPose& lens, const ObjectState* objects, int32_t count,
-                  uint8_t* out);
+void draw_objects(const CameraSpec& spec, const LensPose& lens, const ObjectsAround& around, uint8_t* out);
 
 }  // namespace racecraft

@@ -63,13 +63,12 @@ RC_HD bool is_ahead(const TrackGeometry& track, double distance, const Footprint
 
 // The object that the car has run into, or -1. Between cars only the one behind is at fault: where the
 // other's middle is not ahead along the track, the car is innocent.
-RC_HD int32_t find_crash(const TrackGeometry& track, const Footprint& car, const ObjectState* objects,
-                         int32_t count) {
-    for (int32_t i = 0; i < count; ++i) {
-        if (!has_corner_in(car, object_footprint(objects[i]))) continue;
-        const bool is_static =
-            objects[i].kind == ObjectKind::box || objects[i].kind == ObjectKind::parked_car;
-        if (is_static || is_ahead(track, objects[i].distance, car)) return i;
+RC_HD int32_t find_crash(const TrackGeometry& track, const Footprint& car, const ObjectsAround& around) {
+    for (int32_t i = 0; i < around.count; ++i) {
+        const ObjectState& object = object_at(around, i);
+        if (!is_solid(object) || !has_corner_in(car, object_footprint(object))) continue;
+        const bool is_static = object.kind == ObjectKind::box || object.kind == ObjectKind::parked_car;
+        if (is_static || is_ahead(track, object.distance, car)) return i;
     }
     return -1;
 }

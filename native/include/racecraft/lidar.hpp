@@ -58,8 +58,7 @@ RC_HD float distance_to_rectangle(float half_length, float half_width, float x, 
 }
 
 // One ray of a scan, noise included, as native/src/lidar_kernel.cpp measures all of them at once.
-RC_HD float measure_ray(const Room& room, const LidarPose& pose, const ObjectState* objects, int32_t count,
-                        int32_t ray) {
+RC_HD float measure_ray(const Room& room, const LidarPose& pose, const ObjectsAround& around, int32_t ray) {
     float ray_sine, ray_cosine;
     sincos_of(lidar_angle(ray), ray_sine, ray_cosine);
     const float x = pose.x + kLidarForward * pose.cosine;
@@ -67,8 +66,9 @@ RC_HD float measure_ray(const Room& room, const LidarPose& pose, const ObjectSta
     const float dx = pose.cosine * ray_cosine - pose.sine * ray_sine;
     const float dy = pose.sine * ray_cosine + pose.cosine * ray_sine;
     float distance = distance_to_walls(room, x, y, dx, dy);
-    for (int32_t k = 0; k < count; ++k) {
-        const ObjectState& object = objects[k];
+    for (int32_t k = 0; k < around.count; ++k) {
+        const ObjectState& object = object_at(around, k);
+        if (!is_there(object)) continue;
         const float from_x = x - object.x;
         const float from_y = y - object.y;
         const float half_x = half_length(object.kind);

@@ -20,9 +20,15 @@ constexpr int32_t kNumCarColours = 6;
 constexpr Rgb kCarColours[kNumCarColours] = {{236, 176, 36}, {70, 136, 226}, {214, 216, 220},
                                              {70, 178, 98},  {240, 124, 44}, {176, 104, 214}};
 
-// The body of the car that is object number `index`.
-RC_HD Rgb car_colour(int32_t index) {
-    return kCarColours[index % kNumCarColours];
+constexpr Rgb kRacerColours[kMaxCarsPerRace] = {{214, 60, 44},  {70, 136, 226},  {236, 176, 36},
+                                                {70, 178, 98},  {214, 216, 220}, {176, 104, 214},
+                                                {64, 190, 196}, {92, 96, 104}};
+
+// The body of the car that is number i around another: the cars of a race each have their own.
+RC_HD Rgb car_colour(const ObjectsAround& around, int32_t i) {
+    const int32_t place = place_in_world(around, i);
+    return place < around.first_racer ? kCarColours[place % kNumCarColours]
+                                      : kRacerColours[(place - around.first_racer) % kMaxCarsPerRace];
 }
 
 RC_HD Rgb accent_of(Rgb body) {

@@ -38,7 +38,7 @@ class ObjectPainter {
         sincos_of(spec.pitch, pitch_sine_, pitch_cosine_);
     }
 
-    void draw(const ObjectState& object, int32_t index) {
+    void draw(const ObjectState& object, Rgb body) {
         // Where the lens is and looks, seen from the object.
         const float dx = lens_.x - object.x;
         const float dy = lens_.y - object.y;
@@ -51,7 +51,7 @@ class ObjectPainter {
         if (object.kind == ObjectKind::box) {
             draw_box();
         } else {
-            draw_car(car_colour(index));
+            draw_car(body);
         }
     }
 
@@ -389,21 +389,23 @@ class ObjectPainter {
 // same lens. Objects are convex in plan and stand apart, so far to near is their right order; the room is
 // convex, so no wall hides one.
 template <int32_t kMaxWidth>
-RC_HD void paint_objects(const CameraSpec& spec, const LensPose& lens, const ObjectState* objects,
-                         int32_t count, int32_t first_row, int32_t last_row, uint8_t* out) {
+RC_HD void paint_objects(const CameraSpec& spec, const LensPose& lens, const ObjectsAround& around,
+                         int32_t first_row, int32_t last_row, uint8_t* out) {
     // Those that the lens looks towards, far ones first; equally far ones by their number.
-    int32_t order[kMaxObjects];
-    float distance[kMaxObjects];
+    int32_t order[kMaxAround];
+    float distance[kMaxAround];
     float sine, cosine, pitch_sine, pitch_cosine;
     sincos_of(0.5f * spec.hfov, sine, cosine);
     sincos_of(spec.pitch, pitch_sine, pitch_cosine);
     int32_t seen = 0;
-    for (int32_t i = 0; i < count; ++i) {
-        const float dx = objects[i].x - lens.x;
-        const float dy = objects[i].y - lens.y;
+    for (int32_t i = 0; i < around.count; ++i) {
+        const ObjectState& object = object_at(around, i);
+        if (!is_there(object)) continue;
+        const float dx = object.x - lens.x;
+        const float dy = object.y - lens.y;
         const float ahead = dx * lens.cosine + dy * lens.sine;
         const float right = abs_of(dx * lens.sine - dy * lens.cosine);
-        const float reach = half_length(objects[i].kind) + half_width(objects[i].kind);
+        const float reach = half_length(object.kind) + half_width(object.kind);
         // Not farther aside than the opening angle lets it be at the greatest depth that any part of it can
         // have.
         const float depth = (ahead + reach) * pitch_cosine + spec.above * abs_of(pitch_sine);
@@ -419,7 +421,9 @@ RC_HD void paint_objects(const CameraSpec& spec, const LensPose& lens, const Obj
     }
     if (seen == 0) return;
     ObjectPainter<kMaxWidth> painter(spec, lens, first_row, last_row, out);
-    for (int32_t k = 0; k < seen; ++k) painter.draw(objects[order[k]], order[k]);
+    for (int32_t k = 0; k < seen; ++k) {
+        painter.draw(object_at(around, order[k]), car_colour(around, order[k]));
+    }
 }
 
 }  // namespace racecraft

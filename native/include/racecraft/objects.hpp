@@ -1,4 +1,4 @@
-// What stands or drives on the track besides the car: boxes, parked cars, bot cars.
+// What stands or drives on the track besides the car: boxes, parked cars, bot cars, the other cars of a race.
 //
 //        inner border  ----------------------------------      lane  2
 //        inner lane      - - - [box] - - - - - - - - - -             1
@@ -19,17 +19,22 @@ enum class ObjectKind : int32_t {
     box = 0,
     parked_car = 1,
     bot_car = 2,
-    racer = 3
-};  // racer: another agent's car
-constexpr int32_t kNumObjectKinds = 4;
+    racer = 3,         // another agent's car
+    frozen_racer = 4,  // the same while it stands as a penalty: seen, but nobody can run into it
+    gone_racer = 5     // the same when its episode is over: neither seen nor hit
+};
+constexpr int32_t kNumObjectKinds = 6;
 
-constexpr int32_t kMaxObjects = 32;  // of one car's world
+constexpr int32_t kMaxObjects = 32;     // obstacles and bots of one world
+constexpr int32_t kMaxCarsPerRace = 8;  // agents' cars in one world
+constexpr int32_t kMaxAround = kMaxObjects + kMaxCarsPerRace - 1;
 
 // Length, width and height, m. Collisions see a box larger than it is, as the original's do.
 constexpr float kBoxLength = 0.4f, kBoxWidth = 0.3f, kBoxHeight = 0.25f;
 constexpr float kBoxBuffer = 0.1f;
 constexpr float kCarLength = 0.3235f, kCarWidth = 0.1961f;
 
+constexpr float kParkDistance = 100.0f;  // m beyond the room, where the cars are whose episode is over
 constexpr double kStartClearance = 1.0;  // m along the track; a car that starts nearer takes the other lane
 
 enum class Placement : int32_t { even = 0, random = 1, fixed = 2 };
@@ -75,6 +80,33 @@ struct ObjectState {
     ObjectKind kind;
 };
 static_assert(sizeof(ObjectState) == 3 * sizeof(double) + 10 * sizeof(float) + 2 * sizeof(int32_t));
+
+// A world is an array: its obstacles, its bots, and the cars of its race where there are several. This is
+// what one of these cars has around it: the same without itself.
+struct ObjectsAround {
+    const ObjectState* world;
+    int32_t count;        // around the car
+    int32_t first_racer;  // where the cars of the race begin in the world
+    int32_t own;          // the car itself; first_racer where the world has no racers
+};
+
+// Where in the world the object number i around a car is.
+RC_HD int32_t place_in_world(const ObjectsAround& around, int32_t i) {
+    return i + (i >= around.own ? 1 : 0);
+}
+
+RC_HD const ObjectState& object_at(const ObjectsAround& around, int32_t i) {
+    return around.world[place_in_world(around, i)];
+}
+
+RC_HD bool is_there(const ObjectState& object) {
+    return object.kind != ObjectKind::gone_racer;
+}
+
+// Whether cars can run into it.
+RC_HD bool is_solid(const ObjectState& object) {
+    return object.kind < ObjectKind::frozen_racer;
+}
 
 // Half of the rectangle that collisions see, m, along and across.
 RC_HD float collision_half_length(ObjectKind kind) {
@@ -248,13 +280,13 @@ RC_HD void place_group(const TrackGeometry& track, const ObjectGroup& group, con
 
 // The lane that a start at arc_length takes: 0, the centre line, unless an object is near; then the lane
 // whose nearest object is farther.
-RC_HD float start_lane(const TrackGeometry& track, const ObjectState* objects, int32_t count,
-                       double arc_length) {
+RC_HD float start_lane(const TrackGeometry& track, const ObjectsAround& around, double arc_length) {
     double nearest_inner = 1e300;
     double nearest_outer = 1e300;
-    for (int32_t i = 0; i < count; ++i) {
-        const double distance = abs_of(distance_ahead(track, objects[i].arc_length, arc_length));
-        double& nearest = objects[i].lane > 0.0f ? nearest_inner : nearest_outer;
+    for (int32_t i = 0; i < around.count; ++i) {
+        const ObjectState& object = object_at(around, i);
+        const double distance = abs_of(distance_ahead(track, object.arc_length, arc_length));
+        double& nearest = object.lane > 0.0f ? nearest_inner : nearest_outer;
         nearest = min_of(nearest, distance);
     }
     if (min_of(nearest_inner, nearest_outer) >= kStartClearance) return 0.0f;
@@ -332,19 +364,22 @@ struct Neighbours {
     int32_t prev, next;
 };
 
-// The objects behind and ahead by their distance along the track, around the end of it.
-RC_HD Neighbours closest_objects(const ObjectState* objects, int32_t count, double distance) {
-    int32_t prev = -1, next = -1, first = 0, last = 0;
-    for (int32_t i = 0; i < count; ++i) {
-        const double d = objects[i].distance;
-        if (d < objects[first].distance) first = i;
-        if (d >= objects[last].distance) last = i;
+// The objects behind and ahead by their distance along the track, around the end of it; the first where all
+// are gone.
+RC_HD Neighbours closest_objects(const ObjectsAround& around, double distance) {
+    int32_t prev = -1, next = -1, first = -1, last = -1;
+    for (int32_t i = 0; i < around.count; ++i) {
+        if (!is_there(object_at(around, i))) continue;
+        const double d = object_at(around, i).distance;
+        if (first < 0 || d < object_at(around, first).distance) first = i;
+        if (last < 0 || d >= object_at(around, last).distance) last = i;
         if (d > distance) {
-            if (next < 0 || d < objects[next].distance) next = i;
-        } else if (prev < 0 || d >= objects[prev].distance) {
+            if (next < 0 || d < object_at(around, next).distance) next = i;
+        } else if (prev < 0 || d >= object_at(around, prev).distance) {
             prev = i;
         }
     }
+    if (first < 0) return {0, 0};
     return {prev < 0 ? last : prev, next < 0 ? first : next};
 }
 
@@ -367,15 +402,15 @@ RC_HD bool is_object_in_view(const ObjectState& object, float lens_x, float lens
     return false;
 }
 
-RC_HD void write_objects(const ObjectState* objects, int32_t count, Neighbours closest, bool in_camera,
-                         int32_t crashed, double* out) {
+RC_HD void write_objects(const ObjectsAround& around, Neighbours closest, bool in_camera, int32_t crashed,
+                         double* out) {
     out[kObjectHeader_closest_object_prev] = closest.prev;
     out[kObjectHeader_closest_object_next] = closest.next;
     out[kObjectHeader_object_in_camera] = in_camera;
     out[kObjectHeader_crashed_object] = crashed;
     double* columns = out + kNumObjectHeader;
-    for (int32_t i = 0; i < count; ++i, columns += kNumObjectColumns) {
-        const ObjectState& object = objects[i];
+    for (int32_t i = 0; i < around.count; ++i, columns += kNumObjectColumns) {
+        const ObjectState& object = object_at(around, i);
         columns[kObject_object_kind] = static_cast<int32_t>(object.kind);
         columns[kObject_object_x] = static_cast<double>(object.x);
         columns[kObject_object_y] = static_cast<double>(object.y);
@@ -386,12 +421,13 @@ RC_HD void write_objects(const ObjectState* objects, int32_t count, Neighbours c
     }
 }
 
-RC_HD void observe_objects(const TrackGeometry& track, const ObjectState* objects, int32_t count,
-                           double distance, float* out) {
+RC_HD void observe_objects(const TrackGeometry& track, const ObjectsAround& around, double distance,
+                           float* out) {
     double nearest[kNumSeenObjects] = {1e300, 1e300};
     int32_t seen[kNumSeenObjects] = {-1, -1};
-    for (int32_t i = 0; i < count; ++i) {
-        double ahead = objects[i].distance - distance;
+    for (int32_t i = 0; i < around.count; ++i) {
+        if (!is_there(object_at(around, i))) continue;
+        double ahead = object_at(around, i).distance - distance;
         if (track.is_closed != 0 && ahead < 0.0) ahead += track.length;
         if (ahead < 0.0 || ahead >= nearest[1]) continue;
         const bool is_first = ahead < nearest[0];
@@ -403,7 +439,7 @@ RC_HD void observe_objects(const TrackGeometry& track, const ObjectState* object
     for (int32_t k = 0; k < kNumSeenObjects; ++k, out += 3) {
         out[0] = out[1] = out[2] = 0.0f;
         if (seen[k] < 0) continue;
-        const ObjectState& object = objects[seen[k]];
+        const ObjectState& object = object_at(around, seen[k]);
         const float half = 0.5f * table_at(track.width_table, table_position(track, object.distance));
         out[0] = 1.0f / (1.0f + static_cast<float>(nearest[k]));
         out[1] = clamp(static_cast<float>(object.offset) / half, -4.0f, 4.0f);

@@ -17,6 +17,7 @@ enum class Purpose : uint32_t {
     object_place = 3,    // where objects stand at the start of an episode
     lane_change = 4,     // when a bot car changes its lane
     lidar_noise = 5,     // of every ray
+    grid = 6,            // who starts where in a race
     track = 16,          // which of several tracks an episode is driven on
     conditions = 17,     // of an episode, see randomization.hpp; word i is that of quantity i
     tint = 18,           // colour of an episode's light

@@ -13,9 +13,10 @@ struct StartRule {
     StartMode mode;
     double offset;         // of the first episode
     double advance;        // added with every episode of a car (mode advance)
-    bool spread;           // spaces the cars of a batch evenly along the lap
+    bool spread;           // spaces the races of a batch evenly along the lap
     float lateral_jitter;  // m, uniform in plus or minus
     float heading_jitter;  // rad, uniform in plus or minus
+    bool shuffle = false;  // draws who starts where in the grid of a race
 };
 
 // What the random numbers of an episode are a function of.
@@ -25,20 +26,22 @@ struct Draws {
     uint32_t episode;
 };
 
-// Pose of car number `env` of a batch at the start of its episode; `start` becomes its fraction of the lap.
-RC_HD VehicleState start_pose(const StartRule& rule, const TrackGeometry& track, size_t env, size_t num_envs,
-                              const Draws& draws, const ObjectState* objects, int32_t count, double& start) {
+// Where number `index` of `count` races starts, as a fraction of the lap.
+RC_HD double start_fraction(const StartRule& rule, const TrackGeometry& track, size_t index, size_t count,
+                            const Draws& draws) {
     double fraction = rule.offset;
-    if (rule.spread) fraction += static_cast<double>(env) / static_cast<double>(num_envs);
+    if (rule.spread) fraction += static_cast<double>(index) / static_cast<double>(count);
     if (rule.mode == StartMode::advance) fraction += rule.advance * static_cast<int32_t>(draws.episode);
     if (rule.mode == StartMode::random) {
         const RandomBlock place = philox(draws.seed, draws.stream, draws.episode, 0, Purpose::start_position);
         fraction = static_cast<double>(uniform_of(place.words[0]));
     }
-    fraction = track.is_closed ? fraction - floor_of(fraction) : 0.0;
-    start = fraction;
+    return track.is_closed ? fraction - floor_of(fraction) : 0.0;
+}
 
-    const double arc_length = fraction * track.length;
+// Pose of a car that starts at a place of the track, in a lane or, with 0, on the centre line.
+RC_HD VehicleState pose_at(const StartRule& rule, const TrackGeometry& track, double arc_length, float lane,
+                           const Draws& draws) {
     const Segment* last = track.segments + track.num_segments - 1;
     const Segment* segment = track.segments;
     while (segment < last && segment[1].arc_length <= arc_length) ++segment;
@@ -48,7 +51,6 @@ RC_HD VehicleState start_pose(const StartRule& rule, const TrackGeometry& track,
 
     const RandomBlock random = philox(draws.seed, draws.stream, draws.episode, 0, Purpose::start_pose);
     const double lateral = static_cast<double>(rule.lateral_jitter * symmetric_of(random.words[0]));
-    const float lane = start_lane(track, objects, count, arc_length);
     const LanePoint middle = lane == 0.0f ? LanePoint{segment->x + along * ux, segment->y + along * uy}
                                           : lane_point(track, arc_length, lane);
     VehicleState state{};
@@ -57,6 +59,15 @@ RC_HD VehicleState start_pose(const StartRule& rule, const TrackGeometry& track,
     state.heading = wrap_angle(atan2_of(static_cast<float>(uy), static_cast<float>(ux)) +
                                rule.heading_jitter * symmetric_of(random.words[1]));
     return state;
+}
+
+// Pose of car number `env` of a batch, racing alone, at the start of its episode; `start` becomes its
+// fraction of the lap.
+RC_HD VehicleState start_pose(const StartRule& rule, const TrackGeometry& track, size_t env, size_t num_envs,
+                              const Draws& draws, const ObjectsAround& around, double& start) {
+    start = start_fraction(rule, track, env, num_envs, draws);
+    const double arc_length = start * track.length;
+    return pose_at(rule, track, arc_length, start_lane(track, around, arc_length), draws);
 }
 
 }  // namespace racecraft

@@ -15,12 +15,25 @@ from racecraft.env.registration import ENV_ID, register_environments
 
 if TYPE_CHECKING:
     from racecraft.env.observation import STATE_BOUNDS
+    from racecraft.env.parallel_env import RacecraftParallelEnv
     from racecraft.env.racecraft_env import RacecraftEnv
     from racecraft.env.vector_env import RacecraftVectorEnv
 
-__all__ = ["ENV_ID", "STATE_BOUNDS", "RacecraftEnv", "RacecraftVectorEnv", "register_environments"]
+__all__ = [
+    "ENV_ID",
+    "STATE_BOUNDS",
+    "RacecraftEnv",
+    "RacecraftParallelEnv",
+    "RacecraftVectorEnv",
+    "register_environments",
+]
 
-_ON_FIRST_USE = {"STATE_BOUNDS": "observation", "RacecraftEnv": "racecraft_env", "RacecraftVectorEnv": "vector_env"}
+_ON_FIRST_USE = {
+    "STATE_BOUNDS": "observation",
+    "RacecraftEnv": "racecraft_env",
+    "RacecraftParallelEnv": "parallel_env",
+    "RacecraftVectorEnv": "vector_env",
+}
 
 
 def __getattr__(name: str) -> Any:

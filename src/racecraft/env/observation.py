@@ -65,7 +65,7 @@ class Observer:
 
     def __init__(self, simulation: Simulation, *, kind: ObservationKind) -> None:
         check_kind(kind)
-        more = OBJECT_STATE_BOUNDS.values() if simulation.objects.count else ()
+        more = OBJECT_STATE_BOUNDS.values() if simulation.num_objects else ()
         low, high = np.array([*STATE_BOUNDS.values(), *more], dtype=np.float32).T
         self._low, self._high = low, high
         self._kind = kind

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -11,12 +12,11 @@ import numpy as np
 from racecraft.agent import DiscreteActionSpace
 from racecraft.env.info import single_info
 from racecraft.env.observation import Observation
+from racecraft.env.opponents import Driver, Opponents, check_opponents
 from racecraft.env.rendering import Renderer, check_render_mode
 from racecraft.env.task import DrivingTask, TaskSettings, seed_key
 from racecraft.errors import ConfigError, ResetNeeded
 from racecraft.track import Track
-
-_ONE = np.ones(1, dtype=np.bool_)
 
 
 class RacecraftEnv(gymnasium.Env[Observation, Any]):
@@ -82,7 +82,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | 14  | curvature_6       | -10 | 10  | 1/m, 2 m ahead                        |
     | 15  | curvature_7       | -10 | 10  | 1/m, 3 m ahead                        |
 
-    With `objects`, six more numbers tell of the next two ahead: closeness, offset and speed of each.
+    With `objects` or `opponents`, six more numbers tell of the next two ahead: closeness, offset and speed of each.
 
     `observation="both"`: a `Dict` with `camera` and `state`.
 
@@ -136,6 +136,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | `sensors`           | None            | AWS's sensor names, for a `Dict` of what each of them sees     |
     | `lidar`             | None            | `LidarConfig` of `DISCRETIZED_SECTOR_LIDAR`                    |
     | `objects`           | None            | boxes and bot cars: `racecraft.sim.Objects`                    |
+    | `opponents`         | `()`            | drivers of other cars on the track, up to 7                    |
     | `start`             | `random`        | `random`, `advance`, `fixed`, or a `Start` with jitter         |
     | `direction`         | `forward`       | `forward`, `reverse`, or `alternate` with every episode        |
     | `laps`              | `1`             | laps to an episode, driven without a stop                      |
@@ -143,6 +144,12 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
 
     `render_mode="rgb_array"` renders the car from behind, 640 x 480 pixels. Reward functions that keep state
     or draw random numbers begin anew with `reset(seed=...)`, callables do not.
+
+    ## Opponents
+
+    `opponents=[driver, ...]` puts other cars on the track: policies of runs (`racecraft.race.load_driver`), an
+    `Autopilot`, or your own functions. All start on a grid, the car in front; it is crashed when it runs into one
+    ahead. An opponent whose episode is over comes back into the race. Bot cars, which follow a lane, are `objects`.
 
     ## Version History
 
@@ -156,6 +163,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
         track: str | Path | Track = "reinvent_2018",
         *,
         render_mode: str | None = None,
+        opponents: Sequence[Driver] = (),
         **settings: Unpack[TaskSettings],
     ) -> None:
         if not isinstance(track, str | Path | Track):
@@ -165,7 +173,10 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
             )
         check_render_mode(render_mode)
         self.render_mode = render_mode
-        self._task = DrivingTask(track, num_envs=1, num_threads=1, **settings)
+        cars = 1 + len(drivers := check_opponents(opponents))
+        self._task = DrivingTask(track, num_envs=cars, cars_per_race=cars, num_threads=1, **settings)
+        self._opponents = Opponents(self._task.simulation, drivers) if drivers else None
+        self._everyone = np.ones(cars, dtype=np.bool_)
         self._renderer = Renderer(self._task.simulation) if render_mode else None
         self.observation_space = self._task.observer.space
         self.action_space = self._task.action_space.space
@@ -194,7 +205,8 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
         super().reset(seed=key)
         if key is None and not self._has_key:
             key = int(self.np_random.integers(2**63))
-        self._task.reset(_ONE, seeds=None if key is None else np.array([key], dtype=np.uint64))
+        seeds = None if key is None else np.full(len(self._everyone), key, dtype=np.uint64)
+        self._task.reset(self._everyone, seeds=seeds)
         self._has_key = self._is_running = True
         return self._task.observer.one(0), single_info(self._task.simulation.rows[0])
 
@@ -208,7 +220,11 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
         if not self._is_running:
             raise ResetNeeded("step() was called while no episode is under way; call reset() first.")
         task = self._task
-        reward = float(task.step(np.asarray(action)[None])[0])
+        if self._opponents is None:
+            reward = float(task.step(np.asarray(action)[None])[0])
+        else:
+            commands = self._opponents.commands(task.action_space.to_commands(np.asarray(action)[None]))
+            reward = float(task.drive(commands, reset=task.done)[0])
         terminated, truncated = bool(task.simulation.terminated[0]), bool(task.simulation.truncated[0])
         self._is_running = not (terminated or truncated)
         info = single_info(task.simulation.rows[0])

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError
 from racecraft.sim import Simulation
-from racecraft.sim.views import CarView, Scene, View
+from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.views import RACER_COLORS, CarView, Scene, View, views_of_objects
 
 RENDER_SIZE: Final = (640, 480)
 """Width and height of a rendered frame, pixels."""
@@ -34,9 +35,12 @@ class Renderer:
 
     def frame(self, car: int) -> NDArray[np.uint8]:
         """The picture of one car, RGB (480, 640, 3)."""
-        x, y, heading, _, _, _, steering = self._simulation.vehicles[:, car].tolist()
-        itself = CarView(x, y, heading, steering)
-        return self._view(car).draw(x, y, heading, cars=[itself])
+        simulation = self._simulation
+        x, y, heading, _, _, _, steering = simulation.vehicles[:, car].tolist()
+        number = car % simulation.cars_per_race
+        itself = CarView(x, y, heading, steering, RACER_COLORS[number])
+        around = views_of_objects(simulation.judged[car, len(ROW_COLUMNS) :], car=number)
+        return self._view(car).draw(x, y, heading, cars=[itself, *around])
 
     def _view(self, car: int) -> View:
         simulation = self._simulation

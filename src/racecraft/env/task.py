@@ -67,6 +67,7 @@ class DrivingTask:
         *,
         num_envs: int,
         num_threads: int,
+        cars_per_race: int = 1,
         reward: str | Path | RewardFunction = "racing",
         action_space: str | Path | ActionSpace = "default",
         observation: ObservationKind = "camera",
@@ -101,6 +102,7 @@ class DrivingTask:
             laps=laps,
             max_steps=int(max_episode_steps) + 1,  # the simulation counts the prepare step
             num_threads=num_threads,
+            cars_per_race=cars_per_race,
         )
         self.observer: Observer | SensorObserver
         if sensors:
@@ -108,7 +110,9 @@ class DrivingTask:
         else:
             self.observer = Observer(self.simulation, kind=observation)
         self._lap_clock = LapClock(num_envs)
-        self._reward = open_reward(reward, tracks=self.simulation.tracks, num_envs=num_envs, num_objects=objects.count)
+        self._reward = open_reward(
+            reward, tracks=self.simulation.tracks, num_envs=num_envs, num_objects=self.simulation.num_objects
+        )
 
     @property
     def done(self) -> NDArray[np.bool_]:
@@ -129,7 +133,11 @@ class DrivingTask:
             actions: In the form of the action space.
             reset: Cars whose episode is over; they begin the next one instead of acting, with reward 0.
         """
-        self.simulation.step(self.action_space.to_commands(actions))
+        return self.drive(self.action_space.to_commands(actions), reset=reset)
+
+    def drive(self, commands: NDArray[np.float32], *, reset: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+        """The same by commands (N, 2): steering angle in rad and speed in m/s."""
+        self.simulation.step(commands)
         if reset is not None and reset.any():
             self.reset(reset)
         return self._reward(self.simulation.judged)

@@ -4,6 +4,7 @@ from racecraft.race.autopilot import Autopilot
 from racecraft.race.conditions import Conditions
 from racecraft.race.evaluation import Completion, completion, evaluate, trial_simulation
 from racecraft.race.generalization import Generalization, TrackResult, generalize
+from racecraft.race.policy import load_driver
 from racecraft.race.race_replay import Replay, read_replay, write_replay
 from racecraft.race.racing_line import draw_racing_line
 from racecraft.race.recording import Recording
@@ -38,6 +39,7 @@ __all__ = [
     "evaluate",
     "film",
     "generalize",
+    "load_driver",
     "mean_interval",
     "official_races",
     "places",

@@ -9,7 +9,7 @@ It proves that a track can be driven, paces tests and benchmarks, and is a basel
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ _SPEED, _OFFSET, _HALF_WIDTH, _SINE, _COSINE, _CURVATURE = (
 @dataclass(frozen=True, kw_only=True)
 class Autopilot:
     """Steers along the centre line and slows for bends; called with state (N, S), returns commands (N, 2)."""
+
+    sees: ClassVar = "state"
 
     speed: float = 1.0
     """m/s on a straight, 0.1 to 4."""

@@ -137,4 +137,4 @@ def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
 
 def start_offset(simulation: Simulation, trial: int) -> float:
     """M to the left of the centre line where the simulation started a car, because of an object near the start."""
-    return float(simulation.column("offset")[trial]) if simulation.objects.count else 0.0
+    return float(simulation.column("offset")[trial]) if simulation.num_objects else 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,3 +65,17 @@ def load_policy(run: RunFolder, *, checkpoint: str | int = "best", num_threads: 
     learner.load_weights(given)
     metadata = run.read_model_metadata()
     return saved.step, NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite)
+
+
+def load_driver(run: str | Path, *, checkpoint: str | int = "best") -> NetworkPolicy:
+    """The policy of a run folder, to drive with: an opponent, a ghost, a model in a race.
+
+    Args:
+        run: Path of the run.
+        checkpoint: ``best``, ``last`` or a number of steps.
+
+    Raises:
+        RunError: There is no such run.
+        CheckpointError: There is no such checkpoint, or it is damaged.
+    """
+    return load_policy(RunFolder.open(run), checkpoint=checkpoint, num_threads=1)[1]

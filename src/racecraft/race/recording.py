@@ -31,6 +31,8 @@ class Recording:
     actions: NDArray[np.float32]
     """What the driver asked for in every step, steering angle [rad] and speed [m/s], before any limit; zero in prepare
     steps, where nobody is asked  (T, 2)."""
+    car: int = 0
+    """Number of the car in its race."""
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -39,9 +41,14 @@ class Recording:
         """A column of the rows by name, as a view  (T,)."""
         return self.rows[:, ROW_COLUMNS.index(name)]
 
-    def objects(self, step: int) -> list[ObjectView]:
-        """What stood or drove on the track besides the car, as pictures show it."""
-        return views_of_objects(self.rows[step, len(ROW_COLUMNS) :])
+    def objects(self, step: int, *, alpha: float = 1.0) -> list[ObjectView]:
+        """What stood or drove on the track besides the car, as pictures show it.
+
+        Args:
+            step: Index of the row.
+            alpha: How solid the cars are that stand as a penalty.
+        """
+        return views_of_objects(self.rows[step, len(ROW_COLUMNS) :], car=self.car, alpha=alpha)
 
     @cached_property
     def origins(self) -> NDArray[np.float64]:
@@ -97,4 +104,4 @@ class Recording:
     def lap(self, number: int) -> Recording:
         """The steps of one lap, numbered from 1."""
         steps = self.lap_numbers == number
-        return Recording(self.track, self.rows[steps], self.clock[steps], self.actions[steps])
+        return Recording(self.track, self.rows[steps], self.clock[steps], self.actions[steps], self.car)

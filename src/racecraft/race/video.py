@@ -143,13 +143,13 @@ def frames(
     overlay = Overlay(recording, name=name, laps=laps, ghosts=ghosts)
     places, headings = recording.origins, recording.column("heading")
     steering = recording.column("actual_steering_angle")
-    directions, alphas = follow(recording), blink(recording)
+    directions, alphas, waves = follow(recording), blink(recording), wave(recording)
     frame = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
     step = 0
     for step in range(len(recording)):
         (x, y), heading = places[step].tolist(), float(headings[step])
         car = CarView(x, y, heading, float(steering[step]), color, float(alphas[step]))
-        objects = recording.objects(step)
+        objects = recording.objects(step, alpha=float(waves[step]))
         around = [view for view in overlay.ghosts_at(step) if view is not None]
         chase.draw(x, y, float(directions[step]), cars=[car, *objects, *around], out=frame)
         frame[top : top + height, left : left + width] = driver.draw(x, y, heading, objects)
@@ -181,5 +181,10 @@ def follow(recording: Recording) -> NDArray[np.float64]:
 def blink(recording: Recording) -> NDArray[np.float64]:
     """How solid the car is at every step: 1, or fading to and fro while it stands as a penalty (T,)."""
     stands = np.array([status == "pause" for status in recording.statuses])
-    wave = 0.5 + 0.5 * np.cos(2.0 * np.pi * recording.clock / BLINK_PERIOD)
-    return np.where(stands, BLINK_ALPHA + (1.0 - BLINK_ALPHA) * wave, 1.0)
+    return np.where(stands, wave(recording), 1.0)
+
+
+def wave(recording: Recording) -> NDArray[np.float64]:
+    """How solid any car would be at every step that stands as a penalty (T,)."""
+    share = 0.5 + 0.5 * np.cos(2.0 * np.pi * recording.clock / BLINK_PERIOD)
+    return np.asarray(BLINK_ALPHA + (1.0 - BLINK_ALPHA) * share)

@@ -79,6 +79,8 @@ class CudaSimulation:
         self, tracks: Track | Sequence[Track], *, num_envs: int, device: Device | str = "cuda", **settings: Any
     ) -> None:
         check_whole("num_envs", num_envs, 1, 1_000_000)
+        if settings.get("cars_per_race", 1) != 1:
+            raise ConfigError(f"cars_per_race is {settings['cars_per_race']!r}; allowed on a GPU is 1.")
         self.device = open_device(device) if isinstance(device, str) else device
         self.settings = settings
         self.template = Simulation(tracks, num_envs=1, **{**settings, "num_threads": 1})

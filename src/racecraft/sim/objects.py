@@ -19,8 +19,9 @@ MAX_OBJECTS: Final = 32
 """On one track, obstacles and bot cars together."""
 PLACEMENTS: Final = ("even", "random", "fixed")
 OBSTACLE_KINDS: Final = ("box", "car")
-OBJECT_KINDS: Final = ("box", "parked_car", "bot_car", "racer")
-"""By the number that the column `object_kind` holds."""
+OBJECT_KINDS: Final = ("box", "parked_car", "bot_car", "racer", "frozen_racer", "gone_racer")
+"""By the number that the column `object_kind` holds. A racer is another agent's car: frozen while it stands as a
+penalty (seen, but nobody can run into it), gone once its episode is over (neither seen nor hit)."""
 RACE_TYPES: Final = ("time-trial", "object-avoidance", "head-to-bot")
 
 Positions = tuple[tuple[float, int], ...]

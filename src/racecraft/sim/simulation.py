@@ -52,11 +52,13 @@ class Start:
     advance: float = 0.05
     """Fraction of a lap that a car's start moves on with every episode, in mode ``advance``."""
     spread: bool = False
-    """Space the cars of a batch evenly along the lap."""
+    """Space the races of a batch evenly along the lap."""
     lateral_jitter: float = 0.0
     """m, uniform to either side."""
     heading_jitter: float = 0.0
     """rad, uniform to either side."""
+    shuffle: bool = False
+    """Draw for every race who starts where in its grid, instead of car 0 in front."""
 
     def __post_init__(self) -> None:
         if self.mode not in START_MODES:
@@ -71,6 +73,7 @@ class Start:
         for name, (low, high) in limits.items():
             check_number(f"Start setting {name}", getattr(self, name), low, high)
         check_type("Start setting spread", self.spread, bool, "allowed are True and False")
+        check_type("Start setting shuffle", self.shuffle, bool, "allowed are True and False")
 
 
 class Simulation:
@@ -79,6 +82,17 @@ class Simulation:
     A step judges every car's pose *before* its action acts (filling `rows`), then moves the cars, then renders what
     their cameras see, as the original does. A terminated car stands until it is reset. `reset` includes the original's
     `prepare` step, so the first judged step of an episode has ``steps == 2``.
+
+    **Races.** Every `cars_per_race` consecutive cars share one world: car ``i`` is number ``i % cars_per_race`` in race
+    ``i // cars_per_race``, with one track, one set of obstacles and bots, and the other cars among its objects
+    (kind ``racer``, behind obstacles and bots, in their order without itself). They see each other in cameras and
+    LIDARs, and only the one behind is at fault in a collision. They start on a staggered grid: 0.75 m from car to car,
+    car 0 in front in the outer lane, the next in the inner one, further back where something stands. A step does
+    each thing for all cars before the next, so their order means nothing.
+
+    A car whose episode is over leaves the race: the others neither see nor hit it until `reset` or `set_pose` puts it
+    back. While `freeze` keeps it standing it is seen but cannot be hit. A `reset` of all cars of a race begins a new
+    one with objects placed anew; a reset of some puts them into the race that goes on, where there is room.
 
     Args:
         tracks: One track, or several to be driven in one batch.
@@ -95,7 +109,8 @@ class Simulation:
         time_limit: Seconds that truncate an episode; 0 for none.
         max_steps: Steps that truncate an episode.
         substeps: Physics steps to a control step.
-        objects: Boxes and cars on the track, around every car of its own.
+        objects: Boxes and bot cars on the track of every race.
+        cars_per_race: Agents' cars that share a track, 1 to 8; `num_envs` is a multiple of it.
         lidar: Whether the cars carry the original's LIDAR.
         num_threads: 0 takes one per core.
 
@@ -105,13 +120,14 @@ class Simulation:
         lidar: Distances of the LIDAR's rays now, m, counter-clockwise from 30° left of straight ahead over the
             car's back, float32 (N, 64); empty without one.
         rows: The last step as the rules judged it, float64 (N, len(ROW_COLUMNS)).
-        judged: The same with the columns of objects behind, float64 (N, row_width(objects.count)).
-        state: Privileged state now, scaled to about unit size, float32 (N, state_width(objects.count)).
+        judged: The same with the columns of objects behind, float64 (N, row_width(num_objects)).
+        state: Privileged state now, scaled to about unit size, float32 (N, state_width(num_objects)).
+        num_objects: Around every car: obstacles, bots, and the other cars of its race.
         terminated: The episode ended by its rules, bool (N,).
         truncated: The episode was cut by a limit, bool (N,).
         vehicles: x, y, heading, speed, lateral_speed, yaw_rate, steering (SI), float32 (7, N).
         parameters: Vehicle parameters per car, writeable, float32 (len(VEHICLE_PARAMETERS), N).
-        track_choice: Track of each car from its next episode on, writeable, int32 (N,).
+        track_choice: Track of each car from its next episode on, writeable, int32 (N,); a race takes its first car's.
         conditions: What randomisation drew for each car's episode, float32 (N, len(CONDITIONS)); (0, ...) without.
 
     Raises:
@@ -138,6 +154,7 @@ class Simulation:
         objects: Objects = NO_OBJECTS,
         lidar: bool = False,
         num_threads: int = 0,
+        cars_per_race: int = 1,
     ) -> None:
         if isinstance(tracks, Track):
             tracks = (tracks,)
@@ -167,6 +184,9 @@ class Simulation:
         check_whole("substeps", substeps, 4, 128)
         check_whole("num_threads", num_threads, 0, 1024)
         check_number("time_limit", time_limit, 0.0, 1e9)
+        check_whole("cars_per_race", cars_per_race, 1, _native.MAX_CARS_PER_RACE)
+        if num_envs % cars_per_race:
+            raise ConfigError(f"num_envs is {num_envs}; allowed are multiples of cars_per_race, {cars_per_race}.")
 
         self.num_envs = num_envs
         self.seed = seed
@@ -178,6 +198,8 @@ class Simulation:
         self.direction = direction
         self.laps = laps
         self.objects = objects
+        self.cars_per_race = cars_per_race
+        self.num_objects = objects.count + cars_per_race - 1
         self._everyone = np.ones(num_envs, dtype=np.bool_)
         self._engine = _native.Engine(
             tracks=[native_track(track) for track in self.tracks],
@@ -205,6 +227,8 @@ class Simulation:
             world=camera.palette if camera else "2018",
             has_lidar=lidar,
             baseline=camera.baseline if camera else 0.0,
+            cars_per_race=cars_per_race,
+            shuffle=start.shuffle,
         )
         frames: NDArray[np.uint8] = self._engine.frames  # (N, lenses, height, width)
         is_stereo = camera is not None and camera.baseline > 0.0
@@ -235,13 +259,13 @@ class Simulation:
         return self.rows[:, ROW_COLUMNS.index(name)]
 
     def object_column(self, name: str) -> NDArray[np.float64]:
-        """One column of the objects, a view: (N, objects.count), or (N,) for those of `OBJECT_HEADER`.
+        """One column of the objects, a view: (N, num_objects), or (N,) for those of `OBJECT_HEADER`.
 
         Raises:
             ConfigError: There are no objects, or no such column.
         """
-        if not self.objects.count or name not in (*OBJECT_HEADER, *OBJECT_COLUMNS):
-            allowed = ", ".join((*OBJECT_HEADER, *OBJECT_COLUMNS)) if self.objects.count else "none without objects"
+        if not self.num_objects or name not in (*OBJECT_HEADER, *OBJECT_COLUMNS):
+            allowed = ", ".join((*OBJECT_HEADER, *OBJECT_COLUMNS)) if self.num_objects else "none without objects"
             raise ConfigError(f"There is no object column {name!r}; allowed: {allowed}.")
         begin = len(ROW_COLUMNS)
         if name in OBJECT_HEADER:
@@ -251,14 +275,16 @@ class Simulation:
     def reset(self, mask: NDArray[np.bool_] | None = None, *, seeds: NDArray[np.uint64] | None = None) -> None:
         """Put the masked cars (all without a mask) at the start of their next episode.
 
+        All cars of a race begin a new race; some of them come back into the one that goes on.
+
         Args:
             mask: The cars to reset, bool (N,).
-            seeds: Begin anew: the masked cars start their first episode and draw, from now on, as the only car
-                of a simulation with this seed would, uint64 (N,).
+            seeds: Begin anew: the masked races start their first episode and draw, from now on, as the only race
+                of a simulation with this seed would, uint64 (N,), the same for all cars of a race.
 
         Raises:
             ShapeError: The mask is not bool, or the seeds are not uint64, of shape (N,).
-            ConfigError: `track_choice` names a track that does not exist.
+            ConfigError: `track_choice` names a track that does not exist, or seeds are for a part of a race.
         """
         if mask is None:
             mask = self._everyone
@@ -273,6 +299,9 @@ class Simulation:
                 raise ShapeError(
                     f"seeds are {seeds.dtype} of shape {seeds.shape}, expected uint64 of shape ({self.num_envs},)."
                 )
+            races, keys = (array.reshape(-1, self.cars_per_race) for array in (mask, seeds))
+            if (races != races[:, :1]).any() or (keys != keys[:, :1])[races].any():
+                raise ConfigError("seeds begin whole races anew; mask all cars of a race, and give them the same seed.")
         if self.track_choice.min() < 0 or self.track_choice.max() >= len(self.tracks):
             raise ConfigError(f"track_choice must be 0 to {len(self.tracks) - 1}, got {self.track_choice.tolist()}.")
         self._engine.reset(mask, seeds)

@@ -72,19 +72,31 @@ class BoxView(NamedTuple):
 ObjectView = CarView | BoxView
 
 
-def views_of_objects(columns: NDArray[np.float64]) -> list[ObjectView]:
-    """The objects of one judged row as a picture shows them.
+RACER_COLORS: Final[tuple[tuple[int, int, int], ...]] = _native.RACER_COLOURS
+"""Bodies of the cars of a race by their number in it."""
+
+
+def views_of_objects(columns: NDArray[np.float64], *, car: int = 0, alpha: float = 1.0) -> list[ObjectView]:
+    """The objects of one judged row as a picture shows them; cars that have left the race are not there.
 
     Args:
         columns: What follows the row's own columns (`Simulation.judged`); empty where there are no objects.
+        car: Number in its race of the car that the row is of; it is none of the objects.
+        alpha: How solid the cars are now that stand as a penalty.
     """
     views: list[ObjectView] = []
     table = columns[len(OBJECT_HEADER) :].reshape(-1, len(OBJECT_COLUMNS))
-    for index, (kind, x, y, heading, *_) in enumerate(table.tolist()):
-        if OBJECT_KINDS[int(kind)] == "box":
+    racers = 0
+    for index, (code, x, y, heading, *_) in enumerate(table.tolist()):
+        kind = OBJECT_KINDS[int(code)]
+        color = _native.CAR_COLOURS[index % len(_native.CAR_COLOURS)]
+        if kind.endswith("racer"):
+            color = RACER_COLORS[(racers + (racers >= car)) % len(RACER_COLORS)]
+            racers += 1
+        if kind == "box":
             views.append(BoxView(x, y, heading))
-        else:
-            views.append(CarView(x, y, heading, color=_native.CAR_COLOURS[index % len(_native.CAR_COLOURS)]))
+        elif kind != "gone_racer":
+            views.append(CarView(x, y, heading, color=color, alpha=alpha if kind == "frozen_racer" else 1.0))
     return views
 
 

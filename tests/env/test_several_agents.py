@@ -1,0 +1,168 @@
+"""Several agents on one track: PettingZoo's own tests, who leaves when, and one car against frozen opponents."""
+
+from __future__ import annotations
+
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env, data_equivalence
+
+from racecraft.env import RacecraftEnv, RacecraftParallelEnv
+from racecraft.errors import ConfigError, ResetNeeded, ShapeError
+from racecraft.race import Autopilot
+from racecraft.sim import Bots, Objects, Start
+
+with warnings.catch_warnings():  # it imports a game of its own, in a way that it has deprecated
+    warnings.simplefilter("ignore", DeprecationWarning)
+    from pettingzoo.test import parallel_api_test
+    from pettingzoo.test.seed_test import parallel_seed_test
+
+SHORT = {"track": "oval", "max_episode_steps": 60}
+
+
+def drive_straight(frames):
+    assert frames.dtype == np.uint8
+    return np.tile(np.float32([0.0, 1.0]), (len(frames), 1))
+
+
+# --- PettingZoo
+
+
+@pytest.mark.filterwarnings("error::UserWarning")
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"num_cars": 4, "observation": "state"},
+        {"num_cars": 2, "observation": "both", "action_space": "continuous"},
+        {"num_cars": 1, "observation": "state", "objects": Objects(bots=Bots())},
+    ],
+)
+def test_pettingzoos_own_tests(settings):
+    env = RacecraftParallelEnv(**SHORT, **settings)
+    parallel_api_test(env, num_cycles=80)
+    env.close()
+    parallel_seed_test(lambda: RacecraftParallelEnv(**SHORT, **settings), num_cycles=20)
+
+
+def test_agents_leave_as_they_are_done_and_the_race_ends_without_them():
+    env = RacecraftParallelEnv(track="oval", num_cars=3, observation="state", action_space="continuous")
+    env.reset(seed=1)
+    left = np.float32([1.0, 0.5])
+    ahead = np.float32([0.0, -1.0])
+    seen = []
+    while env.agents:
+        before = list(env.agents)
+        results = env.step({agent: left if agent == "car_1" else ahead for agent in before})
+        for result in results:
+            assert list(result) == before
+        seen.append(len(before))
+    assert seen[0] == 3
+    assert 2 in seen  # somebody left before the others
+    with pytest.raises(ResetNeeded):
+        env.step({})
+    env.reset()
+    assert env.agents == ["car_0", "car_1", "car_2"]
+    env.close()
+
+
+def test_the_reward_of_an_agent_sees_the_others_as_objects():
+    seen = []
+
+    def reward(params):
+        seen.append(len(params["objects_location"]))
+        return 1.0
+
+    env = RacecraftParallelEnv(
+        track="oval", num_cars=3, observation="state", reward=reward, objects=Objects(bots=Bots())
+    )
+    env.reset(seed=1)
+    rewards = env.step(dict.fromkeys(env.agents, 0))[1]
+    assert rewards == dict.fromkeys(env.agents, 1.0)
+    assert seen == [5] * 3  # three bots and two others
+    env.close()
+
+
+def test_mistakes_of_a_caller_are_said():
+    for settings in ({"num_cars": 0}, {"num_cars": 9}, {"num_cars": "2"}, {"render_mode": "human"}):
+        with pytest.raises(ConfigError):
+            RacecraftParallelEnv(track="oval", **settings)
+    env = RacecraftParallelEnv(track="oval", observation="state")
+    with pytest.raises(ResetNeeded):
+        env.step({"car_0": 0, "car_1": 0})
+    env.reset(seed=2)
+    with pytest.raises(ConfigError, match="actions lack car_1"):
+        env.step({"car_0": 0})
+    with pytest.raises(ConfigError, match="seed"):
+        env.reset(seed=-1)
+    env.close()
+
+
+def test_a_picture_shows_the_race():
+    env = RacecraftParallelEnv(track="oval", num_cars=2, observation="state", render_mode="rgb_array")
+    alone = RacecraftParallelEnv(track="oval", num_cars=1, observation="state", render_mode="rgb_array")
+    for each in (env, alone):
+        each.reset(seed=1)
+    assert env.render().shape == (480, 640, 3)
+    assert (env.render() != alone.render()).mean() > 0.001
+    env.close()
+    alone.close()
+
+
+# --- one car against others
+
+
+def test_one_car_against_frozen_opponents_is_a_gymnasium_environment():
+    env = gymnasium.make("racecraft.env:Racecraft-v0", opponents=[drive_straight, Autopilot()], **SHORT)
+    check_env(env.unwrapped, skip_render_check=True)
+    results = []
+    for _ in range(2):
+        observation, info = env.reset(seed=5)
+        results.append([(observation, info), *(env.step(2 * (i % 3)) for i in range(15))])
+    assert data_equivalence(results[0], results[1], exact=True)
+    env.close()
+
+
+def test_opponents_come_back_and_the_car_runs_into_one_that_stands():
+    class Stands:
+        sees = "state"
+
+        def __call__(self, state):
+            return np.zeros((len(state), 2), np.float32)
+
+    env = RacecraftEnv(
+        track="oval",
+        observation="state",
+        action_space="continuous",
+        start=Start(mode="fixed", shuffle=True),
+        opponents=[Stands()] * 3,
+    )
+    statuses = set()
+    for seed in range(12):
+        env.reset(seed=seed)
+        done = False
+        steps = 0
+        while not done and steps < 40:
+            *_, terminated, truncated, info = env.step(np.float32([0.0, -0.5]))
+            done, steps = terminated or truncated, steps + 1
+        statuses.add(info["status"])
+    assert "crashed" in statuses
+    assert "in_progress" in statuses or "off_track" in statuses  # where it started in front
+    env.close()
+
+
+@pytest.mark.parametrize("opponents", [drive_straight, "runs/one", [1], [drive_straight] * 8, 3])
+def test_opponents_that_are_no_drivers_are_refused(opponents):
+    with pytest.raises(ConfigError, match="pponent"):
+        RacecraftEnv(track="oval", opponents=opponents)
+
+
+def test_opponents_that_cannot_see_or_drive_are_refused():
+    with pytest.raises(ConfigError, match="cannot see"):
+        RacecraftEnv(track="oval", observation="state", opponents=[drive_straight])
+    env = RacecraftEnv(track="oval", opponents=[lambda frames: np.zeros(2, np.float32)])
+    env.reset(seed=1)
+    with pytest.raises(ShapeError, match="Opponent 1"):
+        env.step(0)
+    env.close()
