@@ -202,6 +202,13 @@ def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str
         (["train", "--network", "SMALL"], "ConfigError", "RACECRAFT_SMALL"),
         (["train", "--direction", "foward"], "ConfigError", "Did you mean 'forward'?"),
         (["train", "--num-envs", "-1"], "ConfigError", "num_envs"),
+        (["train", "--race", "head-to-heads"], "ConfigError", "head-to-heads"),
+        (["train", "--race", "head-to-head", "--cars", "9"], "ConfigError", "2 to 8"),
+        (["train", "--race", "head-to-head", "--cars", "2", "--opponents", "bots"], "ConfigError", "--bots"),
+        (["train", "--race", "head-to-head", "--opponents", "runs/none"], "RunError", "none"),
+        (["train", "--race", "head-to-head", "--opponents", "self", "--opponents", "a"], "ConfigError", "'self' alone"),
+        (["train", "--cars", "3"], "ConfigError", "--race head-to-head"),
+        (["train", "--opponents", "self"], "ConfigError", "--race head-to-head"),
         (["train", "--seed", "-1"], "ConfigError", "seed"),
         (["train", "--name", "../x"], "RunError", "../x"),
         (["train", "--hyperparameters", "none.json"], "ConfigError", "none.json"),
@@ -407,6 +414,19 @@ def test_train_ends_with_one_json_object(racecraft: Run) -> None:
     assert result["best_lap_seconds"] is None or result["best_lap_seconds"] > 0
     assert result["reason"] == "steps"
     assert json.loads(Path("runs/mine/run.json").read_text())["seed"] == 3
+
+
+def test_train_against_itself_and_against_the_run_that_came_of_it(racecraft: Run) -> None:
+    race = ("--race", "head-to-head", "--cars", "3", "--until", "512 steps", "--json")
+    first = racecraft("train", *SMALL, *race, "--name", "first")
+    assert (first.status, first.err) == (0, "")
+    opponents = json.loads(Path("runs/first/run.json").read_text())["settings"]["opponents"]
+    assert (opponents["drivers"], opponents["cars"]) == (["self"], 3)
+    second = racecraft("train", *SMALL, *race, "--opponents", "runs/first", "--reward", "overtake", "--name", "second")
+    assert (second.status, second.err) == (0, "")
+    bots = racecraft("train", *SMALL, "--race", "head-to-head", "--opponents", "bots", "--bots", "2", *race[4:])
+    assert (bots.status, bots.err) == (0, "")
+    assert json.loads(Path(bots.document["run"], "run.json").read_text())["settings"]["objects"]["bots"]["count"] == 2
 
 
 def test_train_tells_people_how_it_goes_and_how_to_go_on(racecraft: Run) -> None:

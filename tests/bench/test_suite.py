@@ -11,6 +11,7 @@ from racecraft.errors import ConfigError, RacecraftError
 
 FIGURES = {
     "simulator": ("camera_steps_per_second", "state_steps_per_second", "bytes_per_car"),
+    "races": ("camera_steps_per_second", "six_boxes_in_view_percent"),
     "reward": ("calls_per_second", "microseconds_per_call"),
     "train": ("steps_per_second",),
 }

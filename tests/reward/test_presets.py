@@ -155,3 +155,36 @@ def test_every_preset_is_small_and_finite(name):
         for heading in (-180.0, 0.0, 90.0):
             assert math.isfinite(reward(name, speed=speed, heading=heading, distance_from_center=0.3))
             assert abs(reward(name, speed=speed, heading=heading)) <= 11.0
+
+
+AHEAD = {
+    "closest_objects": [0, 0],
+    "objects_location": [(0.0, 0.0)],
+    "objects_left_of_center": [True],
+    "objects_speed": [1.0],
+    "objects_distance": [11.0],
+    "objects_distance_from_center": [0.1],
+    "projection_distance": 10.0,
+    "track_length": 20.0,
+    "distance_from_center": 0.1,
+}
+
+
+def test_overtake_is_racing_with_something_for_passing():
+    alone = {key: AHEAD[key] for key in ("projection_distance", "track_length", "distance_from_center")}
+    free = reward("racing", speed=3.0, distance_from_center=0.1)
+    assert reward("overtake", speed=3.0, **alone) == pytest.approx(free)
+    assert reward("overtake", speed=3.0, **{**AHEAD, "objects_distance": [12.5]}) == pytest.approx(free)
+    assert reward("overtake", speed=3.0, **{**AHEAD, "objects_distance": [9.0]}) == pytest.approx(free)  # behind
+    # 1 m behind a car, half of the way into its reach: straight behind it, and with room to pass
+    assert reward("overtake", speed=3.0, is_left_of_center=True, **AHEAD) == pytest.approx(free * 0.6)
+    beside = {**AHEAD, "objects_distance_from_center": [0.2]}
+    gained = (3.0 - 1.0) / 15
+    assert reward("overtake", speed=3.0, is_left_of_center=False, **beside) == pytest.approx(free + 0.5 * gained)
+    mirrored = {**beside, "objects_left_of_center": [False], "is_left_of_center": True}
+    assert reward("overtake", speed=3.0, **mirrored) == pytest.approx(free + 0.5 * gained)
+    # around the end of the lap
+    wrapped = {**AHEAD, "projection_distance": 19.5, "objects_distance": [0.5], "is_left_of_center": True}
+    assert reward("overtake", speed=3.0, **wrapped) == pytest.approx(free * 0.6)
+    assert reward("overtake", is_offtrack=True, **AHEAD) == -1.0
+    assert reward("overtake", is_crashed=True, is_offtrack=True, **AHEAD) == -2.0

@@ -18,6 +18,7 @@ def test_the_presets():
         "heading",
         "lap_time",
         "object_avoidance",
+        "overtake",
         "progress_pace",
         "racing",
         "speed_gate",

@@ -22,13 +22,15 @@ from racecraft.bench.rivals import measure_rivals
 from racecraft.errors import ConfigError, RacecraftError, did_you_mean
 from racecraft.learn import NetworkSpec, PPOConfig, forward_operations
 from racecraft.reward import RewardWorker, load_preset
-from racecraft.sim import STATE_COLUMNS, CameraSpec, Simulation, Start
+from racecraft.sim import STATE_COLUMNS, CameraSpec, Objects, Obstacles, Simulation, Start
 from racecraft.track import Track, load_track
 
 ROUNDS = 5
 TRACK = "reinvent_2018"
 CAMERA_CARS = 256
 STATE_CARS = 8192
+RACE_CARS = 4
+SIX_BOXES = tuple((0.042 + 0.018 * i, 1 if i % 2 else -1) for i in range(6))  # of a lap, from 0.6 m on
 REWARD = "centerline"
 REWARD_BATCH = 64
 START_SECONDS = 2.0  # that a training may take to start, beside the time it is measured for
@@ -102,6 +104,39 @@ def bytes_per_car(track: Track) -> int:
     few, more = 64, 1024
     sizes = [Simulation(track, num_envs=n, camera=None, num_threads=1).num_bytes for n in (few, few + more)]
     return (sizes[1] - sizes[0]) // more
+
+
+def measure_races(seconds: float, seeds: int) -> dict[str, Any]:
+    """Four cars on one track with camera, all cores; and what boxes in view cost, as shares of CPU time in turns."""
+    del seeds
+    track = load_track(TRACK)
+    cars = _steps_per_second(track, CAMERA_CARS, CameraSpec(), seconds, cars_per_race=RACE_CARS)
+    boxes = Objects(obstacles=Obstacles(count=6, placement="fixed", positions=SIX_BOXES))
+    start = Start(mode="fixed")
+    simulations = [
+        Simulation(track, num_envs=64, objects=objects, start=start, num_threads=1, max_steps=10**6)
+        for objects in (Objects(), boxes)
+    ]
+    spent = [0.0, 0.0]
+    action = np.tile(np.array([0.0, 0.1], dtype=np.float32), (64, 1))  # so slow that the boxes stay in view
+    begun = time.perf_counter()
+    while time.perf_counter() - begun < seconds:
+        for i, simulation in enumerate(simulations):
+            simulation.reset()
+            before = time.process_time()
+            for _ in range(20):
+                simulation.step(action)
+            spent[i] += time.process_time() - before
+    return {
+        "camera_steps_per_second": round(cars),
+        "cars_per_race": RACE_CARS,
+        "six_boxes_in_view_percent": round(100 * spent[0] / spent[1], 1),
+        "limits": {
+            "camera_steps_per_second": _limit(
+                copy_bandwidth() / (CameraSpec().width * CameraSpec().height), "copying finished frames, one thread"
+            )
+        },
+    }
 
 
 def measure_reward(seconds: float, seeds: int) -> dict[str, Any]:
@@ -201,6 +236,7 @@ def measure_skill(seconds: float, seeds: int) -> dict[str, Any]:
 
 BENCHMARKS: dict[str, Callable[[float, int], dict[str, Any]]] = {
     "simulator": measure_simulator,
+    "races": measure_races,
     "reward": measure_reward,
     "train": measure_training,
     "skill": measure_skill,
@@ -216,10 +252,22 @@ def _of_run(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _steps_per_second(
-    track: Track, num_envs: int, camera: CameraSpec | None, seconds: float, *, num_threads: int = 0
+    track: Track,
+    num_envs: int,
+    camera: CameraSpec | None,
+    seconds: float,
+    *,
+    num_threads: int = 0,
+    cars_per_race: int = 1,
 ) -> float:
     simulation = Simulation(
-        track, num_envs=num_envs, camera=camera, start=Start(spread=True), num_threads=num_threads, seed=1
+        track,
+        num_envs=num_envs,
+        camera=camera,
+        start=Start(spread=True),
+        num_threads=num_threads,
+        seed=1,
+        cars_per_race=cars_per_race,
     )
     rng = np.random.default_rng(1)
     actions = [

@@ -10,8 +10,15 @@ from racecraft.errors import ConfigError
 
 if TYPE_CHECKING:
     from racecraft.sim import Objects
+    from racecraft.training import Opponents
 
 Race = Annotated[str, typer.Option("--race", help="time-trial, object-avoidance or head-to-bot.")]
+TrainRace = Annotated[str, typer.Option("--race", help="time-trial, object-avoidance, head-to-bot or head-to-head.")]
+Rivals = Annotated[
+    list[str],
+    typer.Option("--opponents", help="Of head-to-head: self, bots or a run folder; several runs by repeating it."),
+]
+Cars = Annotated[int, typer.Option("--cars", help="To a head-to-head race, the learner's included; 2 by default.")]
 NumObjects = Annotated[int, typer.Option("--objects", help="Obstacles of object avoidance; 6 by default.")]
 NumBots = Annotated[int, typer.Option("--bots", help="Bot cars of head-to-bot; 3 by default.")]
 BotSpeed = Annotated[float | None, typer.Option("--bot-speed", help="m/s of the bot cars; 0.2 by default.")]
@@ -74,3 +81,25 @@ def objects_of(
     if parked_cars:
         settings["kind"] = "car"
     return objects_for_race(name, settings=settings)
+
+
+def opponents_of(race: str, *, opponents: list[str], cars: int = 0) -> tuple[str, Opponents | None]:
+    """The race as far as its objects go, and the other cars of a head-to-head race.
+
+    Raises:
+        ConfigError: An option does not go with the race, or has no meaning.
+    """
+    name = race.lower().replace("_", "-")
+    for option, is_given in (("--opponents", bool(opponents)), ("--cars", cars != 0)):
+        if is_given and name != "head-to-head":
+            raise ConfigError(f"{option} goes with --race head-to-head; the race is {name}.")
+    if name != "head-to-head":
+        return race, None
+    if opponents == ["bots"]:
+        if cars:
+            raise ConfigError("--cars counts the cars that policies drive; bots are counted by --bots.")
+        return "head-to-bot", None
+    from racecraft.training.opponents import Opponents
+
+    given: dict[str, Any] = {"cars": cars} if cars else {}
+    return "time-trial", Opponents(drivers=tuple(opponents) or ("self",), **given)

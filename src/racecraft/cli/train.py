@@ -17,7 +17,8 @@ _OPTIONS_OF: Final = {
     "objects": (
         *("race", "objects", "bots", "bot_speed", "lane_changes"),
         *("parked_cars", "placement", "positions"),
-    )
+    ),
+    "opponents": ("race", "opponents", "cars"),
 }
 """Settings that several options make."""
 
@@ -63,7 +64,9 @@ def train(
         str,
         typer.Option("--randomize", help="What differs between episodes: light, strong, aws or a JSON file."),
     ] = "none",
-    race: race_options.Race = "time-trial",
+    race: race_options.TrainRace = "time-trial",
+    opponents: race_options.Rivals = [],  # noqa: B006 (Typer copies it)
+    cars: race_options.Cars = 0,
     objects: race_options.NumObjects = 0,
     bots: race_options.NumBots = 0,
     bot_speed: race_options.BotSpeed = None,
@@ -107,6 +110,7 @@ def train(
     from racecraft.training.progress import SilentReporter
     from racecraft.training.terminal import TerminalReporter
 
+    race, rivals = race_options.opponents_of(race, opponents=opponents, cars=cars)
     on_track = race_options.objects_of(
         race,
         objects=objects,
@@ -142,6 +146,7 @@ def train(
                 "direction": direction,
                 "randomize": randomize,
                 "objects": on_track,
+                "opponents": rivals,
                 "num_envs": num_envs,
                 "num_threads": num_threads,
                 "device": device,

@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from racecraft.agent import ActionSpace
+    from racecraft.training.opponents import Opponents
 
 __all__ = [
     "EvaluationReport",
     "IterationReport",
+    "Opponents",
     "Reporter",
     "SilentReporter",
     "TrainResult",

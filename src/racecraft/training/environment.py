@@ -21,11 +21,14 @@ from racecraft.reward.worker import RewardWorker
 from racecraft.run import Episode, EpisodeCounter, PrintLog, SimTraceWriter
 from racecraft.sim import CudaSimulation, Simulation
 from racecraft.track import Track
+from racecraft.training.opponents import OpponentPool
 from racecraft.training.settings import TrainSettings
 
 
 class TrainingEnvironment:
     """A batch of cars with rewards; an implementation of `racecraft.learn.Environment`.
+
+    With opponents every race has one car that learns; the others are nobody's business but theirs.
 
     Args:
         simulation: The cars.
@@ -35,6 +38,7 @@ class TrainingEnvironment:
         sensors: What the policy sees through.
         trace: Logs every step; None for no log.
         prints: Keeps what the reward function prints; None drops it.
+        opponents: Drive the other cars of every race; None where each car races alone.
     """
 
     def __init__(
@@ -47,6 +51,7 @@ class TrainingEnvironment:
         sensors: SensorSuite = FRONT_CAMERA,
         trace: SimTraceWriter | None = None,
         prints: PrintLog | None = None,
+        opponents: OpponentPool | None = None,
     ) -> None:
         self.simulation = simulation
         self.worker = worker
@@ -55,10 +60,12 @@ class TrainingEnvironment:
         self.sensors = sensors
         self.trace = trace
         self.prints = prints
+        self.opponents = opponents
+        self._own: slice | NDArray[np.intp] = slice(None) if opponents is None else opponents.own
         self.reward_seconds = 0.0
         self.trace_seconds = 0.0
         self._finished: list[Episode] = []
-        self._is_driving = np.ones(simulation.num_envs, bool)  # not between an episode's end and the next reset
+        self._is_driving = np.ones(self.num_envs, bool)  # not between an episode's end and the next reset
 
     @property
     def shown(self) -> Simulation:
@@ -67,12 +74,12 @@ class TrainingEnvironment:
 
     @property
     def num_envs(self) -> int:
-        """N, the number of cars."""
-        return self.simulation.num_envs
+        """N, the number of cars that learn."""
+        return self.simulation.num_envs // self.simulation.cars_per_race
 
     def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """What the sensors tell, as `SensorSuite.read` has it, and privileged state (N, S) at the current poses."""
-        return self.sensors.read(self.simulation), self.simulation.state
+        return self.sensors.read(self.simulation)[self._own], self.simulation.state[self._own]
 
     def step(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Drive one step: rewards, terminated, truncated, each (N,), the caller's to keep.
@@ -81,23 +88,27 @@ class TrainingEnvironment:
             RewardError: The user's function failed.
         """
         simulation = self.simulation
-        simulation.step(self.action_space.to_commands(actions))
+        commands = self.action_space.to_commands(actions)
+        simulation.step(commands if self.opponents is None else self.opponents.commands(commands))
+        rows = simulation.rows[self._own]
         moved = time.perf_counter()
         try:
-            rewards = self.worker(simulation.judged)
+            rewards = self.worker(simulation.judged[self._own])
         except RewardError:
             with suppress(RunError):  # the first error is the one to tell
                 self._keep_prints()
             raise
         self._keep_prints()
         paid = time.perf_counter()
-        terminated, truncated = simulation.terminated.copy(), simulation.truncated.copy()
+        terminated, truncated = (flags[self._own].copy() for flags in (simulation.terminated, simulation.truncated))
         done = (terminated | truncated) & self._is_driving
-        ended = self.counter.update(simulation.rows, rewards, done)
+        ended = self.counter.update(rows, rewards, done)
         self._finished += ended
         self._is_driving &= ~done
         if self.trace is not None:
-            self.trace.write(simulation.rows, actions=actions, rewards=rewards, ended=ended)
+            self.trace.write(rows, actions=actions, rewards=rewards, ended=ended)
+        if self.opponents is not None:
+            self.opponents.bring_back()
         self.reward_seconds += paid - moved
         self.trace_seconds += time.perf_counter() - paid
         return rewards, terminated, truncated
@@ -112,7 +123,9 @@ class TrainingEnvironment:
         self.counter.abandon(mask)
         if self.trace is not None:
             self.trace.abandon(mask)
-        self.simulation.reset(mask)
+        self.simulation.reset(np.repeat(mask, self.simulation.cars_per_race))
+        if self.opponents is not None:
+            self.opponents.draw(mask)
 
     def take_finished(self) -> list[Episode]:
         """The episodes that ended since the last call."""
@@ -129,7 +142,8 @@ def open_simulation(
         ConfigError: There is no such device.
     """
     common: dict[str, Any] = {
-        "num_envs": settings.num_envs,
+        "num_envs": settings.num_envs * settings.cars_per_race,
+        "cars_per_race": settings.cars_per_race,
         "seed": settings.seed,
         "vehicle": settings.vehicle,
         "start": settings.start,

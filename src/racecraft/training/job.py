@@ -47,6 +47,7 @@ from racecraft.training.cuda_environment import CudaTrainingEnvironment
 from racecraft.training.environment import TrainingEnvironment, open_simulation
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
+from racecraft.training.opponents import OpponentPool
 from racecraft.training.parent import begin_from
 from racecraft.training.progress import EvaluationReport, IterationReport, Reporter, SilentReporter, TrainResult
 from racecraft.training.start import aws_hyperparameters, read_settings, require_trainable, require_valid_reward
@@ -68,6 +69,7 @@ class _Session:
     history: HistoryWriter
     hyperparameters: Hyperparameters | None
     aws_log: AwsLog | None
+    opponents: OpponentPool | None
 
     @property
     def counter(self) -> EpisodeCounter:
@@ -159,7 +161,7 @@ class Training:
             copies = settings.num_envs if keeps_state(source) else 1
             worker = stack.enter_context(
                 RewardWorker(
-                    source, list(tracks), seed=settings.seed, num_cars=copies, num_objects=settings.objects.count
+                    source, list(tracks), seed=settings.seed, num_cars=copies, num_objects=settings.num_objects
                 )
             )
             kept = saved.step if saved is not None else 0
@@ -195,7 +197,13 @@ class Training:
             )
             prints = stack.enter_context(PrintLog(folder.reward_log))
             environment: TrainingEnvironment | CudaTrainingEnvironment
+            opponents = None
             if isinstance(simulation, Simulation):
+                if settings.opponents is not None:
+                    own = NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite)
+                    opponents = OpponentPool(
+                        settings.opponents, simulation, own, seed=settings.seed, num_threads=settings.num_threads
+                    )
                 environment = TrainingEnvironment(
                     simulation,
                     worker,
@@ -204,6 +212,7 @@ class Training:
                     sensors=metadata.suite,
                     trace=trace,
                     prints=prints,
+                    opponents=opponents,
                 )
             else:
                 environment = CudaTrainingEnvironment(
@@ -221,6 +230,7 @@ class Training:
                 history=history,
                 hyperparameters=hyperparameters,
                 aws_log=log,
+                opponents=opponents,
             )
             if saved is not None:
                 self._load_state(session, saved)
@@ -246,6 +256,8 @@ class Training:
             self.reporter.note(f"The limit of {self.settings.until} was reached before; --until sets another.")
         while not reason:
             stats = algorithm.iterate()
+            if session.opponents is not None:
+                session.opponents.learn_from(algorithm, step=algorithm.total_steps)
             self._account(session, stats.environment_seconds, stats.policy_seconds, stats.update_seconds)
             for episode in (finished := session.environment.take_finished()):
                 session.metrics.add(episode)
@@ -335,6 +347,7 @@ class Training:
             {
                 **algorithm.state(),
                 **session.trace.state(),
+                **(session.opponents.state() if session.opponents is not None else {}),
                 "simulation": session.environment.simulation.save(),
                 "episode_rewards": counter.rewards,
                 "recent_episodes": self.meter.state(),
@@ -373,6 +386,8 @@ class Training:
             session.algorithm.load_state(arrays)
             session.environment.simulation.load(arrays["simulation"])
             session.counter.rewards[:] = arrays["episode_rewards"]
+            if session.opponents is not None:
+                session.opponents.load_state(arrays)
             session.trace.load_state(arrays)
             session.evaluator.load_state(metadata["evaluator"])
             session.algorithm.prefers_average = session.evaluator.was_good

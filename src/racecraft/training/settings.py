@@ -16,6 +16,7 @@ from racecraft.sim.columns import state_width
 from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import DIRECTIONS
 from racecraft.track import join_names, load_tracks
+from racecraft.training.opponents import Opponents
 from racecraft.training.stop import Until
 
 DEFAULT_TRACK: Final = "reinvent_2018"
@@ -23,7 +24,7 @@ VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v
 ALGORITHMS: Final = ("ppo", "sac", *(f"sb3:{name}" for name in SB3_ALGORITHMS))
 SQUASHED: Final = ("sac", "sb3:sac", "sb3:td3")
 """Algorithms whose best action is the hyperbolic tangent of the policy's mean."""
-_ADDED: Final = ("algorithm", "sac", "sb3", "device")
+_ADDED: Final = ("algorithm", "opponents", "sac", "sb3", "device")
 """Fields that runs of earlier versions lack."""
 CRITICS: Final = ("privileged", "camera")
 EVALUATE_EVERY: Final = 4096
@@ -39,6 +40,8 @@ RACE_PPO: Final = PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4
 """Among boxes and other cars, which take ten times the steps of a lap on a free road."""
 RACE_GOOD: Final = 0.6
 """Mean completion of an evaluation from which on, among objects, the averaged weights drive."""
+RACING: Final = Start(mode="random", lateral_jitter=0.05, shuffle=True)
+"""Where races of several cars start: anywhere, and in any order."""
 SCATTERED: Final = Start(mode="random", lateral_jitter=0.12, heading_jitter=0.2)
 """Where episodes on several tracks start: what the car meets there, no single line prepares it for."""
 MAX_ENVS: Final = 4096  # cars; 80 MB of frames, and more would only wait for each other
@@ -74,6 +77,8 @@ class TrainSettings:
     """Boxes and bot cars on the track; evaluations have them, too."""
     algorithm: str = "ppo"
     """What improves the policy, one of `ALGORITHMS`."""
+    opponents: Opponents | None = None
+    """Who drives the other cars of every race; None where the car is alone."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
     """How PPO does it."""
     sac: SACConfig = field(default_factory=SACConfig)
@@ -116,6 +121,12 @@ class TrainSettings:
             raise ConfigError(f"device is {self.device!r}; allowed are 'cpu', 'cuda', and 'cuda:1' for the second GPU.")
         if self.device != "cpu" and self.algorithm != "ppo":
             raise ConfigError(f"algorithm is {self.algorithm!r}; device {self.device!r} trains 'ppo' only.")
+        if self.opponents is not None and not isinstance(self.opponents, Opponents):
+            raise ConfigError(f"opponents are {self.opponents!r}; use racecraft.training.Opponents(...), or None.")
+        if self.opponents is not None and self.algorithm != "ppo":
+            raise ConfigError(f"algorithm is {self.algorithm!r}; among other cars only ppo learns in this version.")
+        if self.opponents is not None and self.device != "cpu":
+            raise ConfigError(f"device is {self.device!r}; races of several cars are driven on the cpu.")
         if not isinstance(self.until, Until):
             raise ConfigError(f"until is {self.until!r}; allowed is a text such as '5 laps'.")
         if self.until.laps > self.evaluation_trials:
@@ -136,11 +147,21 @@ class TrainSettings:
             name=self.network,
             num_actions=space.size if is_discrete else 2,
             is_discrete=is_discrete,
-            state_size=state_width(self.objects.count) if self.critic == "privileged" else 0,
+            state_size=state_width(self.num_objects) if self.critic == "privileged" else 0,
             is_squashed=self.algorithm in SQUASHED,
             lenses=metadata.suite.lenses,
             lidar_size=metadata.suite.lidar_size,
         )
+
+    @property
+    def cars_per_race(self) -> int:
+        """Cars that share a track."""
+        return 1 if self.opponents is None else self.opponents.cars
+
+    @property
+    def num_objects(self) -> int:
+        """Around every car: boxes, bots, and the other cars of its race."""
+        return self.objects.count + self.cars_per_race - 1
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON, for run.json."""
@@ -164,6 +185,7 @@ class TrainSettings:
             values["start"] = Start(**values["start"])
             values["randomize"] = Randomization(**values["randomize"])
             values["objects"] = Objects.from_dict(values["objects"])
+            values["opponents"] = Opponents.from_dict(values.get("opponents"))
             for name, config in (("ppo", PPOConfig), ("sac", SACConfig), ("sb3", SB3Config)):
                 values[name] = config(**values.get(name, {}))
             return cls(**values)
@@ -220,6 +242,8 @@ def make_settings(
     if is_race:
         settings = {"evaluation_trials": RACE_TRIALS, **settings}
     is_cuda = settings.get("device", "cpu") != "cpu"
+    if settings.get("opponents") is not None:
+        settings = {"start": RACING, **settings}
     if settings.get("evaluate_every", 0) == 0:
         often = FAR_EVALUATE_EVERY if is_far else RACE_EVALUATE_EVERY if is_race else EVALUATE_EVERY
         settings["evaluate_every"] = max(often, CUDA_EVALUATE_EVERY) if is_cuda else often
