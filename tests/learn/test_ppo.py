@@ -56,6 +56,21 @@ def test_learns_from_rewards_of_any_scale():
     assert stats[-1].explained_variance > 0.5
 
 
+def test_the_step_size_falls_with_the_steps_driven(config):
+    config = dataclasses.replace(config, rate_steps=2 * config.num_envs * config.num_steps)
+    ppo = ppo_for(config)
+    rates: list[float] = []
+    update = ppo.learner.update
+    ppo.learner.update = lambda minibatch, objective: (
+        rates.append(objective.learning_rate),
+        update(minibatch, objective),
+    )[1]
+    for _ in range(3):
+        ppo.iterate()
+    expected = [config.learning_rate / (1 + done / 2) for done in (1, 2, 3)]
+    assert list(dict.fromkeys(rates)) == pytest.approx(expected)
+
+
 def test_the_same_seed_gives_the_same_bits(config):
     first, second, other = (ppo_for(config, seed=seed) for seed in (3, 3, 4))
     for ppo in (first, second, other):

@@ -44,6 +44,8 @@ class PPOConfig:
     """Camera steps after which an iteration of whole episodes cuts and bootstraps those still running."""
     learning_rate: float = 1.5e-3
     """Adam's step size; AWS's 3e-4 is safe for days of training, this is for the first laps in seconds."""
+    rate_steps: int = 0
+    """Camera steps after which the step size is a half of learning_rate, after twice as many a third; 0: never."""
     gamma: float = 0.98
     """Discount per step of 1/15 s; 0.98 looks about 3 s ahead."""
     gae_lambda: float = 0.95
@@ -86,6 +88,7 @@ class PPOConfig:
             ("update_epochs", 1),
             ("episodes_per_iteration", 0),
             ("epsilon_steps", 0),
+            ("rate_steps", 0),
         ):
             value = getattr(self, name)
             is_whole = isinstance(value, int) and not isinstance(value, bool)
@@ -410,6 +413,9 @@ class PPO:
         )
         minibatch_size = min(config.minibatch_size, len(used))
         objective = config.objective
+        if config.rate_steps:
+            rate = config.learning_rate / (1.0 + self.total_steps / config.rate_steps)
+            objective = dataclasses.replace(objective, learning_rate=rate)
         stats: list[UpdateStats] = []
         for _ in range(config.update_epochs):
             order = rng.permutation(used)

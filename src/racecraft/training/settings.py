@@ -36,7 +36,7 @@ FAR_PPO: Final = PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4,
 RACE_EVALUATE_EVERY: Final = 25_000
 RACE_TRIALS: Final = 20
 """Laps of an evaluation among objects, whose places differ from lap to lap: five would say little."""
-RACE_PPO: Final = PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4, ent_coef=0.005)
+RACE_PPO: Final = PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4, rate_steps=250_000, ent_coef=0.005)
 """Among boxes and other cars, which take ten times the steps of a lap on a free road."""
 RACE_GOOD: Final = 0.6
 """Mean completion of an evaluation from which on, among objects, the averaged weights drive."""
