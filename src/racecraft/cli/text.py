@@ -140,10 +140,11 @@ def say_raced(outcome: RunRace) -> None:
     console, contest = Console(), outcome.contest
     conditions = contest.conditions
     laps = f"{conditions.rules.laps} lap" + "s" * (conditions.rules.laps > 1)
+    is_crowded = conditions.objects.count > 0 or contest.shares_road
+    room = max(8, console.width - (80 if is_crowded else 70))  # for names
     table = _table(title=f"{contest.kind} on {conditions.track.name}, {laps}")
     table.add_column("", justify="right", no_wrap=True)
-    table.add_column("model", style="bold", overflow="ellipsis", no_wrap=True, max_width=max(8, console.width - 68))
-    is_crowded = conditions.objects.count > 0 or contest.shares_road
+    table.add_column("model", style="bold", overflow="ellipsis", no_wrap=True, max_width=room)
     crashes = ("crashes",) if is_crowded else ()
     for heading in ("laps", "best lap", "total", "gap", "off track", *crashes, "resets"):
         table.add_column(heading, justify="right", no_wrap=True)
@@ -153,7 +154,7 @@ def say_raced(outcome: RunRace) -> None:
         table.add_row(
             "–" if standing.place is None else str(standing.place),
             contest.names[standing.car],
-            f"{standing.laps} of {conditions.rules.laps}",
+            f"{standing.laps}/{conditions.rules.laps}",
             "–" if standing.best is None else f"{standing.best:.2f} s",
             score,
             gap,

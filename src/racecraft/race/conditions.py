@@ -31,3 +31,10 @@ class Conditions:
     """On the track, around every car of its own."""
     randomize: Randomization = PRESETS["none"]
     """What differs from car to car."""
+    cars_per_race: int = 1
+    """Cars that share a road; with one, each has the road for itself."""
+
+    @property
+    def num_objects(self) -> int:
+        """Around every car: boxes, bots and the other cars of its race."""
+        return self.objects.count + self.cars_per_race - 1

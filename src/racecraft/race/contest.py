@@ -7,17 +7,21 @@ head-to-model (2), grid (2 to 8)            one road, a staggered grid, cars tha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
+
+import numpy as np
 
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.race.classification import Standing, classify
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry import Entry
-from racecraft.race.evaluation import evaluate
+from racecraft.race.evaluation import Driver, evaluate, race_simulation
+from racecraft.race.marshal import Marshal
 from racecraft.race.race_replay import Replay
 from racecraft.race.results import Trial
 from racecraft.race.standings import RANKINGS
+from racecraft.sim.camera import CameraSpec
 
 ALONE: Final = ("time-trial", "object-avoidance", "head-to-bot")
 TOGETHER: Final = ("head-to-model", "grid")
@@ -130,7 +134,11 @@ def hold_race(
         raise ConfigError(f"ranking is {ranking!r}; allowed are {', '.join(RANKINGS)}.", hint=hint)
     if not 1 <= needed <= laps:
         raise ConfigError(f"minimum_laps is {needed}; allowed is 1 to {laps}, the laps of the race.")
-    trials = tuple(_alone(entry, conditions, num_threads=num_threads) for entry in entries)
+    if kind in TOGETHER:
+        conditions = replace(shared_road(conditions, len(entries)), camera=conditions.camera or CameraSpec())
+        trials = race_together([entry.policy for entry in entries], conditions, num_threads=num_threads)
+    else:
+        trials = tuple(_alone(entry, conditions, num_threads=num_threads) for entry in entries)
     return Contest(
         kind=kind,
         conditions=conditions,
@@ -169,3 +177,43 @@ def _alone(entry: Entry, conditions: Conditions, *, num_threads: int) -> Trial:
         randomize=conditions.randomize,
         num_threads=num_threads,
     ).trials[0]
+
+
+def race_together(drivers: Sequence[Driver], conditions: Conditions, *, num_threads: int = 0) -> tuple[Trial, ...]:
+    """A race of several cars on one road, in the order of the grid, until the last has finished or is out.
+
+    Args:
+        drivers: Of the cars. Each is called with what its own car sees: the frame (1, 120, 160), or, where its
+            attribute ``sees`` is ``"state"``, the privileged state (1, S).
+        conditions: With `cars_per_race` equal to the number of drivers.
+        num_threads: 0 takes one per core.
+
+    Raises:
+        ConfigError: The conditions are of another number of cars, or the road is no circuit and has several laps.
+    """
+    if conditions.cars_per_race != len(drivers):
+        raise ConfigError(f"There are {len(drivers)} drivers for a race of {conditions.cars_per_race} cars.")
+    simulation = race_simulation(conditions, num_cars=len(drivers), num_threads=num_threads)
+    marshal = Marshal(simulation, conditions.rules, seed=conditions.seed)
+    sights = [simulation.state if getattr(one, "sees", "frames") == "state" else simulation.frames for one in drivers]
+    actions = np.zeros((len(drivers), 2), dtype=np.float32)
+    while marshal.is_racing:
+        for car, (driver, sight) in enumerate(zip(drivers, sights, strict=True)):
+            actions[car] = driver(sight[car : car + 1])[0]
+        marshal.step(actions)
+    return marshal.trials()
+
+
+def shared_road(conditions: Conditions, num_cars: int) -> Conditions:
+    """The same on one road, where laps flow: nobody could stop for a standing start among the others.
+
+    Raises:
+        ConfigError: The road is no circuit and the race has several laps.
+    """
+    if conditions.rules.laps > 1 and not conditions.track.is_closed:
+        raise ConfigError(
+            f"Cars on one road race one lap on {conditions.track.name}, which is no circuit; laps is "
+            f"{conditions.rules.laps}."
+        )
+    rules = replace(conditions.rules, is_continuous=True)
+    return replace(conditions, rules=rules, cars_per_race=num_cars)

@@ -116,6 +116,7 @@ def race_simulation(
         has_lidar=has_lidar,
         randomize=conditions.randomize,
         objects=conditions.objects,
+        cars_per_race=conditions.cars_per_race,
         num_threads=num_threads,
     )
 
@@ -131,6 +132,7 @@ def trial_simulation(
     has_lidar: bool = False,
     randomize: Randomization | str = "none",
     objects: Objects = NO_OBJECTS,
+    cars_per_race: int = 1,
     num_threads: int = 0,
 ) -> Simulation:
     """A simulation by the rules, a car for each trial: what `evaluate` makes and `completion` reuses.
@@ -156,6 +158,7 @@ def trial_simulation(
         laps=laps,
         max_steps=laps * MAX_STEPS,
         objects=objects,
+        cars_per_race=cars_per_race,
         num_threads=num_threads,
     )
 

@@ -14,23 +14,14 @@ from numpy.typing import NDArray
 
 from racecraft.race.recording import Recording
 from racecraft.sim.simulation import CONTROL_DT
-from racecraft.sim.views import CarView
+from racecraft.sim.views import RACER_COLORS, CarView
 from racecraft.track.canvas import Color
 
 GHOST_ALPHA: Final = 0.5
 """How solid a ghost is."""
 LINGERING: Final = 1.0
 """s that a ghost stays where it stopped."""
-LIVERY: Final[tuple[Color, ...]] = (
-    (214, 60, 44),
-    (62, 130, 247),
-    (250, 196, 50),
-    (44, 190, 120),
-    (232, 110, 210),
-    (255, 140, 40),
-    (64, 208, 224),
-    (176, 176, 184),
-)
+LIVERY: Final[tuple[Color, ...]] = RACER_COLORS
 """Colours of the cars of a race and of ghosts, in order; the first is the car that is filmed."""
 
 
@@ -59,6 +50,16 @@ class Ghost:
         step = max(int(np.searchsorted(self.clock, seconds + 0.5 * CONTROL_DT, side="right")) - 1, 0)
         x, y, heading = self.poses[step].tolist()
         return CarView(x, y, heading, float(self.steering[step]), self.color, GHOST_ALPHA)
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Another car of the race, on the same road: already in the picture, but not in the table and on the map."""
+
+    name: str
+    color: Color
+    recording: Recording
+    """Its own."""
 
 
 def ghost_of(recording: Recording, *, name: str, color: Color) -> Ghost:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from racecraft.race.placement import (
     avoiding_pose,
+    clear_pose,
     driven_track,
     line_up,
     start_distance,
@@ -29,7 +30,7 @@ from racecraft.race.placement import (
 from racecraft.race.recording import REFERENCE_AHEAD, Recording
 from racecraft.race.results import Lap, Trial
 from racecraft.race.rules import RESET_STATUSES, RaceRules
-from racecraft.sim.columns import OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.simulation import CONTROL_DT, Simulation
 
 _X, _Y, _HEADING, _PROGRESS, _OFFSET, _DISTANCE, _STATUS, _TIME, _LAP = (
@@ -37,6 +38,7 @@ _X, _Y, _HEADING, _PROGRESS, _OFFSET, _DISTANCE, _STATUS, _TIME, _LAP = (
     for name in ("x", "y", "heading", "progress", "offset", "projection_distance", "status", "time", "lap")
 )
 _CRASHED_OBJECT: Final = len(ROW_COLUMNS) + OBJECT_HEADER.index("crashed_object")
+_OBJECT_X, _OBJECT_Y = OBJECT_COLUMNS.index("object_x"), OBJECT_COLUMNS.index("object_y")
 _LAP_COMPLETE: Final = STATUS_NAMES.index("lap_complete")
 _PAUSE: Final = STATUS_NAMES.index("pause")
 _TIME_UP: Final = STATUS_NAMES.index("time_up")
@@ -48,6 +50,7 @@ class _Car:
 
     index: int
     resets_left: int
+    start: float = 0.0  # m along the track where its laps begin
     status: str = ""  # how the trial ended; empty while it races
     rows: list[NDArray[np.float64]] = field(default_factory=list)
     clock: list[float] = field(default_factory=list)  # s at each row
@@ -101,7 +104,7 @@ class Marshal:
             car.clock.append(clock)
             car.actions.append(np.array(actions[car.index], dtype=np.float32))
             if row[_STATUS] == _PAUSE:  # the core keeps the progress of the mistake; log where the car stands
-                row[_PROGRESS] = self._progress(row[_DISTANCE], near=row[_PROGRESS])
+                row[_PROGRESS] = self._progress(car, row[_DISTANCE], near=row[_PROGRESS])
             # half a step of slack: the clock runs in steps of 1/15 s; time up comes before everything else
             if limit > 0.0 and clock >= limit - 0.5 * CONTROL_DT:
                 row[_STATUS] = _TIME_UP
@@ -142,11 +145,22 @@ class Marshal:
         if mercy:
             car.crashes[crashed] = 0
         pose = avoiding_pose(self._track, car.rows[-2], crashed=crashed, mercy=mercy)
+        if self._simulation.cars_per_race > 1:
+            pose = clear_pose(self._track, pose, self._around(car))
         self._simulation.set_pose(car.index, *pose)
         self._simulation.freeze(car.index, steps)
         car.resets_left -= 1
         car.resets += 1
         car.penalty += steps * CONTROL_DT
+
+    def _around(self, car: _Car) -> NDArray[np.float64]:
+        """Middles of all that is around a car now, those included that were put back in this very step  (K, 2)."""
+        size = self._simulation.cars_per_race
+        first = car.index // size * size
+        others = [env for env in range(first, first + size) if env != car.index and not self._cars[env].status]
+        objects = car.rows[-1][len(ROW_COLUMNS) + len(OBJECT_HEADER) :].reshape(-1, len(OBJECT_COLUMNS))
+        things = objects[: self._simulation.objects.count, [_OBJECT_X, _OBJECT_Y]]
+        return np.concatenate([things, self._simulation.vehicles[:2, others].T.astype(np.float64)])
 
     def _start_again(self, car: _Car, clock: float) -> None:
         mask = np.zeros(self._simulation.num_envs, dtype=np.bool_)
@@ -164,12 +178,21 @@ class Marshal:
     def _log_start(self, car: _Car) -> None:
         """Log the prepare step, at the pose that the car was given since."""
         row = self._simulation.judged[car.index].copy()
+        if self._simulation.cars_per_race > 1:  # it stands where the simulation put it
+            car.start = float(row[_DISTANCE] - row[_PROGRESS] * self._track.length)
+            self._log(car, row)
+            return
+        car.start = start_distance(self._track, self._rules)
         x, y, heading = self._simulation.vehicles[:3, car.index].astype(np.float64).tolist()
         row[_X], row[_Y] = x + REFERENCE_AHEAD * np.cos(heading), y + REFERENCE_AHEAD * np.sin(heading)
         row[_HEADING] = heading
         row[_DISTANCE], row[_OFFSET] = self._track.project(row[[_X, _Y]])
         row[_LAP] = car.laps_before
-        row[_PROGRESS] = self._progress(row[_DISTANCE], near=0.0)
+        row[_PROGRESS] = self._progress(car, row[_DISTANCE], near=0.0)
+        self._log(car, row)
+
+    @staticmethod
+    def _log(car: _Car, row: NDArray[np.float64]) -> None:
         car.rows.append(row)
         car.clock.append(car.began + float(row[_TIME]))
         car.actions.append(np.zeros(2, dtype=np.float32))
@@ -206,16 +229,17 @@ class Marshal:
     def _trial(self, car: _Car) -> Trial:
         rows = np.array(car.rows)
         rows.flags.writeable = False
+        number = car.index % self._simulation.cars_per_race
         return Trial(
             index=car.index,
             laps=tuple(car.laps),
             status=car.status,
             completion=sum(lap.completion for lap in car.laps) / self._rules.laps,
-            recording=Recording(self._track, rows, np.array(car.clock), np.array(car.actions)),
+            recording=Recording(self._track, rows, np.array(car.clock), np.array(car.actions), number),
         )
 
-    def _progress(self, distance: float, *, near: float) -> float:
+    def _progress(self, car: _Car, distance: float, *, near: float) -> float:
         """Fraction of the lap at a distance along the track; of a closed track's many, that near another."""
         track = self._track
-        fraction = (distance - start_distance(track, self._rules)) / track.length
+        fraction = (distance - car.start) / track.length
         return float(fraction - np.round(fraction - near)) if track.is_closed else float(fraction)

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.race.ghost import Ghost
+from racecraft.race.ghost import LIVERY, Ghost, Rival
 from racecraft.race.lettering import Lettering, Mask, blend, disc_mask, pill_mask
 from racecraft.race.racing_line import SPEED_COLORS, speed_color
 from racecraft.race.recording import Recording
@@ -50,7 +50,7 @@ MARGIN = 16
 MAP: Final = (12, 350, 120, 116)  # x, y, width, height
 SPEED_X, STEERING_X, GAUGE_WIDTH, GAUGE_Y = 150, 300, 128, 462
 PROGRESS_HEIGHT = 5
-GHOSTS_Y, GHOST_LINE, SHOWN_GHOSTS = 84, 18, 8  # pixels of the first name and from one to the next, names
+NAMES_Y, NAMES_LINE, SHOWN_NAMES = 84, 18, 9  # pixels of the first name and from one to the next, names
 MAX_SPEED = 4.0  # m/s, the end of the gauge
 
 LABELS: Final = {
@@ -74,10 +74,21 @@ class Overlay:
         recording: What is shown.
         name: The racer's.
         laps: Laps that the race has; 0 if that is not known.
+        color: Of the car.
         ghosts: Named beside their colour, and shown on the map.
+        rivals: The same, in a table with the car itself, whoever is ahead on top.
     """
 
-    def __init__(self, recording: Recording, *, name: str, laps: int = 0, ghosts: Sequence[Ghost] = ()) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        name: str,
+        laps: int = 0,
+        color: Color = LIVERY[0],
+        ghosts: Sequence[Ghost] = (),
+        rivals: Sequence[Rival] = (),
+    ) -> None:
         self._recording = recording
         self._laps = laps
         numbers = recording.lap_numbers
@@ -93,6 +104,12 @@ class Overlay:
         self._ghosts = ghosts
         self._map, self._pixels = _map(recording)
         self._places = self._pixels(recording.origins)
+        field = [Rival(name, color, recording), *rivals] if rivals else []
+        self._field = [
+            (rival, self._pixels(rival.recording.origins[steps]), rival.recording.distances[steps])
+            for rival in field
+            for steps in [rival.recording.steps_at(recording.clock)]
+        ]
         self._static = _Layer(self._drawn_once(name))
 
     def ghosts_at(self, step: int) -> list[CarView | None]:
@@ -111,7 +128,7 @@ class Overlay:
         self._static.blend(frame)
         self._draw_laps(frame, step)
         self._draw_gauges(frame, step)
-        self._draw_ghosts(frame, step)
+        self._draw_others(frame, step)
         disc = disc_mask(5.0)
         x, y = self._places[step]
         blend(frame, x - disc.shape[1] // 2, y - disc.shape[0] // 2, disc, DARK)
@@ -125,20 +142,29 @@ class Overlay:
         elif self._mistake[step]:
             _draw_pill(frame, LABELS[self._mistake[step]], f"{self._remaining[step]:.1f} s", ALARM)
 
-    def _draw_ghosts(self, frame: NDArray[np.uint8], step: int) -> None:
-        views = self.ghosts_at(step)
+    def _draw_others(self, frame: NDArray[np.uint8], step: int) -> None:
+        """Dots on the map; names: of a race the table as it stands, then those of ghosts."""
         disc = disc_mask(3.2)
-        for ghost, view in zip(self._ghosts, views, strict=True):
+        shown: list[tuple[str, Color, Color]] = []
+        ahead = sorted(self._field, key=lambda entry: -float(entry[2][step]))
+        for place, (rival, places, _) in enumerate(ahead, start=1):
+            is_own = rival.recording is self._recording
+            shown.append((f"{place}  {rival.name}", rival.color, WHITE if is_own else SOFT))
+            x, y = places[step]
+            if not is_own:
+                blend(frame, x - disc.shape[1] // 2, y - disc.shape[0] // 2, disc, rival.color)
+        for ghost, view in zip(self._ghosts, self.ghosts_at(step), strict=True):
+            shown.append((ghost.name, ghost.color, SOFT if view is None else WHITE))
             if view is not None:
                 ((x, y),) = self._pixels(np.array([[view.x, view.y]]))
                 blend(frame, x - disc.shape[1] // 2, y - disc.shape[0] // 2, disc, ghost.color)
         disc = disc_mask(4.5)
-        for line, (ghost, view) in enumerate(list(zip(self._ghosts, views, strict=True))[:SHOWN_GHOSTS]):
-            y = GHOSTS_Y + line * GHOST_LINE
-            blend(frame, MARGIN, y - disc.shape[0] + 1, disc, ghost.color)
-            words, color = _fitted(ghost.name, _SMALL, 240), WHITE if view is not None else SOFT
+        for line, (words, color, ink) in enumerate(shown[:SHOWN_NAMES]):
+            y = NAMES_Y + line * NAMES_LINE
+            blend(frame, MARGIN, y - disc.shape[0] + 1, disc, color)
+            words = _fitted(words, _SMALL, 240)
             _SMALL.draw(frame, MARGIN + 17, y + 1, words, DARK)
-            _SMALL.draw(frame, MARGIN + 16, y, words, color)
+            _SMALL.draw(frame, MARGIN + 16, y, words, ink)
 
     def _draw_laps(self, frame: NDArray[np.uint8], step: int) -> None:
         right = WIDTH - MARGIN

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from racecraft.race.rules import RaceRules
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
+from racecraft.sim.objects import OBJECT_KINDS
 from racecraft.sim.simulation import Simulation
 from racecraft.track.polyline import interpolate, wrap_angle
 from racecraft.track.track import Track
@@ -18,6 +19,11 @@ CLEARANCE: Final = 1.0
 LEAST_ROOM: Final = 0.6
 """m to the next object in a lane below which a car is not put there if the other lane has more."""
 
+ROOM: Final = 0.5
+"""m from the middle of a car that is put back to the middle of any other: a car is 0.32 m long, a box 0.5."""
+SEARCH_STEP, SEARCHED = 0.25, 40  # m from one place to the next that is tried, and how many
+
+_OBJECT_KIND, _GONE = OBJECT_COLUMNS.index("object_kind"), OBJECT_KINDS.index("gone_racer")
 _OBJECT_DISTANCE, _OBJECT_OFFSET = OBJECT_COLUMNS.index("object_distance"), OBJECT_COLUMNS.index("object_offset")
 _OFFSET, _DISTANCE = ROW_COLUMNS.index("offset"), ROW_COLUMNS.index("projection_distance")
 
@@ -95,8 +101,12 @@ def avoiding_pose(track: Track, previous: NDArray[np.float64], *, crashed: int =
         mercy: Whether to put it past the object.
     """
     objects = previous[len(ROW_COLUMNS) + len(OBJECT_HEADER) :].reshape(-1, len(OBJECT_COLUMNS))
-    if not len(objects):
+    is_there = objects[:, _OBJECT_KIND] != _GONE
+    if not is_there.any():
         return reset_pose(track, previous)
+    if not is_there.all():  # cars that have left the race
+        crashed = int(is_there[:crashed].sum()) if crashed >= 0 else -1
+        objects = objects[is_there]
     places, offsets = objects[:, _OBJECT_DISTANCE], objects[:, _OBJECT_OFFSET]
     s = float(previous[_DISTANCE])
     nearest = crashed if crashed >= 0 else int(np.abs(_ahead(track, places, s)).argmin())
@@ -115,6 +125,35 @@ def avoiding_pose(track: Track, previous: NDArray[np.float64], *, crashed: int =
     return reset_pose(track, row)
 
 
+def clear_pose(track: Track, pose: Pose, others: NDArray[np.float64]) -> Pose:
+    """A place on the road where nobody is: the given one, or the nearest behind it, in either lane.
+
+    Two cars that are put back at once must not stand in each other, or one would run into the other as it starts.
+
+    Args:
+        track: In driving direction.
+        pose: Where the car would be put; kept where there is room.
+        others: Middles of everything around, x and y in m  (K, 2).
+    """
+    if _has_room(pose, others):
+        return pose
+    s, offset = (float(value) for value in track.project(np.array([pose.x, pose.y])))
+    for number in range(1, SEARCHED + 1):
+        behind = s - number * SEARCH_STEP
+        behind = behind % track.length if track.is_closed else max(behind, 0.0)
+        for side in (offset, -offset):
+            row = np.zeros(len(ROW_COLUMNS))
+            row[_DISTANCE], row[_OFFSET] = behind, side
+            found = reset_pose(track, row)
+            if _has_room(found, others):
+                return found
+    return pose
+
+
+def _has_room(pose: Pose, others: NDArray[np.float64]) -> bool:
+    return bool((np.hypot(others[:, 0] - pose.x, others[:, 1] - pose.y) >= ROOM).all())
+
+
 def _ahead(track: Track, places: Any, s: float) -> Any:
     """M that places are ahead of s along the track, the shorter way round a closed one."""
     ahead = places - s
@@ -122,12 +161,17 @@ def _ahead(track: Track, places: Any, s: float) -> Any:
 
 
 def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
-    """Put every car of a simulation at the start of its trial; equal seeds mean equal starts and conditions."""
+    """Put every car of a simulation at the start of its trial; equal seeds mean equal starts and conditions.
+
+    Cars that share a road stay where the simulation puts them: on its grid, without jitter.
+    """
     if simulation.randomize.is_off:
         simulation.reset()
     else:
-        trials = np.arange(simulation.num_envs, dtype=np.uint64)
-        simulation.reset(seeds=trials + np.uint64((seed % 2**32) << 20))
+        races = np.arange(simulation.num_envs, dtype=np.uint64) // np.uint64(simulation.cars_per_race)
+        simulation.reset(seeds=races + np.uint64((seed % 2**32) << 20))
+    if simulation.cars_per_race > 1:
+        return
     tracks = [track.reversed() if rules.direction == "reverse" else track for track in simulation.tracks]
     for trial in range(1, simulation.num_envs):  # trial 0 already stands where it should
         offset = start_offset(simulation, trial)

@@ -165,7 +165,9 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
     if header.track.repeats and max(header.track.repeats) >= len(track.centerline):
         raise ReplayError(f"The track in {name} repeats a waypoint that it does not have.")
     conditions = conditions_of(header, track, name=name)
-    width = row_width(conditions.objects.count)
+    width = row_width(conditions.num_objects)
+    if len(header.cars) % conditions.cars_per_race:
+        raise ReplayError(f"{name} has {len(header.cars)} cars, {conditions.cars_per_race} of which share a road.")
     if sum(car.steps for car in header.cars) * width > MAX_CELLS:
         raise ReplayError(f"{name} holds more than {MAX_CELLS:,} numbers.")
     driven = driven_track(track, conditions.rules)
@@ -174,7 +176,7 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
         if len(car.types) != ACTION_COLUMNS + width:  # the reward takes the place of the time
             raise ReplayError(f"Car {index} of {name} has {len(car.types)} columns; its objects ask for {width + 2}.")
         table = columns.table(car.steps, car.types)
-        cars.append(_trial(index, car, table, driven, name=name))
+        cars.append(_trial(index, car, table, driven, name=name, number=index % conditions.cars_per_race))
         rewards.append(np.ascontiguousarray(table[:, ACTION_COLUMNS]))
     columns.check_end()
     return Replay(
@@ -187,7 +189,7 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
     )
 
 
-def _trial(index: int, car: CarHeader, table: NDArray[np.float64], track: Track, *, name: str) -> Trial:
+def _trial(index: int, car: CarHeader, table: NDArray[np.float64], track: Track, *, name: str, number: int) -> Trial:
     rows = np.insert(table[:, ACTION_COLUMNS + 1 :], _TIME, 0.0, axis=1)
     rows[:, _TIME] = rows[:, _STEPS] * (1.0 / 15.0)  # as the core counts it
     status = rows[:, _STATUS]
@@ -205,7 +207,7 @@ def _trial(index: int, car: CarHeader, table: NDArray[np.float64], track: Track,
         laps=tuple(lap_of(lap) for lap in car.laps),
         status=car.status,
         completion=car.completion,
-        recording=Recording(track, rows, _clock(rows), table[:, :ACTION_COLUMNS].astype(np.float32)),
+        recording=Recording(track, rows, _clock(rows), table[:, :ACTION_COLUMNS].astype(np.float32), number),
     )
 
 

@@ -63,6 +63,19 @@ class Recording:
         return np.column_stack([self.origins, self.column("heading")])
 
     @cached_property
+    def distances(self) -> NDArray[np.float64]:
+        """Laps driven since the start, whole and in part  (T,)."""
+        driven = self.column("lap") + self.column("progress").clip(0.0, 1.0)
+        is_line = self.column("status") == STATUS_NAMES.index("lap_complete")
+        return np.where(is_line, self.column("lap"), driven)
+
+    def steps_at(self, seconds: NDArray[np.float64]) -> NDArray[np.intp]:
+        """The step that is shown at each of some times on the clock: the last one begun, at the end the last of all."""
+        # half a step of slack: clocks count steps of 1/15 s
+        steps = np.searchsorted(self.clock, seconds + 0.5 * CONTROL_DT, side="right") - 1
+        return np.asarray(steps.clip(0))
+
+    @cached_property
     def rewards(self) -> NDArray[np.float64]:
         """AWS's default reward, which evaluations log whatever the policy learned from; 0 while a car stands  (T,)."""
         stands = np.isin(self.column("status"), [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")])

@@ -85,6 +85,8 @@ class Header(_Strict):
     camera: Settings | None
     objects: Settings
     randomize: Settings
+    cars_per_race: Annotated[int, Field(ge=1, le=8)]
+    """Cars that share a road, in the order of the grid; `cars` has one such race after the other."""
     cars: Annotated[list[CarHeader], Field(min_length=1, max_length=MAX_CARS)]
 
 
@@ -111,6 +113,7 @@ def header_of(conditions: Conditions) -> dict[str, Any]:
         "camera": None if conditions.camera is None else asdict(conditions.camera),
         "objects": conditions.objects.to_dict(),
         "randomize": {name: list(ends) for name, ends in asdict(conditions.randomize).items()},
+        "cars_per_race": conditions.cars_per_race,
     }
 
 
@@ -129,6 +132,7 @@ def conditions_of(header: Header, track: Track, *, name: str) -> Conditions:
             camera=None if header.camera is None else CameraSpec(**header.camera),
             objects=Objects.from_dict(header.objects),
             randomize=Randomization(**header.randomize),
+            cars_per_race=header.cars_per_race,
         )
     except (RacecraftError, TypeError) as error:
         raise ReplayError(f"The settings in {name} are not allowed: {error}") from error

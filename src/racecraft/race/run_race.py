@@ -20,7 +20,7 @@ from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.conditions import Conditions
 from racecraft.race.contest import Contest, check_kind, hold_race
 from racecraft.race.entry import Entry, load_entries
-from racecraft.race.ghost import LIVERY, Ghost, ghost_of
+from racecraft.race.ghost import LIVERY, Ghost, Rival, ghost_of
 from racecraft.race.ghost_source import check_sources, load_ghosts
 from racecraft.race.race_replay import SUFFIX, write_replay
 from racecraft.race.results import Evaluation
@@ -148,6 +148,7 @@ def _write(
                 laps=contest.conditions.rules.laps,
                 color=LIVERY[index % len(LIVERY)],
                 ghosts=[*_others(contest, index), *ghosts],
+                rivals=_rivals(contest, index),
             )
     document = contest.to_dict()
     models = {entry.name: {"run": str(entry.run), "step": entry.step} for entry in entries}
@@ -162,6 +163,17 @@ def _others(contest: Contest, index: int) -> list[Ghost]:
         return []
     return [
         ghost_of(trial.recording, name=contest.names[other], color=LIVERY[other % len(LIVERY)])
+        for other, trial in enumerate(contest.trials)
+        if other != index
+    ]
+
+
+def _rivals(contest: Contest, index: int) -> list[Rival]:
+    """Everybody else, where they drove on the same road."""
+    if not contest.shares_road:
+        return []
+    return [
+        Rival(contest.names[other], LIVERY[other % len(LIVERY)], trial.recording)
         for other, trial in enumerate(contest.trials)
         if other != index
     ]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.errors import ConfigError, RunError
-from racecraft.race.ghost import LIVERY, Ghost
+from racecraft.race.ghost import LIVERY, Ghost, Rival
 from racecraft.race.overlay import HEIGHT, INSET, WIDTH, Overlay
 from racecraft.race.recording import Recording
 from racecraft.race.rules import RESET_STATUSES
@@ -48,6 +48,7 @@ def film(
     color: Color = LIVERY[0],
     palette: str = "2018",
     ghosts: Sequence[Ghost] = (),
+    rivals: Sequence[Rival] = (),
     sensors: SensorSuite = FRONT_CAMERA,
 ) -> Path:
     """Write the video of a trial.
@@ -60,6 +61,7 @@ def film(
         color: Of the car.
         palette: Colours of the world: ``2018`` or ``2020``.
         ghosts: Translucent cars that drove at another time; the driver does not see them.
+        rivals: The other cars of the race, for the table of who is ahead and for the map.
         sensors: Of the car, for the driver's view: of a stereo camera an anaglyph, the left lens in red.
 
     Raises:
@@ -77,7 +79,14 @@ def film(
             stream = container.add_stream("h264", rate=FRAME_RATE, options={"preset": "veryfast", "crf": QUALITY})
             stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
             pictures = frames(
-                recording, name=name, laps=laps, color=color, palette=palette, ghosts=ghosts, sensors=sensors
+                recording,
+                name=name,
+                laps=laps,
+                color=color,
+                palette=palette,
+                ghosts=ghosts,
+                rivals=rivals,
+                sensors=sensors,
             )
             for pixels in pictures:
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
@@ -127,6 +136,7 @@ def frames(
     color: Color = LIVERY[0],
     palette: str = "2018",
     ghosts: Sequence[Ghost] = (),
+    rivals: Sequence[Rival] = (),
     sensors: SensorSuite = FRONT_CAMERA,
 ) -> Iterator[NDArray[np.uint8]]:
     """The frames of `film`, RGB (480, 640, 3), each in the same array: copy what must last.
@@ -140,7 +150,7 @@ def frames(
     scene = Scene(recording.track, palette=palette)
     chase = scene.chase_view(width=WIDTH, height=HEIGHT)
     driver = DriverView(scene, sensors, width=width, height=height)
-    overlay = Overlay(recording, name=name, laps=laps, ghosts=ghosts)
+    overlay = Overlay(recording, name=name, laps=laps, color=color, ghosts=ghosts, rivals=rivals)
     places, headings = recording.origins, recording.column("heading")
     steering = recording.column("actual_steering_angle")
     directions, alphas, waves = follow(recording), blink(recording), wave(recording)
