@@ -133,6 +133,30 @@ def test_a_model_that_always_ties_with_another_is_rated_like_it(models: list[Pat
     assert found.ratings[0] == found.ratings[1]
 
 
+def test_a_ladder_of_duels_is_driven_and_the_same_again(models: list[Path]) -> None:
+    found = ladder(models, kind="head-to-model", starts=3)
+    assert len(found.matches) == 3
+    assert ladder(models, kind="head-to-model", starts=3).to_dict() == found.to_dict()
+    same = ladder([models[0], models[0]], kind="head-to-model", starts=2)
+    assert len({match.places for match in same.matches}) <= 2
+
+
+def test_a_grid_race_has_one_replay_of_all(models: list[Path], tmp_path: Path) -> None:
+    found = race([*models, models[0]], tmp_path, kind="grid")
+    (path,) = tmp_path.glob("*/*.replay")
+    replay = read_replay(path)
+    assert replay.names == ("m1", "m2", "m1-2")
+    assert replay.conditions.cars_per_race == 3
+    assert verify(replay, num_threads=1).is_genuine
+    assert sorted(standing.place or 0 for standing in found.contest.standings)[0] == 1
+    forged = read_replay(path)
+    forged.cars[1].recording.actions[10] = [0.3, 3.0]
+    difference = verify(forged, num_threads=1).difference
+    assert difference is not None
+    assert (difference.car, difference.step) == (1, 10)
+    assert race([*models, models[0]], tmp_path, kind="grid").contest.standings == found.contest.standings
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [

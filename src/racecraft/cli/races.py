@@ -105,7 +105,9 @@ def ladder(
         list[str] | None,
         typer.Option("--track", "-t", help="Track, repeatable: a name, a file, library, generated:0..9."),
     ] = None,
-    kind: Annotated[str, typer.Option("--type", help="time-trial, object-avoidance or head-to-bot.")] = "time-trial",
+    kind: Annotated[
+        str, typer.Option("--type", help="time-trial, object-avoidance, head-to-bot or head-to-model.")
+    ] = "time-trial",
     schedule: Annotated[str, typer.Option("--schedule", help="round-robin or swiss.")] = "round-robin",
     starts: Annotated[int, typer.Option("--starts", help="Different starts on each track.")] = 3,
     rounds: Annotated[int, typer.Option("--rounds", help="Of a Swiss schedule; by default one for every start.")] = 0,

@@ -3,26 +3,29 @@
     models x tracks x starts -> schedule (round-robin, or Swiss) -> matches -> OpenSkill -> a table with uncertainty
 
 Time trials, and races among boxes or bots, are matches, too: two models at the same start of the same track, compared
-by the rules of a race. Each drives each start once, whoever it is compared with.
+by the rules of a race. Each drives each start once, whoever it is compared with. In head-to-model races every match is
+driven: from another place of the lap each time, and every other time with the other model in front.
 """
 
 from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.race.classification import classify
 from racecraft.race.conditions import Conditions
-from racecraft.race.contest import ALONE
+from racecraft.race.contest import ALONE, race_together, shared_road
 from racecraft.race.entry import Entry
 from racecraft.race.evaluation import evaluate
 from racecraft.race.ratings import Rating, rate
 from racecraft.race.results import Trial
 from racecraft.race.schedule import Pair, round_robin, swiss_round
+from racecraft.sim.camera import CameraSpec
 
+LADDER_KINDS: Final = (*ALONE, "head-to-model")
 SCHEDULES: Final = ("round-robin", "swiss")
 MAX_ENTRIES: Final = 200
 MAX_STARTS: Final = 1000
@@ -37,7 +40,7 @@ class Match:
 
     track: str
     start: int
-    """Number of the start on that track, from 0; 0 is exactly on the line."""
+    """Number of the start on that track, from 0; alone, 0 is exactly on the line."""
     cars: Pair
     """Indices of the models."""
     places: tuple[int, int]
@@ -147,7 +150,7 @@ def hold_ladder(
     Args:
         entries: The models, two or more.
         courses: Track, rules, vehicle and objects of each course; starts are drawn from the seed of each.
-        kind: ``time-trial``, ``object-avoidance`` or ``head-to-bot``.
+        kind: ``time-trial``, ``object-avoidance``, ``head-to-bot`` or ``head-to-model``.
         schedule: ``round-robin``: everyone meets everyone at every start of every course; ``swiss``: each meets one of
             about the same strength in each round.
         starts: On each course.
@@ -168,7 +171,11 @@ def hold_ladder(
     ratings = [Rating() for _ in entries]
 
     def meet(pair: Pair, course: Course) -> Match:
-        match = _compare(pair, [trials.of(car, course) for car in pair], courses[course[0]], course[1])
+        if kind == "head-to-model":
+            driven = _duel([entries[car] for car in pair], courses[course[0]], course[1] / starts, course[1] % 2 == 1)
+        else:
+            driven = [trials.of(car, course) for car in pair]
+        match = _compare(pair, driven, courses[course[0]], course[1])
         matches.append(match)
         for car, rating in zip(pair, rate([ratings[car] for car in pair], match.places), strict=True):
             ratings[car] = rating
@@ -245,6 +252,16 @@ class _Trials:
         return self._driven[key][course[1]]
 
 
+def _duel(entries: Sequence[Entry], conditions: Conditions, fraction: float, swaps: bool) -> list[Trial]:
+    """What two models do on one road, from so much of a lap after the start; the second in front if it swaps them."""
+    place = (conditions.rules.start_offset + fraction) % 1.0
+    rules = replace(conditions.rules, start_offset=place if conditions.track.is_closed else 0.0)
+    given = shared_road(replace(conditions, rules=rules, camera=conditions.camera or CameraSpec()), 2)
+    order = [1, 0] if swaps else [0, 1]
+    trials = race_together([entries[car].policy for car in order], given, num_threads=1)
+    return [trials[order.index(car)] for car in range(2)]
+
+
 def _compare(pair: Pair, trials: Sequence[Trial], conditions: Conditions, start: int) -> Match:
     standings = classify(trials, minimum_laps=conditions.rules.laps, ranks_all=True)
     places = {standing.car: standing.place or 0 for standing in standings}
@@ -270,10 +287,9 @@ def check_ladder(num_entries: int, *, kind: str, schedule: str, starts: int, rou
     """
     if not 2 <= num_entries <= MAX_ENTRIES:
         raise ConfigError(f"A ladder has {num_entries} models; allowed are 2 to {MAX_ENTRIES}.")
-    if kind not in ALONE:
-        raise ConfigError(
-            f"A ladder's races are {kind!r}; allowed are {', '.join(ALONE)}.", hint=did_you_mean(kind, ALONE)
-        )
+    if kind not in LADDER_KINDS:
+        hint = did_you_mean(kind, LADDER_KINDS)
+        raise ConfigError(f"A ladder's races are {kind!r}; allowed are {', '.join(LADDER_KINDS)}.", hint=hint)
     if schedule not in SCHEDULES:
         hint = did_you_mean(schedule, SCHEDULES)
         raise ConfigError(f"schedule is {schedule!r}; allowed are {', '.join(SCHEDULES)}.", hint=hint)
