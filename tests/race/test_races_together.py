@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import itertools
 import random
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.errors import ConfigError
 from racecraft.race import Autopilot, Conditions, Evaluation, RaceRules, Replay, Trial, verify
 from racecraft.race.classification import classify
 from racecraft.race.contest import race_together, shared_road
 from racecraft.race.placement import ROOM, Pose, clear_pose
 from racecraft.race.rules import RESET_STATUSES
-from racecraft.sim import Bots, Objects, Obstacles
+from racecraft.sim import Bots, CameraSpec, Objects, Obstacles
 from racecraft.sim.columns import STATUS_NAMES
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.track import Track, generate_track, load_track
@@ -120,6 +122,57 @@ def test_several_laps_need_a_circuit_and_drivers_a_place_each() -> None:
         conditions(2, load_track("straight"), laps=2)
     with pytest.raises(ConfigError, match="3 drivers"):
         race_together([Blind()] * 3, conditions(2))
+
+
+class Watcher:
+    """Remembers what it is shown, and drives in circles."""
+
+    def __init__(self, *names: str) -> None:
+        self.sensors = SensorSuite(names)
+        self.shown: list[np.ndarray] = []
+
+    def __call__(self, sight: np.ndarray) -> np.ndarray:
+        self.shown.append(sight.copy())
+        return np.float32([[0.3, 1.5]])
+
+
+def test_every_car_sees_through_its_own_sensors() -> None:
+    field = [
+        Watcher("FRONT_FACING_CAMERA"),
+        Watcher("STEREO_CAMERAS", "LIDAR"),
+        Watcher("LEFT_CAMERA"),
+        Autopilot(speed=1.5),
+    ]
+    given = replace(conditions(4, max_resets=2, time_limit=15.0), camera=CameraSpec())
+    trials = race_together(field, given, num_threads=1)
+    assert [driver.shown[0].shape for driver in field[:3]] == [
+        (1, 120, 160),
+        (1, 2 * 120 * 160 + 64),
+        (1, 120, 160),
+    ]
+    blind = race_together([Same(trial) for trial in trials], replace(given, camera=None), num_threads=1)
+    for trial, again in zip(trials, blind, strict=True):  # what is seen does not change what happens
+        assert np.array_equal(trial.recording.rows, again.recording.rows)
+    assert sum(lap.resets for trial in trials for lap in trial.laps) > 0  # the eyes went along
+    assert verify(_replay(given, trials), num_threads=1).is_genuine
+
+    again = Watcher("FRONT_FACING_CAMERA")
+    race_together([again, *(Same(trial) for trial in trials[1:])], given, num_threads=1)
+    for first, second in zip(field[0].shown, again.shown, strict=True):
+        assert np.array_equal(first, second)
+
+
+class Same:
+    """Does what another did."""
+
+    sees = "state"
+
+    def __init__(self, trial: Trial) -> None:
+        recording = trial.recording
+        self._actions = iter(recording.actions[np.array(recording.statuses) != "prepare"])
+
+    def __call__(self, state: np.ndarray) -> np.ndarray:
+        return next(self._actions, np.zeros(2, dtype=np.float32))[None]
 
 
 # ---- the worst

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from racecraft.agent.sensor_suite import FRONT_CAMERA
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.race.classification import Standing, classify
 from racecraft.race.conditions import Conditions
@@ -183,8 +184,9 @@ def race_together(drivers: Sequence[Driver], conditions: Conditions, *, num_thre
     """A race of several cars on one road, in the order of the grid, until the last has finished or is out.
 
     Args:
-        drivers: Of the cars. Each is called with what its own car sees: the frame (1, 120, 160), or, where its
-            attribute ``sees`` is ``"state"``, the privileged state (1, S).
+        drivers: Of the cars. Each is called with what its own car's sensors tell (1, ...): those of its attribute
+            ``sensors``, by default the front camera; or, where its attribute ``sees`` is ``"state"``, the privileged
+            state (1, S).
         conditions: With `cars_per_race` equal to the number of drivers.
         num_threads: 0 takes one per core.
 
@@ -194,11 +196,29 @@ def race_together(drivers: Sequence[Driver], conditions: Conditions, *, num_thre
     if conditions.cars_per_race != len(drivers):
         raise ConfigError(f"There are {len(drivers)} drivers for a race of {conditions.cars_per_race} cars.")
     simulation = race_simulation(conditions, num_cars=len(drivers), num_threads=num_threads)
-    marshal = Marshal(simulation, conditions.rules, seed=conditions.seed)
-    sights = [simulation.state if getattr(one, "sees", "frames") == "state" else simulation.frames for one in drivers]
+    suites = [
+        None if getattr(driver, "sees", "frames") == "state" else getattr(driver, "sensors", FRONT_CAMERA)
+        for driver in drivers
+    ]
+    eyes = {
+        suite: simulation
+        if conditions.camera == suite.camera() and not suite.lidar_name
+        else race_simulation(
+            replace(conditions, camera=suite.camera()),
+            num_cars=len(drivers),
+            has_lidar=bool(suite.lidar_name),
+            num_threads=num_threads,
+        )
+        for suite in dict.fromkeys(suites)
+        if suite is not None
+    }
+    followers = [one for one in eyes.values() if one is not simulation]
+    marshal = Marshal(simulation, conditions.rules, seed=conditions.seed, followers=followers)
     actions = np.zeros((len(drivers), 2), dtype=np.float32)
     while marshal.is_racing:
-        for car, (driver, sight) in enumerate(zip(drivers, sights, strict=True)):
+        seen = {suite: suite.read(one) for suite, one in eyes.items()}
+        for car, (driver, suite) in enumerate(zip(drivers, suites, strict=True)):
+            sight = simulation.state if suite is None else seen[suite]
             actions[car] = driver(sight[car : car + 1])[0]
         marshal.step(actions)
     return marshal.trials()

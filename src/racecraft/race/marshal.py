@@ -65,16 +65,28 @@ class _Car:
 
 
 class Marshal:
-    """Runs the rules over a simulation from `trial_simulation`, from the start on."""
+    """Runs the rules over a simulation from `trial_simulation`, from the start on.
 
-    def __init__(self, simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
+    Args:
+        simulation: What is judged.
+        rules: Laps, resets, penalties.
+        seed: Of the starts.
+        followers: Simulations that differ by their sensors only and are led through the very same race: the eyes of
+            cars that see otherwise.
+    """
+
+    def __init__(
+        self, simulation: Simulation, rules: RaceRules, *, seed: int, followers: Sequence[Simulation] = ()
+    ) -> None:
         self._simulation = simulation
+        self._all = (simulation, *followers)
         self._rules = rules
         self._seed = seed
         self._track = driven_track(simulation.tracks[0], rules)
         self._cars = [_Car(index=index, resets_left=rules.max_resets) for index in range(simulation.num_envs)]
         self._is_racing = np.ones(simulation.num_envs, dtype=np.bool_)
-        line_up(simulation, rules, seed=seed)
+        for one in self._all:
+            line_up(one, rules, seed=seed)
         for car in self._cars:
             self._log_start(car)
 
@@ -91,7 +103,8 @@ class Marshal:
                 (N, 2).
         """
         simulation, limit = self._simulation, self._rules.time_limit
-        simulation.step(actions)
+        for one in self._all:
+            one.step(actions)
         rows = simulation.judged.copy()
         is_event = (rows[:, _STATUS] == _LAP_COMPLETE) | simulation.terminated | simulation.truncated
         for car in self._cars:
@@ -147,8 +160,9 @@ class Marshal:
         pose = avoiding_pose(self._track, car.rows[-2], crashed=crashed, mercy=mercy)
         if self._simulation.cars_per_race > 1:
             pose = clear_pose(self._track, pose, self._around(car))
-        self._simulation.set_pose(car.index, *pose)
-        self._simulation.freeze(car.index, steps)
+        for one in self._all:
+            one.set_pose(car.index, *pose)
+            one.freeze(car.index, steps)
         car.resets_left -= 1
         car.resets += 1
         car.penalty += steps * CONTROL_DT
@@ -165,11 +179,12 @@ class Marshal:
     def _start_again(self, car: _Car, clock: float) -> None:
         mask = np.zeros(self._simulation.num_envs, dtype=np.bool_)
         mask[car.index] = True
-        self._simulation.reset(mask)
+        for one in self._all:
+            one.reset(mask)
         offset = start_offset(self._simulation, car.index)
         pose = start_pose(self._track, self._rules, seed=self._seed, trial=car.index, lap=len(car.laps), offset=offset)
-        if car.index > 0:
-            self._simulation.set_pose(car.index, *pose)
+        for one in self._all if car.index > 0 else ():
+            one.set_pose(car.index, *pose)
         car.began = clock
         car.laps_before = len(car.laps)
         car.resets_left = self._rules.max_resets
