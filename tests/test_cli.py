@@ -83,6 +83,7 @@ VERBS = (
     "evaluate",
     "race",
     "ladder",
+    "film",
     "verify",
     "report",
     "tracks",
@@ -562,6 +563,10 @@ def test_race_verify_and_ladder(racecraft: Run, trained: Path, tmp_path: Path) -
     assert rated.status == 0
     assert "rating" in rated.out
     assert racecraft("race", str(trained), "--bots", "2", *short).err.startswith("ConfigError: --bots goes with --type")
+
+    filmed = racecraft("film", replays[0], "--ghost", replays[1], "--ghost", "best-lap", "--json").document
+    assert Path(filmed["video"]).stat().st_size > 10_000
+    assert racecraft("film", replays[0], "--car", "2").err.startswith("ConfigError: Car 2")
 
     from racecraft.race import read_replay, write_replay
 

@@ -300,6 +300,9 @@ def test_hostile_numbers_are_refused(clean: Path, tmp_path: Path) -> None:
         bad.cars[0].recording.rows[5, column] = value
         with pytest.raises(ReplayError):
             read_replay(write_replay(bad, path))
+    rude = replace(replay, names=("\x1b[2J", "b"), title="a\nb")
+    found = read_replay(write_replay(rude, path))
+    assert (found.names[0], found.title) == ("�[2J", "a�b")
     far = replace(replay.conditions.track, outer=replay.conditions.track.outer + 1e8)
     with pytest.raises(ReplayError, match="within 10,000"):
         read_replay(write_replay(replace(replay, conditions=replace(replay.conditions, track=far)), path))

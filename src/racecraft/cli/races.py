@@ -1,4 +1,4 @@
-"""`racecraft race`, `racecraft ladder` and `racecraft verify`."""
+"""`racecraft race`, `racecraft ladder`, and replays: `racecraft film` and `racecraft verify`."""
 
 from __future__ import annotations
 
@@ -158,6 +158,26 @@ def ladder(
         print_json(found.to_dict())
     else:
         text().say_rated(found)
+
+
+@app.command()
+def film(
+    replay: Annotated[Path, typer.Argument(help="Replay file.")],
+    car: Annotated[int, typer.Option("--car", help="Number of the car to follow, from 1; by default the best.")] = 0,
+    ghost: race_options.Ghosts = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="MP4 file; by default beside the replay.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Make a film of a replay."""
+    from racecraft.race.replay_film import film_replay
+
+    path = film_replay(replay, output, car=car, ghosts=ghost or ())
+    if as_json:
+        print_json({"video": str(path)})
+    else:
+        text().say_filmed(path)
 
 
 @app.command()

@@ -194,6 +194,11 @@ def say_rated(found: Ladder) -> None:
     _say(console, (f"Schedule {found.schedule}, seed {found.seed}: the same command gives the same table.", "dim"))
 
 
+def say_filmed(path: Path) -> None:
+    """Where a film is."""
+    _say(Console(), "Film: ", (str(path), "bold"))
+
+
 def say_verified(found: Verification) -> None:
     """Whether a replay is what its actions lead to, and what it holds."""
     console, replay = Console(), found.replay

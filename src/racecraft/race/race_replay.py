@@ -180,13 +180,18 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
         rewards.append(np.ascontiguousarray(table[:, ACTION_COLUMNS]))
     columns.check_end()
     return Replay(
-        title=header.title,
+        title=_printable(header.title),
         conditions=conditions,
-        names=tuple(car.name for car in header.cars),
+        names=tuple(_printable(car.name) for car in header.cars),
         cars=tuple(cars),
         rewards=tuple(rewards),
-        written_by=header.racecraft,
+        written_by=_printable(header.racecraft),
     )
+
+
+def _printable(words: str) -> str:
+    """Somebody else's words, without what could drive a terminal."""
+    return "".join(mark if mark.isprintable() else "�" for mark in words)
 
 
 def _trial(index: int, car: CarHeader, table: NDArray[np.float64], track: Track, *, name: str, number: int) -> Trial:
