@@ -149,6 +149,7 @@ def _write(
                 color=LIVERY[index % len(LIVERY)],
                 ghosts=[*_others(contest, index), *ghosts],
                 rivals=_rivals(contest, index),
+                sensors=entry.policy.sensors,
             )
     document = contest.to_dict()
     models = {entry.name: {"run": str(entry.run), "step": entry.step} for entry in entries}
