@@ -106,7 +106,7 @@ def test_a_newcomers_path_to_a_lap_on_video(visited: tuple[RunningConsole, Any])
     video = page.locator("video")
     video.wait_for()
     assert console.client.get(str(video.get_attribute("src"))).headers["content-type"] == "video/mp4"
-    page.get_by_text("Telemetry").wait_for()
+    page.get_by_role("heading", name="Replay").wait_for()
     page.get_by_role("link", name="Garage").first.click()
     page.locator(".picture img").wait_for()
     assert complaints == []
