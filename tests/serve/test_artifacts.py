@@ -187,7 +187,8 @@ def test_a_server_with_an_empty_folder_has_the_runs_again(tmp_path: Path, url: s
         client = console.client
         name = console.create(name="kept", until="2000 steps", track="oval")
         job = client.get("/api/jobs", params={"run": name}).json()[-1]
-        assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+        ended = console.wait_for(console.job_ended(job["id"]))
+        assert ended["state"] == "done", ended
         console.create(name="dropped", train=False)
         raced = client.post(f"/api/models/{name}/evaluations", json={"laps": 1, "num_trials": 1}).json()
         ended = console.wait_for(console.job_ended(raced["id"]))

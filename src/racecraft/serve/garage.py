@@ -26,6 +26,7 @@ from racecraft.serve.tables import Entry, Job, Model, now
 
 TRASH: Final = "trash"  # inside the state folder
 PICTURE: Final = "racing-line.png"
+NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
 SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
 Status = Literal["training", "queued", "stopped", "finished", "failed", "new"]
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -69,24 +70,31 @@ class Garage:
         raise NotFound(f"Model {name!r} cannot be read: its run.json is damaged.")
 
     def _cards(self, folders: list[RunFolder]) -> list[ModelCard]:
+        """Cards of these folders; what changed is read while nobody waits for the database."""
         only = [folders[0].name] if len(folders) == 1 else None
         with self._database.transaction() as session:
-            rows = _rows(session, only)
-            if fresh := [folder.name for folder in folders if folder.name not in rows]:
+            known = {row.name: (row.fingerprint, row.summary, row.deleted is not None) for row in _rows(session, only)}
+        renewed: dict[str, tuple[str, dict[str, Any]]] = {}
+        for folder in folders:
+            mark = _fingerprint(folder)
+            if known.get(folder.name, ("", {}, True))[::2] != (mark, False):
+                summary, is_settled = _summary(folder)
+                renewed[folder.name] = (mark if is_settled else "", summary)
+        with self._database.transaction() as session:
+            if fresh := [name for name in renewed if name not in known]:
                 session.execute(_insert(session), [{"name": name, "owner_id": 1} for name in fresh])
-                rows = _rows(session, only)
+            for name, (mark, summary) in renewed.items():
+                change: dict[str, Any] = {"fingerprint": mark, "summary": summary}
+                if name in known and known[name][2]:  # a new one by the name of one in the trash
+                    change |= {"deleted": None, "tags": []}
+                session.execute(sa.update(Model).where(Model.name == name).values(change))
+            tags = {row.name: (row.tags, row.summary) for row in _rows(session, only)}
             trainings = _latest_trainings(session, only)
-            cards = []
-            for folder in folders:
-                row = rows[folder.name]
-                if row.deleted is not None:  # a new one by the name of one in the trash
-                    row.deleted, row.tags = None, []
-                if (mark := _fingerprint(folder)) != row.fingerprint:
-                    row.summary, is_settled = _summary(folder)
-                    row.fingerprint = mark if is_settled else ""
-                if row.summary:
-                    status = _status(*trainings.get(folder.name, ("", "")), has_steps=bool(row.summary["steps"]))
-                    cards.append(ModelCard(name=folder.name, tags=row.tags, status=status, **row.summary))
+        cards = []
+        for name, (words, summary) in ((folder.name, tags[folder.name]) for folder in folders if folder.name in tags):
+            if summary:
+                status = _status(*trainings.get(name, ("", "")), has_steps=bool(summary["steps"]))
+                cards.append(ModelCard(name=name, tags=words, status=status, **summary))
         return cards
 
     def require_new(self, name: str) -> None:
@@ -199,7 +207,7 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
         created = datetime.fromisoformat(info.created).isoformat()
     except (RacecraftError, ValueError, TypeError):
         return {}, True
-    raced, is_settled = _evaluations(folder)
+    raced, picture, is_settled = _evaluations(folder)
     metrics = best.metrics if best is not None else {}
     return {
         "track": Path(info.track).stem,
@@ -208,20 +216,22 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
         "seconds": _seconds(folder),
         "completion": metrics.get("completion"),
         "best_lap": metrics.get("best_lap_s"),
-        "evaluations": len(raced),
-        "picture": next((f"{name}/{PICTURE}" for name in raced if (folder.path / name / PICTURE).is_file()), None),
+        "evaluations": raced,
+        "picture": picture,
         "until": str(info.settings.get("until", "")),
     }, is_settled
 
 
-def _evaluations(folder: RunFolder) -> tuple[list[str], bool]:
-    """The folders of finished evaluations, newest first, and whether none is under way."""
+def _evaluations(folder: RunFolder) -> tuple[int, str | None, bool]:
+    """How many evaluations there are, the newest picture, and whether none is under way; looks at the newest only."""
     with os.scandir(folder.path) as entries:
         names = sorted((entry.name for entry in entries if entry.name.startswith("evaluation-")), reverse=True)
-    raced = [name for name in names if (folder.path / name / "evaluation.json").exists()]
-    unfinished = set(names).difference(raced)
+    newest = names[:NEWEST]
+    raced = [name for name in newest if (folder.path / name / "evaluation.json").exists()]
+    unfinished = set(newest).difference(raced)
     youngest = max(((folder.path / name).stat().st_mtime for name in unfinished), default=0.0)
-    return raced, time.time() - youngest > SETTLED
+    picture = next((f"{name}/{PICTURE}" for name in raced if (folder.path / name / PICTURE).is_file()), None)
+    return len(names) - len(unfinished), picture, time.time() - youngest > SETTLED
 
 
 def _seconds(folder: RunFolder) -> float:
@@ -234,9 +244,9 @@ def _seconds(folder: RunFolder) -> float:
     return max((float(point.get("seconds") or 0.0) for point in points), default=0.0)
 
 
-def _rows(session: Session, only: list[str] | None) -> dict[str, Model]:
+def _rows(session: Session, only: list[str] | None) -> list[Model]:
     query = sa.select(Model) if only is None else sa.select(Model).where(Model.name.in_(only))
-    return {row.name: row for row in session.scalars(query)}
+    return list(session.scalars(query))
 
 
 def _insert(session: Session) -> sa.Insert:
