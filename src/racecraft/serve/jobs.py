@@ -21,8 +21,8 @@ from racecraft.serve.tables import Job, now
 
 LEASE: Final = timedelta(seconds=20)
 """How long a job without a heartbeat still counts as running."""
-FIRST_LEASE: Final = timedelta(seconds=60)
-"""The same before the first heartbeat: a process needs its time to start."""
+FIRST_LEASE: Final = timedelta(seconds=180)
+"""The same before the first heartbeat: a busy machine takes its time to start a process; a dead one is seen anyway."""
 MAX_LOSSES: Final = 5
 """How often a job's process may die before it is given up: it may be what kills it. Progress makes up for losses."""
 ENDED: Final = ("done", "failed", "cancelled")
