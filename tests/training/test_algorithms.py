@@ -13,7 +13,7 @@ from tiny_runs import Recorder, Train, weights
 from racecraft import evaluate, train
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.errors import ConfigError
-from racecraft.learn import SACConfig
+from racecraft.learn import DistillConfig, SACConfig
 from racecraft.learn.sb3 import SB3Config
 from racecraft.run import RunFolder
 from racecraft.training import resume
@@ -24,6 +24,9 @@ pytest.importorskip("torch")
 
 TINY_SAC = SACConfig(num_envs=4, num_steps=8, minibatch_size=16, learning_starts=32, buffer_size=512)
 TINY_SB3 = SB3Config(num_envs=4, num_steps=8, batch_size=16, learning_starts=16, buffer_size=256)
+TINY_DISTILL = DistillConfig(
+    num_envs=4, num_steps=8, teacher_steps=1, minibatch_size=16, updates_per_iteration=1, buffer_size=64
+)
 SHORT: dict[str, Any] = {"until": "96 steps", "evaluate_every": 64}
 
 
@@ -31,6 +34,7 @@ SHORT: dict[str, Any] = {"until": "96 steps", "evaluate_every": 64}
     "algorithm",
     [
         "sac",
+        "distill",
         "sb3:ppo",
         "sb3:dqn",
         pytest.param("sb3:a2c", marks=pytest.mark.slow),
@@ -42,7 +46,7 @@ def test_a_run_is_as_any_other(tiny: Train, algorithm: str) -> None:
     if algorithm.startswith("sb3"):
         pytest.importorskip("stable_baselines3")
     recorder = Recorder()
-    result = tiny(algorithm=algorithm, sac=TINY_SAC, sb3=TINY_SB3, reporter=recorder, **SHORT)
+    result = tiny(algorithm=algorithm, sac=TINY_SAC, sb3=TINY_SB3, distill=TINY_DISTILL, reporter=recorder, **SHORT)
     assert (result.reason, result.steps) == ("steps", 96)
     folder = RunFolder.open(result.run)
     assert read_settings(folder).algorithm == algorithm
@@ -81,7 +85,7 @@ def test_awss_files_choose_sac_and_its_settings(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings", "match"),
     [
-        ({"algorithm": "sacc"}, "algorithm is 'sacc'; allowed are ppo, sac, sb3:ppo"),
+        ({"algorithm": "sacc"}, "algorithm is 'sacc'; allowed are ppo, sac, distill, sb3:ppo"),
         ({"algorithm": "sb3:"}, "algorithm is 'sb3:'"),
         ({"algorithm": "sac", "actions": "default"}, "sac needs a continuous action space; this one is discrete"),
         ({"algorithm": "sb3:td3", "actions": "default"}, "sb3:td3 needs a continuous"),
@@ -107,11 +111,24 @@ def test_sb3_takes_no_hyperparameters_of_aws_and_sac_no_parent(tiny: Train, tmp_
 def test_a_run_of_an_earlier_version_is_one_of_ppo(tiny: Train) -> None:
     run = tiny(until="64 steps").run
     document = json.loads((run / "run.json").read_text())
-    for name in ("algorithm", "sac", "sb3"):
+    for name in ("algorithm", "sac", "distill", "sb3"):
         del document["settings"][name]
     (run / "run.json").write_text(json.dumps(document))
     assert read_settings(RunFolder.open(run)).algorithm == "ppo"
     assert resume(run, until="128 steps").steps == 128
+
+
+@pytest.mark.slow
+def test_a_student_laps_the_oval_after_a_few_thousand_frames(tmp_path: Path) -> None:
+    """Of what the teacher learned from the user's reward; PPO needs some 8,000 frames for it."""
+    settings: dict[str, Any] = {
+        "until": "5 laps or 6144 steps",
+        "evaluate_every": 2048,
+        "num_threads": 1,
+        "root": tmp_path,
+    }
+    result = train("oval", algorithm="distill", distill=DistillConfig(teacher_steps=60_000), seed=1, **settings)
+    assert (result.reason, result.laps_completed) == ("laps", 5)
 
 
 @pytest.mark.slow

@@ -54,7 +54,7 @@ def train(
         Path | None, typer.Option("--hyperparameters", help="AWS's hyperparameters.json; trains as AWS did.")
     ] = None,
     algorithm: Annotated[
-        str, typer.Option("--algorithm", help="ppo, sac, or sb3:ppo, a2c, dqn, sac, td3 of Stable-Baselines3.")
+        str, typer.Option("--algorithm", help="ppo, sac, distill, or Stable-Baselines3's sb3:ppo, a2c, dqn, sac, td3.")
     ] = "",
     network: Annotated[str, typer.Option("--network", help="RACECRAFT_SMALL or one of AWS's three names.")] = "",
     critic: Annotated[str, typer.Option("--critic", help="What the critic sees: privileged or camera.")] = "privileged",

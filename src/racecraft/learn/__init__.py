@@ -7,6 +7,7 @@ from typing import Any
 
 from racecraft.errors import ConfigError
 from racecraft.learn.algorithm import Algorithm
+from racecraft.learn.distill import Distill, DistillConfig
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats
 from racecraft.learn.networks import forward_operations, initial_weights, network_names, parameter_count
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
@@ -75,6 +76,8 @@ __all__ = [
     "PPO",
     "SAC",
     "Algorithm",
+    "Distill",
+    "DistillConfig",
     "Environment",
     "IterationStats",
     "Learner",

@@ -211,6 +211,7 @@ class PPO:
             observation_shape=learner.observation_shape,
             state_size=spec.state_size,
             action_size=0 if spec.is_discrete else spec.num_actions,
+            observation_dtype=getattr(learner, "observation_dtype", np.uint8),
         )
         self._episode_returns = np.zeros(config.num_envs)
         self._episode_lengths = np.zeros(config.num_envs, np.int64)

@@ -23,6 +23,7 @@ class Rollout:
         observation_shape: Shape of one encoded frame.
         state_size: S, columns of privileged state.
         action_size: 0 for discrete actions (int64 indices), else A (float32).
+        observation_dtype: Of encoded frames; a learner without a camera has others.
     """
 
     def __init__(
@@ -33,9 +34,10 @@ class Rollout:
         observation_shape: tuple[int, ...],
         state_size: int,
         action_size: int,
+        observation_dtype: type = np.uint8,
     ) -> None:
         shape = (num_steps, num_envs)
-        self.observations = np.zeros((*shape, *observation_shape), np.uint8)
+        self.observations = np.zeros((*shape, *observation_shape), observation_dtype)
         self.states = np.zeros((*shape, state_size), np.float32)
         self.actions: NDArray[Any] = (
             np.zeros((*shape, action_size), np.float32) if action_size else np.zeros(shape, np.int64)

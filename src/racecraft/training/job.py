@@ -42,7 +42,7 @@ from racecraft.run import (
 from racecraft.run.history import HistoryWriter
 from racecraft.sim import Simulation
 from racecraft.track import Track, joint_digest, load_tracks
-from racecraft.training.algorithms import make_algorithm
+from racecraft.training.algorithms import make_algorithm, teacher_environment
 from racecraft.training.cuda_environment import CudaTrainingEnvironment
 from racecraft.training.environment import TrainingEnvironment, open_simulation
 from racecraft.training.evaluator import Evaluator
@@ -218,9 +218,13 @@ class Training:
                 environment = CudaTrainingEnvironment(
                     simulation, worker, source, metadata.action_space, counter=counter, note=self.reporter.note
                 )
+
+            def open_teacher() -> TrainingEnvironment:
+                return teacher_environment(settings, source, tracks, metadata.action_space, stack)
+
             session = _Session(
                 environment=environment,
-                algorithm=make_algorithm(settings, learner, environment),
+                algorithm=make_algorithm(settings, learner, environment, open_teacher=open_teacher),
                 evaluator=Evaluator(
                     NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite), tracks, settings
                 ),

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError, RunError, did_you_mean
-from racecraft.learn import NetworkSpec, PPOConfig, SACConfig, network_names
+from racecraft.learn import DistillConfig, NetworkSpec, PPOConfig, SACConfig, network_names
 from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3_ALGORITHMS, SB3Config
 from racecraft.sim import CameraSpec, Randomization, Start, Vehicle, load_randomization, load_vehicle
 from racecraft.sim.columns import state_width
@@ -21,10 +21,10 @@ from racecraft.training.stop import Until
 
 DEFAULT_TRACK: Final = "reinvent_2018"
 VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
-ALGORITHMS: Final = ("ppo", "sac", *(f"sb3:{name}" for name in SB3_ALGORITHMS))
+ALGORITHMS: Final = ("ppo", "sac", "distill", *(f"sb3:{name}" for name in SB3_ALGORITHMS))
 SQUASHED: Final = ("sac", "sb3:sac", "sb3:td3")
 """Algorithms whose best action is the hyperbolic tangent of the policy's mean."""
-_ADDED: Final = ("algorithm", "opponents", "sac", "sb3", "device")
+_ADDED: Final = ("algorithm", "opponents", "sac", "distill", "sb3", "device")
 """Fields that runs of earlier versions lack."""
 CRITICS: Final = ("privileged", "camera")
 EVALUATE_EVERY: Final = 4096
@@ -83,6 +83,8 @@ class TrainSettings:
     """How PPO does it."""
     sac: SACConfig = field(default_factory=SACConfig)
     """How SAC does it."""
+    distill: DistillConfig = field(default_factory=DistillConfig)
+    """How distillation does it."""
     sb3: SB3Config = field(default_factory=SB3Config)
     """How Stable-Baselines3 does it."""
     evaluate_every: int = EVALUATE_EVERY
@@ -137,6 +139,8 @@ class TrainSettings:
         """Cars driven at once."""
         if self.algorithm.startswith("sb3:"):
             return self.sb3.num_envs
+        if self.algorithm == "distill":
+            return self.distill.num_envs
         return self.sac.num_envs if self.algorithm == "sac" else self.ppo.num_envs
 
     def network_spec(self, metadata: ModelMetadata) -> NetworkSpec:
@@ -186,7 +190,12 @@ class TrainSettings:
             values["randomize"] = Randomization(**values["randomize"])
             values["objects"] = Objects.from_dict(values["objects"])
             values["opponents"] = Opponents.from_dict(values.get("opponents"))
-            for name, config in (("ppo", PPOConfig), ("sac", SACConfig), ("sb3", SB3Config)):
+            for name, config in (
+                ("ppo", PPOConfig),
+                ("sac", SACConfig),
+                ("distill", DistillConfig),
+                ("sb3", SB3Config),
+            ):
                 values[name] = config(**values.get(name, {}))
             return cls(**values)
         except (TypeError, AttributeError) as error:
@@ -254,16 +263,15 @@ def make_settings(
             hyperparameters.check_algorithm("sac")
         theirs: dict[str, Any] = {} if hyperparameters is None else hyperparameters.to_sac()
         settings["sac"] = SACConfig(**theirs)
-    if hyperparameters is not None and algorithm.startswith("sb3:"):
+    if hyperparameters is not None and algorithm not in ("ppo", "sac"):
         raise ConfigError(
             f"hyperparameters.json is for AWS's algorithms, {algorithm} is none of them.", hint="Leave it out."
         )
-    for name in ("sac", "sb3"):
-        if num_envs and algorithm.split(":")[0] == name:
-            _check_num_envs(num_envs, MAX_ENVS)
-            settings[name] = replace(
-                settings.get(name, SACConfig() if name == "sac" else SB3Config()), num_envs=num_envs
-            )
+    kind = algorithm.split(":")[0]
+    if num_envs and kind != "ppo":
+        _check_num_envs(num_envs, MAX_ENVS)
+        begin: dict[str, Any] = {"sac": SACConfig(), "distill": DistillConfig(), "sb3": SB3Config()}
+        settings[kind] = replace(settings.get(kind, begin[kind]), num_envs=num_envs)
     if hyperparameters is not None:
         if ppo is not None:
             raise ConfigError("ppo and hyperparameters both say how the policy improves; give one of them.")

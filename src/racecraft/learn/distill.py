@@ -1,0 +1,305 @@
+"""Privileged distillation: a teacher learns on the simulator's state, a student with a camera learns from the teacher.
+
+    teacher:  state ──PPO──▶ policy            (no camera is rendered, the user's reward as always)
+    student:  drives with its own camera policy ──▶ the teacher says what it would do there ──▶ ReplayMemory ──▶ update
+
+The student visits its own states and is told the teacher's answer in each of them (DAgger,
+https://arxiv.org/abs/1011.0686), so it learns to come back from its own mistakes. Its loss is the cross-entropy to the
+teacher's distribution of actions, sampled anew for every minibatch. ("Learning by cheating", https://arxiv.org/abs/1912.12294.)
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import CheckpointError, ConfigError, TrainingError
+from racecraft.learn import distributions
+from racecraft.learn.average import WeightAverage
+from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights
+from racecraft.learn.mlp_learner import MlpLearner
+from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
+
+TEACHER_PPO = PPOConfig(num_envs=64, num_steps=32, minibatch_size=512, update_epochs=4, learning_rate=2e-3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistillConfig:
+    """Settings of distillation."""
+
+    num_envs: int = 64
+    """Cars of the student."""
+    num_steps: int = 8
+    """Steps of each of them in one iteration."""
+    teacher_steps: int = 100_000
+    """Steps of the teacher before the student begins; they render no camera and do not count as camera steps."""
+    learning_rate: float = 1.5e-3
+    """Adam's step size of the student."""
+    minibatch_size: int = 128
+    """Samples of one gradient step."""
+    updates_per_iteration: int = 12
+    """Gradient steps of the student after every iteration."""
+    buffer_size: int = 16_000
+    """Steps of the student that are remembered, of 4 kB each with the default network."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot work, naming the field."""
+        for name in (
+            "num_envs",
+            "num_steps",
+            "teacher_steps",
+            "minibatch_size",
+            "updates_per_iteration",
+            "buffer_size",
+        ):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 10**9:
+                raise ConfigError(f"{name} is {value!r}, expected a whole number, 1 or more.")
+        rate = self.learning_rate
+        if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 <= rate <= 1:
+            raise ConfigError(f"learning_rate is {rate!r}, expected a number from 0 to 1.")
+        if self.buffer_size < self.num_envs * self.num_steps:
+            raise ConfigError(
+                f"buffer_size is {self.buffer_size}, expected at least num_envs x num_steps = "
+                f"{self.num_envs * self.num_steps}."
+            )
+
+
+class StateWorld:
+    """An environment whose frames are its states, for a teacher."""
+
+    def __init__(self, environment: Environment) -> None:
+        self.environment = environment
+        self.num_envs = environment.num_envs
+
+    def observe(self) -> tuple[NDArray[Any], NDArray[np.float32]]:
+        """The states, twice."""
+        states = self.environment.observe()[1]
+        return states, states
+
+    def step(self, actions: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.bool_]]:
+        """As of the environment."""
+        return self.environment.step(actions)
+
+    def reset(self, mask: NDArray[np.bool_]) -> None:
+        """As of the environment."""
+        self.environment.reset(mask)
+
+
+class Distill:
+    """The algorithm and its place in training; a `racecraft.learn.Algorithm`.
+
+    Args:
+        config: Settings.
+        learner: The student's network.
+        environment: The student's cars, with a camera.
+        teacher_environment: The teacher's cars; they need none.
+        seed: Decides all sampling, together with the number of the iteration.
+    """
+
+    def __init__(
+        self,
+        config: DistillConfig,
+        learner: Learner,
+        environment: Environment,
+        teacher_environment: Environment,
+        *,
+        seed: int = 0,
+    ) -> None:
+        if config.num_envs != environment.num_envs:
+            raise ConfigError(f"num_envs is {config.num_envs}, expected the environment's {environment.num_envs}.")
+        self.config, self.learner, self.environment, self.seed = config, learner, environment, seed
+        self.state_size = environment.observe()[1].shape[1]
+        teacher_spec = replace(learner.spec, state_size=self.state_size)
+        ppo = replace(TEACHER_PPO, num_envs=teacher_environment.num_envs)
+        if not learner.spec.is_discrete:
+            ppo = replace(ppo, ent_coef=0.0)
+        self.teacher = PPO(ppo, MlpLearner(teacher_spec, seed=seed), StateWorld(teacher_environment), seed=seed)
+        self.total_steps = 0
+        self.iteration = 0
+        self.prefers_average = False
+        self._average = WeightAverage(0.06)
+        capacity = config.buffer_size // config.num_envs * config.num_envs
+        self._observations = np.zeros((capacity, *learner.observation_shape), np.uint8)
+        self._answers = np.zeros((capacity, learner.spec.policy_size), np.float32)  # the teacher's outputs
+        self._count = 0
+        self._totals = np.zeros(config.num_envs)
+        self._lengths = np.zeros(config.num_envs, np.int64)
+
+    @property
+    def spec(self) -> NetworkSpec:
+        """The student's network."""
+        return self.learner.spec
+
+    @property
+    def is_teaching(self) -> bool:
+        """Whether the teacher has learned what it is to learn."""
+        return self.teacher.total_steps >= self.config.teacher_steps
+
+    def iterate(self) -> IterationStats:
+        """One iteration of the teacher, or, once it has learned, of the student.
+
+        Raises:
+            TrainingError: Loss or gradient is not finite.
+        """
+        self.iteration += 1
+        if not self.is_teaching:
+            stats = self.teacher.iterate()
+            return replace(stats, iteration=self.iteration, total_steps=0, num_steps=0)
+        rng = np.random.default_rng([self.seed, self.iteration])
+        clocks = {"environment": 0.0, "policy": 0.0}
+        finished: list[tuple[float, int]] = []
+        for _ in range(self.config.num_steps):
+            self._drive(rng, clocks, finished)
+        started = time.perf_counter()
+        losses = self._learn(rng)
+        self._average.add(self.learner.weights(), iteration=self.iteration)
+        return IterationStats(
+            iteration=self.iteration,
+            total_steps=self.total_steps,
+            num_steps=self.config.num_steps * self.config.num_envs,
+            episodes=len(finished),
+            mean_return=float(np.mean([total for total, _ in finished])) if finished else float("nan"),
+            mean_length=float(np.mean([length for _, length in finished])) if finished else float("nan"),
+            losses=losses,
+            explained_variance=float("nan"),
+            environment_seconds=clocks["environment"],
+            policy_seconds=clocks["policy"],
+            update_seconds=time.perf_counter() - started,
+        )
+
+    def _drive(self, rng: np.random.Generator, clocks: dict[str, float], finished: list[tuple[float, int]]) -> None:
+        """One step of the student's cars, and the teacher's answers there."""
+        spec, started = self.spec, time.perf_counter()
+        frames, states = self.environment.observe()
+        observations = self.learner.encode(frames)
+        outputs = self.learner.policy(observations)
+        if not np.isfinite(outputs).all():
+            raise TrainingError("The policy's outputs are not finite.", hint="Lower learning_rate.")
+        noise = distributions.noise_for(
+            len(outputs), num_actions=spec.num_actions, is_discrete=spec.is_discrete, rng=rng
+        )
+        actions = distributions.sample(outputs, noise, is_discrete=spec.is_discrete)
+        rows = (self._count + np.arange(len(outputs))) % len(self._answers)
+        self._observations[rows] = observations
+        self._answers[rows] = self.teacher.learner.policy(states.astype(np.float32))  # type: ignore[arg-type]
+        self._count += len(outputs)
+        acted = time.perf_counter()
+        rewards, terminated, truncated = self.environment.step(actions if spec.is_discrete else actions.clip(-1.0, 1.0))
+        done = terminated | truncated
+        self._totals += rewards
+        self._lengths += 1
+        ended = np.flatnonzero(done)
+        finished += zip(self._totals[ended].tolist(), self._lengths[ended].tolist(), strict=True)
+        self._totals[done], self._lengths[done] = 0.0, 0
+        if len(ended):
+            self.environment.reset(done)
+        self.total_steps += len(outputs)
+        clocks["policy"] += acted - started
+        clocks["environment"] += time.perf_counter() - acted
+
+    def _learn(self, rng: np.random.Generator) -> UpdateStats:
+        """Gradient steps on the cross-entropy to the teacher's distribution.
+
+        With an advantage of 1 and the present log-probabilities as the old ones, the gradient of PPO's loss is that of
+        minus the log-probability of the action; with actions drawn from the teacher that is the cross-entropy's.
+        """
+        spec, config = self.spec, self.config
+        objective = Objective(
+            learning_rate=config.learning_rate,
+            clip_coef=0.2,
+            ent_coef=0.0,
+            vf_coef=0.0,
+            value_loss="mse",
+            max_grad_norm=0.5,
+        )
+        known = min(self._count, len(self._answers))
+        cross_entropies, norms = [], []
+        for _ in range(config.updates_per_iteration):
+            rows = rng.integers(0, known, config.minibatch_size)
+            observations, answers = self._observations[rows], self._answers[rows]
+            noise = distributions.noise_for(
+                len(rows), num_actions=spec.num_actions, is_discrete=spec.is_discrete, rng=rng
+            )
+            actions = distributions.sample(answers, noise, is_discrete=spec.is_discrete)
+            outputs = self.learner.policy(observations)
+            log_probs = distributions.log_prob(outputs, actions, is_discrete=spec.is_discrete)
+            stats = self.learner.update(
+                Minibatch(
+                    observations=observations,
+                    states=np.zeros((len(rows), spec.state_size), np.float32),
+                    actions=actions,
+                    log_probs=log_probs,
+                    advantages=np.ones(len(rows), np.float32),
+                    returns=np.zeros(len(rows), np.float32),
+                ),
+                objective,
+            )
+            if not (stats.is_finite and np.isfinite(log_probs).all()):
+                raise TrainingError(
+                    f"The student's loss is not finite in iteration {self.iteration}; its step was not taken.",
+                    hint="Lower learning_rate.",
+                )
+            cross_entropies.append(-float(log_probs.mean()))
+            norms.append(stats.grad_norm)
+        return UpdateStats(
+            policy_loss=float(np.mean(cross_entropies)),
+            value_loss=0.0,
+            entropy=stats.entropy,
+            approx_kl=float("nan"),
+            clip_fraction=float("nan"),
+            grad_norm=float(np.mean(norms)),
+        )
+
+    @property
+    def driving_weights(self) -> Weights:
+        """The weights to judge and to save."""
+        return (self._average.weights() if self.prefers_average else {}) or self.learner.weights()
+
+    @contextmanager
+    def driving(self) -> Iterator[None]:
+        """Within, the learner holds the weights that are to drive; afterwards those it learns with."""
+        own = self.learner.weights()
+        self.learner.load_weights(self.driving_weights)
+        try:
+            yield
+        finally:
+            self.learner.load_weights(own)
+
+    # ---- resume
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Student, teacher, optimisers and counters; not the frames that are remembered."""
+        arrays = {f"weights/{name}": array.copy() for name, array in self.driving_weights.items()}
+        arrays |= {f"learning/{name}": array for name, array in self.learner.weights().items()}
+        arrays |= {f"average/{name}": array.copy() for name, array in self._average.weights().items()}
+        arrays |= {f"optimizer/{name}": array for name, array in self.learner.optimizer_state().items()}
+        arrays |= {f"teacher/{name}": array for name, array in self.teacher.state().items()}
+        counters = np.array([self.seed, self.iteration, self.total_steps], np.int64)
+        totals = np.stack([self._totals, self._lengths])
+        return {**arrays, "distill/counters": counters, "distill/episodes": totals}
+
+    def load_state(self, state: dict[str, NDArray[Any]]) -> None:
+        """Continue from what ``state`` gave, with no frames remembered; CheckpointError where it does not fit."""
+
+        def below(prefix: str) -> dict[str, NDArray[Any]]:
+            return {name.removeprefix(prefix): a for name, a in state.items() if name.startswith(prefix)}
+
+        try:
+            counters, episodes = state["distill/counters"], state["distill/episodes"]
+        except KeyError as error:
+            raise CheckpointError(f"The training state has no entry {error}.") from None
+        if episodes.shape != (2, self.config.num_envs):
+            raise CheckpointError(f"The training state is of {episodes.shape[-1]} cars, not of {self.config.num_envs}.")
+        self.teacher.load_state(below("teacher/"))
+        self.learner.load_weights(below("learning/"))
+        self._average.load(below("average/"), like=self.learner.weights())
+        self.learner.load_optimizer_state(below("optimizer/"))
+        self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
+        self._totals, self._lengths = episodes[0].copy(), episodes[1].astype(np.int64)

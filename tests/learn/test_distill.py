@@ -1,0 +1,135 @@
+"""Distillation on a toy world: the teacher's gradient, what the student learns from it, and resuming."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from stripe_world import StripeWorld
+
+from racecraft.errors import CheckpointError, ConfigError
+from racecraft.learn import Minibatch, NetworkSpec, Objective, distributions, make_learner
+from racecraft.learn.distill import Distill, DistillConfig
+from racecraft.learn.mlp_learner import MlpLearner
+
+CONFIG = DistillConfig(num_envs=8, num_steps=8, teacher_steps=1, minibatch_size=32, buffer_size=512)
+OBJECTIVE = Objective(
+    learning_rate=1e-3, clip_coef=0.2, ent_coef=0.05, vf_coef=0.5, value_loss="huber", max_grad_norm=0.5
+)
+
+
+def make(config: DistillConfig = CONFIG, *, is_discrete: bool = True, seed: int = 0) -> Distill:
+    spec = NetworkSpec(num_actions=3 if is_discrete else 1, is_discrete=is_discrete, state_size=2)
+    learner = make_learner(spec, seed=seed, num_threads=1)
+    return Distill(config, learner, StripeWorld(config.num_envs), StripeWorld(16, seed=4), seed=seed)
+
+
+@pytest.mark.parametrize("is_discrete", [True, False])
+def test_the_teachers_gradient_is_that_of_its_loss(is_discrete: bool) -> None:
+    """Central differences of the whole loss along the gradient and along a random direction."""
+    spec = NetworkSpec(num_actions=3 if is_discrete else 2, is_discrete=is_discrete, state_size=5)
+    learner, rng = MlpLearner(spec, seed=1), np.random.default_rng(2)
+    weights = {
+        name: array + rng.normal(0, 0.3, array.shape).astype(np.float32) for name, array in learner.weights().items()
+    }
+    learner.load_weights(weights)
+    states = rng.normal(size=(40, 5)).astype(np.float32)
+    outputs = learner.policy(states)
+    noise = distributions.noise_for(40, num_actions=spec.num_actions, is_discrete=is_discrete, rng=rng)
+    actions = distributions.sample(outputs, noise, is_discrete=is_discrete)
+    old = distributions.log_prob(outputs, actions, is_discrete=is_discrete)
+    minibatch = Minibatch(
+        observations=states,  # type: ignore[arg-type]
+        states=states,
+        actions=actions,
+        log_probs=old + rng.normal(0, 0.1, 40).astype(np.float32),
+        advantages=rng.normal(size=40).astype(np.float32),
+        returns=rng.normal(0, 2, 40).astype(np.float32),
+        rows=rng.permutation(40)[:31],
+    )
+
+    def loss() -> float:
+        stats, _ = learner.gradient(minibatch, OBJECTIVE)
+        return stats.policy_loss - OBJECTIVE.ent_coef * stats.entropy + OBJECTIVE.vf_coef * stats.value_loss
+
+    _, gradient = learner.gradient(minibatch, OBJECTIVE)
+    assert gradient.keys() == weights.keys()
+    for name, slope in gradient.items():
+        for direction in (slope.astype(float), rng.normal(size=slope.shape)):
+            direction /= np.linalg.norm(direction)
+            sides = []
+            for step in (1e-3, -1e-3):
+                learner.load_weights({**weights, name: (weights[name] + step * direction).astype(np.float32)})
+                sides.append(loss())
+            learner.load_weights(weights)
+            expected = float((slope * direction).sum())
+            assert (sides[0] - sides[1]) / 2e-3 == pytest.approx(expected, rel=0.02, abs=2e-3), name
+
+
+def mean_reward(trained: Distill) -> float:
+    world = StripeWorld(32, seed=9, time_limit=10**6)
+    rewards = []
+    with trained.driving():
+        for _ in range(30):
+            outputs = trained.learner.policy(trained.learner.encode(world.observe()[0]))
+            reward, terminated, _ = world.step(distributions.most_likely(outputs, is_discrete=trained.spec.is_discrete))
+            rewards.append(reward.mean())
+            if terminated.any():
+                world.reset(terminated)
+    return float(np.mean(rewards[10:]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_discrete", [True, False])
+def test_a_student_with_a_camera_learns_what_its_teacher_knows(is_discrete: bool) -> None:
+    trained = make(replace(CONFIG, teacher_steps=16_000), is_discrete=is_discrete)
+    before = mean_reward(trained)
+    while not trained.is_teaching:
+        assert trained.iterate().num_steps == 0
+    assert trained.total_steps == 0
+    for _ in range(16):
+        stats = trained.iterate()
+    assert (stats.num_steps, trained.total_steps) == (64, 16 * 64)
+    assert before < 0.7 < 0.8 < mean_reward(trained)
+
+
+@pytest.mark.slow
+def test_from_a_teacher_that_knows_nothing_nothing_is_learned() -> None:
+    trained = make()
+    for _ in range(17):
+        trained.iterate()
+    assert mean_reward(trained) < 0.7
+
+
+def test_the_same_seed_gives_the_same_bits_and_a_resumed_run_has_them() -> None:
+    first, second, third = make(), make(), make(seed=3)
+    for _ in range(3):
+        first.iterate()
+        second.iterate()
+    state = first.state()
+    third.load_state(state)
+    for trained in (second, third):
+        for name, array in trained.state().items():
+            np.testing.assert_array_equal(array, state[name], err_msg=name)
+    assert third.is_teaching
+    assert third.iterate().total_steps == 3 * 64
+    with pytest.raises(CheckpointError, match="no entry"):
+        third.load_state({})
+    with pytest.raises(CheckpointError, match="of 4 cars"):
+        third.load_state({**state, "distill/episodes": np.zeros((2, 4))})
+
+
+@pytest.mark.parametrize(
+    ("settings", "match"),
+    [
+        ({"teacher_steps": 0}, "teacher_steps is 0"),
+        ({"learning_rate": -1.0}, "learning_rate is -1.0"),
+        ({"buffer_size": 100}, "at least num_envs x num_steps = 512"),
+        ({"minibatch_size": 1.5}, "minibatch_size is 1.5"),
+    ],
+)
+def test_settings_that_cannot_work_are_refused(settings: dict[str, Any], match: str) -> None:
+    with pytest.raises(ConfigError, match=match):
+        DistillConfig(**settings)
