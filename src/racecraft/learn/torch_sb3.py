@@ -1,6 +1,6 @@
 """Stable-Baselines3 on our cars: its algorithms, our networks, our checkpoints.
 
-A policy here is a camera tower of `racecraft.learn.networks` with one linear layer behind it, so what any of these
+A policy here is a tower of `racecraft.learn.networks` with one linear layer behind it, so what any of these
 algorithms learned is published under our own names and driven by the native learner: torch is needed for training only.
 (What DQN publishes as logits are the values of the actions; the best one is the same.)
 """
@@ -203,19 +203,19 @@ class SB3:
         return {"policy": policy.optimizer}
 
 
-class CameraTower(BaseFeaturesExtractor):
-    """The camera tower of one of our networks without its head, over flat encoded frames of bytes."""
+class SensorTower(BaseFeaturesExtractor):
+    """The sensors' tower of one of our networks without its head, over flat observations of bytes."""
 
     def __init__(self, observation_space: spaces.Box, spec: NetworkSpec) -> None:
-        arch = networks.architecture(spec.name)
-        super().__init__(observation_space, arch.dense[-1])
-        self.spec = spec
         shapes = networks.weight_shapes(spec)
-        for i, conv in enumerate(arch.convs, 1):
-            channels = shapes[f"policy.conv{i}.weight"][1]
-            self.add_module(f"conv{i}", nn.Conv2d(channels, conv.filters, conv.kernel, conv.stride))
-        for i, units in enumerate(arch.dense, 1):
-            self.add_module(f"dense{i}", nn.Linear(shapes[f"policy.dense{i}.weight"][1], units))
+        super().__init__(observation_space, shapes["policy.head.weight"][1])
+        self.spec = spec
+        for name, shape in shapes.items():
+            tower, *layer = name.split(".")
+            if tower == "policy" and layer[-1] == "weight" and layer[0] != "head":
+                # the stride is given where the layer is used: these modules hold and begin the weights
+                made = nn.Conv2d(shape[1], shape[0], shape[2]) if len(shape) == 4 else nn.Linear(shape[1], shape[0])
+                self.add_module(layer[0], made)
 
     def forward(self, observations: Tensor) -> Tensor:
         """What the head sees  (B, units), for frames (B, bytes)."""
@@ -305,7 +305,7 @@ def _arguments(name: str, config: SB3Config, spec: NetworkSpec) -> dict[str, Any
         "gamma": config.gamma,
         "policy_kwargs": {
             "net_arch": [] if name == "dqn" else heads,
-            "features_extractor_class": CameraTower,
+            "features_extractor_class": SensorTower,
             "features_extractor_kwargs": {"spec": spec},
             "normalize_images": False,
         },
