@@ -36,7 +36,7 @@ SHORT: dict[str, Any] = {"until": "96 steps", "evaluate_every": 64}
         "sac",
         "distill",
         "sb3:ppo",
-        "sb3:dqn",
+        pytest.param("sb3:dqn", marks=pytest.mark.slow),
         pytest.param("sb3:a2c", marks=pytest.mark.slow),
         pytest.param("sb3:sac", marks=pytest.mark.slow),
         pytest.param("sb3:td3", marks=pytest.mark.slow),

@@ -50,6 +50,7 @@ def test_every_trial_is_a_run_with_the_numbers_it_was_given(tmp_path: Path) -> N
     assert json.loads((tmp_path / "search" / "result.json").read_text())["best"]["run"] == outcome.best.run
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_where_it_was_killed(tmp_path: Path) -> None:
     folder = begin(tmp_path)
     Tuning(folder).run(minutes=5, max_trials=2)
