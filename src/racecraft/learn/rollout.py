@@ -37,7 +37,7 @@ class Rollout:
         observation_dtype: type = np.uint8,
     ) -> None:
         shape = (num_steps, num_envs)
-        self.observations = np.zeros((*shape, *observation_shape), observation_dtype)
+        self.observations: NDArray[Any] = np.zeros((*shape, *observation_shape), observation_dtype)
         self.states = np.zeros((*shape, state_size), np.float32)
         self.actions: NDArray[Any] = (
             np.zeros((*shape, action_size), np.float32) if action_size else np.zeros(shape, np.int64)
