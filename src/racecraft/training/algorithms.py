@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from racecraft.agent import ActionSpace
 from racecraft.errors import ConfigError
 from racecraft.learn import PPO, SAC, Algorithm, Distill, Environment, Learner, make_cuda_ppo
@@ -60,6 +63,14 @@ def make_algorithm(
     return PPO(settings.ppo, learner, environment, seed=seed)
 
 
+class _WithoutCamera(TrainingEnvironment):
+    """Cars that tell their state only."""
+
+    def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """No frames, and the privileged state (N, S), a view."""
+        return np.zeros((self.num_envs, 0), np.uint8), self.simulation.state
+
+
 def teacher_environment(
     settings: TrainSettings,
     source: str,
@@ -98,7 +109,7 @@ def teacher_environment(
             num_objects=settings.objects.count,
         )
     )
-    return TrainingEnvironment(simulation, worker, action_space, counter=EpisodeCounter(num_envs))
+    return _WithoutCamera(simulation, worker, action_space, counter=EpisodeCounter(num_envs))
 
 
 def _import(module: str, algorithm: str, *, extra: str) -> Any:
