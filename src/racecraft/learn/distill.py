@@ -188,7 +188,7 @@ class Distill:
         actions = distributions.sample(outputs, noise, is_discrete=spec.is_discrete)
         rows = (self._count + np.arange(len(outputs))) % len(self._answers)
         self._observations[rows] = observations
-        self._answers[rows] = self.teacher.learner.policy(states.astype(np.float32))  # type: ignore[arg-type]
+        self._answers[rows] = self.teacher.learner.policy(states.astype(np.float32))
         self._count += len(outputs)
         acted = time.perf_counter()
         rewards, terminated, truncated = self.environment.step(actions if spec.is_discrete else actions.clip(-1.0, 1.0))

@@ -169,7 +169,7 @@ class MlpLearner:
         slope = slope.astype(np.float32)
         for i in range(len(UNITS) + 1, 0, -1):
             inputs = observations if i == 1 else outputs[i - 2]
-            gradient[f"{tower}.{i}.weight"] = inputs.T @ slope
+            gradient[f"{tower}.{i}.weight"] = np.asarray(inputs.T @ slope, dtype=np.float32)
             gradient[f"{tower}.{i}.bias"] = slope.sum(0)
             if i > 1:
                 slope = (slope @ self._weights[f"{tower}.{i}.weight"].T) * (1 - inputs**2)

@@ -84,7 +84,7 @@ def evaluate(
         ShapeError: The policy's commands do not have the shape (N, 2).
         NonFiniteAction: A command is NaN or infinite.
     """
-    sensors = sensors or getattr(policy, "sensors", FRONT_CAMERA)
+    sensors = _sensors_of(policy, sensors)
     conditions = Conditions(
         track=track,
         rules=rules,
@@ -234,7 +234,7 @@ def drive_lap(
     max_seconds: float = 0.0,
 ) -> Completion:
     """The same from where the cars stand."""
-    sensors = sensors or getattr(policy, "sensors", FRONT_CAMERA)
+    sensors = _sensors_of(policy, sensors)
     rewards = np.zeros(simulation.num_envs)
     is_running = np.ones(simulation.num_envs, dtype=np.bool_)
     for _ in range(round(max_seconds / CONTROL_DT) if max_seconds > 0.0 else MAX_STEPS):
@@ -251,6 +251,11 @@ def drive_lap(
         rewards=rewards,
         statuses=tuple(STATUS_NAMES[code] for code in status),
     )
+
+
+def _sensors_of(policy: Any, sensors: SensorSuite | None) -> SensorSuite:
+    suite: SensorSuite = getattr(policy, "sensors", FRONT_CAMERA) if sensors is None else sensors
+    return suite
 
 
 def _sight(simulation: Simulation, sees: str, sensors: SensorSuite) -> NDArray[Any]:
