@@ -1,15 +1,16 @@
 // What a translated reward function (racecraft.reward.cuda) is made of: Python's arithmetic on doubles.
 //
-// What Python would raise sets `bad`; the row's reward is then NaN, and the interpreter is asked what happened.
+// What Python would raise sets `bad`; the row's reward is then NaN, and the interpreter is asked what
+// happened.
 #pragma once
 
 #include "racecraft/platform.hpp"
 
 #if !defined(__CUDACC_RTC__)
 #include <cmath>
-using std::acos, std::asin, std::atan, std::atan2, std::ceil, std::cos, std::cosh, std::exp, std::fabs, std::floor,
-    std::hypot, std::isfinite, std::isnan, std::log, std::log10, std::log2, std::pow, std::sin, std::sinh, std::sqrt,
-    std::tan, std::tanh, std::trunc, std::fmod;
+using std::acos, std::asin, std::atan, std::atan2, std::ceil, std::cos, std::cosh, std::exp, std::fabs,
+    std::floor, std::hypot, std::isfinite, std::isnan, std::log, std::log10, std::log2, std::pow, std::sin,
+    std::sinh, std::sqrt, std::tan, std::tanh, std::trunc, std::fmod;
 #endif
 
 namespace racecraft {
@@ -89,16 +90,17 @@ RC_HD Waypoints line_of(const RewardTask& task, double track) {
 }  // namespace racecraft
 
 #if defined(__CUDACC_RTC__)
-#define RC_REWARD_KERNEL                                                                                   \
-    extern "C" __global__ void pay_cars(const __grid_constant__ racecraft::RewardTask task, const void*, const void*)
-#define RC_EACH_ROW(i)                                                                          \
+#define RC_REWARD_KERNEL                                                                                 \
+    extern "C" __global__ void pay_cars(const __grid_constant__ racecraft::RewardTask task, const void*, \
+                                        const void*)
+#define RC_EACH_ROW(i) \
     if (const int32_t i = static_cast<int32_t>(blockIdx.x * blockDim.x + threadIdx.x); i < task.count)
 #else
-#define RC_REWARD_KERNEL                                                                         \
-    static void pay_cars(const racecraft::RewardTask& task);                                     \
+#define RC_REWARD_KERNEL                                                                                 \
+    static void pay_cars(const racecraft::RewardTask& task);                                             \
     extern "C" void run_pay_cars(int32_t, const racecraft::RewardTask* task, const void*, const void*) { \
-        pay_cars(*task);                                                                         \
-    }                                                                                            \
+        pay_cars(*task);                                                                                 \
+    }                                                                                                    \
     static void pay_cars(const racecraft::RewardTask& task)
 #define RC_EACH_ROW(i) for (int32_t i = 0; i < task.count; ++i)
 #endif
