@@ -144,11 +144,11 @@ class Engine {
     // Randomisation; all of it empty where there is none.
     std::unique_ptr<Randomization> randomization_;
     RgbPalette colours_;
-    VehicleParameters vehicle_;           // before randomisation
-    std::vector<Conditions> conditions_;  // (N,)
+    VehicleParameters vehicle_;                         // before randomisation
+    std::vector<Conditions> conditions_;                // (N,)
     std::vector<CameraModel> cameras_, right_cameras_;  // (N,), empty unless cameras differ, or lenses
-    std::vector<int32_t> delay_;          // (N,) substeps, empty unless commands act late
-    std::vector<float> earlier_;          // (4, N), see VehicleArrays
+    std::vector<int32_t> delay_;                        // (N,) substeps, empty unless commands act late
+    std::vector<float> earlier_;                        // (4, N), see VehicleArrays
 
     std::unique_ptr<bool[]> flags_;  // terminated, then truncated (std::vector<bool> has no bytes to show)
 };
