@@ -21,7 +21,7 @@ FIGURES = {
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(suite, "CAMERA_CARS", 16)
     monkeypatch.setattr(suite, "STATE_CARS", 64)
-    monkeypatch.setattr(suite, "START_SECONDS", 1.0)
+    monkeypatch.setattr(suite, "START_SECONDS", 5.0)
     monkeypatch.setattr(suite, "has_numba", lambda: False)  # compiling takes seconds; tests/reward does it
     monkeypatch.setattr("racecraft.bench.machine.COPY_BYTES", 1 << 20)
 
