@@ -11,6 +11,9 @@ from running_consoles import RunningConsole, running_console
 
 pytest.importorskip("fastapi")
 
+ON_BOTH = ("test_api", "test_archives", "test_races_api")
+"""Files of tests that ask a console for what only its database knows."""
+
 
 @pytest.fixture(scope="session")
 def postgres() -> Iterator[PostgresServer]:
@@ -31,9 +34,16 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     return server.new_database()
 
 
-@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run what depends on the database on both, and pages, drives and the like on SQLite alone."""
+    if "console" in metafunc.fixturenames:
+        databases = ["sqlite", "postgresql"] if metafunc.module.__name__ in ON_BOTH else ["sqlite"]
+        metafunc.parametrize("console", databases, indirect=True, scope="module")
+
+
+@pytest.fixture(scope="module")
 def console(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningConsole]:
-    """A console on either database."""
+    """A console on the database that `pytest_generate_tests` chose."""
     options = []
     if request.param == "postgresql":
         server: PostgresServer = request.getfixturevalue("postgres")
