@@ -45,7 +45,7 @@ def studio() -> Iterator[tuple[RunningConsole, Page]]:
             assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
         arguments = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        page = browser.new_page()
+        page = browser.new_context().new_page()
         page.set_default_timeout(1000 * PATIENCE)
         cookie = console.client.cookies["racecraft_session"]
         page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
