@@ -314,3 +314,12 @@ def test_a_placed_car_is_seen_at_once_and_may_go_on_after_its_end():
     before = simulation.vehicles[:, 1].copy()
     simulation.place(0, 5.0)
     assert (simulation.vehicles[:, 1] == before).all()
+
+
+def test_the_mask_of_a_reset_may_be_what_it_clears():
+    simulation = Simulation(OVAL, num_envs=3, camera=None, start=FIXED)
+    while not simulation.terminated.all():
+        simulation.step(np.tile(np.float32([0.5, 2.0]), (3, 1)))
+    simulation.reset(simulation.terminated)
+    assert not simulation.terminated.any()
+    assert simulation.column("episode").tolist() == [1.0, 1.0, 1.0]

@@ -288,7 +288,7 @@ class Simulation:
         """
         if mask is None:
             mask = self._everyone
-        mask = np.ascontiguousarray(mask)
+        mask = np.array(mask)  # a copy: `terminated` itself may be the mask, and a reset clears it as it goes
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise ShapeError(
                 f"reset mask is {mask.dtype} of shape {mask.shape}, expected bool of shape ({self.num_envs},)."
