@@ -142,9 +142,9 @@ def test_the_datasheets_arguments_are_the_real_ones():
     rows = table("Arguments", first="Argument")
     own = inspect.signature(RacecraftEnv.__init__).parameters
     shared = inspect.signature(DrivingTask.__init__).parameters
-    assert [row[0] for row in rows] == ["track", *TaskSettings.__annotations__]
+    assert [row[0] for row in rows] == ["track", *TaskSettings.__annotations__, "opponents"]
     for name, default, _ in rows:
-        real = (own if name == "track" else shared)[name].default
+        real = (own if name in ("track", "opponents") else shared)[name].default
         assert default == ("CameraSpec()" if real == CameraSpec() else str(real))
 
 

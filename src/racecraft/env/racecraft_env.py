@@ -136,16 +136,14 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | `sensors`           | None            | AWS's sensor names, for a `Dict` of what each of them sees     |
     | `lidar`             | None            | `LidarConfig` of `DISCRETIZED_SECTOR_LIDAR`                    |
     | `objects`           | None            | boxes and bot cars: `racecraft.sim.Objects`                    |
-    | `opponents`         | `()`            | drivers of other cars on the track, up to 7                    |
     | `start`             | `random`        | `random`, `advance`, `fixed`, or a `Start` with jitter         |
     | `direction`         | `forward`       | `forward`, `reverse`, or `alternate` with every episode        |
     | `laps`              | `1`             | laps to an episode, driven without a stop                      |
     | `max_episode_steps` | `3000`          | steps that truncate an episode, 200 s                          |
+    | `opponents`         | `()`            | drivers of other cars on the track, up to 7                    |
 
     `render_mode="rgb_array"` renders the car from behind, 640 x 480 pixels. Reward functions that keep state
     or draw random numbers begin anew with `reset(seed=...)`, callables do not.
-
-    ## Opponents
 
     `opponents=[driver, ...]` puts other cars on the track: policies of runs (`racecraft.race.load_driver`), an
     `Autopilot`, or your own functions. All start on a grid, the car in front; it is crashed when it runs into one
