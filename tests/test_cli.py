@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -51,6 +52,7 @@ def racecraft(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatc
     def run(*arguments: str) -> Outcome:
         with monkeypatch.context() as patch:
             patch.setattr(sys, "argv", ["racecraft", *arguments])
+            patch.setattr("racecraft.cli.train.process_start", time.monotonic)  # not when the tests began
             patch.setattr("warnings.showwarning", None)  # restored afterwards, whatever main puts here
             capsys.readouterr()
             with pytest.raises(SystemExit) as ended:

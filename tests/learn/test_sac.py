@@ -15,6 +15,7 @@ from racecraft.learn.replay_buffer import ReplayBuffer
 
 torch = pytest.importorskip("torch")
 from racecraft.learn.torch_sac import TorchSAC  # noqa: E402
+from racecraft.learn.torch_subnormals import subnormals_flushed  # noqa: E402
 
 SPEC = NetworkSpec(num_actions=1, is_discrete=False, state_size=2, is_squashed=True)
 CONFIG = SACConfig(
@@ -177,3 +178,19 @@ def test_the_buffer_gives_back_what_was_put_in_and_never_joins_two_episodes() ->
     is_first = found.states[:, 0] < 100
     np.testing.assert_array_equal(found.terminated, is_first & (steps % 7 == 0))
     assert not (~is_first & (steps % 5 == 0)).any()
+
+
+def test_gradient_steps_flush_subnormals_and_nothing_else_does() -> None:
+    def least() -> float:
+        return float(np.float64(5e-324) * np.float64(1.0))
+
+    with subnormals_flushed():
+        assert least() == 0
+        with subnormals_flushed():
+            assert least() == 0
+        assert least() == 0
+    assert least() > 0
+    trained = make(replace(CONFIG, learning_starts=64))
+    trained.iterate()
+    trained.iterate()
+    assert least() > 0

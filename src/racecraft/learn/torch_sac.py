@@ -20,6 +20,7 @@ from racecraft.learn import networks, torch_networks
 from racecraft.learn.learner import NetworkSpec, UpdateStats, Weights
 from racecraft.learn.replay_buffer import Transitions
 from racecraft.learn.sac import SACConfig
+from racecraft.learn.torch_subnormals import subnormals_flushed
 
 LOG_STD_MIN, LOG_STD_MAX = -20.0, 2.0
 """Of the Gaussian before it is squashed, as AWS's."""
@@ -47,7 +48,6 @@ class TorchSAC:
     ) -> None:
         if num_threads:
             torch.set_num_threads(num_threads)
-        torch.set_flush_denormal(True)  # Adam's moments of dead units decay into such numbers, at ten times the cost
         self.spec, self.config, self.state_size = spec, config, state_size
         size = spec.num_actions
         self._tower = replace(spec, num_actions=2 * size, is_discrete=True, is_squashed=False, state_size=1)
@@ -92,6 +92,7 @@ class TorchSAC:
         actions, _ = self._draw(torch.from_numpy(observations), _tensor(noise))
         return np.asarray(actions.numpy())
 
+    @subnormals_flushed()
     def update(self, batch: Transitions, noise: NDArray[np.float64], *, improves_actor: bool) -> UpdateStats:
         """One step of Adam of the critics, and of actor and temperature; nothing where it is not finite."""
         config = self.config

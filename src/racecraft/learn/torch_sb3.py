@@ -27,6 +27,7 @@ from racecraft.learn import networks, torch_networks
 from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights
 from racecraft.learn.ppo import Environment, IterationStats
 from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3Config
+from racecraft.learn.torch_subnormals import subnormals_flushed
 
 _CLASSES: dict[str, Any] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC, "td3": TD3}
 _LOSSES = {
@@ -71,13 +72,13 @@ class SB3:
             raise ConfigError(f"num_envs is {config.num_envs}, expected the environment's {environment.num_envs}.")
         if num_threads:
             torch.set_num_threads(num_threads)
-        torch.set_flush_denormal(True)
         self.name, self.config, self.learner = name, config, learner
         self.iteration = 0
         self.prefers_average = False
         self._cars = _Cars(environment, learner)
         self._model = _CLASSES[name]("MlpPolicy", self._cars, seed=seed, device="cpu", **_arguments(name, config, spec))
         self._model.set_logger(Logger(folder=None, output_formats=[]))
+        self._model.train = subnormals_flushed()(self._model.train)  # the gradient steps, not the cars between them
         if name == "dqn":
             model = self._model  # every call of learn() is one iteration, so its own schedule would begin anew
             model.exploration_schedule = lambda _: max(0.05, 1.0 - 0.95 * model.num_timesteps / 10_000)
