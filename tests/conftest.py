@@ -1,4 +1,4 @@
-"""Property tests run without a clock, since a busy machine is slow, not wrong; no test leaves other arithmetic behind."""
+"""Property tests run without a clock: a busy machine is slow, not wrong. No test leaves other arithmetic behind."""
 
 from collections.abc import Iterator
 
