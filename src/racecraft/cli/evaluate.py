@@ -82,16 +82,7 @@ def evaluate(
         context.fail("--json and --aws-log - both want stdout; give the log a file.")
     from racecraft.race.run_evaluation import evaluate_run
 
-    given = race_options.objects_of(
-        race,
-        objects=objects,
-        bots=bots,
-        bot_speed=bot_speed,
-        lane_changes=lane_changes,
-        parked_cars=parked_cars,
-        placement=placement,
-        positions=positions,
-    )
+    given = race_options.objects_of(race, context.params)
     outcome = evaluate_run(
         run,
         track=track or None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -32,32 +33,27 @@ Ghosts = Annotated[
 Positions = Annotated[str, typer.Option("--positions", help="Fixed places, lap and lane of each: '0.23,-1;0.46,1'.")]
 
 
-def objects_of(
-    race: str,
-    *,
-    objects: int = 0,
-    bots: int = 0,
-    bot_speed: float | None = None,
-    lane_changes: bool = False,
-    parked_cars: bool = False,
-    placement: str = "",
-    positions: str = "",
-    option: str = "--race",
-) -> Objects:
-    """The objects that the options ask for; `option` is the one that names the race.
+def kind_of(race: str) -> str:
+    """Our spelling of a race's type; AWS's is understood, too."""
+    return race.lower().replace("_", "-")
+
+
+def objects_of(race: str, options: Mapping[str, Any], *, option: str = "--race") -> Objects:
+    """The objects that a verb's options (its `context.params`) ask for; `option` is the one that names the race.
 
     Raises:
         ConfigError: An option does not go with the race, or has no meaning.
     """
     from racecraft.sim.objects import objects_for_race, parse_positions
 
-    name = race.lower().replace("_", "-") or "time-trial"
+    name = kind_of(race) or "time-trial"
+    placement, positions, count = options["placement"], options["positions"], options["objects"] or options["bots"]
     for name_given, is_given, needed in (
-        ("--objects", objects != 0, "object-avoidance"),
-        ("--parked-cars", parked_cars, "object-avoidance"),
-        ("--bots", bots != 0, "head-to-bot"),
-        ("--bot-speed", bot_speed is not None, "head-to-bot"),
-        ("--lane-changes", lane_changes, "head-to-bot"),
+        ("--objects", options["objects"] != 0, "object-avoidance"),
+        ("--parked-cars", options["parked_cars"], "object-avoidance"),
+        ("--bots", options["bots"] != 0, "head-to-bot"),
+        ("--bot-speed", options["bot_speed"] is not None, "head-to-bot"),
+        ("--lane-changes", options["lane_changes"], "head-to-bot"),
     ):
         if is_given and name != needed:
             raise ConfigError(f"{name_given} goes with {option} {needed}; the race is {name}.")
@@ -72,13 +68,13 @@ def objects_of(
         except ValueError as error:
             raise ConfigError(f"--positions is {positions!r}; {error}.") from error
         settings["count"] = len(settings["positions"])
-    if objects or bots:
-        settings["count"] = objects or bots
-    if bot_speed is not None:
-        settings["speed"] = bot_speed
-    if lane_changes:
+    if count:
+        settings["count"] = count
+    if options["bot_speed"] is not None:
+        settings["speed"] = options["bot_speed"]
+    if options["lane_changes"]:
         settings["changes_lane"] = True
-    if parked_cars:
+    if options["parked_cars"]:
         settings["kind"] = "car"
     return objects_for_race(name, settings=settings)
 
@@ -89,7 +85,7 @@ def opponents_of(race: str, *, opponents: list[str], cars: int = 0) -> tuple[str
     Raises:
         ConfigError: An option does not go with the race, or has no meaning.
     """
-    name = race.lower().replace("_", "-")
+    name = kind_of(race)
     for option, is_given in (("--opponents", bool(opponents)), ("--cars", cars != 0)):
         if is_given and name != "head-to-head":
             raise ConfigError(f"{option} goes with --race head-to-head; the race is {name}.")

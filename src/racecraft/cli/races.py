@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from racecraft.cli import race_options
 from racecraft.cli.app import Json, TrackOption, app, print_json, text
+
+if TYPE_CHECKING:
+    from racecraft.sim import Objects
 
 Models = Annotated[list[str], typer.Argument(metavar="MODELS", help="Runs, RUN or RUN@CHECKPOINT.")]
 Kind = Annotated[
@@ -19,6 +23,7 @@ Kind = Annotated[
 
 @app.command()
 def race(
+    context: typer.Context,
     models: Models,
     track: TrackOption = "reinvent_2018",
     kind: Kind = "time-trial",
@@ -63,21 +68,12 @@ def race(
     outcome = race_models(
         models,
         track=track,
-        kind=_kind(kind),
+        kind=race_options.kind_of(kind),
         laps=laps,
         rules=rules,
         ranking=ranking,
         minimum_laps=minimum_laps,
-        objects=_objects(
-            kind,
-            objects=objects,
-            bots=bots,
-            bot_speed=bot_speed,
-            lane_changes=lane_changes,
-            parked_cars=parked_cars,
-            placement=placement,
-            positions=positions,
-        ),
+        objects=_objects(kind, context.params),
         vehicle=vehicle or None,
         randomize=randomize,
         seed=seed,
@@ -100,6 +96,7 @@ def race(
 
 @app.command()
 def ladder(
+    context: typer.Context,
     models: Models,
     track: Annotated[
         list[str] | None,
@@ -133,23 +130,14 @@ def ladder(
     found = rate_models(
         models,
         tracks=track or ["reinvent_2018"],
-        kind=_kind(kind),
+        kind=race_options.kind_of(kind),
         schedule=schedule,
         starts=starts,
         rounds=rounds,
         laps=laps,
         rules=rules,
         changes={"time_limit": time_limit},
-        objects=_objects(
-            kind,
-            objects=objects,
-            bots=bots,
-            bot_speed=bot_speed,
-            lane_changes=lane_changes,
-            parked_cars=parked_cars,
-            placement=placement,
-            positions=positions,
-        ),
+        objects=_objects(kind, context.params),
         vehicle=vehicle or None,
         seed=seed,
         progress=(lambda line: None) if as_json else text().say_progress,
@@ -198,16 +186,11 @@ def verify(
         raise typer.Exit(1)
 
 
-def _kind(kind: str) -> str:
-    """AWS's spelling is understood, too."""
-    return kind.lower().replace("_", "-")
-
-
-def _objects(kind: str, **options: Any) -> Any:
+def _objects(kind: str, options: Mapping[str, Any]) -> Objects:
     """Those of the race's type; on a road that models share there are none unless boxes or bots are asked for."""
     from racecraft.race.contest import TOGETHER
 
-    name = _kind(kind)
+    name = race_options.kind_of(kind)
     if name in TOGETHER:
         name = "object-avoidance" if options["objects"] else "head-to-bot" if options["bots"] else "time-trial"
-    return race_options.objects_of(name, option="--type", **options)
+    return race_options.objects_of(name, options, option="--type")

@@ -111,16 +111,7 @@ def train(
     from racecraft.training.terminal import TerminalReporter
 
     race, rivals = race_options.opponents_of(race, opponents=opponents, cars=cars)
-    on_track = race_options.objects_of(
-        race,
-        objects=objects,
-        bots=bots,
-        bot_speed=bot_speed,
-        lane_changes=lane_changes,
-        parked_cars=parked_cars,
-        placement=placement,
-        positions=positions,
-    )
+    on_track = race_options.objects_of(race, context.params)
     reward = reward or defaults_for(on_track).reward
     where = Path(track[0]).stem if len(track) == 1 else f"{len(track)} tracks"
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"

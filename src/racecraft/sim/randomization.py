@@ -14,9 +14,8 @@ from typing import Any, Final
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.checks import check_number, check_type
+from racecraft.sim.parameter_file import read_parameters
 from racecraft.sim.vehicle import Vehicle
-
-MAX_FILE_BYTES: Final = 100_000
 
 Range = tuple[float, float]
 """Least and greatest value."""
@@ -211,22 +210,7 @@ def load_randomization(name_or_path: str | Path) -> Randomization:
     name = str(name_or_path)
     if name in PRESETS:
         return PRESETS[name]
-    path = Path(name_or_path)
-    if not path.is_file():
-        raise ConfigError(
-            f"Randomization {name!r} is neither a preset ({', '.join(PRESETS)}) nor a file.",
-            hint=did_you_mean(name, PRESETS),
-        )
-    try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise ConfigError(f"Randomization file {name!r} has more than {MAX_FILE_BYTES} bytes.")
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"Randomization file {name!r} is not JSON: {error}.") from error
-    except OSError as error:
-        raise ConfigError(f"Randomization file {name!r} cannot be read: {error.strerror or error}.") from error
-    if not isinstance(data, dict):
-        raise ConfigError(f"Randomization file {name!r} must hold one JSON object, not {type(data).__name__}.")
+    data = read_parameters(name, kind="Randomization", presets=PRESETS)
     preset = data.pop("preset", "none")
     if preset not in list(PRESETS):
         raise ConfigError(

@@ -9,8 +9,7 @@ from typing import Final
 
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.sim.checks import check_number
-
-MAX_FILE_BYTES: Final = 100_000
+from racecraft.sim.parameter_file import read_parameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,20 +150,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     name = str(name_or_path)
     if name in PRESETS:
         return PRESETS[name]
-    path = Path(name_or_path)
-    if not path.is_file():
-        raise ConfigError(
-            f"Vehicle {name!r} is neither a preset ({', '.join(PRESETS)}) nor a file.",
-            hint=did_you_mean(name, PRESETS),
-        )
-    if path.stat().st_size > MAX_FILE_BYTES:
-        raise ConfigError(f"Vehicle file {name!r} has more than {MAX_FILE_BYTES} bytes; it should hold a few numbers.")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"Vehicle file {name!r} is not JSON: {error}.") from error
-    if not isinstance(data, dict):
-        raise ConfigError(f"Vehicle file {name!r} must hold one JSON object, not {type(data).__name__}.")
+    data = read_parameters(name, kind="Vehicle", presets=PRESETS)
     for key in data:
         if key not in LIMITS:
             raise ConfigError(
