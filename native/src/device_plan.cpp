@@ -54,6 +54,8 @@ void DevicePlan::point(size_t object, const T* const* slot, const void* base, si
 DevicePlan::DevicePlan(const Engine& engine, size_t num_envs)
     : palette_(engine.palettes_.front()), seed_(engine.config_.seed) {
     const EngineConfig& config = engine.config_;
+    if (config.cars_per_race != 1)
+        throw std::invalid_argument("A GPU drives cars that race alone; cars_per_race must be 1.");
     const ObjectField& field = engine.objects_;
     Batch& b = batch_;
     b.num_envs = static_cast<int32_t>(num_envs);

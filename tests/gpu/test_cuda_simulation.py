@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from host_device import HostDevice
 
+from racecraft import _native
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.gpu import open_device
 from racecraft.sim import Bots, CameraSpec, Objects, Obstacles, Simulation, Start
@@ -161,3 +162,9 @@ def test_a_state_may_not_lead_a_kernel_astray():
     saved[-1] = 9  # a flag
     with pytest.raises(ShapeError, match="damaged"):
         kernels.load(saved)
+
+
+def test_cars_that_share_a_track_are_refused_by_the_plan_too() -> None:
+    racing = Simulation(load_track("oval"), num_envs=4, cars_per_race=2, camera=None)
+    with pytest.raises(ValueError, match="cars_per_race must be 1"):
+        _native.DevicePlan(racing._engine, 4)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from round_tracks import ring, track_of
 
 from racecraft.errors import ShapeError, TrackError
-from racecraft.track import Track, generate_track, load_track, track_names
+from racecraft.track import Track, generate_track, load_track, polyline, track_names
 from racecraft.track.readers import read_route, save_route
 
 SOME = ["straight", "oval", "reinvent_2018", "lakeside", "bottleneck", "generated:3"]
@@ -108,6 +108,19 @@ def test_projection_undoes_a_step_to_the_side(name: str) -> None:
     found_s, found_offset = track.project(track.point_at(s) + side[:, None] * normal)
     assert found_offset == pytest.approx(side, abs=5e-3)
     assert found_s == pytest.approx(s, abs=0.05)
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_projection_onto_a_long_line_gives_the_same_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a tree of the pieces, and by looking at every piece; also halfway between two roads, and at corners."""
+    track, rng = load_track(name), np.random.default_rng(7)
+    low_x, low_y, high_x, high_y = track.bounds
+    anywhere = rng.uniform((low_x - 1, low_y - 1), (high_x + 1, high_y + 1), (500, 2))
+    queries = np.concatenate((anywhere, track.centerline, track.inner, anywhere.round(1), [[np.nan, 0.0]]))
+    expected = track.project(queries)
+    monkeypatch.setattr(polyline, "_MANY", 0)
+    for found, value in zip(track.project(queries), expected, strict=True):
+        np.testing.assert_array_equal(found, value)
 
 
 def test_projection_takes_any_shape_and_passes_nan_on() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.errors import ConfigError, RunError
-from racecraft.learn import PPOConfig
+from racecraft.learn import DistillConfig, PPOConfig, SACConfig
 from racecraft.reward import load_preset
 from racecraft.sim import Bots, Objects, Obstacles, Start, Vehicle
 from racecraft.sim.objects import NO_OBJECTS
@@ -26,6 +26,7 @@ from racecraft.training.settings import (
     TrainSettings,
     make_settings,
 )
+from racecraft.training.start import aws_hyperparameters
 
 DISCRETE = ModelMetadata(neural_network="RACECRAFT_SMALL")
 SETTINGS = TrainSettings(
@@ -109,6 +110,22 @@ def test_a_near_miss_is_recognised() -> None:
 def test_more_laps_than_trials_bring_more_trials() -> None:
     assert TrainSettings(until=Until(laps=9)).evaluation_trials == 9
     assert TrainSettings(until=Until(laps=2)).evaluation_trials == 5
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "expected"),
+    [
+        ("ppo", {"lr": PPOConfig().learning_rate, "num_epochs": PPOConfig().update_epochs, "discount_factor": 0.98}),
+        ("sac", {"lr": SACConfig().learning_rate, "sac_alpha": 0.2, "batch_size": 128, "discount_factor": 0.98}),
+        ("distill", {"lr": DistillConfig().learning_rate, "batch_size": DistillConfig().minibatch_size}),
+        ("sb3:dqn", {"discount_factor": 0.98}),
+    ],
+)
+def test_what_awss_tools_are_told_is_how_the_algorithm_learns(algorithm: str, expected: dict[str, float]) -> None:
+    told = aws_hyperparameters(TrainSettings(algorithm=algorithm).learning)
+    assert expected.items() <= told.items()
+    assert ("beta_entropy" in told) == (algorithm == "ppo")
+    assert ("lr" in told) == (algorithm != "sb3:dqn")  # the library's own default, which it does not tell
 
 
 def test_aws_hyperparameters_become_ppo() -> None:

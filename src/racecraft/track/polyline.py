@@ -9,6 +9,9 @@ from racecraft.errors import ShapeError
 
 Floats = NDArray[np.float64]
 
+Pieces = NDArray[np.intp]
+
+_MANY = 1 << 24  # pairs of a query point and a segment from which on a tree of the segments is quicker than all pairs
 _CHUNK = 1 << 19  # pairs of a query point and a segment held in memory at once
 
 
@@ -56,20 +59,42 @@ def project(queries: Floats, points: Floats, arc: Floats) -> tuple[Floats, Float
     """
     start, step = points[:-1], np.diff(points, axis=0)
     squared = np.einsum("wi,wi->w", step, step)
-    s, offset = np.empty(len(queries)), np.empty(len(queries))
-    rows = max(1, _CHUNK // len(step))
-    for first in range(0, len(queries), rows):
-        chunk = slice(first, first + rows)
-        delta_x = queries[chunk, 0, None] - start[:, 0]
-        delta_y = queries[chunk, 1, None] - start[:, 1]
-        along = np.clip((delta_x * step[:, 0] + delta_y * step[:, 1]) / squared, 0.0, 1.0)
-        distance_squared = (delta_x - along * step[:, 0]) ** 2 + (delta_y - along * step[:, 1]) ** 2
-        nearest = distance_squared.argmin(axis=1)
-        row = np.arange(len(nearest))
-        side = step[nearest, 0] * delta_y[row, nearest] - step[nearest, 1] * delta_x[row, nearest]
-        s[chunk] = arc[nearest] + along[row, nearest] * np.sqrt(squared[nearest])
-        offset[chunk] = np.copysign(np.sqrt(distance_squared[row, nearest]), side)
-    return s, offset
+
+    def look(x: Floats, y: Floats, piece: Pieces) -> tuple[Floats, Floats, Floats]:
+        """How far along each piece, squared distance, and the side, of places that broadcast with pieces."""
+        delta_x, delta_y = x - start[piece, 0], y - start[piece, 1]
+        along = np.clip((delta_x * step[piece, 0] + delta_y * step[piece, 1]) / squared[piece], 0.0, 1.0)
+        across = step[piece, 0] * delta_y - step[piece, 1] * delta_x
+        return along, (delta_x - along * step[piece, 0]) ** 2 + (delta_y - along * step[piece, 1]) ** 2, across
+
+    x, y = queries.T
+    nearest = np.zeros(len(queries), np.intp)
+    if len(queries) * len(step) > _MANY:
+        query, piece = _near_pieces(queries, points)
+        order = np.lexsort((piece, look(x[query], y[query], piece)[1], query))
+        nearest[query[order][::-1]] = piece[order][::-1]  # the first of each query is written last
+    else:
+        every = np.arange(len(step))
+        rows = max(1, _CHUNK // len(step))
+        for first in range(0, len(queries), rows):
+            chunk = slice(first, first + rows)
+            nearest[chunk] = look(x[chunk, None], y[chunk, None], every)[1].argmin(axis=1)
+    along, distance_squared, across = look(x, y, nearest)
+    return arc[nearest] + along * np.sqrt(squared[nearest]), np.copysign(np.sqrt(distance_squared), across)
+
+
+def _near_pieces(queries: Floats, points: Floats) -> tuple[Pieces, Pieces]:
+    """Pairs of a query and a piece of the polyline that can be its nearest, by a tree of the pieces."""
+    import shapely
+
+    tree = shapely.STRtree(np.asarray(shapely.linestrings(np.stack((points[:-1], points[1:]), axis=1))))
+    sane = np.flatnonzero(np.isfinite(queries).all(axis=1))
+    places = shapely.points(queries[sane])
+    (query, _), distance = tree.query_nearest(places, return_distance=True, all_matches=False)
+    reach = np.zeros(len(sane))
+    reach[query] = distance * (1 + 1e-9) + 1e-9  # metres; GEOS rounds otherwise than we do
+    query, piece = tree.query(places, predicate="dwithin", distance=reach)
+    return sane[query], piece
 
 
 def nearest(queries: Floats, points: Floats) -> Floats:

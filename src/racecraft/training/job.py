@@ -177,7 +177,7 @@ class Training:
                 log.write_settings(
                     world=tracks[0].name,
                     metadata=metadata,
-                    hyperparameters=aws_hyperparameters(settings.ppo, hyperparameters),
+                    hyperparameters=aws_hyperparameters(settings.learning, hyperparameters),
                 )
             per_iteration = settings.ppo.episodes_per_iteration or AWS_EPISODES
             trace = SimTraceWriter(

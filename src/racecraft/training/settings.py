@@ -50,6 +50,9 @@ CUDA_PPO: Final = PPOConfig(num_envs=1024, num_steps=8, minibatch_size=1024)
 """A GPU is fast when it has much to do at once; minibatches and steps are a compromise with learning."""
 CUDA_EVALUATE_EVERY: Final = 100_000
 
+Learning = PPOConfig | SACConfig | DistillConfig | SB3Config
+"""Settings of one algorithm."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrainSettings:
@@ -135,13 +138,15 @@ class TrainSettings:
             object.__setattr__(self, "evaluation_trials", self.until.laps)
 
     @property
+    def learning(self) -> Learning:
+        """How the chosen algorithm learns."""
+        named: dict[str, Learning] = {"ppo": self.ppo, "sac": self.sac, "distill": self.distill, "sb3": self.sb3}
+        return named[self.algorithm.split(":")[0]]
+
+    @property
     def num_envs(self) -> int:
         """Cars driven at once."""
-        if self.algorithm.startswith("sb3:"):
-            return self.sb3.num_envs
-        if self.algorithm == "distill":
-            return self.distill.num_envs
-        return self.sac.num_envs if self.algorithm == "sac" else self.ppo.num_envs
+        return self.learning.num_envs
 
     def network_spec(self, metadata: ModelMetadata) -> NetworkSpec:
         """The network for a model's action space and sensors."""

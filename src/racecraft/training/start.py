@@ -8,13 +8,14 @@ from typing import Any
 
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError
-from racecraft.learn import PPOConfig
+from racecraft.learn import DistillConfig, PPOConfig, SACConfig
+from racecraft.learn.sb3 import SB3Config
 from racecraft.reward import dry_run, validate_reward
 from racecraft.run import RunFolder, RunInfo
 from racecraft.run.training_params import TrainingParams
 from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.parent import WEIGHTS, Parent
-from racecraft.training.settings import TrainSettings
+from racecraft.training.settings import Learning, TrainSettings
 
 
 def start_run(
@@ -83,7 +84,7 @@ def write_run(
         reward_function=reward,
         model_metadata=metadata,
         hyperparameters=hyperparameters,
-        equivalent=aws_hyperparameters(settings.ppo, hyperparameters),
+        equivalent=aws_hyperparameters(settings.learning, hyperparameters),
         training_params=params,
     )
     document = settings.to_dict()
@@ -99,25 +100,35 @@ def write_run(
     )
 
 
-def aws_hyperparameters(ppo: PPOConfig, given: Hyperparameters | None = None) -> dict[str, Any]:
+def aws_hyperparameters(config: Learning, given: Hyperparameters | None = None) -> dict[str, Any]:
     """How a run learns by AWS's names, for its tools; ours may lie outside of AWS's ranges."""
     if given is not None:
         return given.to_dict()
-    return {
-        "batch_size": ppo.minibatch_size,
-        "beta_entropy": ppo.ent_coef,
-        "discount_factor": ppo.gamma,
-        "e_greedy_value": ppo.epsilon_end,
-        "epsilon_steps": ppo.epsilon_steps,
-        "exploration_type": ppo.exploration,
-        "loss_type": "huber" if ppo.value_loss == "huber" else "mean squared error",
-        "lr": ppo.learning_rate,
-        "num_episodes_between_training": ppo.episodes_per_iteration or Hyperparameters.num_episodes_between_training,
-        "num_epochs": ppo.update_epochs,
+    document: dict[str, Any] = {
+        "num_episodes_between_training": Hyperparameters.num_episodes_between_training,
         "stack_size": 1,
         "term_cond_avg_score": Hyperparameters.term_cond_avg_score,
         "term_cond_max_episodes": Hyperparameters.term_cond_max_episodes,
     }
+    batch_size = config.batch_size if isinstance(config, SB3Config) else config.minibatch_size
+    document |= {name: value for name, value in (("batch_size", batch_size), ("lr", config.learning_rate)) if value}
+    if not isinstance(config, DistillConfig):  # its student looks no further than the next action
+        document["discount_factor"] = config.gamma
+    if isinstance(config, SACConfig):
+        document["sac_alpha"] = config.alpha
+    if isinstance(config, PPOConfig):
+        document |= {
+            "beta_entropy": config.ent_coef,
+            "e_greedy_value": config.epsilon_end,
+            "epsilon_steps": config.epsilon_steps,
+            "exploration_type": config.exploration,
+            "loss_type": "huber" if config.value_loss == "huber" else "mean squared error",
+            "lr": config.learning_rate,
+            "num_epochs": config.update_epochs,
+        }
+        if config.episodes_per_iteration:
+            document["num_episodes_between_training"] = config.episodes_per_iteration
+    return dict(sorted(document.items()))
 
 
 def read_settings(folder: RunFolder) -> TrainSettings:
