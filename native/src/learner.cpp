@@ -135,7 +135,7 @@ void Learner::read_sample(Worker& worker, const uint8_t* observation, size_t sam
     }
 }
 
-void Learner::policy(const uint8_t* observations, size_t count, float* out) {
+void Learner::policy(const uint8_t* observations, const float* states, size_t count, float* out) {
     const std::lock_guard lock(mutex_);
     const NetworkSpec& spec = network_.spec;
     const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, kChunk);
@@ -143,10 +143,11 @@ void Learner::policy(const uint8_t* observations, size_t count, float* out) {
     const size_t stride = static_cast<size_t>(network_.policy.layers.back().shape.out_channels);
     for_each_task((count + chunk - 1) / chunk, [&](Worker& worker, size_t task) {
         const size_t first = task * chunk, samples = std::min(chunk, count - first);
-        for (size_t i = 0; i < samples; ++i) {
+        for (size_t i = 0; network_.policy.sees_camera && i < samples; ++i) {
             read_sample(worker, observations + (first + i) * spec.observation_size(), i);
         }
-        const Inputs in{worker.input.data(), worker.lidar.data(), nullptr};
+        const Inputs in{worker.input.data(), worker.lidar.data(),
+                        states + first * static_cast<size_t>(spec.is_blind() ? spec.state_size : 0)};
         point(network_.policy, worker.policy, nullptr, 0, worker.policy_at);
         forward(network_.policy, in, samples, worker.policy_at);
         for (size_t i = 0; i < samples; ++i) {
@@ -329,7 +330,7 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
     const size_t end = (group + 1) * minibatch.size / num_groups;
     for (size_t first = group * minibatch.size / num_groups; first < end; first += kChunk) {
         const size_t samples = std::min(kChunk, end - first);
-        for (size_t i = 0; i < samples; ++i) {
+        for (size_t i = 0; image_size > 0 && i < samples; ++i) {
             RC_DISPATCH(bytes_to_unit, minibatch.observations + minibatch.row(first + i) * observation_size,
                         image_size, worker.input.data() + i * image_size);
         }

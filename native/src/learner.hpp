@@ -51,8 +51,9 @@ class Learner {
     // observation_size).
     void encode(const uint8_t* sight, size_t count, uint8_t* out);
 
-    // Logits, or means and log standard deviations  (count, policy_size).
-    void policy(const uint8_t* observations, size_t count, float* out);
+    // Logits, or means and log standard deviations  (count, policy_size). `states` are read by a policy that
+    // sees them, `observations` by the others.
+    void policy(const uint8_t* observations, const float* states, size_t count, float* out);
 
     // The critic's estimates  (count,).
     void values(const uint8_t* observations, const float* states, size_t count, float* out);

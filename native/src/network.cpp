@@ -96,11 +96,19 @@ void for_each_parameter(const Network& network, const Visit& visit) {
 }  // namespace
 
 Network::Network(const NetworkSpec& description) : spec(description) {
-    require(spec.height > 0 && spec.width > 0 && spec.width <= 4096 && spec.pool > 0 && spec.block > 0,
+    if (spec.is_blind()) {
+        require(spec.state_size > 0, "A policy that sees the state needs one of at least one column.");
+        require(spec.height == 0 && spec.width == 0 && spec.top == 0 && spec.lidar_size == 0 &&
+                    spec.convs.empty() && spec.dense.empty() && spec.pool > 0 && spec.block > 0,
+                "A policy that sees the state has neither image nor LIDAR.");
+    }
+    require(spec.is_blind() ||
+                (spec.height > 0 && spec.width > 0 && spec.width <= 4096 && spec.pool > 0 && spec.block > 0),
             "The network's image needs 1 to 4096 columns and at least one row, its pool and block at least 1 "
             "pixel.");
     require(spec.pool <= 2, "The network's pool is " + std::to_string(spec.pool) + ", expected 1 or 2.");
-    require(spec.top >= 0 && spec.top < spec.height, "The network sees no row of its image.");
+    require(spec.is_blind() || (spec.top >= 0 && spec.top < spec.height),
+            "The network sees no row of its image.");
     require((spec.height - spec.top) % (spec.pool * spec.block) == 0 &&
                 spec.width % (spec.pool * spec.block) == 0,
             "The network's image does not divide into squares of " + std::to_string(spec.pool * spec.block) +
@@ -109,15 +117,20 @@ Network::Network(const NetworkSpec& description) : spec(description) {
             "The network needs at least one action, and a state of 0 or more columns.");
     for (const int units : spec.dense) require(units > 0, "A dense layer needs at least one unit.");
     for (const int units : spec.critic_units) require(units > 0, "A dense layer needs at least one unit.");
+    for (const int units : spec.policy_units) require(units > 0, "A dense layer needs at least one unit.");
     for (const int units : spec.lidar_units) require(units > 0, "A dense layer needs at least one unit.");
     require(spec.lenses == 1 || spec.lenses == 2, "A camera has one lens or two.");
     require(spec.lidar_size >= 0 && (spec.lidar_size == 0 || !spec.lidar_units.empty()),
             "A LIDAR of 0 or more values needs a branch of at least one dense layer.");
     require(spec.camera_dense >= 0 && spec.camera_dense <= static_cast<int>(spec.dense.size()),
             "The camera's branch cannot have more dense layers than there are.");
-    add_camera_tower(policy, spec.num_actions);
+    if (spec.is_blind()) {
+        add_state_tower(policy, spec.policy_units, spec.num_actions);
+    } else {
+        add_camera_tower(policy, spec.num_actions);
+    }
     if (spec.state_size > 0) {
-        add_state_tower(critic);
+        add_state_tower(critic, spec.critic_units, 1);
     } else {
         add_camera_tower(critic, 1);
     }
@@ -195,16 +208,16 @@ int Network::add_lidar_branch(Tower& tower) {
     return inputs;
 }
 
-void Network::add_state_tower(Tower& tower) {
+void Network::add_state_tower(Tower& tower, const std::vector<int>& all_units, int num_outputs) {
     tower.sees_camera = false;
     Source source = Source::state;
     int inputs = spec.state_size;
-    for (const int units : spec.critic_units) {
+    for (const int units : all_units) {
         add_dense_layer(tower, source, Activation::tanh, units, 1, 1, inputs, 0);
         source = Source::layer;
         inputs = units;
     }
-    add_dense_layer(tower, source, Activation::identity, 1, 1, 1, inputs, 0);
+    add_dense_layer(tower, source, Activation::identity, num_outputs, 1, 1, inputs, 0);
 }
 
 void Network::add_dense_layer(Tower& tower, Source source, Activation activation, int outputs, int height,

@@ -2,9 +2,9 @@
 // packed.
 //
 // A network is two towers over one vector of parameters: the policy sees the sensors, the critic the
-// privileged state or the sensors. Every layer is a convolution; a dense layer is one whose kernel covers its
-// whole input. Where there is a LIDAR, a tower has a branch for it, and a layer without parameters that lays
-// the ends of both branches side by side:
+// privileged state or the sensors. A teacher's policy sees the state, too, and no sensors. Every layer is a
+// convolution; a dense layer is one whose kernel covers its whole input. Where there is a LIDAR, a tower has
+// a branch for it, and a layer without parameters that lays the ends of both branches side by side:
 //
 //     image ─▶ convolutions [─▶ dense layers] ─┐
 //                                              join ─▶ dense layers ─▶ head
@@ -54,7 +54,9 @@ struct NetworkSpec {
     int lidar_size = 0;             // values of the LIDAR sensor, a byte each; 0 without one
     std::vector<int> lidar_units;   // of the LIDAR's branch
     int camera_dense = 0;           // how many of the dense layers belong to the camera's branch
+    std::vector<int> policy_units;  // of a policy that sees the state; then there is no image and no LIDAR
 
+    bool is_blind() const { return !policy_units.empty(); }  // sees the state only
     int rows() const { return (height - top) / (pool * block); }
     int columns() const { return width / (pool * block); }
     int channels() const { return lenses * block * block; }
@@ -134,7 +136,7 @@ class Network {
 
   private:
     void add_camera_tower(Tower& tower, int num_outputs);
-    void add_state_tower(Tower& tower);
+    void add_state_tower(Tower& tower, const std::vector<int>& all_units, int num_outputs);
     void add_dense_layer(Tower& tower, Source source, Activation activation, int outputs, int height,
                          int width, int channels, int joined_inputs);
     int add_lidar_branch(Tower& tower);

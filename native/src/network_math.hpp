@@ -1,5 +1,5 @@
 // exp, log, tanh, sine and cosine of the network, its loss and its policy: the same bits everywhere, like
-// racecraft/math.hpp, in double.
+// racecraft/math.hpp, in double but for tanh.
 #pragma once
 
 #include <bit>
@@ -89,8 +89,27 @@ RC_HD void sincos_of_turn(double turn, double& sine, double& cosine) {
     cosine = ((quadrant + 1) & 2) != 0 ? -cosine_of_r : cosine_of_r;
 }
 
+// x P(x^2) / Q(x^2), fitted to the relative error over [0, 9.02], beyond which the result is 1 in float:
+// within 4e-7 of the exact value, relative. In float throughout, as a network's layers spend much of their
+// time here.
 RC_HD float tanh_of(float x) {
-    return static_cast<float>(1.0 - 2.0 / (exp_of(2.0 * static_cast<double>(x)) + 1.0));
+    constexpr float kMost = 9.02f;
+    x = x < -kMost ? -kMost : x;
+    x = x > kMost ? kMost : x;
+    const float x2 = x * x;
+    float p = 1.3319107594611523e-08f;
+    p = p * x2 + 2.058350946754217e-05f;
+    p = p * x2 + 0.0034940363839268684f;
+    p = p * x2 + 0.13379719853401184f;
+    p = p * x2 + 1.0f;
+    float q = 7.762034783809213e-07f;
+    q = q * x2 + 0.0003283095720689744f;
+    q = q * x2 + 0.02587108127772808f;
+    q = q * x2 + 0.4671303331851959f;
+    q = q * x2 + 1.0f;
+    float t = x * p / q;
+    t = t < -1.0f ? -1.0f : t;
+    return t > 1.0f ? 1.0f : t;
 }
 
 }  // namespace racecraft

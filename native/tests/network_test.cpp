@@ -146,14 +146,17 @@ Outputs reference_outputs(const Network& network, const Values& parameters, cons
     for (size_t i = 0; i < spec.observation_size(); ++i) {
         (i < spec.image_size() ? image : lidar).push_back(bytes[i] / 255.0);
     }
-    Outputs outputs{reference_tower(network.policy, spec, p, image, lidar, true), 0.0};
+    const size_t columns = static_cast<size_t>(spec.state_size);
+    const float* floats = samples.states.data() + row * columns;
+    const Values state(floats, floats + columns);
+    const bool is_blind = !spec.policy_units.empty();
+    Outputs outputs{reference_tower(network.policy, spec, p, is_blind ? state : image, lidar, !is_blind),
+                    0.0};
     if (!spec.is_discrete) {
         outputs.policy.insert(outputs.policy.end(), p, p + spec.num_actions);
         p += spec.num_actions;
     }
-    const size_t columns = static_cast<size_t>(spec.state_size);
-    const float* state = samples.states.data() + row * columns;
-    const Values critic_input = columns > 0 ? Values(state, state + columns) : image;
+    const Values critic_input = columns > 0 ? state : image;
     outputs.value = reference_tower(network.critic, spec, p, critic_input, lidar, columns == 0)[0];
     return outputs;
 }
@@ -203,6 +206,8 @@ std::vector<NetworkSpec> odd_networks() {
         {12, 16, 1, 4, {{5, 8, 4}}, {7, 6}, 3, true, 5, {6}, 0, 2, 9, {5, 3}, 1},  // two lenses and a LIDAR
         {9, 11, 1, 1, {{3, 3, 2}, {4, 2, 1}}, {}, 2, false, 0, {}, 0, 2, 4, {18}, 0},  // the head joins them
         {8, 8, 2, 1, {{3, 3, 1}}, {35}, 2, true, 0, {}, 0, 1, 33, {2}, 1},
+        {0, 0, 1, 1, {}, {}, 3, true, 17, {33, 5}, 0, 1, 0, {}, 0, {34, 7}},  // teachers, which see the state
+        {0, 0, 1, 1, {}, {}, 2, false, 5, {16}, 0, 1, 0, {}, 0, {64, 64, 3}},
     };
 }
 
@@ -219,7 +224,7 @@ std::vector<float> after_two_steps(const NetworkSpec& spec, int num_threads) {
     learner.read(Learner::Part::weights, bits.data());
     const Samples samples(spec, 21, 4);
     std::vector<float> outputs(21 * spec.policy_size()), values(21);
-    learner.policy(samples.observations.data(), 21, outputs.data());
+    learner.policy(samples.observations.data(), samples.states.data(), 21, outputs.data());
     learner.values(samples.observations.data(), samples.states.data(), 21, values.data());
     bits.insert(bits.end(), outputs.begin(), outputs.end());
     bits.insert(bits.end(), values.begin(), values.end());
@@ -237,11 +242,13 @@ TEST(exp_log_and_tanh_are_accurate) {
         CHECK_NEAR(exp_of(x) / std::exp(x), 1.0, 1e-14);
         CHECK_NEAR(log_of(std::exp(x)), x, 1e-14 * (1.0 + std::abs(x)));
         const float t = static_cast<float>(x) * 0.1f;
-        CHECK_NEAR(tanh_of(t), std::tanh(static_cast<double>(t)), 1e-7);
+        CHECK_NEAR(tanh_of(t) / std::tanh(static_cast<double>(t)), 1.0, 4e-7);
     }
     CHECK_EQUAL(exp_of(0.0), 1.0);
     CHECK_EQUAL(log_of(1.0), 0.0);
     CHECK_EQUAL(tanh_of(100.0f), 1.0f);
+    CHECK_EQUAL(tanh_of(-100.0f), -1.0f);
+    CHECK_EQUAL(tanh_of(0.0f), 0.0f);
     const double nan = std::nan("");
     CHECK(std::isnan(exp_of(nan)));
     CHECK(std::isnan(log_of(nan)));
@@ -256,7 +263,7 @@ TEST(outputs_agree_with_the_reference) {
         const Values exact(parameters.begin(), parameters.end());
         const Samples samples(spec, 19, 6);
         std::vector<float> policy(19 * spec.policy_size()), values(19);
-        learner.policy(samples.observations.data(), 19, policy.data());
+        learner.policy(samples.observations.data(), samples.states.data(), 19, policy.data());
         learner.values(samples.observations.data(), samples.states.data(), 19, values.data());
         for (size_t row = 0; row < 19; ++row) {
             const Outputs expected = reference_outputs(learner.network(), exact, samples, row);

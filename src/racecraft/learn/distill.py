@@ -23,7 +23,7 @@ from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights
-from racecraft.learn.mlp_learner import MlpLearner
+from racecraft.learn.native_state_learner import NativeStateLearner
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
 TEACHER_PPO = PPOConfig(num_envs=64, num_steps=32, minibatch_size=512, update_epochs=4, learning_rate=2e-3)
@@ -101,6 +101,7 @@ class Distill:
         environment: The student's cars, with a camera.
         teacher_environment: The teacher's cars; they need none.
         seed: Decides all sampling, together with the number of the iteration.
+        num_threads: Of the teacher's learner; 0 takes every core. Results are the same for any number.
     """
 
     def __init__(
@@ -111,6 +112,7 @@ class Distill:
         teacher_environment: Environment,
         *,
         seed: int = 0,
+        num_threads: int = 0,
     ) -> None:
         if config.num_envs != environment.num_envs:
             raise ConfigError(f"num_envs is {config.num_envs}, expected the environment's {environment.num_envs}.")
@@ -120,7 +122,8 @@ class Distill:
         ppo = replace(TEACHER_PPO, num_envs=teacher_environment.num_envs)
         if not learner.spec.is_discrete:
             ppo = replace(ppo, ent_coef=0.0)
-        self.teacher = PPO(ppo, MlpLearner(teacher_spec, seed=seed), StateWorld(teacher_environment), seed=seed)
+        teacher = NativeStateLearner(teacher_spec, seed=seed, num_threads=num_threads)
+        self.teacher = PPO(ppo, teacher, StateWorld(teacher_environment), seed=seed)
         self.total_steps = 0
         self.iteration = 0
         self.prefers_average = False

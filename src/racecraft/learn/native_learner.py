@@ -21,6 +21,7 @@ from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateSta
 
 _NO_INDICES = np.zeros(0, np.int64)
 _NO_ACTIONS = np.zeros((0, 0), np.float32)
+_NO_STATES = np.zeros((0, 0), np.float32)
 
 
 class NativeLearner:
@@ -39,32 +40,36 @@ class NativeLearner:
         self.spec = spec
         self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
         self._shapes = networks.weight_shapes(spec)
-        arch = networks.architecture(spec.name, lenses=spec.lenses)
-        height, width = spec.frame_shape
         try:
-            self._native = _native.Learner(
-                height=height,
-                width=width,
-                top=networks.sky_rows(spec),
-                pool=arch.pool,
-                block=networks.block_size(spec),
-                convs=[(conv.filters, conv.kernel, conv.stride) for conv in arch.convs],
-                dense=list(arch.dense),
-                num_actions=spec.num_actions,
-                is_discrete=spec.is_discrete,
-                state_size=spec.state_size,
-                critic_units=list(networks.CRITIC_UNITS),
-                lenses=spec.lenses,
-                lidar_size=spec.lidar_size,
-                lidar_units=list(arch.lidar),
-                camera_dense=arch.camera_dense,
-                num_threads=num_threads,
-            )
+            self._native = self._make(spec, num_threads)
         except ValueError as error:
             raise ConfigError(str(error)) from None
         self._objective: tuple[Objective | None, Any] = (None, None)  # the last one, and as the core knows it
         if seed is not None:
             self.load_weights(networks.initial_weights(spec, seed=seed, orthonormalize=_native.orthonormalize))
+
+    def _make(self, spec: NetworkSpec, num_threads: int) -> _native.Learner:
+        arch = networks.architecture(spec.name, lenses=spec.lenses)
+        height, width = spec.frame_shape
+        return _native.Learner(
+            height=height,
+            width=width,
+            top=networks.sky_rows(spec),
+            pool=arch.pool,
+            block=networks.block_size(spec),
+            convs=[(conv.filters, conv.kernel, conv.stride) for conv in arch.convs],
+            dense=list(arch.dense),
+            num_actions=spec.num_actions,
+            is_discrete=spec.is_discrete,
+            state_size=spec.state_size,
+            critic_units=list(networks.CRITIC_UNITS),
+            lenses=spec.lenses,
+            lidar_size=spec.lidar_size,
+            lidar_units=list(arch.lidar),
+            camera_dense=arch.camera_dense,
+            policy_units=[],
+            num_threads=num_threads,
+        )
 
     def encode(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Pool and lay out what the sensors tell (N, *sight_shape) as (N, *observation_shape)."""
@@ -74,7 +79,7 @@ class NativeLearner:
 
     def policy(self, observations: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Logits, or means and log standard deviations  (N, P)."""
-        outputs: NDArray[np.float32] = self._native.policy(self._observations(observations))
+        outputs: NDArray[np.float32] = self._native.policy(self._observations(observations), _NO_STATES)
         return outputs
 
     def values(self, observations: NDArray[np.uint8], states: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -103,8 +108,7 @@ class NativeLearner:
         if objective is not self._objective[0]:
             self._objective = objective, _native_objective(objective)
         terms = self._native.update(
-            self._observations(minibatch.observations, size),
-            self._column("states", minibatch.states, (size, spec.state_size)),
+            *self._sensed(minibatch, size),
             indices,
             actions,
             self._column("log_probs", minibatch.log_probs, (size,)),
@@ -167,6 +171,11 @@ class NativeLearner:
                 "are missing, superfluous or of another shape."
             )
         return np.concatenate([np.asarray(arrays[name], np.float32).ravel() for name in self._shapes])
+
+    def _sensed(self, minibatch: Minibatch, size: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """What the core is to see of a minibatch: bytes and states."""
+        states = self._column("states", minibatch.states, (size, self.spec.state_size))
+        return self._observations(minibatch.observations, size), states
 
     def _observations(self, observations: NDArray[np.uint8], size: int | None = None) -> NDArray[np.uint8]:
         shape = (len(observations) if size is None else size, *self.observation_shape)

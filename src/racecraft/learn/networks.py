@@ -76,6 +76,13 @@ STEREO: dict[str, Architecture] = {
 """What AWS builds under these names for a stereo camera; the others are the same for both."""
 CRITIC_UNITS = (64, 64)
 """Dense layers (tanh) of the critic that sees the privileged state."""
+TEACHER = "TEACHER"
+"""The network without a camera, for `racecraft.learn.native_state_learner`: both towers are dense layers (tanh)
+over the privileged state."""
+TEACHER_UNITS = (64, 64)
+"""Its dense layers."""
+TEACHER_LOG_STD = -1.0
+"""Log standard deviation that it begins with where actions are continuous."""
 
 
 def network_names() -> tuple[str, ...]:
@@ -149,7 +156,12 @@ def image_shape(spec: NetworkSpec) -> tuple[int, int, int]:
 
 
 def observation_shape(spec: NetworkSpec) -> tuple[int, ...]:
-    """Shape of an observation as `encode` makes it: that of the image, or its bytes and behind them the LIDAR's."""
+    """Shape of an observation as `encode` makes it: that of the image, or its bytes and behind them the LIDAR's.
+
+    Of a teacher it is that of its state.
+    """
+    if spec.name == TEACHER:
+        return (spec.state_size,)
     shape = image_shape(spec)
     return (int(np.prod(shape)) + spec.lidar_size,) if spec.lidar_size else shape
 
@@ -213,7 +225,7 @@ def flat_size(spec: NetworkSpec) -> int:
 
 def weight_shapes(spec: NetworkSpec) -> dict[str, tuple[int, ...]]:
     """Name and shape of every parameter, in the fixed order of the towers."""
-    arch = _architecture(spec)
+    is_blind = spec.name == TEACHER
     shapes: dict[str, tuple[int, ...]] = {}
 
     def dense(layer: str, inputs: int, units: tuple[int, ...], *, first: int = 1) -> int:
@@ -226,7 +238,7 @@ def weight_shapes(spec: NetworkSpec) -> dict[str, tuple[int, ...]]:
         shapes[f"{tower}.head.weight"], shapes[f"{tower}.head.bias"] = (outputs, inputs), (outputs,)
 
     def sensors(tower: str, outputs: int) -> None:
-        channels = spec.lenses
+        arch, channels = _architecture(spec), spec.lenses
         for i, conv in enumerate(arch.convs, 1):
             shapes[f"{tower}.conv{i}.weight"] = (conv.filters, channels, conv.kernel, conv.kernel)
             shapes[f"{tower}.conv{i}.bias"] = (conv.filters,)
@@ -237,11 +249,17 @@ def weight_shapes(spec: NetworkSpec) -> dict[str, tuple[int, ...]]:
             inputs += dense(f"{tower}.lidar", spec.lidar_size, arch.lidar)
         head(tower, dense(f"{tower}.dense", inputs, after, first=arch.camera_dense + 1), outputs)
 
-    sensors("policy", spec.num_actions)
+    def states(tower: str, units: tuple[int, ...], outputs: int) -> None:
+        head(tower, dense(f"{tower}.dense", spec.state_size, units), outputs)
+
+    if is_blind:
+        states("policy", TEACHER_UNITS, spec.num_actions)
+    else:
+        sensors("policy", spec.num_actions)
     if not spec.is_discrete:
         shapes["policy.log_std"] = (spec.num_actions,)
-    if spec.state_size:
-        head("critic", dense("critic.dense", spec.state_size, CRITIC_UNITS), 1)
+    if is_blind or spec.state_size:
+        states("critic", TEACHER_UNITS if is_blind else CRITIC_UNITS, 1)
     else:
         sensors("critic", 1)
     return shapes
@@ -267,7 +285,9 @@ def initial_weights(
     weights: Weights = {}
     for name, shape in weight_shapes(spec).items():
         if not name.endswith(".weight"):
-            begin = _architecture(spec).log_std if name == "policy.log_std" else 0.0
+            begin = 0.0
+            if name == "policy.log_std":
+                begin = TEACHER_LOG_STD if spec.name == TEACHER else _architecture(spec).log_std
             weights[name] = np.full(shape, begin, np.float32)
             continue
         gain = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}.get(name, 2.0**0.5)

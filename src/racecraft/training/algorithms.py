@@ -54,7 +54,7 @@ def make_algorithm(
     if settings.algorithm == "distill":
         if settings.opponents is not None:
             raise ConfigError("distill trains alone on the track; opponents need --algorithm ppo.")
-        return Distill(settings.distill, learner, environment, open_teacher(), seed=seed)
+        return Distill(settings.distill, learner, environment, open_teacher(), seed=seed, num_threads=threads)
     if settings.algorithm.startswith("sb3:"):
         torch_sb3 = _import("torch_sb3", settings.algorithm, extra="sb3")
         name = settings.algorithm.removeprefix("sb3:")
