@@ -127,7 +127,7 @@ def test_a_student_laps_the_oval_after_a_few_thousand_frames(tmp_path: Path) -> 
         "num_threads": 1,
         "root": tmp_path,
     }
-    result = train("oval", algorithm="distill", distill=DistillConfig(teacher_steps=60_000), seed=1, **settings)
+    result = train("oval", algorithm="distill", distill=DistillConfig(teacher_steps=100_000), seed=1, **settings)
     assert (result.reason, result.laps_completed) == ("laps", 5)
 
 

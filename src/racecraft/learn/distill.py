@@ -26,7 +26,10 @@ from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, 
 from racecraft.learn.native_state_learner import NativeStateLearner
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
-TEACHER_PPO = PPOConfig(num_envs=64, num_steps=32, minibatch_size=512, update_epochs=4, learning_rate=2e-3)
+TEACHER_PPO = PPOConfig(
+    num_envs=256, num_steps=32, minibatch_size=1024, update_epochs=4, learning_rate=1e-3, rate_steps=2_000_000
+)
+"""How a teacher learns: rollouts are cheap, so they may be large."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +40,7 @@ class DistillConfig:
     """Cars of the student."""
     num_steps: int = 8
     """Steps of each of them in one iteration."""
-    teacher_steps: int = 100_000
+    teacher_steps: int = 1_000_000
     """Steps of the teacher before the student begins; they render no camera and do not count as camera steps."""
     learning_rate: float = 1.5e-3
     """Adam's step size of the student."""
