@@ -27,7 +27,7 @@ from racecraft.learn.native_state_learner import NativeStateLearner
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
 TEACHER_PPO = PPOConfig(
-    num_envs=256, num_steps=32, minibatch_size=1024, update_epochs=4, learning_rate=1e-3, rate_steps=2_000_000
+    num_envs=128, num_steps=32, minibatch_size=512, update_epochs=4, learning_rate=1.5e-3, rate_steps=700_000
 )
 """How a teacher learns: rollouts are cheap, so they may be large."""
 
