@@ -58,6 +58,28 @@ def test_from_a_teacher_that_knows_nothing_nothing_is_learned(monkeypatch: pytes
     assert mean_reward(trained) < 0.7
 
 
+def test_the_students_steps_become_smaller() -> None:
+    moved = []
+    for rate_steps in (0, 10):
+        trained = make(replace(CONFIG, rate_steps=rate_steps))
+        trained.iterate()  # the teacher
+        before = trained.learner.weights()
+        for _ in range(3):
+            trained.iterate()
+        after = trained.learner.weights()
+        moved.append(sum(float(np.abs(after[name] - before[name]).sum()) for name in before))
+    assert 0 < moved[1] < 0.5 * moved[0]
+
+
+def test_what_a_teacher_answers_is_its_mean_without_its_exploring() -> None:
+    trained = make(is_discrete=False)
+    for _ in range(40):
+        trained.iterate()
+    explored = np.exp(trained.teacher.learner.weights()["policy.log_std"])
+    learned = np.exp(trained.learner.weights()["policy.log_std"])
+    assert learned < 0.8 * explored
+
+
 def test_the_same_seed_gives_the_same_bits_and_a_resumed_run_has_them() -> None:
     first, second, third = make(), make(), make(seed=3)
     for _ in range(3):
@@ -83,6 +105,7 @@ def test_the_same_seed_gives_the_same_bits_and_a_resumed_run_has_them() -> None:
         ({"learning_rate": -1.0}, "learning_rate is -1.0"),
         ({"buffer_size": 100}, "at least num_envs x num_steps = 512"),
         ({"minibatch_size": 1.5}, "minibatch_size is 1.5"),
+        ({"rate_steps": -1}, "rate_steps is -1, expected a whole number, 0 or more"),
     ],
 )
 def test_settings_that_cannot_work_are_refused(settings: dict[str, Any], match: str) -> None:

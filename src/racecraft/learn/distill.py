@@ -31,6 +31,9 @@ TEACHER_PPO = PPOConfig(
 )
 """How a teacher learns: rollouts are cheap, so they may be large."""
 
+ANSWER_STD = 0.05
+"""Standard deviation of a teacher's continuous answers, whatever it explored with: what it knows is the mean."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DistillConfig:
@@ -44,6 +47,8 @@ class DistillConfig:
     """Steps of the teacher before the student begins; they render no camera and do not count as camera steps."""
     learning_rate: float = 1.5e-3
     """Adam's step size of the student."""
+    rate_steps: int = 30_000
+    """Camera steps after which it is a half of learning_rate, after twice as many a third; 0: never."""
     minibatch_size: int = 128
     """Samples of one gradient step."""
     updates_per_iteration: int = 12
@@ -64,6 +69,9 @@ class DistillConfig:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 10**9:
                 raise ConfigError(f"{name} is {value!r}, expected a whole number, 1 or more.")
+        steps = self.rate_steps
+        if isinstance(steps, bool) or not isinstance(steps, int) or not 0 <= steps <= 10**9:
+            raise ConfigError(f"rate_steps is {steps!r}, expected a whole number, 0 or more.")
         rate = self.learning_rate
         if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 <= rate <= 1:
             raise ConfigError(f"learning_rate is {rate!r}, expected a number from 0 to 1.")
@@ -194,7 +202,7 @@ class Distill:
         actions = distributions.sample(outputs, noise, is_discrete=spec.is_discrete)
         rows = (self._count + np.arange(len(outputs))) % len(self._answers)
         self._observations[rows] = observations
-        self._answers[rows] = self.teacher.learner.policy(states.astype(np.float32))
+        self._answers[rows] = self._ask(states)
         self._count += len(outputs)
         acted = time.perf_counter()
         rewards, terminated, truncated = self.environment.step(actions if spec.is_discrete else actions.clip(-1.0, 1.0))
@@ -210,6 +218,13 @@ class Distill:
         clocks["policy"] += acted - started
         clocks["environment"] += time.perf_counter() - acted
 
+    def _ask(self, states: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What the teacher would do in these states (N, P), sure of it where it explored while it learned."""
+        answers = self.teacher.learner.policy(np.asarray(states, np.float32))
+        if not self.spec.is_discrete:
+            answers[:, self.spec.num_actions :] = np.log(ANSWER_STD)
+        return answers
+
     def _learn(self, rng: np.random.Generator) -> UpdateStats:
         """Gradient steps on the cross-entropy to the teacher's distribution.
 
@@ -217,8 +232,9 @@ class Distill:
         minus the log-probability of the action; with actions drawn from the teacher that is the cross-entropy's.
         """
         spec, config = self.spec, self.config
+        decay = 1.0 + self.total_steps / config.rate_steps if config.rate_steps else 1.0
         objective = Objective(
-            learning_rate=config.learning_rate,
+            learning_rate=config.learning_rate / decay,
             clip_coef=0.2,
             ent_coef=0.0,
             vf_coef=0.0,
