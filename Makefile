@@ -9,7 +9,7 @@ UV := $(BIN)/uv
 NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/* native/gpu/*)
 
 PAGES := src/racecraft/serve/pages/index.html
-WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/*)
+WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/* web/src/*/*/*)
 
 .PHONY: help train console test test-fast lint format bench setup build stub clean requirements
 

@@ -1,0 +1,16 @@
+/** Deutsch. */
+import type { Key } from "../en";
+import { analysis } from "./analysis";
+import { create } from "./create";
+import { draw } from "./draw";
+import { drive } from "./drive";
+import { evaluation } from "./evaluation";
+import { garage } from "./garage";
+import { races } from "./races";
+import { replay } from "./replay";
+import { settings } from "./settings";
+import { shell } from "./shell";
+import { tracks } from "./tracks";
+import { watch } from "./watch";
+
+export const de: Record<Key, string> = { ...shell, ...replay, ...analysis, ...create, ...watch, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings };

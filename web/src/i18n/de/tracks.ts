@@ -1,0 +1,33 @@
+/** Strecken. */
+import type { tracks as english } from "../en/tracks";
+
+export const tracks: Record<keyof typeof english, string> = {
+  tracks_lead: "Die Strecken der Bibliothek und deine eigenen.",
+  length: "Länge",
+  width: "Breite",
+  tightest: "Engste Kurve",
+  corners: "Kurven",
+  train_here: "Hier trainieren",
+  tracks_find: "Strecken suchen",
+  tracks_own: "Eigene",
+  tracks_library: "Bibliothek",
+  tracks_short: "Kurz",
+  tracks_left: "Links herum",
+  tracks_right: "Rechts herum",
+  tracks_sort_length: "Länge",
+  tracks_sort_width: "Breite",
+  tracks_sort_radius: "Engste Kurve",
+  tracks_draw: "Strecke zeichnen",
+  tracks_import: "Datei einlesen",
+  tracks_imported: "{name} wurde eingelesen.",
+  tracks_import_hint: "Eine AWS-Route (.npy) oder eine Mittellinie mit Breiten (.csv), höchstens 2 MB. Du kannst sie auch hierher ziehen.",
+  tracks_drop: "Streckendatei hier ablegen",
+  tracks_drive: "Fahren",
+  tracks_edit: "Bearbeiten",
+  tracks_copy: "Kopie bearbeiten",
+  tracks_download: "Herunterladen",
+  tracks_count: "{count} Strecken",
+  tracks_surprise: "Überrasch mich",
+  tracks_own_badge: "deine",
+  tracks_found_none: "Keine Strecke passt zu diesen Filtern.",
+};

@@ -1,0 +1,17 @@
+/** English: the complete catalogue, a file per page; other languages have the same keys. */
+import { analysis } from "./analysis";
+import { create } from "./create";
+import { draw } from "./draw";
+import { drive } from "./drive";
+import { evaluation } from "./evaluation";
+import { garage } from "./garage";
+import { races } from "./races";
+import { replay } from "./replay";
+import { settings } from "./settings";
+import { shell } from "./shell";
+import { tracks } from "./tracks";
+import { watch } from "./watch";
+
+export const en = { ...shell, ...replay, ...analysis, ...create, ...watch, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings } as const;
+
+export type Key = keyof typeof en;
