@@ -171,6 +171,69 @@ def test_models_are_compared(studio: tuple[RunningConsole, Any]) -> None:
     assert page.get_by_role("region", name="Results").locator("tbody tr").count() == 2
 
 
+def test_models_are_chosen_in_the_garage_to_be_compared(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/")
+    page.get_by_role("button", name="Compare left").click()
+    assert page.get_by_role("region", name="Compare").get_by_role("button", name="Compare").is_disabled()
+    page.get_by_role("button", name="Compare right").click()
+    page.get_by_text("2 of at most 6 models are chosen.").wait_for()
+    page.get_by_role("region", name="Compare").get_by_role("button", name="Compare").click()
+    page.wait_for_url("**/compare/left/right")
+    assert page.get_by_role("region", name="Results").locator("tbody tr").count() == 2
+
+
+def test_numbers_are_searched_and_the_best_becomes_a_model(studio: tuple[RunningConsole, Any]) -> None:
+    pytest.importorskip("optuna")
+    page = visit(studio, "/models/left/tune")
+    page.get_by_role("checkbox", name="Learning rate").wait_for()
+    for box in page.get_by_role("checkbox").all():
+        if box.is_visible() and "gamma" not in box.locator("..").inner_text():
+            box.uncheck()
+    page.get_by_role("spinbutton", name="gamma, up to").fill("0.99")
+    page.get_by_role("spinbutton", name="Steps per trial").fill("2000")
+    page.get_by_role("button", name="Start searching").click()
+    page.get_by_role("region", name="Trials").locator("tbody tr").nth(1).wait_for()
+    page.get_by_role("button", name="Stop").last.click()
+    page.locator(".badge.finished", has_text="Ended").wait_for()
+    page.get_by_role("button", name="Make a model of the best").click()
+    page.get_by_role("button", name="Open the model").click()
+    page.get_by_role("heading", name="left-tuned").wait_for()
+    assert 0.9 <= studio[0].client.get("/api/models/left-tuned").json()["settings"]["ppo"]["gamma"] <= 0.99
+
+
+def test_every_page_works_without_any_network_but_its_own_server(studio: tuple[RunningConsole, Any]) -> None:
+    console, first = studio
+    foreign: list[str] = []
+    own = str(console.client.base_url)
+
+    def guard(route: Any) -> None:
+        if route.request.url.startswith(own):
+            route.continue_()
+        else:
+            foreign.append(route.request.url)
+            route.abort()
+
+    page = first.context.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("websocket", lambda socket: foreign.append(socket.url))
+    page.context.route("**/*", guard)
+    with pytest.raises(Exception, match="ERR_FAILED"):  # the guard does catch what leaves
+        page.goto("http://racecraft.invalid/")
+    assert foreign == ["http://racecraft.invalid/"]
+    foreign.clear(), complaints.clear()
+    models = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "tune", "setup")]
+    others = ("/create", "/tracks", "/draw", "/drive/oval", "/races", "/races/new", "/compare/left/right", "/settings")
+    for path in ("/", *others, *models):
+        visit((console, page), path)
+        page.wait_for_timeout(700)
+    page.context.unroute("**/*")
+    page.close()
+    assert foreign == []
+    assert complaints == []
+
+
 def test_training_goes_on_with_a_changed_reward(studio: tuple[RunningConsole, Any]) -> None:
     page = visit(studio, "/models/right/setup")
     editor = page.locator(".cm-content")
@@ -190,8 +253,8 @@ def test_axe_finds_nothing_serious_in_the_studio(studio: tuple[RunningConsole, A
     page = studio[1].context.new_page()  # axe itself tries what the page's policy forbids
     page.add_init_script(f"localStorage.setItem('racecraft-theme', '{theme}')")
     found = {}
-    own = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "setup")]
-    for path in ("/create", "/compare/left/right", *own):
+    own = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "tune", "setup")]
+    for path in ("/", "/create", "/compare/left/right", *own):
         visit((studio[0], page), path)
         page.wait_for_timeout(1500)
         page.evaluate("document.querySelectorAll('details:not(.keep)').forEach(part => { part.open = true; })")

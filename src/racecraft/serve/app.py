@@ -39,11 +39,13 @@ from racecraft.serve.routes import (
     races,
     rewards,
     tracks,
+    tunings,
 )
 from racecraft.serve.schemas import ProblemReply
 from racecraft.serve.security import Guard, content_policy
 from racecraft.serve.settings import ServeSettings, version
 from racecraft.serve.supervisor import Supervisor
+from racecraft.serve.tunings import Tunings
 
 PAGES: Final = Path(__file__).parent / "pages"
 """The built web client, part of the package."""
@@ -79,6 +81,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         drives=Drives(),
         ghosts=Ghosts(settings.runs, database),
         races=Races(database, queue, garage, courses),
+        tunings=Tunings(settings.state, queue, garage),
         mirror=Mirror(artifacts, runs=settings.runs, state=settings.state, queue=queue, supervisor=supervisor),
         hub=Hub(settings.runs, queue),
     )
@@ -108,7 +111,8 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.state.guard = guard = Guard(database, hosts)
     app.add_middleware(guard.middleware)
     problems.install(app)
-    parts = (console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, races, jobs, events)
+    parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, races]
+    parts += [jobs, events]
     for part in parts:
         app.include_router(part.router)
 

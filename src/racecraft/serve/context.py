@@ -18,6 +18,7 @@ from racecraft.serve.mirror import Mirror
 from racecraft.serve.races import Races
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.supervisor import Supervisor
+from racecraft.serve.tunings import Tunings
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Context:
     drives: Drives
     ghosts: Ghosts
     races: Races
+    tunings: Tunings
     mirror: Mirror
     hub: Hub
 

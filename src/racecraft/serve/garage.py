@@ -178,7 +178,7 @@ class Garage:
             waiting = sa.select(Job.kind).where(Job.run == folder.name, Job.state.in_(("queued", "running")))
             kind = session.scalar(waiting.limit(1))
         if kind is not None:
-            hint = "Stop its training first." if kind == "train" else "Wait until it has ended."
+            hint = "Stop it first." if kind in ("train", "tune") else "Wait until it has ended."
             raise Conflict(f"Model {folder.name!r} is in use: there is a job of kind {kind!r}.", hint=hint)
         with ExitStack() as stack:
             try:

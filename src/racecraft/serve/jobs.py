@@ -46,9 +46,11 @@ class JobQueue:
         with self._database.transaction() as session:
             return session.get(Job, job_id)
 
-    def list(self, *, run: str | None = None, limit: int = 200) -> list[Job]:
+    def list(self, *, run: str | None = None, kind: str | None = None, limit: int = 200) -> list[Job]:
         """Jobs, newest first."""
         query = sa.select(Job).order_by(Job.created.desc()).limit(limit)
+        if kind is not None:
+            query = query.where(Job.kind == kind)
         if run is not None:
             query = query.where(Job.run == run)
         with self._database.transaction() as session:

@@ -20,10 +20,15 @@ class JobKind:
 
     A job may be started again at any moment, so the function goes on where it was, or finds that all is done.
     """
+    progress: str = "{run}/checkpoints/manifest.json"
+    """File below the runs folder that changes whenever something is kept for good."""
 
 
 KINDS: Final[Mapping[str, JobKind]] = {
     "train": JobKind(slot="training", work="racecraft.serve.tasks:train"),
+    "tune": JobKind(
+        slot="training", work="racecraft.serve.tuning_tasks:tune", progress=".racecraft/tunings/{tuning}/result.json"
+    ),
     "evaluate": JobKind(slot="other", work="racecraft.serve.tasks:evaluate"),
     "race": JobKind(slot="other", work="racecraft.serve.tasks:race"),
     "store": JobKind(slot="other", work="racecraft.serve.tasks:store"),

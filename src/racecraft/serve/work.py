@@ -73,7 +73,8 @@ class Worker:
         self._stops: list[Callable[[], None]] = []
         self._is_cancelled = False  # by the user
         self._leaving = threading.Event()  # the server is going down
-        self._manifest = runs / job.run / "checkpoints" / "manifest.json"
+        kind = KINDS.get(job.kind, KINDS["train"])
+        self._kept = runs / kind.progress.format(run=job.run, tuning=job.payload.get("tuning", ""))
         self._task = Task(job=job, runs=runs, database=database, artifacts=artifacts, on_stop=self._stops.append)
 
     def run(self) -> None:
@@ -137,7 +138,7 @@ class Worker:
     def _progress(self) -> float:
         """Changes whenever something is kept for good, so that the next attempt does not begin at the start."""
         try:
-            return self._manifest.stat().st_mtime
+            return self._kept.stat().st_mtime
         except OSError:
             return 0.0
 

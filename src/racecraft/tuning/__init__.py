@@ -8,7 +8,8 @@ from __future__ import annotations
 from racecraft.tuning.constants import find_constants, rewrite_constants
 from racecraft.tuning.outcome import Outcome, TrialOutcome
 from racecraft.tuning.space import HYPERPARAMETERS, Parameter, make_space
-from racecraft.tuning.study import Tuning, start_tuning
+from racecraft.tuning.start import make_tuning, plan_of, space_of, start_tuning
+from racecraft.tuning.study import Tuning
 
 __all__ = [
     "HYPERPARAMETERS",
@@ -18,6 +19,9 @@ __all__ = [
     "Tuning",
     "find_constants",
     "make_space",
+    "make_tuning",
+    "plan_of",
     "rewrite_constants",
+    "space_of",
     "start_tuning",
 ]

@@ -27,6 +27,8 @@ class TrialOutcome:
     best_lap_seconds: float | None
     steps: int | None
     """Camera steps it was trained."""
+    seconds: float | None
+    """Wall clock it took; None where it failed or was killed."""
     error: str
     """Why it failed, in one sentence."""
 

@@ -14,25 +14,24 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from racecraft.agent import ModelMetadata
 from racecraft.agent.aws_file import read_json_object
-from racecraft.errors import ConfigError, RacecraftError, RunError, did_you_mean
+from racecraft.errors import ConfigError, RacecraftError, RunError
 from racecraft.run import RunFolder
-from racecraft.run.atomic import write_file, write_json
-from racecraft.run.folder import sanitize_name
+from racecraft.run.atomic import write_json
 from racecraft.run.lock import exclusive_lock
 from racecraft.training import EvaluationReport, SilentReporter, TrainResult, Until
 from racecraft.training.job import Training
-from racecraft.training.plan import Plan, make_plan
+from racecraft.training.plan import Plan
 from racecraft.training.settings import TrainSettings
-from racecraft.tuning.constants import find_constants, rewrite_constants
+from racecraft.tuning.constants import rewrite_constants
 from racecraft.tuning.outcome import Outcome, TrialOutcome
-from racecraft.tuning.space import Parameter, make_space
+from racecraft.tuning.space import Parameter
 
 if TYPE_CHECKING:
     import optuna
@@ -74,6 +73,8 @@ class Tuning:
         self.plan = Plan(settings=settings, reward=reward, metadata=metadata, hyperparameters=None, parent=None)
         self._on_trial = on_trial
         self._optuna = _optuna()
+        self._stop = threading.Event()
+        self._training: Training | None = None
 
     def run(self, *, minutes: float = 10.0, max_trials: int = 0) -> Outcome:
         """Search until the time is up.
@@ -97,12 +98,31 @@ class Tuning:
             self._take_up(study)
             done, is_interrupted = 0, False
             while time.monotonic() < deadline and not is_interrupted and (not max_trials or done < max_trials):
+                if self._stop.is_set():
+                    is_interrupted = True
+                    break
                 is_interrupted = self._trial(study, deadline)
                 done += 1
                 self._write(self._outcome(study, is_interrupted=is_interrupted))
             outcome = self._outcome(study, is_interrupted=is_interrupted)
             self._write(outcome)
         return outcome
+
+    def past(self) -> tuple[TrialOutcome, ...]:
+        """The trials so far.
+
+        Raises:
+            RunError: The storage is damaged.
+        """
+        states = self._optuna.trial.TrialState
+        return tuple(self._seen(trial) for trial in self._study().trials if trial.state != states.WAITING)
+
+    def stop(self) -> None:
+        """Ask the search to end; the trial under way is begun again by the next `run`. Safe from any thread."""
+        self._stop.set()
+        training = self._training
+        if training is not None:
+            training.stop()
 
     # ---- one trial
 
@@ -118,7 +138,9 @@ class Tuning:
         try:
             run = self._start(values, name)
             training = Training(run, reporter=judge, is_checked=True)
-            judge.training = training
+            judge.training = self._training = training
+            if self._stop.is_set():  # between the look and the trial
+                training.stop()
             timer = threading.Timer(max(deadline - begun, 0.0), training.stop)
             timer.daemon = True
             timer.start()
@@ -139,6 +161,7 @@ class Tuning:
         if result is not None:
             for attribute, value in judge.attributes(result).items():
                 trial.set_user_attr(attribute, value)
+            trial.set_user_attr("seconds", time.monotonic() - begun)
             if judge.is_pruned:
                 study.tell(trial, state=states.PRUNED)
             elif result.reason == "interrupted":
@@ -216,6 +239,7 @@ class Tuning:
             completion=attributes.get("completion"),
             best_lap_seconds=attributes.get("best_lap"),
             steps=attributes.get("steps"),
+            seconds=attributes.get("seconds"),
             error=str(attributes.get("error", "")),
         )
 
@@ -236,63 +260,6 @@ class Tuning:
             write_json(self.folder / "result.json", outcome.to_dict())
         except OSError as error:
             raise RunError(f"{self.folder / 'result.json'} cannot be written: {error.strerror or error}.") from error
-
-
-def start_tuning(
-    track: str | Path | Sequence[str | Path] | None = None,
-    *,
-    search: Sequence[str] = (),
-    goal: str = "laps",
-    trial_steps: int = 40_000,
-    root: str | Path = "tuning",
-    name: str | None = None,
-    **settings: Any,
-) -> Path:
-    """Make the folder of a search; `Tuning` runs it.
-
-    Args:
-        track: As of `racecraft.training.train`.
-        search: ``NAME`` or ``NAME=LOW..HIGH`` of hyperparameters and of constants of the reward function; by default
-            all such constants, and the usual hyperparameters.
-        goal: ``laps`` (fewest camera steps until every evaluation lap is completed) or ``lap_time`` (the fastest lap).
-        trial_steps: Camera steps after which a trial ends.
-        root: Where such folders lie.
-        name: Of the folder; by default a new one.
-        settings: Others of `racecraft.training.train`.
-
-    Raises:
-        RacecraftError: An input is wrong.
-    """
-    _optuna()
-    if goal not in GOALS:
-        raise ConfigError(f"goal is {goal!r}, allowed: {', '.join(GOALS)}.", hint=did_you_mean(str(goal), GOALS))
-    if isinstance(trial_steps, bool) or not 1 <= trial_steps <= 10**9:
-        raise ConfigError(f"trial_steps is {trial_steps!r}, allowed: a whole number from 1 to 10^9.")
-    for setting in ("hyperparameters", "parent"):
-        if settings.get(setting) is not None:
-            raise ConfigError(f"A search cannot have {setting}; leave it out.")
-    plan = make_plan(track, **settings)
-    space = make_space(search, ppo=plan.settings.ppo, constants=find_constants(plan.reward))
-    folder = Path(root) / (_checked(name) if name is not None else f"tuning-{time.strftime('%Y%m%d-%H%M%S')}")
-    try:
-        folder.mkdir(parents=True)
-        write_file(folder / "reward_function.py", plan.reward.encode())
-        write_json(folder / "model_metadata.json", plan.metadata.to_dict())
-        write_json(
-            folder / "tuning.json",
-            {
-                "format": FORMAT,
-                "goal": goal,
-                "trial_steps": trial_steps,
-                "space": [parameter.to_dict() for parameter in space],
-                "settings": plan.settings.to_dict(),
-            },
-        )
-    except FileExistsError as error:
-        raise RunError(f"{folder} exists.", hint="Choose another --name, or continue it with --resume.") from error
-    except OSError as error:
-        raise RunError(f"{folder} cannot be made: {error.strerror or error}.") from error
-    return folder
 
 
 class _Judge(SilentReporter):
@@ -353,18 +320,15 @@ def _importances(optuna: Any, study: optuna.Study) -> dict[str, float]:
     return {name: float(share) for name, share in found.items()}
 
 
+def no_optuna() -> ConfigError:
+    """What is said where Optuna is missing."""
+    return ConfigError("racecraft tune needs Optuna, which is not installed.", hint="Install 'racecraft[tune]'.")
+
+
 def _optuna() -> Any:
     try:
         import optuna
     except ImportError as error:
-        raise ConfigError(
-            "racecraft tune needs Optuna, which is not installed.", hint="Install 'racecraft[tune]'."
-        ) from error
+        raise no_optuna() from error
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     return optuna
-
-
-def _checked(name: str) -> str:
-    if sanitize_name(name) != name:
-        raise RunError(f"Name {name!r} is not allowed.", hint=f"Use '{sanitize_name(name)}'.")
-    return name

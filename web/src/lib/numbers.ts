@@ -10,6 +10,9 @@ export const percent = (value: number | null | undefined): string =>
 export const count = (value: number | null | undefined): string =>
   value == null ? NONE : Math.round(value).toLocaleString("en-US").replaceAll(",", "\u202f");
 
+/** 0.000123456 → 0.0001235: four digits that count. */
+export const short = (value: number): string => String(Number(value.toPrecision(4)));
+
 /** 75 → 1:15, 3700 → 1:01:40. */
 export function clock(value: number | null | undefined): string {
   if (value == null || !Number.isFinite(value)) return NONE;

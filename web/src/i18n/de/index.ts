@@ -11,6 +11,7 @@ import { replay } from "./replay";
 import { settings } from "./settings";
 import { shell } from "./shell";
 import { tracks } from "./tracks";
+import { tune } from "./tune";
 import { watch } from "./watch";
 
-export const de: Record<Key, string> = { ...shell, ...replay, ...analysis, ...create, ...watch, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings };
+export const de: Record<Key, string> = { ...shell, ...replay, ...analysis, ...create, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings };

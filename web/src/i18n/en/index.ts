@@ -10,8 +10,9 @@ import { replay } from "./replay";
 import { settings } from "./settings";
 import { shell } from "./shell";
 import { tracks } from "./tracks";
+import { tune } from "./tune";
 import { watch } from "./watch";
 
-export const en = { ...shell, ...replay, ...analysis, ...create, ...watch, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings } as const;
+export const en = { ...shell, ...replay, ...analysis, ...create, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings } as const;
 
 export type Key = keyof typeof en;

@@ -1,0 +1,135 @@
+"""The beginning of a search: everything checked, written into a new folder, and nothing tried yet."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.run import RunFolder
+from racecraft.run.atomic import write_file, write_json
+from racecraft.run.folder import sanitize_name
+from racecraft.training.plan import Plan, make_plan
+from racecraft.training.start import read_settings
+from racecraft.tuning.constants import find_constants
+from racecraft.tuning.space import Parameter, make_space
+from racecraft.tuning.study import FORMAT, GOALS, no_optuna
+
+
+def start_tuning(
+    track: str | Path | Sequence[str | Path] | None = None,
+    *,
+    search: Sequence[str] = (),
+    goal: str = "laps",
+    trial_steps: int = 40_000,
+    root: str | Path = "tuning",
+    name: str | None = None,
+    **settings: Any,
+) -> Path:
+    """Make the folder of a search; `Tuning` runs it.
+
+    Args:
+        track: As of `racecraft.training.train`.
+        search: ``NAME`` or ``NAME=LOW..HIGH`` of hyperparameters and of constants of the reward function; by default
+            all such constants, and the usual hyperparameters.
+        goal: ``laps`` (fewest camera steps until every evaluation lap is completed) or ``lap_time`` (the fastest lap).
+        trial_steps: Camera steps after which a trial ends.
+        root: Where such folders lie.
+        name: Of the folder; by default a new one.
+        settings: Others of `racecraft.training.train`.
+
+    Raises:
+        RacecraftError: An input is wrong.
+    """
+    for setting in ("hyperparameters", "parent"):
+        if settings.get(setting) is not None:
+            raise ConfigError(f"A search cannot have {setting}; leave it out.")
+    return make_tuning(
+        make_plan(track, **settings), search=search, goal=goal, trial_steps=trial_steps, root=root, name=name
+    )
+
+
+def plan_of(run: RunFolder) -> Plan:
+    """A run's own settings and reward, to be searched around; the weights begin anew.
+
+    Raises:
+        RacecraftError: The run cannot be read.
+    """
+    return Plan(
+        settings=read_settings(run),
+        reward=run.read_reward_function(),
+        metadata=run.read_model_metadata(),
+        hyperparameters=None,  # they are among the settings, and trials have others
+        parent=None,
+    )
+
+
+def space_of(plan: Plan, search: Sequence[str] = ()) -> tuple[Parameter, ...]:
+    """What is to be searched around a plan; the search is that of `start_tuning`.
+
+    Raises:
+        RacecraftError: A name means nothing here, or the bounds are none.
+    """
+    constants = find_constants(plan.reward)
+    space = make_space(search, ppo=plan.settings.ppo, constants=constants)
+    if plan.settings.algorithm == "ppo":
+        return space
+    left = tuple(parameter for parameter in space if parameter.kind == "constant")
+    if (search and len(left) < len(space)) or not left:
+        raise ConfigError(
+            f"Hyperparameters can be searched for ppo only; the algorithm is {plan.settings.algorithm}.",
+            hint="Search constants of the reward function.",
+        )
+    return left
+
+
+def make_tuning(
+    plan: Plan,
+    *,
+    search: Sequence[str] = (),
+    goal: str = "laps",
+    trial_steps: int = 40_000,
+    root: str | Path = "tuning",
+    name: str | None = None,
+) -> Path:
+    """Make the folder of a search around a plan; the other arguments are those of `start_tuning`.
+
+    Raises:
+        RacecraftError: An input is wrong.
+    """
+    if find_spec("optuna") is None:  # importing it takes a second, which a server does not have
+        raise no_optuna()
+    if goal not in GOALS:
+        raise ConfigError(f"goal is {goal!r}, allowed: {', '.join(GOALS)}.", hint=did_you_mean(str(goal), GOALS))
+    if isinstance(trial_steps, bool) or not 1 <= trial_steps <= 10**9:
+        raise ConfigError(f"trial_steps is {trial_steps!r}, allowed: a whole number from 1 to 10^9.")
+    space = space_of(plan, search)
+    folder = Path(root) / (_checked(name) if name is not None else f"tuning-{time.strftime('%Y%m%d-%H%M%S')}")
+    try:
+        folder.mkdir(parents=True)
+        write_file(folder / "reward_function.py", plan.reward.encode())
+        write_json(folder / "model_metadata.json", plan.metadata.to_dict())
+        write_json(
+            folder / "tuning.json",
+            {
+                "format": FORMAT,
+                "goal": goal,
+                "trial_steps": trial_steps,
+                "space": [parameter.to_dict() for parameter in space],
+                "settings": plan.settings.to_dict(),
+            },
+        )
+    except FileExistsError as error:
+        raise RunError(f"{folder} exists.", hint="Choose another --name, or continue it with --resume.") from error
+    except OSError as error:
+        raise RunError(f"{folder} cannot be made: {error.strerror or error}.") from error
+    return folder
+
+
+def _checked(name: str) -> str:
+    if sanitize_name(name) != name:
+        raise RunError(f"Name {name!r} is not allowed.", hint=f"Use '{sanitize_name(name)}'.")
+    return name
