@@ -52,6 +52,19 @@ def test_the_migrations_make_the_tables_that_the_code_expects(database: Database
         assert all(columns[c.name]["nullable"] == c.nullable for c in table.columns)
 
 
+def test_the_migrations_and_the_tables_made_at_once_are_the_same(database_url: str) -> None:
+    from alembic.autogenerate import compare_metadata
+    from alembic.migration import MigrationContext
+
+    database = Database(database_url)
+    database._upgrade()
+    with database.engine.connect() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": False})
+        assert compare_metadata(context, Table.metadata) == []
+    database.migrate()  # nothing is left to do, and the local user is there
+    database.close()
+
+
 def test_a_database_that_cannot_be_opened_is_told(tmp_path: Path) -> None:
     (tmp_path / "file.db").write_bytes(b"not a database, but long enough to be read as one" * 100)
     with pytest.raises(RunError, match="cannot be opened"):

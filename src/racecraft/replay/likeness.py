@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 LUMA: Final = np.array([0.2989, 0.587, 0.114])
 """What the original weighs red, green and blue with."""
@@ -32,6 +31,8 @@ def structural_similarity(a: Picture, b: Picture) -> float:
     Wang et al., "Image quality assessment: from error visibility to structural similarity", 2004, with the paper's
     Gaussian window and constants.
     """
+    from scipy import ndimage  # takes long to import; a console that only imports us has not the time
+
     a, b = a.astype(float), b.astype(float)
 
     def blur(picture: Picture) -> Picture:
@@ -64,12 +65,16 @@ def edge_offsets(seen: Picture, drawn: Picture) -> dict[str, float | None]:
 def _offset(seen: Picture, drawn: Picture) -> float | None:
     if not seen.any() or not drawn.any():
         return None
+    from scipy import ndimage
+
     distances = ndimage.distance_transform_edt(~drawn)[seen] / FINER
     return float(np.percentile(distances, 95))
 
 
 def _outline(strength: Picture, level: float) -> Picture:
     """Where a channel crosses a level, on a finer grid of bool."""
+    from scipy import ndimage
+
     high, wide = strength.shape
     above = _between(high) @ strength @ _between(wide).T > level
     return np.asarray(above & ~ndimage.binary_erosion(above, border_value=1))
