@@ -19,10 +19,17 @@ Rivals = Annotated[
     list[str],
     typer.Option("--opponents", help="Of head-to-head: self, bots or a run folder; several runs by repeating it."),
 ]
-Cars = Annotated[int, typer.Option("--cars", help="To a head-to-head race, the learner's included; 2 by default.")]
-NumObjects = Annotated[int, typer.Option("--objects", help="Obstacles of object avoidance; 6 by default.")]
-NumBots = Annotated[int, typer.Option("--bots", help="Bot cars of head-to-bot; 3 by default.")]
-BotSpeed = Annotated[float | None, typer.Option("--bot-speed", help="m/s of the bot cars; 0.2 by default.")]
+Cars = Annotated[
+    int,
+    typer.Option("--cars", help="To a head-to-head race, the learner's included; 2 by default.", show_default=False),
+]
+NumObjects = Annotated[
+    int, typer.Option("--objects", help="Obstacles of object avoidance; 6 by default.", show_default=False)
+]
+NumBots = Annotated[int, typer.Option("--bots", help="Bot cars of head-to-bot; 3 by default.", show_default=False)]
+BotSpeed = Annotated[
+    float | None, typer.Option("--bot-speed", help="m/s of the bot cars; 0.2 by default.", show_default=False)
+]
 LaneChanges = Annotated[bool, typer.Option("--lane-changes", help="Bot cars change lanes every 3 to 5 s.")]
 ParkedCars = Annotated[bool, typer.Option("--parked-cars", help="Obstacles are parked cars, not boxes.")]
 Placement = Annotated[str, typer.Option("--placement", help="Of objects: random (each episode anew), even or fixed.")]
