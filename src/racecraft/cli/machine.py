@@ -27,7 +27,7 @@ def doctor(as_json: Json = False) -> None:
 def bench(
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", help="simulator, races, reward, train, skill or rivals; may be repeated."),
+        typer.Option("--only", help="simulator, races, reward, train, skill, rivals or learn; may be repeated."),
     ] = None,
     seconds: Annotated[float, typer.Option("--seconds", help="Time for each throughput.")] = 3.0,
     seeds: Annotated[int, typer.Option("--seeds", help="Trainings of the skill benchmark.")] = 5,
