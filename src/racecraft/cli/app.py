@@ -45,3 +45,9 @@ def text() -> Any:
 def print_json(document: dict[str, Any]) -> None:
     """One JSON object on stdout."""
     typer.echo(json.dumps(document, allow_nan=False, default=str))
+
+
+def is_given(context: typer.Context, *options: str) -> bool:
+    """Whether one of these options was typed."""
+    sources = [context.get_parameter_source(option) for option in options]
+    return any(source is not None and source.name == "COMMANDLINE" for source in sources)

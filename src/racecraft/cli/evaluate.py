@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import Json, app, print_json, text
+from racecraft.cli.app import Json, app, is_given, print_json, text
 
 RACE_ONLY: Final = ("track", "laps", "rules", "offtrack_penalty", "max_resets", "video", "aws_log", "ghost")
 
@@ -111,8 +111,7 @@ def evaluate(
 def _generalize(context: typer.Context, run: Path, *, as_json: bool, **settings: Any) -> None:
     """One lap on each of many tracks; the rules of a race do not apply."""
     for option in context.command.params:
-        source = context.get_parameter_source(str(option.name))
-        if option.name in RACE_ONLY and source is not None and source.name == "COMMANDLINE":
+        if option.name in RACE_ONLY and is_given(context, str(option.name)):
             context.fail(f"{option.opts[0]} does not go with --tracks: each track is one lap without a reset.")
     from racecraft.race.run_generalization import generalize_run
 

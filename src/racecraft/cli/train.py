@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import INTERRUPTED, Json, app, print_json, text
+from racecraft.cli.app import INTERRUPTED, Json, app, is_given, print_json, text
 
 DEFAULT_TRACK: Final = "reinvent_2018"
 _OPTIONS_OF: Final = {
@@ -145,7 +145,7 @@ def train(
             }
             # What is not given is the parent's, or follows from the rest.
             given = {
-                name: value for name, value in options.items() if _is_given(context, *_OPTIONS_OF.get(name, (name,)))
+                name: value for name, value in options.items() if is_given(context, *_OPTIONS_OF.get(name, (name,)))
             }
             if parent is None:
                 given = {**options, "evaluate_every": 0, **given}
@@ -175,15 +175,10 @@ def train(
         raise typer.Exit(INTERRUPTED)
 
 
-def _is_given(context: typer.Context, *options: str) -> bool:
-    sources = [context.get_parameter_source(option) for option in options]
-    return any(source is not None and source.name == "COMMANDLINE" for source in sources)
-
-
 def _refuse_beside_resume(context: typer.Context) -> None:
     """A resumed run keeps its settings: only its limit may change."""
     for option in context.command.params:
-        if _is_given(context, str(option.name)) and option.name not in (
+        if is_given(context, str(option.name)) and option.name not in (
             "resume",
             "until",
             "video",

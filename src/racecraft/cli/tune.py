@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from racecraft.cli.app import INTERRUPTED, Json, app, print_json
+from racecraft.cli.app import INTERRUPTED, Json, app, is_given, print_json
 
 
 @app.command()
@@ -43,9 +43,7 @@ def tune(
     """Tune a reward's constants and hyperparameters within minutes."""
     if resume is not None:
         for option in context.command.params:
-            source = context.get_parameter_source(str(option.name))
-            is_given = source is not None and source.name == "COMMANDLINE"
-            if is_given and option.name not in ("resume", "minutes", "trials", "as_json"):
+            if is_given(context, str(option.name)) and option.name not in ("resume", "minutes", "trials", "as_json"):
                 context.fail(f"{option.opts[0]} does not go with --resume: a search keeps what it was started with.")
     from racecraft.cli import tune_text
     from racecraft.tuning import Tuning, start_tuning
