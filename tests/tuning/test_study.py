@@ -31,7 +31,8 @@ def begin(tmp_path: Path, **settings: Any) -> Path:
         "root": tmp_path,
         "name": "search",
     }
-    return start_tuning(**{**defaults, **settings})
+    given = {**defaults, **settings}
+    return start_tuning(**{name: value for name, value in given.items() if value is not None})
 
 
 def test_every_trial_is_a_run_with_the_numbers_it_was_given(tmp_path: Path) -> None:
@@ -74,6 +75,36 @@ def test_at_the_end_of_the_time_the_trial_under_way_is_kept_for_later(tmp_path: 
     assert second.trials[1].params == first.trials[0].params
 
 
+def test_trials_begin_with_a_parents_weights_and_awss_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # the parent may be named from another folder than the search is resumed in
+    parent = Tuning(begin(tmp_path, name="first"))
+    parent.run(max_trials=1)
+    file = tmp_path / "hyperparameters.json"
+    file.write_text(json.dumps({"lr": 0.001, "batch_size": 64, "num_episodes_between_training": 4}))
+    folder = begin(
+        tmp_path,
+        name="second",
+        parent="first/trial-0000@last",
+        hyperparameters=file,
+        ppo=None,
+        track=None,
+        reward=None,
+        search=["learning_rate"],
+    )
+    monkeypatch.chdir("/")
+    outcome = Tuning(folder).run(max_trials=1)
+    run = RunFolder.open(outcome.trials[0].run)
+    information = run.read_info()
+    assert information.parent is not None
+    assert (information.parent["step"], information.track) == (128, "oval")
+    ppo = information.settings["ppo"]
+    assert (ppo["learning_rate"], ppo["minibatch_size"]) == (0.001, 64)
+    assert run.read_aws_hyperparameters()["batch_size"] == 64
+    shutil.rmtree(tmp_path / "first")
+    with pytest.raises(RunError, match="trial-0000"):
+        Tuning(folder)
+
+
 def test_a_trial_that_lags_behind_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     optuna = pytest.importorskip("optuna")
     eager = optuna.pruners.ThresholdPruner(upper=0.5)  # nobody is that far after 64 steps
@@ -109,8 +140,6 @@ def test_what_does_not_train_now_is_an_error_and_no_search(tmp_path: Path) -> No
         ({"goal": "fame"}, "goal is 'fame', allowed: laps, lap_time"),
         ({"trial_steps": 0}, "trial_steps is 0"),
         ({"search": ["nonsense"]}, "neither a constant"),
-        ({"hyperparameters": "hyperparameters.json"}, "cannot have hyperparameters"),
-        ({"parent": "runs/first"}, "cannot have parent"),
     ],
 )
 def test_a_search_that_makes_no_sense_is_refused(tmp_path: Path, settings: dict[str, Any], match: str) -> None:

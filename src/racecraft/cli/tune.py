@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -33,6 +33,12 @@ def tune(
     model_metadata: Annotated[
         Path | None, typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions.")
     ] = None,
+    hyperparameters: Annotated[
+        Path | None, typer.Option("--hyperparameters", help="AWS's hyperparameters.json, where the search begins.")
+    ] = None,
+    parent: Annotated[
+        str | None, typer.Option("--from", help="Every trial begins with the weights of RUN or RUN@checkpoint.")
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of every trial and of the search.")] = 0,
     num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the search's folder.")] = None,
@@ -50,14 +56,17 @@ def tune(
 
     folder = resume
     if folder is None:
+        options: dict[str, Any] = {"track": track, "reward": reward, "actions": actions}
+        if parent is not None:  # what is not given is the parent's
+            options = {name: value for name, value in options.items() if is_given(context, name)}
         folder = start_tuning(
-            track,
+            **options,
             search=search,
             goal=goal,
             trial_steps=trial_steps,
-            reward=reward,
-            actions=actions,
             model_metadata=model_metadata,
+            hyperparameters=hyperparameters,
+            parent=parent,
             seed=seed,
             num_threads=num_threads,
             name=name,

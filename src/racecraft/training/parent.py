@@ -41,6 +41,11 @@ class Parent:
         return f"{self.folder.path}@{self.saved.step}"
 
     @property
+    def address(self) -> str:
+        """The name, from whatever folder it is read."""
+        return f"{self.folder.path.resolve()}@{self.saved.step}"
+
+    @property
     def weights(self) -> Arrays:
         """The network's parameters by name: those that drove its evaluations."""
         return {

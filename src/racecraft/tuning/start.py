@@ -39,14 +39,12 @@ def start_tuning(
         trial_steps: Camera steps after which a trial ends.
         root: Where such folders lie.
         name: Of the folder; by default a new one.
-        settings: Others of `racecraft.training.train`.
+        settings: Others of `racecraft.training.train`; with a ``parent`` every trial begins with its weights as they
+            are now.
 
     Raises:
         RacecraftError: An input is wrong.
     """
-    for setting in ("hyperparameters", "parent"):
-        if settings.get(setting) is not None:
-            raise ConfigError(f"A search cannot have {setting}; leave it out.")
     return make_tuning(
         make_plan(track, **settings), search=search, goal=goal, trial_steps=trial_steps, root=root, name=name
     )
@@ -120,6 +118,7 @@ def make_tuning(
                 "trial_steps": trial_steps,
                 "space": [parameter.to_dict() for parameter in space],
                 "settings": plan.settings.to_dict(),
+                "parent": None if plan.parent is None else plan.parent.address,
             },
         )
     except FileExistsError as error:

@@ -27,6 +27,7 @@ from racecraft.run.atomic import write_json
 from racecraft.run.lock import exclusive_lock
 from racecraft.training import EvaluationReport, SilentReporter, TrainResult, Until
 from racecraft.training.job import Training
+from racecraft.training.parent import open_parent
 from racecraft.training.plan import Plan
 from racecraft.training.settings import TrainSettings
 from racecraft.tuning.constants import rewrite_constants
@@ -51,7 +52,7 @@ class Tuning:
         on_trial: Is told every trial that ended.
 
     Raises:
-        RunError: There is no such folder, or its files are not what they were.
+        RunError: There is no such folder, its files are not what they were, or the run that trials begin from is gone.
         ConfigError: Optuna is not installed.
     """
 
@@ -68,9 +69,16 @@ class Tuning:
             settings = TrainSettings.from_dict(dict(document["settings"]))
             reward = (self.folder / "reward_function.py").read_text(encoding="utf-8")
             metadata = ModelMetadata.load(self.folder / "model_metadata.json")
+            parent = document.get("parent")
         except (ConfigError, KeyError, TypeError, ValueError, OSError) as error:
             raise RunError(f"{self.folder} cannot be opened: {error}") from error
-        self.plan = Plan(settings=settings, reward=reward, metadata=metadata, hyperparameters=None, parent=None)
+        self.plan = Plan(
+            settings=settings,
+            reward=reward,
+            metadata=metadata,
+            hyperparameters=None,  # they are in the settings, where trials change them
+            parent=None if parent is None else open_parent(str(parent)),
+        )
         self._on_trial = on_trial
         self._optuna = _optuna()
         self._stop = threading.Event()
