@@ -8,6 +8,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -23,7 +24,12 @@ from racecraft.errors import ConfigError, RunError
 from racecraft.run import RunFolder
 
 pytest.importorskip("obstore")
+from racecraft.serve import mirror
 from racecraft.serve.artifacts import Artifacts
+from racecraft.serve.database import Database
+from racecraft.serve.jobs import JobQueue
+from racecraft.serve.settings import ServeSettings
+from racecraft.serve.supervisor import Supervisor
 
 REWARD = "def reward_function(params):\n    return 1.0\n"
 
@@ -173,6 +179,41 @@ def test_a_store_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "x")
         with pytest.raises(RunError, match="does not answer"):
             Artifacts("s3://racing/x").names()
+
+
+def test_a_store_that_did_not_answer_at_first_is_asked_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(mirror, "FIRST_WAIT", 0.01)
+    store, folder = Artifacts(f"file://{tmp_path}/store"), make_run(tmp_path / "runs")
+    store.keep(folder)
+    stored = tmp_path / "store" / "runs" / "a" / hashlib.sha256(REWARD.encode()).hexdigest()
+    stored.rename(tmp_path / "hidden")
+    there = tmp_path / "there"
+    there.mkdir()
+    database = Database(f"sqlite:///{tmp_path / 'console.db'}")
+    queue = JobQueue(database)
+    settings = ServeSettings(runs=there)
+    supervisor = Supervisor(settings, database, queue)
+    keeper = mirror.Mirror(store, runs=there, state=settings.state, queue=queue, supervisor=supervisor)
+    thread = threading.Thread(target=keeper.start)
+    thread.start()
+    deadline = time.monotonic() + 60
+    while "cannot be fetched" not in caplog.text:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    assert not (there / "a").exists()
+    (tmp_path / "hidden").rename(stored)
+    thread.join(60)
+    assert contents(there / "a") == contents(folder.path)
+    stored.unlink()  # and for ever, until the server ends
+    shutil.rmtree(there / "a")
+    thread = threading.Thread(target=keeper.start)
+    thread.start()
+    keeper.end()
+    thread.join(60)
+    assert not thread.is_alive()
+    database.close()
 
 
 @pytest.mark.parametrize("url", ["gs://x", "http://127.0.0.1", "file://relative", ""])

@@ -91,6 +91,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         tending = asyncio.create_task(context.supervisor.run())
         threading.Thread(target=context.mirror.start, name="mirror", daemon=True).start()
         yield
+        context.mirror.end()
         tending.cancel()
         with suppress(asyncio.CancelledError):
             await tending

@@ -62,7 +62,9 @@ class Artifacts:
                 Path(url.removeprefix("file://")).mkdir(parents=True, exist_ok=True)
                 self._store: Any = store.from_url(url)
             else:
-                options: Any = {"allow_http": endpoint.startswith("http://")}
+                # obstore's own 5 s to connect and 30 s to answer are too short where a machine or a line is busy
+                times = {"connect_timeout": "30 seconds", "timeout": "300 seconds"}
+                options: Any = {"allow_http": endpoint.startswith("http://"), **times}
                 retries: Any = {"max_retries": 3}
                 self._store = store.from_url(url, client_options=options, retry_config=retries)
         except (*self._broken, ValueError) as error:

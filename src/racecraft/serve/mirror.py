@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import threading
 from pathlib import Path
+from typing import Final
 
 from racecraft.errors import RunError
 from racecraft.run import list_runs
@@ -12,6 +14,8 @@ from racecraft.serve.jobs import JobQueue
 from racecraft.serve.supervisor import Supervisor
 
 _LOG = logging.getLogger("racecraft.serve")
+FIRST_WAIT: Final = 2.0  # s until a store that does not answer is asked again
+LONGEST_WAIT: Final = 60.0  # s
 
 
 class Mirror:
@@ -30,21 +34,36 @@ class Mirror:
     ) -> None:
         self._artifacts, self._runs, self._state = artifacts, runs, state
         self._queue, self._supervisor = queue, supervisor
+        self._is_ended = threading.Event()
 
     def start(self) -> None:
-        """Fetch the runs that are only in the store, and copy those that changed since they were copied."""
+        """Make both alike, again and again until the store has answered; a thread's work, which `end` ends."""
+        wait = FIRST_WAIT
+        while not self._is_ended.is_set() and not self._align():
+            self._is_ended.wait(wait)
+            wait = min(2 * wait, LONGEST_WAIT)
+
+    def end(self) -> None:
+        """Stop asking a store that does not answer."""
+        self._is_ended.set()
+
+    def _align(self) -> bool:
+        """Fetch the runs that are only in the store, and copy those that changed since; False to try again."""
         if self._artifacts is None:
-            return
+            return True
+        is_whole = True
         try:
             here = {folder.name for folder in list_runs(self._runs)}
             for name in self._artifacts.names():
                 if name not in here and not (self._runs / name).exists():
-                    self._fetch(self._artifacts, name)
+                    is_whole &= self._fetch(self._artifacts, name)
             for folder in list_runs(self._runs):
                 if folder.name in here and not self._artifacts.is_current(folder):
                     self.copy(folder.name)
         except (RunError, OSError) as error:
             _LOG.error("%s %s", error, getattr(error, "hint", ""))
+            return False
+        return is_whole
 
     def copy(self, name: str) -> None:
         """A run is new or has changed, and there is no other job that copies it at its end."""
@@ -60,8 +79,11 @@ class Mirror:
             except RunError as error:
                 _LOG.error("%s stays in the store: %s", name, error)
 
-    def _fetch(self, artifacts: Artifacts, name: str) -> None:
+    def _fetch(self, artifacts: Artifacts, name: str) -> bool:
+        """Whether it is here now; the others are fetched all the same."""
         try:
             artifacts.fetch(name, self._runs, incoming=self._state / "incoming")
-        except (RunError, OSError) as error:  # the others are fetched all the same
+        except (RunError, OSError) as error:
             _LOG.error("%s cannot be fetched: %s", name, error)
+            return False
+        return True
