@@ -14,6 +14,7 @@
 #include "dispatch.hpp"
 #include "engine.hpp"
 #include "log_judge.hpp"
+#include "number_text.hpp"
 #include "racecraft/lidar.hpp"
 #include "racecraft/object_look.hpp"
 #include "replay_kernel.hpp"
@@ -462,6 +463,16 @@ NB_MODULE(_native, m) {
     m.attr("RACER_COLOURS") = nb::tuple(racers);
     m.attr("MAX_CARS_PER_RACE") = racecraft::kMaxCarsPerRace;
     m.attr("VEHICLE_PARAMETERS") = racecraft::names_of(racecraft::kVehicleNames);
+    m.def(
+        "number_texts",
+        [](const nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>& values) {
+            nb::list texts;
+            char text[racecraft::kMaxNumberText];
+            for (size_t i = 0; i < values.shape(0); ++i)
+                texts.append(nb::str(text, racecraft::write_number(values(i), text)));
+            return texts;
+        },
+        "values"_a, "`repr` of every number.");
     m.def("isa", [] { return std::string(racecraft::isa_name(racecraft::current_isa())); });
     m.def("available_isas", [] {
         std::vector<std::string> names;

@@ -27,6 +27,9 @@ MAX_CARS_PER_RACE: int = 8
 
 VEHICLE_PARAMETERS: tuple = ...
 
+def number_texts(values: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> list:
+    """`repr` of every number."""
+
 def isa() -> str: ...
 
 def available_isas() -> list[str]: ...

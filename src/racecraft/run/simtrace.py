@@ -18,6 +18,7 @@ from racecraft.agent import ActionSpace, DiscreteActionSpace
 from racecraft.errors import CheckpointError, RunError
 from racecraft.run.episodes import STEP_SECONDS, Episode
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim.number_text import number_texts
 
 if TYPE_CHECKING:
     from racecraft.run.aws_log import AwsLog
@@ -252,26 +253,26 @@ class SimTraceWriter:
         if isinstance(self._action_space, DiscreteActionSpace):
             indices = table[:, -2].astype(int)
             names = [str(index) for index in indices]
-            steer, throttle = np.array(self._action_space.to_degrees())[indices].T.tolist()
+            steer, throttle = map(number_texts, np.array(self._action_space.to_degrees())[indices].T)
         else:
-            steer, throttle = np.degrees(column["steering_angle"]).tolist(), column["speed"].tolist()
-            names = [f"[{angle!r} {speed!r}]" for angle, speed in zip(steer, throttle, strict=True)]
+            steer, throttle = number_texts(np.degrees(column["steering_angle"])), number_texts(column["speed"])
+            names = [f"[{angle} {speed}]" for angle, speed in zip(steer, throttle, strict=True)]
         heading = column["heading"]
         texts = (
-            map(repr, column["steps"].tolist()),
-            map(repr, column["x"].tolist()),
-            map(repr, column["y"].tolist()),
-            map(repr, np.degrees(np.arctan2(np.sin(heading), np.cos(heading))).tolist()),
-            map(repr, steer),
-            map(repr, throttle),
+            number_texts(column["steps"]),
+            number_texts(column["x"]),
+            number_texts(column["y"]),
+            number_texts(np.degrees(np.arctan2(np.sin(heading), np.cos(heading)))),
+            steer,
+            throttle,
             names,
-            map(repr, table[:, -1].tolist()),
+            number_texts(table[:, -1]),
             ["False"] * (len(table) - 1) + ["True"],
             map(repr, (column["all_wheels_on_track"] > 0).tolist()),
-            ["100" if share >= 1 else repr(100 * share) for share in column["progress"].tolist()],
+            ["100" if text == "100.0" else text for text in number_texts(100 * np.minimum(column["progress"], 1))],
             map(repr, self._closest(column).tolist()),
-            map(repr, column["track_length"].tolist()),
-            map(repr, np.round(episode.start_time + column["time"], 3).tolist()),
+            number_texts(column["track_length"]),
+            number_texts(np.round(episode.start_time + column["time"], 3)),
             [STATUS_NAMES[code] for code in column["status"].astype(int)],
         )
         rows = list(zip(*texts, strict=True))
