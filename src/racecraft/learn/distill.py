@@ -43,7 +43,7 @@ class DistillConfig:
     """Cars of the student."""
     num_steps: int = 8
     """Steps of each of them in one iteration."""
-    teacher_steps: int = 1_000_000
+    teacher_steps: int = 250_000
     """Steps of the teacher before the student begins; they render no camera and do not count as camera steps."""
     learning_rate: float = 1.5e-3
     """Adam's step size of the student."""
