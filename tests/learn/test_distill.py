@@ -11,7 +11,7 @@ from stripe_world import StripeWorld
 
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import NetworkSpec, distill, distributions, make_learner
-from racecraft.learn.distill import Distill, DistillConfig
+from racecraft.learn.distill import ANSWER_STD, Distill, DistillConfig, sure_answers
 
 CONFIG = DistillConfig(num_envs=8, num_steps=8, teacher_steps=1, minibatch_size=32, buffer_size=512)
 
@@ -78,6 +78,13 @@ def test_what_a_teacher_answers_is_its_mean_without_its_exploring() -> None:
     explored = np.exp(trained.teacher.learner.weights()["policy.log_std"])
     learned = np.exp(trained.learner.weights()["policy.log_std"])
     assert learned < 0.8 * explored
+
+
+def test_an_answer_is_what_the_teachers_car_would_do() -> None:
+    outputs = np.array([[0.25, -3.0, 0.5, -1.0], [1.75, 1.0, 0.5, -1.0]], np.float32)
+    answers = sure_answers(outputs)
+    np.testing.assert_array_equal(answers[:, :2], distributions.most_likely(outputs, is_discrete=False))
+    np.testing.assert_allclose(np.exp(answers[:, 2:]), ANSWER_STD, rtol=1e-6)
 
 
 def test_the_same_seed_gives_the_same_bits_and_a_resumed_run_has_them() -> None:

@@ -82,6 +82,17 @@ class DistillConfig:
             )
 
 
+def sure_answers(outputs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What a teacher of continuous actions does when it does not explore, as a policy's outputs  (N, P).
+
+    Means beyond the range of actions, of which a teacher has many as it likes full throttle, are cut to it: the cars do
+    the same, and the student need not imitate how far beyond they are.
+    """
+    num_actions = outputs.shape[1] // 2
+    log_stds = np.full((len(outputs), num_actions), np.log(ANSWER_STD), np.float32)
+    return np.concatenate([outputs[:, :num_actions].clip(-1.0, 1.0), log_stds], axis=1)
+
+
 class StateWorld:
     """An environment whose frames are its states, for a teacher."""
 
@@ -202,7 +213,8 @@ class Distill:
         actions = distributions.sample(outputs, noise, is_discrete=spec.is_discrete)
         rows = (self._count + np.arange(len(outputs))) % len(self._answers)
         self._observations[rows] = observations
-        self._answers[rows] = self._ask(states)
+        told = self.teacher.learner.policy(np.asarray(states, np.float32))
+        self._answers[rows] = told if spec.is_discrete else sure_answers(told)
         self._count += len(outputs)
         acted = time.perf_counter()
         rewards, terminated, truncated = self.environment.step(actions if spec.is_discrete else actions.clip(-1.0, 1.0))
@@ -217,13 +229,6 @@ class Distill:
         self.total_steps += len(outputs)
         clocks["policy"] += acted - started
         clocks["environment"] += time.perf_counter() - acted
-
-    def _ask(self, states: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What the teacher would do in these states (N, P), sure of it where it explored while it learned."""
-        answers = self.teacher.learner.policy(np.asarray(states, np.float32))
-        if not self.spec.is_discrete:
-            answers[:, self.spec.num_actions :] = np.log(ANSWER_STD)
-        return answers
 
     def _learn(self, rng: np.random.Generator) -> UpdateStats:
         """Gradient steps on the cross-entropy to the teacher's distribution.
