@@ -20,6 +20,7 @@ from racecraft.race.rules import RESET_STATUSES
 from racecraft.sim import Bots, CameraSpec, Objects, Obstacles
 from racecraft.sim.columns import STATUS_NAMES
 from racecraft.sim.objects import NO_OBJECTS
+from racecraft.sim.views import RACER_COLORS, CarView
 from racecraft.track import Track, generate_track, load_track
 
 OVAL = load_track("oval")
@@ -70,6 +71,10 @@ def test_all_cars_drive_the_same_distance_and_the_fastest_wins() -> None:
     given, trials = race(drivers[::-1])  # the fastest in front: nobody meets
     assert [trial.laps[0].crash_count for trial in trials] == [0, 0, 0]
     assert [standing.car for standing in classify(trials, ranks_all=True)] == [0, 1, 2]
+    for car, trial in enumerate(trials):  # a film shows the others in their colours, also if it is cut
+        others = [color for number, color in enumerate(RACER_COLORS[:3]) if number != car]
+        for recording in (trial.recording, trial.recording.until(2.0), trial.recording.lap(1)):
+            assert [view.color for view in recording.objects(3) if isinstance(view, CarView)] == others
     for trial in trials:
         moved = np.diff(trial.recording.poses[:, :2], axis=0)
         assert np.hypot(*moved.T).sum() == pytest.approx(OVAL.length, rel=0.06)

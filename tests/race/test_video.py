@@ -97,7 +97,7 @@ def pill(frame):
 def test_mistakes_and_the_end_are_announced():
     mistake = CLUMSY.statuses.index("off_track")
     none = pill(shown(CLUMSY, mistake - 1))
-    assert none == (128, 128, 128)
+    assert 60 < min(none) <= max(none) < 128  # the shaded ground
     red = pill(shown(CLUMSY, mistake))
     assert red[0] > 180 > 90 > red[1]
     assert pill(shown(CLUMSY, mistake + 15)) == red

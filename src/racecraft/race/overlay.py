@@ -45,7 +45,7 @@ TROUGH: Final[Color] = (74, 79, 89)
 ALARM: Final[Color] = (214, 48, 49)
 FINISHED: Final[Color] = (38, 148, 84)
 
-TOP_BAND, BOTTOM_BAND = 96, 156  # pixels, of the shaded parts
+TOP_BAND, BOTTOM_BAND = 132, 156  # pixels, of the shaded parts
 MARGIN = 16
 MAP: Final = (12, 350, 120, 116)  # x, y, width, height
 SPEED_X, STEERING_X, GAUGE_WIDTH, GAUGE_Y = 150, 300, 128, 462
@@ -246,7 +246,7 @@ class _Layer:
 def _shade(frame: NDArray[np.uint8]) -> None:
     """Darken towards the upper and the lower edge, so that letters are readable on any ground."""
     strength = np.zeros(HEIGHT)
-    strength[:TOP_BAND] = np.minimum(np.linspace(1.6, 0.0, TOP_BAND), 0.82)
+    strength[:TOP_BAND] = np.minimum(np.linspace(1.7, 0.0, TOP_BAND), 0.82)
     strength[HEIGHT - BOTTOM_BAND :] = np.linspace(0.0, 0.9, BOTTOM_BAND) ** 2
     mask = np.broadcast_to((256 * strength).astype(np.uint16)[:, None, None], (HEIGHT, WIDTH, 1))
     blend(frame, 0, 0, mask, DARK)

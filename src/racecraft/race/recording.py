@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -111,10 +111,11 @@ class Recording:
 
     def until(self, seconds: float) -> Recording:
         """The steps up to a time on the clock."""
-        steps = self.clock <= seconds
-        return Recording(self.track, self.rows[steps], self.clock[steps], self.actions[steps])
+        return self._only(self.clock <= seconds)
 
     def lap(self, number: int) -> Recording:
         """The steps of one lap, numbered from 1."""
-        steps = self.lap_numbers == number
-        return Recording(self.track, self.rows[steps], self.clock[steps], self.actions[steps], self.car)
+        return self._only(self.lap_numbers == number)
+
+    def _only(self, steps: NDArray[np.bool_]) -> Recording:
+        return replace(self, rows=self.rows[steps], clock=self.clock[steps], actions=self.actions[steps])
