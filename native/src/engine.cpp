@@ -7,7 +7,7 @@
 
 #include "exposure_kernel.hpp"
 #include "lidar_kernel.hpp"
-#include "object_painter.hpp"
+#include "object_painter_kernel.hpp"
 #include "vehicle_kernel.hpp"
 
 namespace racecraft {
@@ -140,7 +140,7 @@ void Engine::render(const CameraModel& camera, size_t env, const VehicleState& s
     render_grey(camera, ground, palettes_[env], state.x, state.y, state.heading, frame);
     if (objects_.count() > 0) {
         const LensPose lens = place_lens(camera.view(), ground.view(), state.x, state.y, state.heading);
-        draw_objects(camera.spec(), lens, objects_.around(env), frame);
+        RC_DISPATCH(draw_objects, camera.spec(), lens, objects_.around(env), frame);
     }
     if (randomization_ != nullptr) {
         const Conditions& light = conditions_[env];

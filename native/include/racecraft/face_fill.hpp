@@ -19,7 +19,7 @@ constexpr int kMostCorners = 5;  // of a quadrangle after the near plane has cut
 constexpr int32_t kBlockRows = 1;    // that are cut at once; a thread of a GPU draws one
 constexpr int32_t kBlockPixels = 1;  // that are mixed at once
 #else
-constexpr int32_t kBlockRows = 4;
+constexpr int32_t kBlockRows = 16;
 constexpr int32_t kBlockPixels = 8;
 #endif
 
@@ -40,25 +40,32 @@ struct Polygon {
 template <int kLines>
 RC_HD void find_spans(const Polygon& polygon, const float (&y)[kLines], float begin, float end,
                       float (&left)[kLines], float (&right)[kLines]) {
+    // Counted down from what no edge reaches: both sides gather without a branch.
+    float lower[kLines], upper[kLines];
     for (int k = 0; k < kLines; ++k) {
-        left[k] = 1e6f;
-        right[k] = -1e6f;
+        lower[k] = 1e6f;
+        upper[k] = -1e6f;
     }
     for (int i = 0; i < polygon.count; ++i) {
         const float from_x = polygon.x[i];
         const float from_y = polygon.y[i];
-        const float to_y = polygon.y[i + 1];
+        const float high = min_of(from_y, polygon.y[i + 1]);
+        const float low = max_of(from_y, polygon.y[i + 1]);
         const float slope = polygon.slope[i];
+#pragma GCC ivdep
+#pragma GCC unroll 1
         for (int k = 0; k < kLines; ++k) {
-            const bool is_cut = (from_y <= y[k]) != (to_y <= y[k]);
             const float x = from_x + (y[k] - from_y) * slope;
-            left[k] = min_of(left[k], is_cut ? x : 1e6f);
-            right[k] = max_of(right[k], is_cut ? x : -1e6f);
+            const bool is_cut = (high <= y[k]) & (low > y[k]);
+            const float least = is_cut ? x : 1e6f;
+            const float most = is_cut ? x : -1e6f;
+            lower[k] = least < lower[k] ? least : lower[k];
+            upper[k] = most > upper[k] ? most : upper[k];
         }
     }
     for (int k = 0; k < kLines; ++k) {
-        left[k] = clamp(left[k], begin, end);
-        right[k] = clamp(right[k], begin, end);
+        left[k] = clamp(lower[k], begin, end);
+        right[k] = clamp(upper[k], begin, end);
     }
 }
 
