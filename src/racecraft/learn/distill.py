@@ -303,9 +303,12 @@ class Distill:
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Student, teacher, optimisers and counters; not the frames that are remembered."""
-        arrays = {f"weights/{name}": array.copy() for name, array in self.driving_weights.items()}
-        arrays |= {f"learning/{name}": array for name, array in self.learner.weights().items()}
-        arrays |= {f"average/{name}": array.copy() for name, array in self._average.weights().items()}
+        own = self.learner.weights()
+        average = {name: array.copy() for name, array in self._average.weights().items()}
+        driving = (average if self.prefers_average else {}) or own
+        arrays = {f"weights/{name}": array for name, array in driving.items()}
+        arrays |= {f"learning/{name}": array for name, array in own.items()}
+        arrays |= {f"average/{name}": array for name, array in average.items()}
         arrays |= {f"optimizer/{name}": array for name, array in self.learner.optimizer_state().items()}
         arrays |= {f"teacher/{name}": array for name, array in self.teacher.state().items()}
         counters = np.array([self.seed, self.iteration, self.total_steps], np.int64)

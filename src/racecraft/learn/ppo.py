@@ -453,10 +453,13 @@ class PPO:
             "ppo/episode_lengths": self._episode_lengths.copy(),
             "ppo/return_scale": self._return_scale.copy(),
         }
-        arrays |= {f"weights/{name}": array.copy() for name, array in self.driving_weights.items()}
+        own = self.learner.weights()
+        average = {name: array.copy() for name, array in self._average.weights().items()}
+        driving = (average if self.prefers_average else {}) or own
+        arrays |= {f"weights/{name}": array for name, array in driving.items()}
         if self.config.average_share > 0:
-            arrays |= {f"learning/{name}": array for name, array in self.learner.weights().items()}
-            arrays |= {f"average/{name}": array.copy() for name, array in self._average.weights().items()}
+            arrays |= {f"learning/{name}": array for name, array in own.items()}
+            arrays |= {f"average/{name}": array for name, array in average.items()}
         arrays |= {f"optimizer/{name}": array for name, array in self.learner.optimizer_state().items()}
         return arrays
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,12 @@ from typing import Any
 TEMPORARY = ".tmp"  # suffix of unfinished files
 
 
-def write_file(path: Path, data: bytes, *, durable: bool = True) -> None:
+def write_file(path: Path, data: bytes | Iterable[bytes | memoryview], *, durable: bool = True) -> None:
     """Replace a file's content in one step.
 
     Args:
         path: The file; its folder exists.
-        data: The new content.
+        data: The new content, or its pieces.
         durable: Wait until it survives a power cut; a rename alone survives a killed process.
 
     Raises:
@@ -29,9 +30,10 @@ def write_file(path: Path, data: bytes, *, durable: bool = True) -> None:
     try:
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o644)
         try:
-            rest = memoryview(data)
-            while rest:
-                rest = rest[os.write(descriptor, rest) :]
+            for piece in [data] if isinstance(data, bytes) else data:
+                rest = memoryview(piece)
+                while rest:
+                    rest = rest[os.write(descriptor, rest) :]
             if durable:
                 os.fsync(descriptor)
         finally:

@@ -15,7 +15,7 @@ import math
 import re
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from racecraft.errors import CheckpointError, did_you_mean
 from racecraft.run.atomic import TEMPORARY, write_file, write_json
+from racecraft.run.tensor_file import is_storable, tensor_file
 
 FORMAT = 1
 KEEP = 4  # as AWS: the last four and the best
@@ -122,13 +123,14 @@ class CheckpointStore:
             "metrics": shown,
             "metadata": metadata or {},
         }
-        data = _encode(arrays, header)
-        digest = hashlib.sha256(data).hexdigest()
-        entry = Entry(step, f"{step:09d}-{digest[:8]}.safetensors", len(data), digest, time_stamp, ranked, shown)
+        pieces = _encode(arrays, header)
+        digest = _digest(pieces)
+        size = sum(piece.nbytes for piece in pieces)
+        entry = Entry(step, f"{step:09d}-{digest[:8]}.safetensors", size, digest, time_stamp, ranked, shown)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             kept = self._kept([*(e for e in self.entries() if e.file != entry.file), entry])
-            write_file(self.folder / entry.file, data)
+            write_file(self.folder / entry.file, pieces)
             self._write_manifest(kept)
         except OSError as error:
             self._prune()
@@ -320,20 +322,23 @@ def _read_capped(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> bytes:
-    from safetensors.numpy import save
-
-    plain = {}
-    for name, values in arrays.items():
-        array = np.asarray(values)
-        if array.dtype.kind not in "biuf":
+def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> list[memoryview]:
+    plain = {name: np.asarray(values) for name, values in arrays.items()}
+    for name, array in plain.items():
+        if not is_storable(array):
             raise CheckpointError(f"array {name!r} has type {array.dtype}, allowed: booleans, integers, floats.")
-        plain[name] = np.asarray(array, dtype=array.dtype.newbyteorder("="), order="C")
     try:
         text = json.dumps(header, allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:
         raise CheckpointError(f"metadata of a checkpoint must be JSON: {error}.") from error
-    return bytes(save(plain, metadata={_HEADER_KEY: text}))
+    return list(tensor_file(plain, {_HEADER_KEY: text}))
+
+
+def _digest(pieces: Iterable[memoryview]) -> str:
+    digest = hashlib.sha256()
+    for piece in pieces:
+        digest.update(piece)
+    return digest.hexdigest()
 
 
 def _plain(value: object) -> object:
