@@ -1,9 +1,13 @@
-/** The track and all cars of a batch in 3D. Loaded when it is shown; draws only what has changed. */
+/** The track and all cars of a batch in 3D. Loaded when it is shown; draws only what has changed, in three draw calls,
+ * and while it moves only as sharp as the machine can at a good pace. */
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import type { TrackGeometry } from "../api/client";
+import { carGeometry } from "./car";
+import { fieldGeometry, RISE, roadGeometry } from "./ground";
+import { Paint, paintGround } from "./paint";
 import { between, type Look } from "./poses";
+import { Sharpness } from "./sharpness";
 
 export type View = "orbit" | "follow" | "top" | "chase" | "driver";
 
@@ -22,73 +26,18 @@ export interface Trail {
   colors: string[];
 }
 
-const LINE = 0.0762; // m, width of the white lines
 const MAX_CARS = 256;
-const RISE = 0.004; // m between layers, so that none shows through another
+const COARSEST = 0.6; // pixels per CSS pixel, along a side
+const STILL = 400; // ms without a change, after which the picture is drawn as sharp as it can be
 
-type Points = number[][];
-
-/** A band between two lines of the same number of points. */
-function band(from: Points, to: Points, isClosed: boolean, height: number): three.BufferGeometry {
-  const positions = from.flatMap((point, index) => [point[0]!, point[1]!, height, to[index]![0]!, to[index]![1]!, height]);
-  const indices: number[] = [];
-  const last = isClosed ? from.length : from.length - 1;
-  for (let index = 0; index < last; index++) {
-    const [a, b] = [2 * index, 2 * ((index + 1) % from.length)];
-    indices.push(a, b, a + 1, b, b + 1, a + 1);
-  }
-  const geometry = new three.BufferGeometry();
-  geometry.setAttribute("position", new three.Float32BufferAttribute(positions, 3));
-  geometry.setIndex(indices);
-  return geometry;
-}
-
-/** A line moved towards another by a width in metres. */
-const inward = (line: Points, other: Points, width: number): Points =>
-  line.map((point, index) => {
-    const [dx, dy] = [other[index]![0]! - point[0]!, other[index]![1]! - point[1]!];
-    const share = width / Math.max(Math.hypot(dx, dy), 1e-6);
-    return [point[0]! + dx * share, point[1]! + dy * share];
-  });
-
-/** Dashes along the middle. */
-function dashes(center: Points, isClosed: boolean): three.BufferGeometry {
-  const pieces: three.BufferGeometry[] = [];
-  const line = isClosed ? [...center, center[0]!] : center;
-  let next = 0;
-  let walked = 0;
-  for (let index = 0; index + 1 < line.length; index++) {
-    const [a, b] = [line[index]!, line[index + 1]!];
-    const length = Math.hypot(b[0]! - a[0]!, b[1]! - a[1]!);
-    for (; next < walked + length; next += 0.24) {
-      const share = (next - walked) / length;
-      const piece = new three.PlaneGeometry(0.12, 0.03);
-      piece.rotateZ(Math.atan2(b[1]! - a[1]!, b[0]! - a[0]!));
-      piece.translate(a[0]! + (b[0]! - a[0]!) * share, a[1]! + (b[1]! - a[1]!) * share, 2 * RISE);
-      pieces.push(piece);
-    }
-    walked += length;
-  }
-  return mergeGeometries(pieces);
-}
-
-/** A small racing car of boxes and wheels, coloured per vertex; the body is white, to be tinted per car. */
-function carGeometry(): three.BufferGeometry {
-  const parts: three.BufferGeometry[] = [];
-  const add = (geometry: three.BufferGeometry, colour: number, x: number, y: number, z: number) => {
-    geometry.translate(x, y, z);
-    const tint = new three.Color(colour);
-    const count = geometry.getAttribute("position").count;
-    geometry.setAttribute("color", new three.Float32BufferAttribute(Array.from({ length: count }, () => [tint.r, tint.g, tint.b]).flat(), 3));
-    geometry.deleteAttribute("uv");
-    parts.push(geometry.toNonIndexed());
-  };
-  add(new three.BoxGeometry(0.3, 0.15, 0.06), 0xffffff, 0, 0, 0.07);
-  add(new three.BoxGeometry(0.13, 0.12, 0.06), 0x20242a, -0.03, 0, 0.125);
-  add(new three.BoxGeometry(0.02, 0.19, 0.02), 0xffffff, -0.15, 0, 0.14);
-  for (const x of [-0.085, 0.085])
-    for (const y of [-0.085, 0.085]) add(new three.CylinderGeometry(0.038, 0.038, 0.034, 12), 0x15181c, x, y, 0.038);
-  return mergeGeometries(parts);
+/** Whether WebGL is drawn by the processor: smooth edges would cost it more than everything else. */
+function isSoftware(): boolean {
+  const context = document.createElement("canvas").getContext("webgl2");
+  if (!context) return false;
+  const name = context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? context.RENDERER;
+  const renderer = String(context.getParameter(name));
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
 }
 
 export class Scene {
@@ -97,7 +46,9 @@ export class Scene {
   private readonly camera = new three.PerspectiveCamera(42, 1, 0.05, 300);
   private readonly controls: OrbitControls;
   private readonly cars: three.InstancedMesh;
-  private readonly field: three.MeshLambertMaterial;
+  private readonly field: three.Mesh;
+  private readonly paints = new Paint();
+  private readonly sharpness: Sharpness;
   private readonly middle = new three.Vector3();
   private readonly size: number;
   private readonly matrix = new three.Matrix4();
@@ -109,6 +60,8 @@ export class Scene {
   private view: View = "orbit";
   private frame = 0;
   private isDirty = true;
+  private drawn = 0; // when, in ms
+  private isSharp = false;
   private placed: PlacedCar[] | undefined;
   private readonly trails = new three.Group();
 
@@ -117,33 +70,30 @@ export class Scene {
     track: TrackGeometry,
     private readonly isCalm: boolean,
   ) {
-    this.renderer = new three.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const isSlow = isSoftware();
+    const finest = Math.min(devicePixelRatio, 2);
+    this.renderer = new three.WebGLRenderer({ canvas, antialias: !isSlow, powerPreference: "high-performance" });
+    this.sharpness = new Sharpness(finest, COARSEST, isSlow ? 0.7 : finest);
+    this.renderer.setPixelRatio(this.sharpness.ratio);
     this.camera.up.set(0, 0, 1);
     const box = new three.Box2().setFromPoints([...track.outer, ...track.inner].map(([x, y]) => new three.Vector2(x, y)));
     const [center, extent] = [box.getCenter(new three.Vector2()), box.getSize(new three.Vector2())];
     this.middle.set(center.x, center.y, 0);
     this.size = Math.max(extent.x, extent.y * 1.5);
 
-    this.scene.add(new three.HemisphereLight(0xffffff, 0x8f978f, 2.1));
-    const sun = new three.DirectionalLight(0xfff2dd, 1.9);
-    sun.position.set(3, -4, 9);
-    this.scene.add(sun);
-    this.field = new three.MeshLambertMaterial({ color: 0x7f9a78 });
-    const ground = new three.Mesh(new three.PlaneGeometry(extent.x + 60, extent.y + 60), this.field);
-    ground.position.copy(this.middle);
-    this.scene.add(ground);
-    const { inner, outer, is_closed: isClosed } = track;
-    const flat = (color: number) => new three.MeshLambertMaterial({ color, side: three.DoubleSide });
-    this.scene.add(new three.Mesh(band(inner, outer, isClosed, RISE), flat(0x3b4350)));
-    this.scene.add(new three.Mesh(band(inner, inward(inner, outer, LINE), isClosed, 2 * RISE), flat(0xf4f4ef)));
-    this.scene.add(new three.Mesh(band(outer, inward(outer, inner, LINE), isClosed, 2 * RISE), flat(0xf4f4ef)));
-    this.scene.add(new three.Mesh(dashes(track.center, isClosed), flat(0xffb02e)));
-
-    this.cars = new three.InstancedMesh(carGeometry(), new three.MeshLambertMaterial({ vertexColors: true }), MAX_CARS);
+    // drawn in this order: what is hidden by something nearer then costs no pixel
+    this.cars = new three.InstancedMesh(carGeometry(), this.paints, MAX_CARS);
     this.cars.count = 0;
-    this.cars.frustumCulled = false;
-    this.scene.add(this.cars);
+    this.cars.setColorAt(0, new three.Color());
+    this.cars.instanceMatrix.setUsage(three.DynamicDrawUsage);
+    const road = new three.Mesh(roadGeometry(track), this.paints);
+    this.field = new three.Mesh(fieldGeometry(this.size * 5 + 10, 0x7f9a78), this.paints);
+    this.field.position.copy(this.middle);
+    for (const [order, mesh] of [this.cars, road, this.field].entries()) {
+      mesh.renderOrder = order;
+      mesh.frustumCulled = false;
+      this.scene.add(mesh);
+    }
 
     this.scene.add(this.trails);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -199,10 +149,10 @@ export class Scene {
   }
 
   paint(isDark: boolean): void {
-    const sky = isDark ? 0x11161c : 0xdfe6ea;
-    this.scene.background = new three.Color(sky);
-    this.scene.fog = new three.Fog(sky, this.size * 1.6, this.size * 5);
-    this.field.color.set(isDark ? 0x4d6350 : 0x86a37e);
+    const sky = new three.Color(isDark ? 0x11161c : 0xdfe6ea);
+    this.scene.background = sky;
+    this.paints.fade(sky, this.size * 1.6, this.size * 5);
+    paintGround(this.field.geometry, isDark ? 0x4d6350 : 0x86a37e);
     this.isDirty = true;
   }
 
@@ -212,11 +162,10 @@ export class Scene {
     this.controls.dispose();
     this.clearTrails();
     this.scene.traverse((thing) => {
-      if (thing instanceof three.Mesh) {
-        thing.geometry.dispose();
-        (thing.material as three.Material).dispose();
-      }
+      if (thing instanceof three.Mesh) (thing.geometry as three.BufferGeometry).dispose();
     });
+    this.cars.dispose();
+    this.paints.dispose();
     this.renderer.dispose();
   }
 
@@ -243,12 +192,29 @@ export class Scene {
     this.frame = requestAnimationFrame(this.draw);
     const share = this.isCalm ? 1 : Math.min((time - this.arrived) / this.interval, 1);
     const isMoving = this.now !== undefined && time - this.arrived < this.interval + 50;
-    if (!isMoving && !this.isDirty) return;
+    if (isMoving || this.isDirty) {
+      const isSteady = !this.isSharp && time - this.drawn < STILL;
+      if ((isSteady && this.sharpness.took(time - this.drawn)) || this.isSharp) this.sharpen(this.sharpness.ratio);
+      this.isSharp = false;
+      this.render(share);
+      this.drawn = time;
+    } else if (!this.isSharp && time - this.drawn > STILL) {
+      this.sharpen(this.sharpness.finest);
+      this.isSharp = true;
+      this.render(share);
+    }
+  };
+
+  private sharpen(ratio: number): void {
+    if (ratio !== this.renderer.getPixelRatio()) this.renderer.setPixelRatio(ratio);
+  }
+
+  private render(share: number): void {
     this.isDirty = false;
     if (this.placed) this.placeCars(this.placed);
     else if (this.now) this.place(between(this.before, this.now, share));
     this.renderer.render(this.scene, this.camera);
-  };
+  }
 
   private place(poses: ReturnType<typeof between>): void {
     this.cars.count = Math.min(poses.length, MAX_CARS);
