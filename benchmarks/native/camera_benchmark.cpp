@@ -64,7 +64,7 @@ int main() {
     const CameraModel chase(chase_camera(640, 480));
     const CarPicture car = {4.0f, -2.0f, 1.6f, 0.2f, {220, 40, 30}, 1.0f};
     const double seconds = best_seconds(20, [&] {
-        render_rgb(chase, ground, kPalette2018, car.x, car.y, car.heading, &car, 1, colour.data());
+        render_rgb(chase, ground, kPalette2018, car.x, car.y, car.heading, &car, 1, nullptr, colour.data());
     });
     std::printf("chase 640x480 with its car: %.2f ms\n", 1e3 * seconds);
     return 0;

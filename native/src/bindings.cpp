@@ -179,32 +179,43 @@ void bind_views(nb::module_& m) {
             return std::make_tuple(camera.spec, camera.x, camera.y, camera.heading);
         },
         "ground"_a, "width"_a, "height"_a);
+    const auto pictures_of = [](const Cars& cars) {
+        std::vector<CarPicture> pictures;
+        for (size_t i = 0; i < cars.shape(0); ++i) {
+            const float* car = cars.data() + i * kNumCarFields;
+            const auto byte = [&](int field) {
+                return static_cast<uint8_t>(clamp(car[field], 0.0f, 255.0f));
+            };
+            pictures.push_back(
+                {car[0], car[1], car[2], car[3], {byte(4), byte(5), byte(6)}, car[7], car[8] != 0.0f});
+        }
+        return pictures;
+    };
     m.def(
         "render_rgb",
-        [](const CameraModel& camera, const GroundMap& ground, const std::string& palette, float x, float y,
-           float heading, Cars cars, bool lit_walls, Picture out) {
+        [pictures_of](const CameraModel& camera, const GroundMap& ground, const std::string& palette, float x,
+                      float y, float heading, Cars cars, Cars scan, bool lit_walls, Picture out) {
             const CameraSpec& spec = camera.spec();
             if (out.shape(0) != static_cast<size_t>(spec.height) ||
                 out.shape(1) != static_cast<size_t>(spec.width)) {
                 throw std::invalid_argument("The picture does not have the camera's size.");
             }
-            std::vector<CarPicture> pictures;
-            for (size_t i = 0; i < cars.shape(0); ++i) {
-                const float* car = cars.data() + i * kNumCarFields;
-                const auto byte = [&](int field) {
-                    return static_cast<uint8_t>(clamp(car[field], 0.0f, 255.0f));
-                };
-                pictures.push_back(
-                    {car[0], car[1], car[2], car[3], {byte(4), byte(5), byte(6)}, car[7], car[8] != 0.0f});
+            const std::vector<CarPicture> pictures = pictures_of(cars);
+            const std::vector<CarPicture> scanned = pictures_of(scan);  // the scanner, then what it can hit
+            ScanPicture scanner{};
+            if (!scanned.empty()) {
+                scanner = {scanned[0].x, scanned[0].y, scanned[0].heading, scanned.data() + 1,
+                           static_cast<int>(scanned.size()) - 1};
             }
             const RgbPalette& world = rgb_palette(palette);
             const RgbPalette colours = lit_walls ? with_lit_walls(world) : world;
             uint8_t* pixels = out.data();
             nb::gil_scoped_release release;
             render_rgb(camera, ground, colours, x, y, heading, pictures.data(),
-                       static_cast<int>(pictures.size()), pixels);
+                       static_cast<int>(pictures.size()), scanned.empty() ? nullptr : &scanner, pixels);
         },
-        "camera"_a, "ground"_a, "palette"_a, "x"_a, "y"_a, "heading"_a, "cars"_a, "lit_walls"_a, "out"_a);
+        "camera"_a, "ground"_a, "palette"_a, "x"_a, "y"_a, "heading"_a, "cars"_a, "scan"_a, "lit_walls"_a,
+        "out"_a);
 }
 
 ObjectGroup group_of(int kind, int count, int placement, double min_distance,

@@ -7,13 +7,14 @@
 #include "box_mesh.hpp"
 #include "camera_kernel.hpp"
 #include "car_mesh.hpp"
+#include "perspective.hpp"
 #include "racecraft/object_look.hpp"
+#include "scan_picture.hpp"
 
 namespace racecraft {
 namespace {
 
 constexpr int kSupersampling = 3;                   // per direction, of the cars
-constexpr float kNearest = 0.02f;                   // m along the optical axis
 constexpr Vector3 kSun = {0.352f, 0.264f, 0.898f};  // unit vector towards the light, in the world
 constexpr float kAmbient = 0.50f;                   // share of light that comes from everywhere
 constexpr float kShadowLength = 0.205f;             // m, half axes of the soft shadow under a car
@@ -21,48 +22,6 @@ constexpr float kShadowWidth = 0.135f;
 constexpr float kBoxShadowLength = 0.262f;
 constexpr float kBoxShadowWidth = 0.205f;
 constexpr float kShadowDepth = 0.55f;  // share of light that the shadow takes at most
-
-// From the world to the image: x right, y down, both in pixels; depth along the optical axis.
-class Projection {
-  public:
-    Projection(const CameraSpec& spec, const LensPose& lens) : spec_(spec), lens_(lens) {
-        float sine, cosine;
-        sincos_of(0.5f * spec.hfov, sine, cosine);
-        focal_ = 0.5f * static_cast<float>(spec.width) * cosine / sine;
-        sincos_of(spec.pitch, pitch_sine_, pitch_cosine_);
-    }
-
-    Vector3 project(Vector3 p) const {
-        const float dx = p.x - lens_.x;
-        const float dy = p.y - lens_.y;
-        const float ahead = dx * lens_.cosine + dy * lens_.sine;
-        const float right = dx * lens_.sine - dy * lens_.cosine;
-        const float up = p.z - spec_.above;
-        const float depth = ahead * pitch_cosine_ - up * pitch_sine_;
-        const float down = -ahead * pitch_sine_ - up * pitch_cosine_;
-        const float scale = focal_ / max_of(depth, kNearest);
-        return {0.5f * static_cast<float>(spec_.width) + scale * right,
-                0.5f * static_cast<float>(spec_.height) + scale * down, depth};
-    }
-
-    // The ground under the centre of a pixel; false at and above the horizon.
-    bool find_ground(int column, int row, float& x, float& y) const {
-        const float a = (static_cast<float>(column) + 0.5f - 0.5f * static_cast<float>(spec_.width)) / focal_;
-        const float b = (static_cast<float>(row) + 0.5f - 0.5f * static_cast<float>(spec_.height)) / focal_;
-        const float down = pitch_sine_ + b * pitch_cosine_;
-        if (down <= 1e-4f) return false;
-        const float reach = spec_.above / down;
-        const float ahead = reach * (pitch_cosine_ - b * pitch_sine_);
-        x = lens_.x + ahead * lens_.cosine + reach * a * lens_.sine;
-        y = lens_.y + ahead * lens_.sine - reach * a * lens_.cosine;
-        return true;
-    }
-
-  private:
-    CameraSpec spec_;
-    LensPose lens_;
-    float focal_, pitch_sine_, pitch_cosine_;
-};
 
 // Pixels [x0, x1) x [y0, y1) of the image.
 struct Box {
@@ -125,7 +84,7 @@ struct Sample {
 // One car, drawn into its own small supersampled depth buffer and laid over the picture.
 class CarPainter {
   public:
-    CarPainter(const CameraSpec& spec, const LensPose& lens) : spec_(spec), projection_(spec, lens) {}
+    CarPainter(const CameraSpec& spec, const LensPose& lens) : spec_(spec), perspective_(spec, lens) {}
 
     void draw(const CarPicture& car, std::vector<Sample>& samples, uint8_t* out) {
         place(car);
@@ -134,8 +93,8 @@ class CarPainter {
         box_ = nothing(spec_);
         for (const Triangle& triangle : mesh) {
             for (const Vector3& corner : triangle.corners) {
-                const Vector3 p = projection_.project(to_world(corner, triangle.wheel));
-                if (p.z < kNearest) return;  // the lens is inside the car
+                const Vector3 p = perspective_.project(to_world(corner, triangle.wheel));
+                if (p.z < kNearestSeen) return;  // the lens is inside the car
                 box_.cover(p, spec_);
             }
         }
@@ -172,15 +131,15 @@ class CarPainter {
         Box box = nothing(spec_);
         for (const float x : {-length, length}) {
             for (const float y : {-width, width}) {
-                const Vector3 p = projection_.project(to_world({x, y, 0.0f}, 0));
-                if (p.z < kNearest) return;
+                const Vector3 p = perspective_.project(to_world({x, y, 0.0f}, 0));
+                if (p.z < kNearestSeen) return;
                 box.cover(p, spec_);
             }
         }
         for (int row = box.y0; row < box.y1; ++row) {
             for (int column = box.x0; column < box.x1; ++column) {
                 float x, y;
-                if (!projection_.find_ground(column, row, x, y)) continue;
+                if (!perspective_.find_ground(column, row, x, y)) continue;
                 const float along = ((x - x_) * cosine_ + (y - y_) * sine_) / length;
                 const float across = ((y - y_) * cosine_ - (x - x_) * sine_) / width;
                 const float edge = along * along * along * along + across * across * across * across;
@@ -196,7 +155,7 @@ class CarPainter {
         Vector3 world[3], image[3];
         for (int i = 0; i < 3; ++i) {
             world[i] = to_world(triangle.corners[i], triangle.wheel);
-            image[i] = projection_.project(world[i]);
+            image[i] = perspective_.project(world[i]);
             image[i].x = (image[i].x - static_cast<float>(box_.x0)) * kSupersampling;
             image[i].y = (image[i].y - static_cast<float>(box_.y0)) * kSupersampling;
         }
@@ -283,7 +242,7 @@ class CarPainter {
     }
 
     CameraSpec spec_;
-    Projection projection_;
+    Perspective perspective_;
     float x_ = 0.0f, y_ = 0.0f, sine_ = 0.0f, cosine_ = 1.0f, steering_sine_ = 0.0f, steering_cosine_ = 1.0f;
     Box box_{};
     int columns_ = 0, rows_ = 0;
@@ -339,11 +298,13 @@ FixedCamera top_down_camera(const GroundMap& ground, int width, int height) {
 }
 
 void render_rgb(const CameraModel& camera, const GroundMap& ground, const RgbPalette& palette, float x,
-                float y, float heading, const CarPicture* cars, int num_cars, uint8_t* out) {
+                float y, float heading, const CarPicture* cars, int num_cars, const ScanPicture* scan,
+                uint8_t* out) {
     const LensPose lens = place_lens(camera.view(), ground.view(), x, y, heading);
     ShadeTable tables[3];
     for (int c = 0; c < 3; ++c) tables[c] = shade_table(channel_of(palette, c));
     RC_DISPATCH(render_room, camera.view(), ground.view(), tables, 3, lens, out);
+    if (scan != nullptr) draw_scan(camera.spec(), lens, ground.view(), *scan, ScanPart::beams, out);
 
     // Far cars first, so that near ones cover them.
     thread_local std::vector<int> order;
@@ -358,6 +319,7 @@ void render_rgb(const CameraModel& camera, const GroundMap& ground, const RgbPal
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return distance(a) > distance(b); });
     CarPainter painter(camera.spec(), lens);
     for (const int i : order) painter.draw(cars[i], samples, out);
+    if (scan != nullptr) draw_scan(camera.spec(), lens, ground.view(), *scan, ScanPart::facing_ends, out);
 }
 
 }  // namespace racecraft

@@ -26,10 +26,19 @@ struct FixedCamera {
 };
 FixedCamera top_down_camera(const GroundMap& ground, int width, int height);
 
+// A LIDAR at work: a car's pose, and what its beams can hit besides the room's walls.
+struct ScanPicture {
+    float x, y, heading;  // m, rad, of the car that carries it
+    const CarPicture* objects;
+    int num_objects;
+};
+
 // What the camera of a car at (x, y, heading) sees, into out (height, width, 3). Cars closer to the lens than
 // 2 cm are left out, and so is whatever the caller leaves out of `cars`: a driver does not see the own car.
-// Safe from any thread; allocates only while its buffers grow to the largest car seen so far.
+// The beams of `scan` are shown, if it is not null. Safe from any thread; allocates only while its buffers
+// grow to the largest car seen so far.
 void render_rgb(const CameraModel& camera, const GroundMap& ground, const RgbPalette& palette, float x,
-                float y, float heading, const CarPicture* cars, int num_cars, uint8_t* out);
+                float y, float heading, const CarPicture* cars, int num_cars, const ScanPicture* scan,
+                uint8_t* out);
 
 }  // namespace racecraft

@@ -12,7 +12,7 @@ std::vector<uint8_t> frame(const CameraModel& camera, const GroundMap& ground, f
                            float heading, const std::vector<CarPicture>& cars) {
     std::vector<uint8_t> pixels(size_t(camera.spec().width) * camera.spec().height * 3);
     render_rgb(camera, ground, kPalette2018, x, y, heading, cars.data(), static_cast<int>(cars.size()),
-               pixels.data());
+               nullptr, pixels.data());
     return pixels;
 }
 

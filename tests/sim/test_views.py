@@ -5,7 +5,7 @@ import pytest
 
 from racecraft.errors import ConfigError
 from racecraft.sim import ROW_COLUMNS, Bots, CameraSpec, Objects, Obstacles, Simulation, Start
-from racecraft.sim.views import BoxView, CarView, Scene, driver_frames, views_of_objects
+from racecraft.sim.views import BoxView, CarView, ScanView, Scene, driver_frames, views_of_objects
 from racecraft.track import load_track
 
 OVAL = load_track("oval")
@@ -133,3 +133,38 @@ def test_boxes_and_bots_stand_where_the_simulation_has_them():
     assert (seen & drawn).sum() > 0.9 * seen.sum()
     assert drawn.sum() < 2.5 * seen.sum()
     assert views_of_objects(np.zeros(0)) == []
+
+
+def test_beams_of_a_lidar_end_where_the_sensor_measures():
+    places = ((0.02, 1.0), (0.05, -1.0), (0.95, 1.0), (0.97, -1.0))
+    boxes = Obstacles(count=4, placement="fixed", positions=places)
+    simulation = Simulation(OVAL, camera=None, lidar=True, objects=Objects(obstacles=boxes), start=Start(mode="fixed"))
+    simulation.reset()
+    x, y, heading = (float(value) for value in simulation.vehicles[:3, 0])
+    objects = views_of_objects(simulation.judged[0, len(ROW_COLUMNS) :])
+    above = CameraSpec(width=640, height=480, pitch=1.5, above_ground=0.9, forward=0.0, horizontal_fov=2.6)
+    view = Scene(OVAL).driver_view(above)
+    without = view.draw(x, y, 0.0, cars=objects)
+    shown = view.draw(x, y, 0.0, cars=objects, scan=ScanView(x, y, heading, objects)).astype(int)
+    is_dot = (shown[..., 0] > 225) & (shown[..., 1] < 90)
+    angles = heading + math.radians(30) + np.arange(64) * math.radians(300 / 63)
+    ends_x = x + 0.02913 * math.cos(heading) + simulation.lidar[0] * np.cos(angles)  # the scanner's place in the car
+    ends_y = y + 0.02913 * math.sin(heading) + simulation.lidar[0] * np.sin(angles)
+    focal, sine, cosine, down = 320 / math.tan(1.3), math.sin(1.5), math.cos(1.5), 0.9 - 0.13
+    depth = (ends_x - x) * cosine + down * sine
+    columns, rows = 320 - focal * (ends_y - y) / depth, 240 + focal * (down * cosine - (ends_x - x) * sine) / depth
+    inside = (columns > 2) & (columns < view.width - 3) & (rows > 2) & (rows < view.height - 3)
+    assert inside.sum() > 20
+    for column, row in zip(columns[inside].astype(int), rows[inside].astype(int), strict=True):
+        assert is_dot[row - 2 : row + 3, column - 2 : column + 3].any()
+    assert 0.01 < (shown != without).any(axis=2).mean() < 0.3  # thin beams, not a painted floor
+
+
+def test_a_beam_stops_at_a_car_and_not_at_what_it_cannot_hit():
+    scene = Scene(OVAL)
+    behind = CarView(START[0] - 1.0, START[1], START[2])
+    view = scene.chase_view()
+    looking_back = (START[0], START[1], START[2] + math.pi)
+    pictures = [view.draw(*looking_back, cars=[behind], scan=ScanView(*START, objects)) for objects in ([], [behind])]
+    assert (pictures[0] != pictures[1]).any()
+    np.testing.assert_array_equal(pictures[0], view.draw(*looking_back, cars=[behind], scan=ScanView(*START)))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from racecraft.errors import ConfigError
 from racecraft.sim import Simulation
 from racecraft.sim.columns import ROW_COLUMNS
-from racecraft.sim.views import RACER_COLORS, CarView, Scene, View, views_of_objects
+from racecraft.sim.views import RACER_COLORS, CarView, ScanView, Scene, View, views_of_objects
 
 RENDER_SIZE: Final = (640, 480)
 """Width and height of a rendered frame, pixels."""
@@ -40,7 +40,8 @@ class Renderer:
         number = car % simulation.cars_per_race
         itself = CarView(x, y, heading, steering, RACER_COLORS[number])
         around = views_of_objects(simulation.judged[car, len(ROW_COLUMNS) :], car=number)
-        return self._view(car).draw(x, y, heading, cars=[itself, *around])
+        scan = ScanView(x, y, heading, around) if simulation.lidar.size else None
+        return self._view(car).draw(x, y, heading, cars=[itself, *around], scan=scan)
 
     def _view(self, car: int) -> View:
         simulation = self._simulation

@@ -23,7 +23,7 @@ from racecraft.race.recording import Recording
 from racecraft.race.rules import RESET_STATUSES
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.simulation import CONTROL_DT
-from racecraft.sim.views import CarView, ObjectView, Scene
+from racecraft.sim.views import CarView, ObjectView, ScanView, Scene
 from racecraft.track.canvas import Color
 
 FRAME_RATE: Final = 15
@@ -62,7 +62,7 @@ def film(
         palette: Colours of the world: ``2018`` or ``2020``.
         ghosts: Translucent cars that drove at another time; the driver does not see them.
         rivals: The other cars of the race, for the table of who is ahead and for the map.
-        sensors: Of the car, for the driver's view: of a stereo camera an anaglyph, the left lens in red.
+        sensors: Of the car: its driver's view, of a stereo camera an anaglyph, the left lens in red; its LIDAR's beams.
 
     Raises:
         ConfigError: Nothing was recorded, the palette is unknown, or the path does not end in .mp4.
@@ -161,7 +161,8 @@ def frames(
         car = CarView(x, y, heading, float(steering[step]), color, float(alphas[step]))
         objects = recording.objects(step, alpha=float(waves[step]))
         around = [view for view in overlay.ghosts_at(step) if view is not None]
-        chase.draw(x, y, float(directions[step]), cars=[car, *objects, *around], out=frame)
+        scan = ScanView(x, y, heading, objects) if sensors.lidar_name else None
+        chase.draw(x, y, float(directions[step]), cars=[car, *objects, *around], scan=scan, out=frame)
         frame[top : top + height, left : left + width] = driver.draw(x, y, heading, objects)
         if step == len(recording) - 1:
             break

@@ -72,6 +72,19 @@ class BoxView(NamedTuple):
 ObjectView = CarView | BoxView
 
 
+class ScanView(NamedTuple):
+    """A LIDAR at work in a picture: its beams as they are without noise."""
+
+    x: float
+    """m, of the origin of the car that carries it."""
+    y: float
+    """m"""
+    heading: float
+    """rad"""
+    objects: Sequence[ObjectView] = ()
+    """What its beams can hit besides the walls."""
+
+
 RACER_COLORS: Final[tuple[tuple[int, int, int], ...]] = _native.RACER_COLOURS
 """Bodies of the cars of a race by their number in it."""
 
@@ -98,6 +111,10 @@ def views_of_objects(columns: NDArray[np.float64], *, car: int = 0, alpha: float
         elif kind != "gone_racer":
             views.append(CarView(x, y, heading, color=color, alpha=alpha if kind == "frozen_racer" else 1.0))
     return views
+
+
+def _table(views: Sequence[ObjectView]) -> NDArray[np.float32]:
+    return np.array([_fields(view) for view in views], dtype=np.float32).reshape(-1, 9)
 
 
 def _fields(view: ObjectView) -> tuple[float, ...]:
@@ -171,6 +188,7 @@ class View:
         heading: float = 0.0,
         *,
         cars: Sequence[ObjectView] = (),
+        scan: ScanView | None = None,
         out: NDArray[np.uint8] | None = None,
     ) -> NDArray[np.uint8]:
         """A picture, RGB uint8 (height, width, 3).
@@ -180,13 +198,23 @@ class View:
             y: The same.
             heading: Of that car, rad.
             cars: What is seen besides the track, boxes included.
+            scan: A LIDAR whose beams are shown.
             out: Where to draw; a new array by default.
         """
         if out is None:
             out = np.empty((self.height, self.width, 3), dtype=np.uint8)
-        table = np.array([_fields(car) for car in cars], dtype=np.float32).reshape(-1, 9)
+        scanned = () if scan is None else (CarView(*scan[:3]), *scan.objects)
         x, y, heading = self._fixed or (x, y, heading)
         _native.render_rgb(
-            self._camera, self._ground, self._palette, x, y, heading, table, lit_walls=self._lit_walls, out=out
+            self._camera,
+            self._ground,
+            self._palette,
+            x,
+            y,
+            heading,
+            _table(cars),
+            scan=_table(scanned),
+            lit_walls=self._lit_walls,
+            out=out,
         )
         return out
