@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 
@@ -56,27 +57,34 @@ def run(command: list[str | Path], **environment: str) -> str:
     return done.stdout
 
 
+@cache
+def runs(folder: Path, programs: tuple[str, ...] = PROGRAMS, **environment: str) -> dict[str, Future[str]]:
+    """Every program of a build, run as many at a time as there are cores, since most have one thread."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return {name: pool.submit(run, [folder / name], **environment) for name in programs}
+
+
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_release(program):
-    run([build("release", "Release") / program])
+    runs(build("release", "Release"))[program].result()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_without_optimisation_the_golden_hashes_are_the_same(program):
-    run([build("debug", "Debug") / program])
+    runs(build("debug", "Debug"))[program].result()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_address_and_undefined_behaviour_sanitizers_find_nothing(program):
-    run([build("asan", "Release", "address,undefined") / program], ASAN_OPTIONS="detect_leaks=1")
+    runs(build("asan", "Release", "address,undefined"), ASAN_OPTIONS="detect_leaks=1")[program].result()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("program", THREADED)
 def test_thread_sanitizer_finds_nothing(program):
-    run([build("tsan", "Release", "thread", THREADED) / program], TSAN_OPTIONS="halt_on_error=1")
+    runs(build("tsan", "Release", "thread", THREADED), THREADED, TSAN_OPTIONS="halt_on_error=1")[program].result()
 
 
 def test_every_type_of_the_core_has_a_name_of_its_own():
