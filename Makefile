@@ -65,7 +65,7 @@ $(UV): requirements/uv.txt
 	@touch $(UV)
 
 $(VENV)/.train: $(UV) requirements/train.txt
-	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/train.txt
+	$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/train.txt
 	@touch $@
 
 $(VENV)/.dev: $(UV) $(VENV)/.train requirements/dev.txt
@@ -73,7 +73,7 @@ $(VENV)/.dev: $(UV) $(VENV)/.train requirements/dev.txt
 	@touch $@
 
 $(VENV)/.serve: $(UV) $(VENV)/.train requirements/serve.txt
-	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/serve.txt
+	$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/serve.txt
 	@touch $@
 
 $(PAGES): $(WEB)
@@ -83,4 +83,5 @@ $(PAGES): $(WEB)
 
 $(VENV)/.built: $(VENV)/.train $(NATIVE)
 	PATH="$(CURDIR)/$(BIN):$$PATH" flock $(VENV)/.build-lock $(UV) pip install -q --python $(BIN)/python --no-build-isolation --no-deps -e .
+	$(BIN)/python -m compileall -q src/racecraft
 	@touch $@

@@ -63,7 +63,8 @@ def test_a_server_killed_twenty_times(tmp_path: Path) -> None:
         assert {job["state"] for job in ended.values()} == {"done"}, ended
         assert sorted(job["kind"] for job in ended.values()) == [*["evaluate"] * len(raced), "train"]
         cards = console.client.get("/api/models/calm/evaluations").json()
-        assert not workers_of(runs)
+        assert len(workers_of(runs)) <= 1  # the one that waits for a job
+    assert not workers_of(runs)
     done = [json.loads(path.read_text())["job"] for path in (runs / "calm").glob("evaluation-*/evaluation.json")]
     assert sorted(done) == sorted(raced)
     assert len(cards) == len(raced)

@@ -34,8 +34,11 @@ def serve(
 ) -> None:
     """Open the console in a browser: train, watch and race."""
     try:
-        from racecraft.serve import ServeSettings
-        from racecraft.serve import serve as run_server
+        from racecraft.serve.quick import loading
+
+        with loading():
+            from racecraft.serve import ServeSettings
+            from racecraft.serve import serve as run_server
     except ModuleNotFoundError as error:
         raise ConfigError(
             f"The console needs {error.name}, which is not installed.", hint="Install racecraft[serve]."

@@ -7,8 +7,23 @@
 Run folders are the truth about models; the database holds jobs, tags, sessions and races.
 """
 
-from racecraft.serve.app import create_app
-from racecraft.serve.server import serve
-from racecraft.serve.settings import ServeSettings
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from racecraft.serve.app import create_app as create_app
+    from racecraft.serve.server import serve as serve
+    from racecraft.serve.settings import ServeSettings as ServeSettings
+
+_HOME = {"create_app": "app", "serve": "server", "ServeSettings": "settings"}
 
 __all__ = ["ServeSettings", "create_app", "serve"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import on first use: the workers of jobs do without the web server."""
+    if name in _HOME:
+        return getattr(import_module(f"racecraft.serve.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'racecraft.serve' has no attribute {name!r}")

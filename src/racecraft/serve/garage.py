@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import sqlalchemy as sa
-from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.dialects import sqlite
 from sqlalchemy.orm import Session
 
 from racecraft.errors import RacecraftError, RunError
@@ -249,10 +249,16 @@ def _rows(session: Session, only: list[str] | None) -> list[Model]:
     return list(session.scalars(query))
 
 
+_FRESH: Final[dict[str, Any]] = {"tags": [], "fingerprint": "", "summary": {}}
+
+
 def _insert(session: Session) -> sa.Insert:
     """New rows; two who look at the same time do not collide."""
-    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
-    return insert(Model).values(tags=[], fingerprint="", summary={}).on_conflict_do_nothing()
+    if session.get_bind().dialect.name == "postgresql":
+        from sqlalchemy.dialects import postgresql  # takes its time to load, and most consoles do without
+
+        return postgresql.insert(Model).values(**_FRESH).on_conflict_do_nothing()
+    return sqlite.insert(Model).values(**_FRESH).on_conflict_do_nothing()
 
 
 def _latest_trainings(session: Session, only: list[str] | None) -> dict[str, tuple[str, str]]:

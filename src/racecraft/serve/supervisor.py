@@ -1,4 +1,4 @@
-"""Starts jobs as child processes, as many at once as there are slots, and notices when one has died.
+"""Starts jobs in child processes, as many at once as there are slots, and notices when one has died.
 
 A child holds a lock on a file of its own, which the system drops with it. So a server sees at once that a child of the
 server before it is dead, too; what ran on another machine is taken over when its lease has run out.
@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import secrets
 import subprocess
-import sys
+import time
 from contextlib import suppress
 from typing import Final
 
@@ -22,10 +21,12 @@ from racecraft.run.lock import exclusive_lock
 from racecraft.serve.database import Database
 from racecraft.serve.jobs import JobQueue
 from racecraft.serve.kinds import Slot, kinds_of
-from racecraft.serve.settings import ARTIFACTS, DATABASE, WORKERS, ServeSettings
+from racecraft.serve.settings import WORKERS, ServeSettings
+from racecraft.serve.standby import Standby
 
 POLL: Final = 0.5  # s between two looks at the queue; `wake` makes one at once
 GRACE: Final = 20.0  # s for a training to save itself when the server is stopped
+CALM: Final = 5.0  # s after the start of a job before the next worker loads: the job has the machine to itself first
 
 
 class Supervisor:
@@ -43,7 +44,9 @@ class Supervisor:
         self._awake = asyncio.Event()
         self._is_stopping = False
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._log = settings.state / "jobs.log"
+        log = settings.state / "jobs.log"
+        self._standby = Standby(settings.runs, database=database.url, artifacts=settings.artifacts, log=log)
+        self._started = float("-inf")  # the newest job, in `time.monotonic()` seconds
         self._workers = settings.state / WORKERS
         self._workers.mkdir(parents=True, exist_ok=True)
 
@@ -67,6 +70,7 @@ class Supervisor:
     async def stop(self) -> None:
         """Let the children save themselves; what they were doing is queued again for the next server."""
         self._is_stopping = True
+        self._standby.close()
         for child in list(self._children.values()):
             child.terminate()
         deadline = asyncio.get_running_loop().time() + GRACE
@@ -88,6 +92,8 @@ class Supervisor:
             kinds = kinds_of(slot)
             while not self._is_stopping and self._queue.num_running(kinds) < count and self._start(kinds):
                 pass
+        if not self._is_stopping and time.monotonic() - self._started > CALM:
+            self._standby.prepare()
 
     def _start(self, kinds: tuple[str, ...]) -> bool:
         """Start the oldest job of these kinds; False when there is none."""
@@ -95,19 +101,9 @@ class Supervisor:
         job = self._queue.claim(kinds, owner=owner)
         if job is None:
             return False
-        arguments = [job.id, owner, str(self._settings.runs)]
         (self._workers / owner).touch()
-        with self._log.open("ab") as log:
-            child = subprocess.Popen(
-                # -P: a random.py in the user's folder is not to be taken for Python's
-                [sys.executable, "-P", "-m", "racecraft.serve.work", *arguments],
-                env={**os.environ, DATABASE: self._database.url, ARTIFACTS: self._settings.artifacts},
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                start_new_session=True,  # Ctrl-C in the server's terminal is not for it
-            )
-        self._children[owner] = child
+        self._children[owner] = self._standby.start(job.id, owner=owner)
+        self._started = time.monotonic()
         return True
 
     def _reap(self) -> None:

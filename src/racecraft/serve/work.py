@@ -1,170 +1,32 @@
-"""A job's process: ``python -m racecraft.serve.work JOB OWNER RUNS``, and two URLs in the environment.
+"""The process of a job: ``python -m racecraft.serve.work RUNS``, with two URLs in the environment.
 
-It keeps its lease, works, and says how it ended.
-
-The server may die meanwhile: the job goes on, and the next server finds it running. When the job's own process dies,
-its lease runs out and somebody starts it again; a training then continues from its last checkpoint.
+It loads what jobs need, and waits for one line on its standard input: the job and the name that it was claimed under.
+Without a line the server has ended, and so does this.
 """
 
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
-import time
-import traceback
-from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
 
-from sqlalchemy.exc import SQLAlchemyError
-
-from racecraft.errors import RacecraftError, RunError
-from racecraft.run.lock import exclusive_lock
-from racecraft.serve.artifacts import Artifacts
-from racecraft.serve.database import Database
-from racecraft.serve.jobs import LEASE, JobQueue
-from racecraft.serve.kinds import KINDS
-from racecraft.serve.settings import ARTIFACTS, DATABASE, STATE_FOLDER, WORKERS
-from racecraft.serve.tables import Job
-from racecraft.serve.tasks import Task
-
-HEARTBEAT: Final = 1.0  # s
+from racecraft.errors import RunError
+from racecraft.serve.quick import loading
+from racecraft.serve.settings import ARTIFACTS, DATABASE
 
 
-def work(task: Task) -> dict[str, Any]:
-    """Do a job.
-
-    Raises:
-        RacecraftError: It cannot be done.
-    """
-    if task.job.kind not in KINDS:
-        raise RunError(f"Jobs of kind {task.job.kind!r} are not known here.", hint="Update Racecraft.")
-    module, _, function = KINDS[task.job.kind].work.partition(":")
-    result: dict[str, Any] = getattr(import_module(module), function)(task)
-    if task.artifacts is not None and task.job.run:
-        try:
-            task.artifacts.keep(task.folder)
-        except RunError as error:  # what was done is done; the next server copies what is missing
-            if task.job.kind == "store":
-                raise
-            result = {**result, "not_stored": f"{error} {error.hint}".strip()}
-    return result
-
-
-class Worker:
-    """One job from beginning to end.
-
-    Args:
-        database: Where the job is.
-        job: Claimed by `owner`.
-        owner: This process, by the name that it was started under.
-        runs: Folder of the runs.
-        artifacts: Where runs are copied to.
-    """
-
-    def __init__(
-        self, database: Database, job: Job, *, owner: str, runs: Path, artifacts: Artifacts | None = None
-    ) -> None:
-        self._queue = JobQueue(database)
-        self._job, self._owner = job, owner
-        self._stops: list[Callable[[], None]] = []
-        self._is_cancelled = False  # by the user
-        self._leaving = threading.Event()  # the server is going down
-        kind = KINDS.get(job.kind, KINDS["train"])
-        self._kept = runs / kind.progress.format(run=job.run, tuning=job.payload.get("tuning", ""))
-        self._task = Task(job=job, runs=runs, database=database, artifacts=artifacts, on_stop=self._stops.append)
-
-    def run(self) -> None:
-        """Do it, and say how it ended."""
-        signal.signal(signal.SIGTERM, lambda *_: self._leaving.set())
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which then tells us
-        threading.Thread(target=self._keep, name="heartbeat", daemon=True).start()
-        try:
-            result = work(self._task)
-        except Exception as error:
-            described = _described(error)
-            self._report(lambda: self._finish("failed", error=described))
-            return
-        if result.get("reason") == "interrupted" and not self._is_cancelled:
-            self._report(lambda: self._queue.hand_back(self._owner))  # the next server continues
-        else:
-            self._report(lambda: self._finish("done", result=result))
-
-    def _keep(self) -> None:
-        """Keep the lease, and hear of being cancelled."""
-        kept, begun = time.monotonic(), self._progress()
-        while True:
-            try:
-                answer = self._queue.heartbeat(
-                    self._job.id, owner=self._owner, has_progressed=self._progress() != begun
-                )
-                kept = time.monotonic()
-            except SQLAlchemyError:  # the database is being restarted, say
-                answer = "go on"
-            if answer == "lost" or time.monotonic() - kept > LEASE.total_seconds():
-                os._exit(3)  # it is another's now: touch nothing
-            if answer == "stop":
-                self._is_cancelled = True
-            if answer == "stop" or self._leaving.is_set():
-                self._stop()
-            self._leaving.wait(HEARTBEAT)
-            if self._leaving.is_set():
-                time.sleep(0.1)
-
-    def _stop(self) -> None:
-        for call in self._stops:
-            call()
-        if not self._stops:  # nothing to be saved
-            if self._is_cancelled:
-                self._finish("cancelled")
-            else:
-                self._queue.hand_back(self._owner)
-            os._exit(0)
-
-    def _finish(self, state: str, **outcome: Any) -> None:
-        self._queue.finish(self._job.id, owner=self._owner, state=state, **outcome)
-
-    def _report(self, tell: Callable[[], None]) -> None:
-        """Say how it ended; while the database is away, try again until the lease has run out."""
-        while True:
-            try:
-                return tell()
-            except SQLAlchemyError:
-                time.sleep(HEARTBEAT)
-
-    def _progress(self) -> float:
-        """Changes whenever something is kept for good, so that the next attempt does not begin at the start."""
-        try:
-            return self._kept.stat().st_mtime
-        except OSError:
-            return 0.0
-
-
-def _described(error: Exception) -> dict[str, Any]:
-    is_expected = isinstance(error, RacecraftError | OSError)
-    if not is_expected:
-        traceback.print_exception(error)
-    return {
-        "code": type(error).__name__,
-        "message": str(error),
-        "hint": getattr(error, "hint", "") if is_expected else "This is a bug in Racecraft.",
-        "line": getattr(error, "line", None),
-    }
-
-
-def main(job_id: str, owner: str, runs: str) -> int:
+def main(runs: str) -> int:
     """Do one job; the exit status is 0 unless the process itself failed."""
-    database = Database(os.environ.pop(DATABASE))
-    url = os.environ.pop(ARTIFACTS, "")
+    with loading():
+        from racecraft.serve.worker import do_job
+
+    told = sys.stdin.readline().split()
+    if len(told) != 2:
+        return 0
+    job_id, owner = told
+    database_url, artifacts_url = os.environ.pop(DATABASE), os.environ.pop(ARTIFACTS, "")
     try:
-        with exclusive_lock(Path(runs) / STATE_FOLDER / WORKERS / owner):
-            job = JobQueue(database).get(job_id)
-            if job is not None and job.owner == owner:  # else it was taken for dead before it was there
-                artifacts = Artifacts(url) if url else None
-                Worker(database, job, owner=owner, runs=Path(runs), artifacts=artifacts).run()
+        do_job(job_id, owner=owner, runs=Path(runs), database_url=database_url, artifacts_url=artifacts_url)
     except RunError:
         return 1  # a server is just taking it for dead
     return 0

@@ -1,0 +1,70 @@
+"""The worker that waits: it does the next job, is replaced when it dies, and does not outlive its server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from racecraft.serve.database import Database
+from racecraft.serve.jobs import JobQueue
+from racecraft.serve.settings import ServeSettings
+from racecraft.serve.standby import Standby
+
+PATIENCE = 120.0  # s; the machine may be busy
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> ServeSettings:
+    settings = ServeSettings(runs=tmp_path / "runs")
+    (settings.state / "workers").mkdir(parents=True)
+    return settings
+
+
+@pytest.fixture
+def standby(settings: ServeSettings) -> Iterator[Standby]:
+    log = settings.state / "jobs.log"
+    standby = Standby(settings.runs, database=settings.database_url, artifacts="", log=log)
+    yield standby
+    standby.close()
+
+
+def test_the_waiting_worker_does_the_next_job(settings: ServeSettings, standby: Standby) -> None:
+    database = Database(settings.database_url)
+    database.migrate()
+    queue = JobQueue(database)
+    standby.prepare()
+    waiting = standby._waiting
+    standby.prepare()
+    assert standby._waiting is waiting
+    job = queue.add("evaluate", "nothing", {})
+    assert queue.claim(("evaluate",), owner="me") is not None
+    worker = standby.start(job.id, owner="me")
+    assert worker is waiting
+    assert worker.wait(PATIENCE) == 0
+    ended = queue.get(job.id)
+    assert ended is not None
+    assert ended.state == "failed"
+    assert "nothing" in (ended.error or {})["message"]
+    database.close()
+
+
+def test_one_that_died_is_replaced(standby: Standby) -> None:
+    standby.prepare()
+    dead = standby._waiting
+    assert dead is not None
+    dead.kill()
+    dead.wait()
+    standby.prepare()
+    assert standby._waiting is not None
+    assert standby._waiting.pid != dead.pid
+
+
+def test_without_a_server_nobody_waits(standby: Standby) -> None:
+    standby.prepare()
+    worker, standby._waiting = standby._waiting, None
+    assert worker is not None
+    assert worker.stdin is not None
+    worker.stdin.close()  # as the system does when the server is killed
+    assert worker.wait(PATIENCE) == 0
