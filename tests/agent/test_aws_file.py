@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from racecraft.agent import Hyperparameters, ModelMetadata
-from racecraft.agent.aws_file import parse_json_object, read_json_object
 from racecraft.errors import ConfigError
+from racecraft.json_file import parse_json_object, read_json_object
 
 
 @pytest.mark.parametrize(

@@ -10,17 +10,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from racecraft.agent.aws_file import (
-    AwsModel,
-    Number,
-    Whole,
-    file_model,
-    read_json_object,
-    unknown_fields,
-    validate,
-    write_json_object,
-)
+from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, unknown_fields, validate
 from racecraft.errors import ConfigError
+from racecraft.json_file import read_json_object, write_json_object
 
 BATCH_SIZES = (32, 64, 128, 256, 512)
 GAE_LAMBDA = 0.95  # AWS's, fixed

@@ -21,18 +21,11 @@ from racecraft.agent.action_space import (
     DiscreteActionSpace,
     action_space,
 )
-from racecraft.agent.aws_file import (
-    AwsModel,
-    Number,
-    Whole,
-    read_json_object,
-    unknown_fields,
-    validate,
-    write_json_object,
-)
+from racecraft.agent.aws_file import AwsModel, Number, Whole, unknown_fields, validate
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.agent.sensors import LIDAR_RAYS, LidarConfig, check_sensors
 from racecraft.errors import ConfigError
+from racecraft.json_file import read_json_object, write_json_object
 
 NeuralNetwork = Literal[
     "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW",

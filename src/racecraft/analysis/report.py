@@ -15,13 +15,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.agent.aws_file import read_json_object
 from racecraft.analysis.corners import passages, sectors_of
 from racecraft.analysis.laps import TracedLap, driven_direction, read_laps
 from racecraft.analysis.maps import draw_maps, iterations_of
 from racecraft.analysis.report_page import page, pairs, section, table
 from racecraft.analysis.svg import Chart, Curve, action_fan, cell_map, line_chart, racing_line
 from racecraft.errors import RacecraftError, RunError
+from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file
 from racecraft.run.history import read_history

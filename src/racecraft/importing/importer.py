@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
-from racecraft.agent.aws_file import parse_json_object
 from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean
 from racecraft.importing.drfc import DrfcSettings, read_drfc
 from racecraft.importing.env_file import EnvFile, parse_env
@@ -33,6 +32,7 @@ from racecraft.importing.layout import (
 from racecraft.importing.own import read_own
 from racecraft.importing.report import ImportedRun, unused_files
 from racecraft.importing.source import Source, SourceFile, open_source
+from racecraft.json_file import parse_json_object
 from racecraft.race.rules import RaceRules
 from racecraft.reward import check_reward, load_reward, validate_reward
 from racecraft.run import RunFolder

@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from racecraft.agent.aws_file import parse_json_object
 from racecraft.errors import CheckpointError, RacecraftError, RunError, TrackNotFound
 from racecraft.importing.layout import HYPERPARAMETERS, RUN
 from racecraft.importing.source import Source, SourceFile
+from racecraft.json_file import parse_json_object
 from racecraft.run import RunFolder
 from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.settings import TrainSettings

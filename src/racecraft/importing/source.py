@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from racecraft.agent.aws_file import decode_text
 from racecraft.errors import ConfigError, SourceError
 from racecraft.importing.archive import DEFAULT_LIMITS, read_archive
 from racecraft.importing.archive_guard import CHUNK, Limits
 from racecraft.importing.layout import HYPERPARAMETERS, METADATA, PLACES, REWARD, TRAINING_PARAMS, Role, is_plain, role
+from racecraft.json_file import decode_text
 
 MAX_FILES: Final = 100_000
 MAX_DEPTH: Final = 20

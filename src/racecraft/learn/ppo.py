@@ -201,10 +201,8 @@ class PPO:
             )
         self.config = config
         self.learner = learner
-        self.environment = environment
-        self.seed = seed
-        self.iteration = 0
-        self.total_steps = 0
+        self.environment, self.seed = environment, seed
+        self.iteration = self.total_steps = 0
         self._rollout = Rollout(
             capacity,
             num_envs=config.num_envs,
@@ -455,8 +453,7 @@ class PPO:
         }
         own = self.learner.weights()
         average = {name: array.copy() for name, array in self._average.weights().items()}
-        driving = (average if self.prefers_average else {}) or own
-        arrays |= {f"weights/{name}": array for name, array in driving.items()}
+        arrays |= {f"weights/{name}": array for name, array in ((self.prefers_average and average) or own).items()}
         if self.config.average_share > 0:
             arrays |= {f"learning/{name}": array for name, array in own.items()}
             arrays |= {f"average/{name}": array for name, array in average.items()}

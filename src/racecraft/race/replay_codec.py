@@ -23,8 +23,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.agent.aws_file import parse_json_object
 from racecraft.errors import ConfigError, ReplayError
+from racecraft.json_file import parse_json_object
 
 MAGIC: Final = b"RACECRAFTREPLAY\0"
 VERSION: Final = 1

@@ -17,8 +17,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from racecraft.agent.aws_file import read_json_object
 from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.json_file import read_json_object
 from racecraft.limits import TrackLimit, known_limit
 from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.evaluation import evaluate

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.json_file import read_json_object, read_text
 from racecraft.run.atomic import write_file, write_json
 from racecraft.run.checkpoint import CheckpointStore
 from racecraft.run.lock import exclusive_lock
@@ -218,8 +219,6 @@ class RunFolder:
         Raises:
             RunError: It is missing, damaged or of a later version.
         """
-        from racecraft.agent.aws_file import read_json_object
-
         path = self.path / "run.json"
         try:
             document = read_json_object(path)
@@ -265,8 +264,6 @@ class RunFolder:
         Raises:
             RunError: It is missing, too large or not UTF-8.
         """
-        from racecraft.agent.aws_file import read_text
-
         try:
             return read_text(self.reward_function, max_bytes=MAX_REWARD_BYTES)
         except ConfigError as error:
@@ -286,8 +283,6 @@ class RunFolder:
 
     def read_aws_hyperparameters(self) -> dict[str, Any]:
         """How the run learned, by AWS's names, of whatever range; empty where the run does not say."""
-        from racecraft.agent.aws_file import read_json_object
-
         try:
             return read_json_object(self.aws_hyperparameters) if self.aws_hyperparameters.exists() else {}
         except ConfigError as error:

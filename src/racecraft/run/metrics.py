@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from racecraft.errors import RunError
+from racecraft.json_file import read_json_object
 from racecraft.run.atomic import write_file
 from racecraft.run.episodes import Episode
 
@@ -158,8 +159,6 @@ def read_metrics(path: Path) -> dict[str, Any]:
     Raises:
         RunError: It is not one.
     """
-    from racecraft.agent.aws_file import read_json_object
-
     try:
         document = read_json_object(path, max_bytes=MAX_BYTES)
     except ValueError as error:

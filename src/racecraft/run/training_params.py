@@ -10,8 +10,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, read_text, validate
+from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, validate
 from racecraft.errors import ConfigError
+from racecraft.json_file import read_text
 from racecraft.run.atomic import write_file
 
 MAX_BYTES = 1 << 18

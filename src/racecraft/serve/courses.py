@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 from pydantic import ValidationError
 
-from racecraft.agent.aws_file import read_text
 from racecraft.errors import RacecraftError, TrackError, TrackNotFound
+from racecraft.json_file import read_text
 from racecraft.run.atomic import write_file
 from racecraft.serve.problems import Conflict
 from racecraft.serve.schemas import TrackFacts, TrackGeometry

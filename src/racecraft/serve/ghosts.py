@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import sqlalchemy as sa
 
-from racecraft.agent.aws_file import read_json_object
 from racecraft.errors import RacecraftError
+from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder, list_runs
 from racecraft.serve.database import Database
 from racecraft.serve.drive_schemas import Ghost, GhostCard

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from racecraft.agent.aws_file import read_json_object
 from racecraft.errors import ConfigError
+from racecraft.json_file import read_json_object
 from racecraft.race.policy import NetworkPolicy
 from racecraft.run import RunFolder
 from racecraft.serve.artifacts import Artifacts

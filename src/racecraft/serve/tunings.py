@@ -11,8 +11,8 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from racecraft.agent.aws_file import read_json_object
 from racecraft.errors import ConfigError, RunError
+from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
 from racecraft.run.folder import sanitize_name
 from racecraft.serve.garage import Garage

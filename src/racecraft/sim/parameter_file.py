@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
 from racecraft.errors import ConfigError, did_you_mean
+from racecraft.json_file import read_json_object
 
 MAX_FILE_BYTES: Final = 100_000
+"""They hold a few numbers."""
 
 
 def read_parameters(name_or_path: str | Path, *, kind: str, presets: Iterable[str]) -> dict[str, Any]:
@@ -21,23 +22,11 @@ def read_parameters(name_or_path: str | Path, *, kind: str, presets: Iterable[st
         presets: Names that would have been understood instead.
 
     Raises:
-        ConfigError: No such file, too large, or not one JSON object.
+        ConfigError: No such file, too large, or not one strict JSON object.
     """
     name, path, known = str(name_or_path), Path(name_or_path), list(presets)
     if not path.is_file():
         raise ConfigError(
             f"{kind} {name!r} is neither a preset ({', '.join(known)}) nor a file.", hint=did_you_mean(name, known)
         )
-    try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise ConfigError(
-                f"{kind} file {name!r} has more than {MAX_FILE_BYTES} bytes; it should hold a few numbers."
-            )
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{kind} file {name!r} is not JSON: {error}.") from error
-    except OSError as error:
-        raise ConfigError(f"{kind} file {name!r} cannot be read: {error.strerror or error}.") from error
-    if not isinstance(data, dict):
-        raise ConfigError(f"{kind} file {name!r} must hold one JSON object, not {type(data).__name__}.")
-    return data
+    return read_json_object(path, max_bytes=MAX_FILE_BYTES)

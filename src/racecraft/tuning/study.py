@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from racecraft.agent import ModelMetadata
-from racecraft.agent.aws_file import read_json_object
 from racecraft.errors import ConfigError, RacecraftError, RunError
+from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.run.lock import exclusive_lock

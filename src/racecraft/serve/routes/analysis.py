@@ -12,7 +12,6 @@ import numpy as np
 from fastapi import APIRouter, Query, Response
 from numpy.typing import NDArray
 
-from racecraft.agent.aws_file import read_json_object
 from racecraft.analysis import (
     TracedLap,
     draw_maps,
@@ -24,6 +23,7 @@ from racecraft.analysis import (
     start_place,
 )
 from racecraft.errors import RacecraftError
+from racecraft.json_file import read_json_object
 from racecraft.learn import NetworkSpec
 from racecraft.learn.learner import Weights
 from racecraft.learn.saliency import grad_cam

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from fastapi import APIRouter
 
-from racecraft.agent.aws_file import read_json_object
 from racecraft.errors import RacecraftError
+from racecraft.json_file import read_json_object
 from racecraft.race.rules import RULE_SETS
 from racecraft.run import RunFolder
 from racecraft.serve.context import InContext

@@ -11,9 +11,9 @@ from fastapi import APIRouter
 
 from racecraft.agent import action_space
 from racecraft.agent.action_space import PRESETS, DiscreteActionSpace
-from racecraft.agent.aws_file import read_json_object
 from racecraft.analysis import pay_laps
 from racecraft.errors import RacecraftError
+from racecraft.json_file import read_json_object
 from racecraft.reward import check_reward, dry_run, load_preset, preset_names
 from racecraft.reward.painting import paint_reward
 from racecraft.serve.context import Context, InContext

@@ -1,0 +1,105 @@
+"""Strict reading of small text and JSON files of strangers, and one sentence for what is wrong in them.
+
+Never accepted is a file that says two things at once (duplicate keys) or has numbers that are none.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from racecraft.errors import ConfigError
+
+MAX_BYTES = 1 << 20  # bytes; the largest file AWS's console wrote is under 10 kB
+
+
+def read_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> str:
+    """The UTF-8 text in a small file (a byte order mark is fine); never more than `max_bytes` are read.
+
+    Raises:
+        ConfigError: Not readable, too large, or not UTF-8.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = file.read(max_bytes + 1)
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror or error}.") from error
+    if len(data) > max_bytes:
+        raise ConfigError(f"{path} is larger than {max_bytes:,} bytes, too large for a file of its kind.")
+    return decode_text(data, name=str(path))
+
+
+def decode_text(data: bytes, *, name: str) -> str:
+    """As :func:`read_text`, from memory; ``name`` is what messages call it."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{name} is not UTF-8 text: byte {error.start} is {data[error.start]:#04x}.") from error
+
+
+def read_json_object(path: str | Path, *, max_bytes: int = MAX_BYTES) -> dict[str, Any]:
+    """The JSON object in a UTF-8 file.
+
+    Raises:
+        ConfigError: Not readable, too large, not UTF-8, not a JSON object, or with duplicate keys or NaN.
+    """
+    return parse_json_object(read_text(path, max_bytes=max_bytes), name=str(path))
+
+
+def parse_json_object(data: bytes | str, *, name: str) -> dict[str, Any]:
+    """As :func:`read_json_object`, from memory; ``name`` is what messages call it."""
+    text = decode_text(data, name=name) if isinstance(data, bytes) else data
+    try:
+        document = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite_float)
+    except RecursionError as error:
+        raise ConfigError(f"{name} is nested too deeply.") from error
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise ConfigError(f"{name} is not valid JSON: {error.msg} at {where}.") from error
+    except ValueError as error:
+        raise ConfigError(f"{name} is not valid: {error}.") from error
+    if not isinstance(document, dict):
+        raise ConfigError(f"{name} holds a JSON {_json_type(document)}, expected an object {{...}}.")
+    return document
+
+
+def write_json_object(path: str | Path, document: Mapping[str, Any]) -> None:
+    """Write a document as AWS's console does: UTF-8, two spaces.
+
+    Raises:
+        ConfigError: The file cannot be written.
+    """
+    try:
+        Path(path).write_text(json.dumps(document, indent=2), encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    document: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in document:
+            raise ValueError(f"field {key!r} is given twice")
+        document[key] = value
+    return document
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a number that JSON allows")
+
+
+def _finite_float(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is too large for a number")
+    return value
+
+
+def _json_type(value: object) -> str:
+    if isinstance(value, list):
+        return "array"
+    return "string" if isinstance(value, str) else "value"
