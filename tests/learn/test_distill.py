@@ -105,6 +105,53 @@ def test_the_same_seed_gives_the_same_bits_and_a_resumed_run_has_them() -> None:
         third.load_state({**state, "distill/episodes": np.zeros((2, 4))})
 
 
+@pytest.mark.parametrize("is_discrete", [True, False])
+def test_after_its_lessons_the_student_goes_on_with_the_reward_and_its_teachers_critic(is_discrete: bool) -> None:
+    trained = make(replace(CONFIG, student_steps=128), is_discrete=is_discrete)
+    for _ in range(3):
+        trained.iterate()
+    assert (trained.refining, trained.is_refining) == (None, True)
+    student, critic = trained.driving_weights, trained.teacher.learner.weights()
+    taught = {name: array.copy() for name, array in student.items() if name.startswith("critic.")}
+
+    monkeyed = replace(distill.REFINING_PPO, learning_rate=0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(distill, "REFINING_PPO", monkeyed)
+        stats = trained.iterate()
+    assert stats.total_steps == trained.total_steps == 128 + stats.num_steps
+    for name, array in trained.driving_weights.items():
+        if name.startswith("critic."):
+            np.testing.assert_array_equal(array, critic[name], err_msg=name)
+            assert name.endswith(".bias") or not np.array_equal(array, taught[name])
+    assert abs(stats.losses.policy_loss) < 1e-3
+
+
+def test_a_student_whose_critic_sees_the_camera_only_learns_from_its_teacher() -> None:
+    spec = NetworkSpec(num_actions=3, is_discrete=True, state_size=0)
+    config = replace(CONFIG, student_steps=64)
+    trained = Distill(
+        config, make_learner(spec, seed=0, num_threads=1), StripeWorld(8), StripeWorld(16, seed=4), seed=0
+    )
+    for _ in range(4):
+        trained.iterate()
+    assert trained.refining is None
+    assert trained.total_steps == 3 * 64
+
+
+def test_a_student_that_refines_resumes_to_the_bit() -> None:
+    config = replace(CONFIG, student_steps=64)
+    first, second = make(config), make(config, seed=3)
+    for _ in range(3):
+        first.iterate()
+    assert first.refining is not None
+    second.load_state(first.state())
+    assert second.refining is not None
+    assert (second.total_steps, second.iteration) == (first.total_steps, first.iteration)
+    for name, array in second.state().items():
+        np.testing.assert_array_equal(array, first.state()[name], err_msg=name)
+    assert second.iterate().total_steps > first.total_steps
+
+
 @pytest.mark.parametrize(
     ("settings", "match"),
     [
@@ -113,6 +160,7 @@ def test_the_same_seed_gives_the_same_bits_and_a_resumed_run_has_them() -> None:
         ({"buffer_size": 100}, "at least num_envs x num_steps = 512"),
         ({"minibatch_size": 1.5}, "minibatch_size is 1.5"),
         ({"rate_steps": -1}, "rate_steps is -1, expected a whole number, 0 or more"),
+        ({"student_steps": 0.5}, "student_steps is 0.5, expected a whole number, 0 or more"),
     ],
 )
 def test_settings_that_cannot_work_are_refused(settings: dict[str, Any], match: str) -> None:

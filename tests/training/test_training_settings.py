@@ -18,10 +18,13 @@ from racecraft.training import settings as settings_module
 from racecraft.training.defaults import RACE, TIME_TRIAL, defaults_for
 from racecraft.training.settings import (
     EVALUATE_EVERY,
+    FAST_DISTILL,
+    FAST_START,
     MAX_ENVS,
     RACE_EVALUATE_EVERY,
     RACE_PPO,
     RACE_TRIALS,
+    SCATTERED,
     VEHICLE_OF_VERSION,
     TrainSettings,
     make_settings,
@@ -126,6 +129,21 @@ def test_what_awss_tools_are_told_is_how_the_algorithm_learns(algorithm: str, ex
     assert expected.items() <= told.items()
     assert ("beta_entropy" in told) == (algorithm == "ppo")
     assert ("lr" in told) == (algorithm != "sb3:dqn")  # the library's own default, which it does not tell
+
+
+def test_a_distillation_of_continuous_actions_is_for_fast_laps() -> None:
+    continuous = ModelMetadata(neural_network="RACECRAFT_SMALL", action_space=action_space("continuous"))
+    fast = make_settings(metadata=continuous, algorithm="distill", num_envs=32)
+    assert fast.distill == replace(FAST_DISTILL, num_envs=32)
+    assert fast.distill.teacher_steps > DistillConfig().teacher_steps
+    assert fast.start == FAST_START
+    own = make_settings(
+        metadata=continuous, algorithm="distill", distill=DistillConfig(teacher_steps=5), start=SETTINGS.start
+    )
+    assert (own.distill.teacher_steps, own.start) == (5, SETTINGS.start)
+    assert make_settings(metadata=continuous, algorithm="distill", track=["oval", "kidney"]).start == SCATTERED
+    for other in (make_settings(metadata=DISCRETE, algorithm="distill"), make_settings(metadata=continuous)):
+        assert (other.distill, other.start) == (DistillConfig(), Start(spread=True))
 
 
 def test_aws_hyperparameters_become_ppo() -> None:

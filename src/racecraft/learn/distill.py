@@ -2,10 +2,12 @@
 
     teacher:  state ──PPO──▶ policy            (no camera is rendered, the user's reward as always)
     student:  drives with its own camera policy ──▶ the teacher says what it would do there ──▶ ReplayMemory ──▶ update
+    refining: the student, with the teacher's critic beside it ──PPO──▶ policy      (camera, the user's reward again)
 
 The student visits its own states and is told the teacher's answer in each of them (DAgger,
 https://arxiv.org/abs/1011.0686), so it learns to come back from its own mistakes. Its loss is the cross-entropy to the
 teacher's distribution of actions, sampled anew for every minibatch. ("Learning by cheating", https://arxiv.org/abs/1912.12294.)
+What a camera sees of the state does not allow to drive as near the edge as a teacher does: refining finds out how near.
 """
 
 from __future__ import annotations
@@ -31,6 +33,20 @@ TEACHER_PPO = PPOConfig(
 )
 """How a teacher learns: rollouts are cheap, so they may be large."""
 
+REFINING_PPO = PPOConfig(
+    num_envs=64, num_steps=32, minibatch_size=512, learning_rate=5e-4, rate_steps=600_000, ent_coef=0.0
+)
+"""How a student goes on with the reward: in small steps, from large rollouts."""
+
+REFINING_STD = 0.12
+"""Standard deviation of the student's continuous actions as it begins to."""
+
+DRIVING_STD = 0.1
+"""Most standard deviation with which a student of continuous actions drives; it says itself how much it errs."""
+
+AVERAGE_FROM = 20_000
+"""Camera steps from which on the student's averaged weights are judged, even if no evaluation has been perfect yet."""
+
 ANSWER_STD = 0.05
 """Standard deviation of a teacher's continuous answers, whatever it explored with: what it knows is the mean."""
 
@@ -45,15 +61,17 @@ class DistillConfig:
     """Steps of each of them in one iteration."""
     teacher_steps: int = 250_000
     """Steps of the teacher before the student begins; they render no camera and do not count as camera steps."""
+    student_steps: int = 150_000
+    """Camera steps after which the student goes on with PPO and the reward itself; 0: never."""
     learning_rate: float = 1.5e-3
     """Adam's step size of the student."""
-    rate_steps: int = 30_000
+    rate_steps: int = 40_000
     """Camera steps after which it is a half of learning_rate, after twice as many a third; 0: never."""
     minibatch_size: int = 128
     """Samples of one gradient step."""
     updates_per_iteration: int = 12
     """Gradient steps of the student after every iteration."""
-    buffer_size: int = 16_000
+    buffer_size: int = 32_000
     """Steps of the student that are remembered, of 4 kB each with the default network."""
 
     def __post_init__(self) -> None:
@@ -69,9 +87,10 @@ class DistillConfig:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 10**9:
                 raise ConfigError(f"{name} is {value!r}, expected a whole number, 1 or more.")
-        steps = self.rate_steps
-        if isinstance(steps, bool) or not isinstance(steps, int) or not 0 <= steps <= 10**9:
-            raise ConfigError(f"rate_steps is {steps!r}, expected a whole number, 0 or more.")
+        for name in ("student_steps", "rate_steps"):
+            steps = getattr(self, name)
+            if isinstance(steps, bool) or not isinstance(steps, int) or not 0 <= steps <= 10**9:
+                raise ConfigError(f"{name} is {steps!r}, expected a whole number, 0 or more.")
         rate = self.learning_rate
         if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 <= rate <= 1:
             raise ConfigError(f"learning_rate is {rate!r}, expected a number from 0 to 1.")
@@ -146,6 +165,8 @@ class Distill:
             ppo = replace(ppo, ent_coef=0.0)
         teacher = NativeStateLearner(teacher_spec, seed=seed, num_threads=num_threads)
         self.teacher = PPO(ppo, teacher, StateWorld(teacher_environment), seed=seed)
+        self.refining: PPO | None = None
+        """What the student goes on with, from the end of its lessons on."""
         self.total_steps = 0
         self.iteration = 0
         self.prefers_average = False
@@ -167,8 +188,14 @@ class Distill:
         """Whether the teacher has learned what it is to learn."""
         return self.teacher.total_steps >= self.config.teacher_steps
 
+    @property
+    def is_refining(self) -> bool:
+        """Whether the student has had its lessons; never where its critic sees the camera, which no teacher taught."""
+        is_over = 0 < self.config.student_steps <= self.total_steps
+        return is_over and self.spec.state_size == self.state_size
+
     def iterate(self) -> IterationStats:
-        """One iteration of the teacher, or, once it has learned, of the student.
+        """One iteration of the teacher, of its student once it has learned, and then of PPO.
 
         Raises:
             TrainingError: Loss or gradient is not finite.
@@ -177,6 +204,11 @@ class Distill:
         if not self.is_teaching:
             stats = self.teacher.iterate()
             return replace(stats, iteration=self.iteration, total_steps=0, num_steps=0)
+        if self.is_refining:
+            self.refining = self.refining or self._begin_refining()
+            stats = self.refining.iterate()
+            self.total_steps = self.refining.total_steps
+            return stats
         rng = np.random.default_rng([self.seed, self.iteration])
         clocks = {"environment": 0.0, "policy": 0.0}
         finished: list[tuple[float, int]] = []
@@ -210,6 +242,8 @@ class Distill:
         noise = distributions.noise_for(
             len(outputs), num_actions=spec.num_actions, is_discrete=spec.is_discrete, rng=rng
         )
+        if not spec.is_discrete:
+            outputs[:, spec.num_actions :] = outputs[:, spec.num_actions :].clip(max=np.float32(np.log(DRIVING_STD)))
         actions = distributions.sample(outputs, noise, is_discrete=spec.is_discrete)
         rows = (self._count + np.arange(len(outputs))) % len(self._answers)
         self._observations[rows] = observations
@@ -284,10 +318,41 @@ class Distill:
             grad_norm=float(np.mean(norms)),
         )
 
+    # ---- refine: PPO from where the lessons end
+
+    def _begin_refining(self) -> PPO:
+        """PPO with the student's averaged weights, its teacher's critic, and some chance in what it does."""
+        weights = {name: array.copy() for name, array in self._average.weights().items()}
+        weights |= {name: array for name, array in self.teacher.learner.weights().items() if name.startswith("critic.")}
+        if not self.spec.is_discrete:
+            weights["policy.log_std"] = np.full_like(weights["policy.log_std"], np.log(REFINING_STD))
+        self.learner.load_weights(weights)
+        ppo = self._make_refining()
+        ppo.iteration, ppo.total_steps = self.iteration - 1, self.total_steps
+        ppo.return_scale = self.teacher.return_scale.copy()
+        return ppo
+
+    def _make_refining(self) -> PPO:
+        samples = self.config.num_envs * REFINING_PPO.num_steps
+        config = replace(
+            REFINING_PPO,
+            num_envs=self.config.num_envs,
+            minibatch_size=min(REFINING_PPO.minibatch_size, samples),
+        )
+        ppo = PPO(config, self.learner, self.environment, seed=self.seed)
+        ppo.prefers_average = True
+        return ppo
+
     @property
     def driving_weights(self) -> Weights:
         """The weights to judge and to save."""
-        return (self._average.weights() if self.prefers_average else {}) or self.learner.weights()
+        if self.refining is not None:
+            return self.refining.driving_weights
+        return (self._average.weights() if self._drives_by_average else {}) or self.learner.weights()
+
+    @property
+    def _drives_by_average(self) -> bool:
+        return self.prefers_average or self.total_steps >= AVERAGE_FROM
 
     @contextmanager
     def driving(self) -> Iterator[None]:
@@ -303,17 +368,20 @@ class Distill:
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Student, teacher, optimisers and counters; not the frames that are remembered."""
+        counters = np.array([self.seed, self.iteration, self.total_steps], np.int64)
+        totals = np.stack([self._totals, self._lengths])
+        lessons = {"distill/counters": counters, "distill/episodes": totals}
+        lessons |= {f"teacher/{name}": array for name, array in self.teacher.state().items()}
+        if self.refining is not None:
+            return {**self.refining.state(), **lessons}
         own = self.learner.weights()
         average = {name: array.copy() for name, array in self._average.weights().items()}
-        driving = (average if self.prefers_average else {}) or own
+        driving = (average if self._drives_by_average else {}) or own
         arrays = {f"weights/{name}": array for name, array in driving.items()}
         arrays |= {f"learning/{name}": array for name, array in own.items()}
         arrays |= {f"average/{name}": array for name, array in average.items()}
         arrays |= {f"optimizer/{name}": array for name, array in self.learner.optimizer_state().items()}
-        arrays |= {f"teacher/{name}": array for name, array in self.teacher.state().items()}
-        counters = np.array([self.seed, self.iteration, self.total_steps], np.int64)
-        totals = np.stack([self._totals, self._lengths])
-        return {**arrays, "distill/counters": counters, "distill/episodes": totals}
+        return {**arrays, **lessons}
 
     def load_state(self, state: dict[str, NDArray[Any]]) -> None:
         """Continue from what ``state`` gave, with no frames remembered; CheckpointError where it does not fit."""
@@ -328,8 +396,13 @@ class Distill:
         if episodes.shape != (2, self.config.num_envs):
             raise CheckpointError(f"The training state is of {episodes.shape[-1]} cars, not of {self.config.num_envs}.")
         self.teacher.load_state(below("teacher/"))
+        self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
+        self._totals, self._lengths = episodes[0].copy(), episodes[1].astype(np.int64)
+        self.refining = None
+        if "ppo/counters" in state:
+            self.refining = self._make_refining()
+            self.refining.load_state(state)
+            return
         self.learner.load_weights(below("learning/"))
         self._average.load(below("average/"), like=self.learner.weights())
         self.learner.load_optimizer_state(below("optimizer/"))
-        self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
-        self._totals, self._lengths = episodes[0].copy(), episodes[1].astype(np.int64)

@@ -100,12 +100,8 @@ class PPOConfig:
         is_open = _is_number(self.clip_coef, 0.0, 1.0) and 0 < self.clip_coef < 1
         _require(self, "clip_coef", is_open, "between 0 and 1")
         _require(self, "value_loss", self.value_loss in ("mse", "huber"), "'mse' or 'huber'")
-        _require(
-            self,
-            "exploration",
-            self.exploration in ("categorical", "e-greedy"),
-            "'categorical' or 'e-greedy'",
-        )
+        is_known = self.exploration in ("categorical", "e-greedy")
+        _require(self, "exploration", is_known, "'categorical' or 'e-greedy'")
 
     @property
     def objective(self) -> Objective:
@@ -213,7 +209,7 @@ class PPO:
         )
         self._episode_returns = np.zeros(config.num_envs)
         self._episode_lengths = np.zeros(config.num_envs, np.int64)
-        self._return_scale = np.array([0.0, 1.0])  # running mean and spread of the returns, in units of reward
+        self.return_scale = np.array([0.0, 1.0])  # running mean and spread of the returns, in units of reward
         self.prefers_average = False
         """Whether the averaged weights drive. The mean of beginners is none: set it once the policy drives well."""
         self._average = WeightAverage(config.average_share)
@@ -380,7 +376,7 @@ class PPO:
         """The critic's values, in units of reward  (N,)."""
         starts = range(0, len(observations), _VALUE_BATCH)
         values = [self.learner.values(observations[i : i + _VALUE_BATCH], states[i : i + _VALUE_BATCH]) for i in starts]
-        mean, spread = self._return_scale
+        mean, spread = self.return_scale
         return np.asarray(np.concatenate(values) * spread + mean, np.float32)
 
     # ---- update: gradient steps on shuffled minibatches
@@ -391,7 +387,7 @@ class PPO:
         config, rollout = self.config, self._rollout
         used = np.flatnonzero(rollout.is_valid[: rollout.num_steps])
         self._follow_returns(returns.reshape(-1)[used])
-        mean, spread = self._return_scale
+        mean, spread = self.return_scale
         b_observations = rollout.observations.reshape(-1, *rollout.observations.shape[2:])
         b_states = rollout.states.reshape(len(b_observations), rollout.states.shape[2])
         b_actions = rollout.actions.reshape(-1, *rollout.actions.shape[2:])
@@ -436,7 +432,7 @@ class PPO:
             return
         mean, spread = distributions.moments(returns)
         seen = np.array([mean, max(spread, 1e-6)])
-        self._return_scale = seen if self.iteration == 0 else 0.9 * self._return_scale + 0.1 * seen
+        self.return_scale = seen if self.iteration == 0 else 0.9 * self.return_scale + 0.1 * seen
 
     # ---- resume
 
@@ -449,7 +445,7 @@ class PPO:
             "ppo/counters": np.array([self.seed, self.iteration, self.total_steps], np.int64),
             "ppo/episode_returns": self._episode_returns.copy(),
             "ppo/episode_lengths": self._episode_lengths.copy(),
-            "ppo/return_scale": self._return_scale.copy(),
+            "ppo/return_scale": self.return_scale.copy(),
         }
         own = self.learner.weights()
         average = {name: array.copy() for name, array in self._average.weights().items()}
@@ -484,7 +480,7 @@ class PPO:
         self.learner.load_optimizer_state(_below("optimizer/", state))
         self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
         self._episode_returns, self._episode_lengths = returns.copy(), lengths.copy()
-        self._return_scale = scale.copy()
+        self.return_scale = scale.copy()
 
 
 def _below(prefix: str, arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

@@ -220,7 +220,7 @@ class CudaPPO(PPO):
         """Fill advantages and returns, normalised as `PPO` does it; the share of variance that the critic explains."""
         config = self.config
         shape = self._rewards.shape
-        mean, spread = (float(number) for number in self._return_scale)
+        mean, spread = (float(number) for number in self.return_scale)
         observations = self._observations.view(-1, *self._observations.shape[2:])
         estimates = self.learner.estimates(observations, self._states.view(-1, self._states.shape[2]))
         values = estimates.view(shape) * spread + mean
@@ -241,8 +241,8 @@ class CudaPPO(PPO):
         return_mean, return_spread, centre, scale = found.tolist()
         if config.normalize_returns:
             seen = np.array([return_mean, max(return_spread, 1e-6)])
-            self._return_scale = seen if self.iteration == 0 else 0.9 * self._return_scale + 0.1 * seen
-        mean, spread = (float(number) for number in self._return_scale)
+            self.return_scale = seen if self.iteration == 0 else 0.9 * self.return_scale + 0.1 * seen
+        mean, spread = (float(number) for number in self.return_scale)
         self._returns.copy_(((returns - mean) / spread).view(-1))
         self._advantages.copy_(((advantages - centre) / (scale + 1e-8)).view(-1))
         return 1 - (scale / return_spread) ** 2 if return_spread > 0 else float("nan")

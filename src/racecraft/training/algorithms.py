@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -16,13 +17,11 @@ from racecraft.learn.distill import TEACHER_PPO
 from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import EpisodeCounter
 from racecraft.sim import Simulation
-from racecraft.sim.columns import STATUS_NAMES
 from racecraft.track import Track
 from racecraft.training.cuda_environment import CudaTrainingEnvironment
 from racecraft.training.environment import TrainingEnvironment
 from racecraft.training.settings import TrainSettings
 
-_LAP_COMPLETE: Final = STATUS_NAMES.index("lap_complete")
 TEACHER_SEED: Final = 0x74656163
 """The teacher's starts are not its student's."""
 
@@ -66,21 +65,11 @@ def make_algorithm(
 
 
 class _WithoutCamera(TrainingEnvironment):
-    """Cars that tell their state only, and for which the road goes on behind the finish line.
-
-    Who is to be fast must cross the line as one who drives on. The state does not say how far the line is, so an end
-    there would only look like chance: the lap's end cuts the episode, and the critic's value stands for what follows.
-    """
+    """Cars that tell their state only."""
 
     def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """No frames, and the privileged state (N, S), a view."""
         return np.zeros((self.num_envs, 0), np.uint8), self.simulation.state
-
-    def step(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
-        """As of `TrainingEnvironment`, but a completed lap truncates."""
-        rewards, terminated, truncated = super().step(actions)
-        is_lap = terminated & (self.simulation.column("status") == _LAP_COMPLETE)
-        return rewards, terminated & ~is_lap, truncated | is_lap
 
 
 def teacher_environment(
@@ -106,7 +95,7 @@ def teacher_environment(
         seed=(settings.seed + TEACHER_SEED) % 2**32,
         vehicle=settings.vehicle,
         camera=None,
-        start=settings.start,
+        start=replace(settings.start, spread=True),
         direction=settings.direction,
         track_order="random" if len(tracks) > 1 else "fixed",
         objects=settings.objects,
@@ -121,7 +110,7 @@ def teacher_environment(
             num_objects=settings.objects.count,
         )
     )
-    return _WithoutCamera(simulation, worker, action_space, counter=EpisodeCounter(num_envs))
+    return _WithoutCamera(simulation, worker, action_space, counter=EpisodeCounter(num_envs), goes_on=True)
 
 
 def _import(module: str, algorithm: str, *, extra: str) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,13 @@ from racecraft.errors import RewardError, RunError
 from racecraft.reward.worker import RewardWorker
 from racecraft.run import Episode, EpisodeCounter, PrintLog, SimTraceWriter
 from racecraft.sim import CudaSimulation, Simulation
+from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.track import Track
 from racecraft.training.opponents import OpponentPool
 from racecraft.training.settings import TrainSettings
+
+_STATUS: Final = ROW_COLUMNS.index("status")
+_LAP_COMPLETE: Final = STATUS_NAMES.index("lap_complete")
 
 
 class TrainingEnvironment:
@@ -39,6 +43,9 @@ class TrainingEnvironment:
         trace: Logs every step; None for no log.
         prints: Keeps what the reward function prints; None drops it.
         opponents: Drive the other cars of every race; None where each car races alone.
+        goes_on: Whether the road goes on behind the finish line for who learns. Who is to be fast must cross it as one
+            who drives on, and neither camera nor state says how far it is, so an end there would only look like
+            chance: with this a lap's end cuts the episode, and the critic's value stands for what follows.
     """
 
     def __init__(
@@ -52,6 +59,7 @@ class TrainingEnvironment:
         trace: SimTraceWriter | None = None,
         prints: PrintLog | None = None,
         opponents: OpponentPool | None = None,
+        goes_on: bool = False,
     ) -> None:
         self.simulation = simulation
         self.worker = worker
@@ -61,6 +69,7 @@ class TrainingEnvironment:
         self.trace = trace
         self.prints = prints
         self.opponents = opponents
+        self.goes_on = goes_on
         self._own: slice | NDArray[np.intp] = slice(None) if opponents is None else opponents.own
         self.reward_seconds = 0.0
         self.trace_seconds = 0.0
@@ -111,6 +120,9 @@ class TrainingEnvironment:
             self.opponents.bring_back()
         self.reward_seconds += paid - moved
         self.trace_seconds += time.perf_counter() - paid
+        if self.goes_on:
+            is_lap = terminated & (rows[:, _STATUS] == _LAP_COMPLETE)
+            return rewards, terminated & ~is_lap, truncated | is_lap
         return rewards, terminated, truncated
 
     def _keep_prints(self) -> None:

@@ -213,6 +213,7 @@ class Training:
                     trace=trace,
                     prints=prints,
                     opponents=opponents,
+                    goes_on=settings.algorithm == "distill",
                 )
             else:
                 environment = CudaTrainingEnvironment(

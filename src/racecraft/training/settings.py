@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
@@ -40,6 +41,11 @@ RACE_PPO: Final = PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4
 """Among boxes and other cars, which take ten times the steps of a lap on a free road."""
 RACE_GOOD: Final = 0.6
 """Mean completion of an evaluation from which on, among objects, the averaged weights drive."""
+FAST_DISTILL: Final = DistillConfig(teacher_steps=2_000_000)
+"""For continuous actions, whose teacher goes on getting faster for so long."""
+FAST_START: Final = Start(advance=0.25, lateral_jitter=0.02, heading_jitter=math.radians(2.0))
+"""Where episodes start then: every fourth as a race does, since a car that comes from standing meets the first corner
+otherwise than one that flies past the line, as the other three do."""
 RACING: Final = Start(mode="random", lateral_jitter=0.05, shuffle=True)
 """Where races of several cars start: anywhere, and in any order."""
 SCATTERED: Final = Start(mode="random", lateral_jitter=0.12, heading_jitter=0.2)
@@ -273,6 +279,8 @@ def make_settings(
             f"hyperparameters.json is for AWS's algorithms, {algorithm} is none of them.", hint="Leave it out."
         )
     kind = algorithm.split(":")[0]
+    if algorithm == "distill" and metadata.action_space.kind == "continuous":
+        settings = {"distill": FAST_DISTILL, **({} if is_far else {"start": FAST_START}), **settings}
     if num_envs and kind != "ppo":
         _check_num_envs(num_envs, MAX_ENVS)
         begin: dict[str, Any] = {"sac": SACConfig(), "distill": DistillConfig(), "sb3": SB3Config()}
