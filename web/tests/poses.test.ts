@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { scale, span } from "../src/lib/colors";
 import { viewBox } from "../src/lib/geometry";
 import { clock, percent, seconds } from "../src/lib/numbers";
-import { between, turn, type Look } from "../src/lib/poses";
+import { between, halfway, turn, type Look } from "../src/lib/poses";
 import { de } from "../src/i18n/de";
 import { en } from "../src/i18n/en";
 
@@ -23,6 +23,13 @@ describe("cars between two looks", () => {
   });
   it("are where they are when nothing came before", () => {
     expect(between(undefined, now, 0.3)[0]!.x).toBe(1);
+  });
+  it("go on from where they are when the next look comes early", () => {
+    const next = look([[2000, 0, -3100, 0, 0, 0], [2000, 0, 0, 0, 0, 0], [9000, 0, 0, 0, 0, 0]], [7, 3, 7]);
+    const here = halfway(before, now, 0.5);
+    expect(between(here, next, 0)[0]!.x).toBeCloseTo(0.5);
+    expect(between(here, next, 0.5)[0]!.x).toBeCloseTo(1.25);
+    expect(here.steps).toEqual(now.steps);
   });
   it("turn by less than half a turn", () => {
     expect(turn(3, -3)).toBeCloseTo(2 * Math.PI - 6);

@@ -9,14 +9,20 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import Final
 
 from racecraft.errors import RunError
 from racecraft.serve.quick import loading
 from racecraft.serve.settings import ARTIFACTS, DATABASE
 
+NICENESS: Final = 5
+"""Jobs leave most of the processor to pages and 3D views, which stay smooth beside a training."""
+
 
 def main(runs: str) -> int:
     """Do one job; the exit status is 0 unless the process itself failed."""
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
     with loading():
         from racecraft.serve.worker import do_job
 

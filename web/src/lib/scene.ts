@@ -6,7 +6,7 @@ import type { TrackGeometry } from "../api/client";
 import { carGeometry } from "./car";
 import { fieldGeometry, RISE, roadGeometry } from "./ground";
 import { Paint, paintGround } from "./paint";
-import { between, type Look } from "./poses";
+import { between, halfway, type Look } from "./poses";
 import { Sharpness } from "./sharpness";
 
 export type View = "orbit" | "follow" | "top" | "chase" | "driver";
@@ -27,7 +27,8 @@ export interface Trail {
 }
 
 const MAX_CARS = 256;
-const COARSEST = 0.6; // pixels per CSS pixel, along a side
+const COARSEST = 0.7; // pixels per CSS pixel, along a side
+const LATE = 1.4; // times the usual, after which the next look at the latest is expected
 const STILL = 400; // ms without a change, after which the picture is drawn as sharp as it can be
 
 /** Whether WebGL is drawn by the processor: smooth edges would cost it more than everything else. */
@@ -73,7 +74,7 @@ export class Scene {
     const isSlow = isSoftware();
     const finest = Math.min(devicePixelRatio, 2);
     this.renderer = new three.WebGLRenderer({ canvas, antialias: !isSlow, powerPreference: "high-performance" });
-    this.sharpness = new Sharpness(finest, COARSEST, isSlow ? 0.7 : finest);
+    this.sharpness = new Sharpness(finest, COARSEST, isSlow ? 0.85 : finest);
     this.renderer.setPixelRatio(this.sharpness.ratio);
     this.camera.up.set(0, 0, 1);
     const box = new three.Box2().setFromPoints([...track.outer, ...track.inner].map(([x, y]) => new three.Vector2(x, y)));
@@ -109,8 +110,9 @@ export class Scene {
   /** The newest moment. */
   show(look: Look): void {
     const time = performance.now();
+    const from = this.now && halfway(this.before, this.now, this.share(time));
     if (this.now) this.interval += 0.2 * (Math.min(time - this.arrived, 1000) - this.interval);
-    [this.before, this.now, this.arrived] = [this.now, look, time];
+    [this.before, this.now, this.arrived] = [from, look, time];
     this.isDirty = true;
   }
 
@@ -188,10 +190,15 @@ export class Scene {
     this.isDirty = true;
   }
 
+  /** Of the way to the newest look, 0 to 1; they come unevenly, and the cars had better not stop before a late one. */
+  private share(time: number): number {
+    return this.isCalm ? 1 : Math.min(Math.max(time - this.arrived, 0) / (LATE * this.interval), 1);
+  }
+
   private readonly draw = (time: number): void => {
     this.frame = requestAnimationFrame(this.draw);
-    const share = this.isCalm ? 1 : Math.min((time - this.arrived) / this.interval, 1);
-    const isMoving = this.now !== undefined && time - this.arrived < this.interval + 50;
+    const share = this.share(time);
+    const isMoving = this.now !== undefined && !this.isCalm && time - this.arrived < LATE * this.interval + 50;
     if (isMoving || this.isDirty) {
       const isSteady = !this.isSharp && time - this.drawn < STILL;
       if ((isSteady && this.sharpness.took(time - this.drawn)) || this.isSharp) this.sharpen(this.sharpness.ratio);
