@@ -19,6 +19,12 @@ from racecraft.training.opponents import CURRENT, OpponentPool, Opponents
 SELF = Opponents(cars=3, pool_size=4, snapshot_every=64)
 
 
+def test_the_name_that_errors_recommend_is_there() -> None:
+    assert training.Opponents is Opponents
+    assert all(hasattr(training, name) for name in training.__all__)
+    assert not hasattr(training, "Oponents")
+
+
 def test_a_run_against_itself_killed_at_any_iteration_resumes_as_if_it_never_was(tiny: Train, tmp_path: Path) -> None:
     copies: list[Path] = []
 

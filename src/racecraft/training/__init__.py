@@ -33,6 +33,15 @@ __all__ = [
 ]
 
 
+def __getattr__(name: str) -> Any:
+    """Import what few trainings need on first use."""
+    if name == "Opponents":
+        from racecraft.training.opponents import Opponents
+
+        return Opponents
+    raise AttributeError(f"module 'racecraft.training' has no attribute {name!r}")
+
+
 def train(
     track: str | Path | Sequence[str | Path] | None = None,
     *,
