@@ -170,21 +170,32 @@ AHEAD = {
 }
 
 
-def test_overtake_is_racing_with_something_for_passing():
-    alone = {key: AHEAD[key] for key in ("projection_distance", "track_length", "distance_from_center")}
-    free = reward("racing", speed=3.0, distance_from_center=0.1)
-    assert reward("overtake", speed=3.0, **alone) == pytest.approx(free)
-    assert reward("overtake", speed=3.0, **{**AHEAD, "objects_distance": [12.5]}) == pytest.approx(free)
-    assert reward("overtake", speed=3.0, **{**AHEAD, "objects_distance": [9.0]}) == pytest.approx(free)  # behind
+def overtake(gained: float, **params) -> float:
+    """Its reward for a step in which the car gained so many metres."""
+    namespace: dict = {}
+    exec(compile(load_preset("overtake"), "overtake", "exec"), namespace)
+    length = params.setdefault("track_length", 20.0)
+    for steps, progress in ((2.0, 10.0), (3.0, 10.0 + 100.0 * gained / length)):
+        paid = namespace["reward_function"](TEMPLATE | ROAD | {"steps": steps, "progress": progress} | params)
+    return paid
+
+
+def test_overtake_is_lap_time_with_something_for_passing():
+    alone = {key: AHEAD[key] for key in ("projection_distance", "distance_from_center")}
+    assert overtake(0.2, **alone) == pytest.approx(0.2)
+    assert overtake(0.2, **{**AHEAD, "objects_distance": [12.5]}) == pytest.approx(0.2)
+    assert overtake(0.2, **{**AHEAD, "objects_distance": [9.0]}) == pytest.approx(0.2)  # behind
     # 1 m behind a car, half of the way into its reach: straight behind it, and with room to pass
-    assert reward("overtake", speed=3.0, is_left_of_center=True, **AHEAD) == pytest.approx(free * 0.6)
+    assert overtake(0.2, is_left_of_center=True, **AHEAD) == pytest.approx(0.2 * 0.6)
     beside = {**AHEAD, "objects_distance_from_center": [0.2]}
-    gained = (3.0 - 1.0) / 15
-    assert reward("overtake", speed=3.0, is_left_of_center=False, **beside) == pytest.approx(free + 0.5 * gained)
+    passed = 0.2 - 1.0 / 15  # metres gained on it
+    assert overtake(0.2, is_left_of_center=False, **beside) == pytest.approx(0.2 + 0.5 * passed)
     mirrored = {**beside, "objects_left_of_center": [False], "is_left_of_center": True}
-    assert reward("overtake", speed=3.0, **mirrored) == pytest.approx(free + 0.5 * gained)
+    assert overtake(0.2, **mirrored) == pytest.approx(0.2 + 0.5 * passed)
+    assert overtake(0.05, **mirrored) == pytest.approx(0.05)  # the other one drives away
     # around the end of the lap
     wrapped = {**AHEAD, "projection_distance": 19.5, "objects_distance": [0.5], "is_left_of_center": True}
-    assert reward("overtake", speed=3.0, **wrapped) == pytest.approx(free * 0.6)
-    assert reward("overtake", is_offtrack=True, **AHEAD) == -1.0
-    assert reward("overtake", is_crashed=True, is_offtrack=True, **AHEAD) == -2.0
+    assert overtake(0.2, **wrapped) == pytest.approx(0.2 * 0.6)
+    assert overtake(0.2, is_offtrack=True, **AHEAD) == -1.0
+    assert overtake(0.2, is_crashed=True, is_offtrack=True, **AHEAD) == -2.0
+    assert reward("overtake", steps=7.0, progress=50.0, **AHEAD) == 0.0  # the first step it sees
