@@ -32,7 +32,7 @@ def test_a_run_against_itself_killed_at_any_iteration_resumes_as_if_it_never_was
         copies.append(tmp_path / "killed" / str(step))
         shutil.copytree(tmp_path / "runs" / "undisturbed", copies[-1])
 
-    settings = {"opponents": SELF, "until": "768 steps", "evaluate_every": 192}
+    settings = {"opponents": SELF, "until": "768 steps", "evaluate_every": 192, "actions": "default"}
     result = tiny(name="undisturbed", reporter=Recorder(copy), **settings)
     for path in copies[::3]:
         resumed = resume(path)

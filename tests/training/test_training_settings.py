@@ -10,13 +10,17 @@ import pytest
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.errors import ConfigError, RunError
 from racecraft.learn import DistillConfig, PPOConfig, SACConfig
-from racecraft.reward import load_preset
+from racecraft.reward import load_preset, load_reward
 from racecraft.sim import Bots, Objects, Obstacles, Start, Vehicle
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.training import Until, train
 from racecraft.training import settings as settings_module
-from racecraft.training.defaults import RACE, TIME_TRIAL, defaults_for
+from racecraft.training.defaults import DUEL, RACE, TIME_TRIAL, defaults_for
+from racecraft.training.opponents import Opponents
+from racecraft.training.plan import make_plan
 from racecraft.training.settings import (
+    DUEL_EVALUATE_EVERY,
+    DUEL_PPO,
     EVALUATE_EVERY,
     FAST_DISTILL,
     FAST_START,
@@ -32,6 +36,7 @@ from racecraft.training.settings import (
 from racecraft.training.start import aws_hyperparameters
 
 DISCRETE = ModelMetadata(neural_network="RACECRAFT_SMALL")
+CONTINUOUS = replace(DISCRETE, action_space=action_space("continuous"))
 SETTINGS = TrainSettings(
     track="oval",
     until=Until(laps=3, seconds=100.1, steps=12_345_678),
@@ -260,6 +265,21 @@ def test_among_objects_training_takes_its_time(objects: Objects) -> None:
     assert make_settings(metadata=DISCRETE).evaluate_every == EVALUATE_EVERY
     with pytest.raises(ConfigError, match="5 or minutes"):
         train("oval", objects=objects, until="5 or minutes")
+
+
+def test_against_other_models_training_takes_its_time() -> None:
+    rivals = Opponents()
+    assert (defaults_for(NO_OBJECTS, rivals), defaults_for(NO_OBJECTS, None)) == (DUEL, TIME_TRIAL)
+    assert defaults_for(Objects(bots=Bots(count=1)), rivals) == RACE
+    settings = make_settings(metadata=CONTINUOUS, opponents=rivals)
+    assert (settings.ppo, settings.evaluate_every) == (replace(DUEL_PPO, ent_coef=0.0), DUEL_EVALUATE_EVERY)
+    chosen = make_settings(metadata=CONTINUOUS, opponents=rivals, ppo=PPOConfig(), evaluate_every=7)
+    assert (chosen.ppo, chosen.evaluate_every) == (PPOConfig(), 7)
+    alone = make_settings(metadata=CONTINUOUS)
+    assert (alone.ppo, alone.evaluate_every) == (PPOConfig(ent_coef=0.0), EVALUATE_EVERY)
+    plan = make_plan(opponents=rivals)
+    assert (plan.settings.until, plan.metadata.action_space) == (Until(seconds=600), action_space("continuous"))
+    assert plan.reward == load_reward("overtake")
 
 
 def test_a_training_among_objects_has_the_reward_and_the_actions_of_its_race(tmp_path: Path) -> None:

@@ -32,7 +32,9 @@ def train(
     ] = [DEFAULT_TRACK],  # noqa: B006 (Typer copies it)
     reward: Annotated[
         str,
-        typer.Option("--reward", "-r", help="Preset, or path of a reward_function.py; racing, or dodge in a race."),
+        typer.Option(
+            "--reward", "-r", help="Preset or reward_function.py; racing, among objects dodge, head to head overtake."
+        ),
     ] = "",
     until: Annotated[
         str,
@@ -41,7 +43,10 @@ def train(
         ),
     ] = "",
     actions: Annotated[
-        str, typer.Option("--actions", help="default, aws, fast, safe, continuous, or steady, which races take.")
+        str,
+        typer.Option(
+            "--actions", help="default, aws, fast, safe, continuous (head to head) or steady (among objects)."
+        ),
     ] = "",
     sensors: Annotated[
         str, typer.Option("--sensors", help="AWS's names, joined by +; FRONT_FACING_CAMERA, in a race with LIDAR.")
@@ -79,7 +84,8 @@ def train(
     evaluate_every: Annotated[
         int,
         typer.Option(
-            "--evaluate-every", help="Camera steps between evaluations; 25,000 in a race, 50,000 on several tracks."
+            "--evaluate-every",
+            help="Camera steps between evaluations; 25,000 among objects, 50,000 head to head or on several tracks.",
         ),
     ] = 4096,
     num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
@@ -112,7 +118,7 @@ def train(
 
     race, rivals = race_options.opponents_of(race, opponents=opponents, cars=cars)
     on_track = race_options.objects_of(race, context.params)
-    reward = reward or defaults_for(on_track).reward
+    reward = reward or defaults_for(on_track, rivals).reward
     where = Path(track[0]).stem if len(track) == 1 else f"{len(track)} tracks"
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
     if parent is not None:

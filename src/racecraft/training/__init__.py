@@ -65,11 +65,13 @@ def train(
     Args:
         track: Name of a track, or path of a track file; or several, as `racecraft.track.load_tracks` reads them; by
             default ``reinvent_2018``.
-        reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``, among objects ``dodge``.
+        reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``, among objects ``dodge``,
+            against opponents ``overtake``.
         until: When to stop: ``"5 laps"`` (the default), ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or
-            several joined by ``or``; among objects by default ``"20 laps or 5 minutes"``.
+            several joined by ``or``; among objects by default ``"20 laps or 5 minutes"``, against opponents
+            ``"10 minutes"``.
         actions: Action space or name of a preset, where no `model_metadata` is given; by default ``default``, among
-            objects ``steady``.
+            objects ``steady``, against opponents ``continuous``.
         sensors: AWS's names, one camera and at most one LIDAR, where no `model_metadata` is given; by default the front
             camera, among objects with a ``LIDAR``.
         model_metadata: AWS's file: action space, sensors, network, version.

@@ -1,4 +1,4 @@
-"""What a training does where nothing else is said: against the clock, and among boxes and other cars."""
+"""What a training does where nothing else is said: against the clock, among boxes and bots, against other models."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from racecraft.sim.objects import Objects
+from racecraft.training.opponents import Opponents
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,12 @@ TIME_TRIAL: Final = Defaults("racing", "default", "5 laps", ("FRONT_FACING_CAMER
 RACE: Final = Defaults("dodge", "steady", "20 laps or 5 minutes", ("FRONT_FACING_CAMERA", "LIDAR"))
 """Among objects: 1 m/s, a reward that knows what is ahead, and a LIDAR, which sees what is beside the car."""
 
+DUEL: Final = Defaults("overtake", "continuous", "10 minutes", ("FRONT_FACING_CAMERA",))
+"""Against other models: the speed that a race is won by, and time to find it."""
 
-def defaults_for(objects: Objects) -> Defaults:
-    """The choices for a training with these objects on its track."""
-    return RACE if objects.count else TIME_TRIAL
+
+def defaults_for(objects: Objects, opponents: Opponents | None = None) -> Defaults:
+    """The choices for a training with these objects on its track, and these drivers of other cars."""
+    if objects.count:
+        return RACE
+    return TIME_TRIAL if opponents is None else DUEL

@@ -77,8 +77,10 @@ def make_plan(
     if parent is not None and not isinstance(parent, Parent):
         parent = open_parent(parent)
     theirs = None if parent is None else parent.folder
-    objects = settings.get("objects", NO_OBJECTS if theirs is None else read_settings(theirs).objects)
-    defaults = defaults_for(objects)
+    before = None if theirs is None else read_settings(theirs)
+    objects = settings.get("objects", NO_OBJECTS if before is None else before.objects)
+    opponents = settings.get("opponents", None if before is None else before.opponents)
+    defaults = defaults_for(objects, opponents)
     limit = Until.parse(until or defaults.until) if isinstance(until, str) else until
     source = load_reward(reward or defaults.reward) if reward or theirs is None else theirs.read_reward_function()
     if model_metadata is not None:

@@ -46,6 +46,16 @@ FAST_DISTILL: Final = DistillConfig(teacher_steps=2_000_000)
 FAST_START: Final = Start(advance=0.25, lateral_jitter=0.02, heading_jitter=math.radians(2.0))
 """Where episodes start then: every fourth as a race does, since a car that comes from standing meets the first corner
 otherwise than one that flies past the line, as the other three do."""
+DUEL_EVALUATE_EVERY: Final = 50_000
+DUEL_PPO: Final = PPOConfig(
+    num_envs=128,
+    minibatch_size=256,
+    learning_rate=1e-3,
+    rate_steps=1_500_000,
+    growth_steps=200_000,
+    ent_coef=0.005,
+)
+"""Against other models: the first minute learns to drive, and what the next nine learn are tenths of a second."""
 RACING: Final = Start(mode="random", lateral_jitter=0.05, shuffle=True)
 """Where races of several cars start: anywhere, and in any order."""
 SCATTERED: Final = Start(mode="random", lateral_jitter=0.12, heading_jitter=0.2)
@@ -262,10 +272,17 @@ def make_settings(
     if is_race:
         settings = {"evaluation_trials": RACE_TRIALS, **settings}
     is_cuda = settings.get("device", "cpu") != "cpu"
-    if settings.get("opponents") is not None:
+    is_duel = settings.get("opponents") is not None
+    if is_duel:
         settings = {"start": RACING, **settings}
+    suited, often = PPOConfig(), EVALUATE_EVERY
+    if is_far:
+        suited, often = FAR_PPO, FAR_EVALUATE_EVERY
+    elif is_race:
+        suited, often = RACE_PPO, RACE_EVALUATE_EVERY
+    elif is_duel:
+        suited, often = DUEL_PPO, DUEL_EVALUATE_EVERY
     if settings.get("evaluate_every", 0) == 0:
-        often = FAR_EVALUATE_EVERY if is_far else RACE_EVALUATE_EVERY if is_race else EVALUATE_EVERY
         settings["evaluate_every"] = max(often, CUDA_EVALUATE_EVERY) if is_cuda else often
     algorithm = algorithm or ("sac" if metadata.training_algorithm == "sac" else "ppo")
     _check_actions(algorithm, metadata)
@@ -291,7 +308,7 @@ def make_settings(
         learning: dict[str, Any] = hyperparameters.to_ppo()
         ppo = PPOConfig(**learning, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
     elif ppo is None:
-        ppo = CUDA_PPO if is_cuda else FAR_PPO if is_far else RACE_PPO if is_race else PPOConfig()
+        ppo = CUDA_PPO if is_cuda else suited
         if metadata.action_space.kind == "continuous":
             # A Gaussian keeps its spread by itself; a bonus for entropy would make it grow and the car restless.
             ppo = replace(ppo, ent_coef=0.0)
