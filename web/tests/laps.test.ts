@@ -72,4 +72,11 @@ describe("files", () => {
     expect(ticks(0, 1, 5)).toEqual([0, 0.2, 0.4, 0.6, 0.8, 1]);
     expect(ticks(2, 2)).toEqual([2]);
   });
+  it("counts in whole numbers, and marks what was best", () => {
+    expect(ticks(0, 3, 8)).toContain(0.5);
+    expect(ticks(0, 3, 8, true)).toEqual([0, 1, 2, 3]);
+    expect(ticks(0, 40, 8, true)).toEqual([0, 5, 10, 15, 20, 25, 30, 35, 40]);
+    const svg = chartSvg({ title: "", x: [0, 1], lines: [], xLabel: "", marks: [1], mark: "green", ink: "#000", quiet: "#555", grid: "#ddd", card: "#fff" });
+    expect(svg).toContain('fill="green">★</text>');
+  });
 });

@@ -45,6 +45,8 @@ describe("what is drawn", () => {
   it("has a range even when all values are the same, or none is known", () => {
     expect(span([3, 3, null])).toEqual([2.5, 3.5]);
     expect(span([null])).toEqual([0, 1]);
+    expect(span([2, 2.1], 0.5)).toEqual([1.8, 2.3]);
+    expect(span([2, 4], 0.5)).toEqual([2, 4]);
   });
   it("fits its frame", () => {
     expect(viewBox([[[0, 0], [2, 1]]], 1)).toBe("-1.000 -2.000 4.000 3.000");

@@ -10,18 +10,19 @@ const [WIDTH, LEFT, RIGHT, TOP, BOTTOM] = [960, 70, 20, 40, 46];
 
 const escape = (text: string) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
 
-/** Round numbers from low to high, about so many. */
-export function ticks(low: number, high: number, count = 6): number[] {
+/** Round numbers from low to high, about so many; of what is counted, whole ones. */
+export function ticks(low: number, high: number, count = 6, isWhole = false): number[] {
   if (!(high > low)) return [low];
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * ([1, 2, 2.5, 5].find((factor) => power * factor >= rough * 0.999) ?? 10);
+  const round = power * ([1, 2, 2.5, 5].find((factor) => power * factor >= rough * 0.999) ?? 10);
+  const step = isWhole ? Math.max(1, Math.ceil(round)) : round;
   const found: number[] = [];
   for (let index = Math.ceil(low / step - 1e-9); index * step <= high + 1e-9 * step; index++) found.push(+(index * step).toPrecision(12));
   return found;
 }
 
-export function chartSvg(chart: { title: string; x: number[]; lines: ChartLine[]; xLabel: string; isPercent?: boolean; height?: number; ink: string; quiet: string; grid: string; card: string }): string {
+export function chartSvg(chart: { title: string; x: number[]; lines: ChartLine[]; xLabel: string; isPercent?: boolean; isWhole?: boolean; marks?: number[]; mark?: string; height?: number; ink: string; quiet: string; grid: string; card: string }): string {
   const height = chart.height ?? 420;
   const known = chart.lines.flatMap((line) => line.values.filter((value): value is number => value !== null));
   const [x0, x1] = chart.x.length ? [Math.min(...chart.x), Math.max(...chart.x)] : [0, 1];
@@ -37,13 +38,17 @@ export function chartSvg(chart: { title: string; x: number[]; lines: ChartLine[]
     parts.push(`<path d="M${LEFT} ${py(tick).toFixed(1)}H${WIDTH - RIGHT}" stroke="${chart.grid}"/>`);
     parts.push(text(LEFT - 8, py(tick) + 4, chart.isPercent ? `${Math.round(100 * tick)} %` : String(tick), 'text-anchor="end"'));
   }
-  for (const tick of ticks(x0, x1, 8)) parts.push(text(px(tick), height - BOTTOM + 20, String(tick), 'text-anchor="middle"'));
+  for (const tick of ticks(x0, x1, 8, chart.isWhole)) parts.push(text(px(tick), height - BOTTOM + 20, String(tick), 'text-anchor="middle"'));
   parts.push(text(WIDTH - RIGHT, height - 8, chart.xLabel, 'text-anchor="end"'));
   parts.push(`<text x="${LEFT}" y="24" font-weight="600" font-size="15" fill="${chart.ink}">${escape(chart.title)}</text>`);
   let place = WIDTH - RIGHT;
   for (const line of [...chart.lines].reverse()) {
     parts.push(text(place, 24, line.label, `text-anchor="end" fill="${line.color}"`));
     place -= 9 * line.label.length + 18;
+  }
+  for (const place of chart.marks ?? []) {
+    parts.push(`<path d="M${px(place).toFixed(1)} ${TOP}V${height - BOTTOM}" stroke="${chart.mark ?? chart.ink}" stroke-dasharray="4 4"/>`);
+    parts.push(text(px(place), TOP - 2, "★", `text-anchor="middle" font-size="14" fill="${chart.mark ?? chart.ink}"`));
   }
   for (const line of chart.lines) {
     if (line.points) {

@@ -16,10 +16,12 @@ export function scale(share: number): string {
   return `rgb(${mixed.join(" ")})`;
 }
 
-/** Smallest and largest of some numbers, null left out; never equal. */
-export function span(values: Iterable<number | null>): [number, number] {
+/** Smallest and largest of some numbers, null left out; never equal, and no closer than `least`, so that noise is not painted as if it mattered. */
+export function span(values: Iterable<number | null>, least = 0): [number, number] {
   let [low, high] = [Infinity, -Infinity];
   for (const value of values) if (value !== null) [low, high] = [Math.min(low, value), Math.max(high, value)];
   if (!Number.isFinite(low)) return [0, 1];
+  const short = least - (high - low);
+  if (short > 0) return [low - short / 2, high + short / 2];
   return high > low ? [low, high] : [low - 0.5, low + 0.5];
 }
