@@ -36,6 +36,15 @@ def test_the_committed_openapi_is_the_servers() -> None:
     assert json.loads((WEB / "openapi.json").read_text()) == document()
 
 
+def test_the_editor_knows_every_key_of_params() -> None:
+    import re
+
+    from racecraft.reward.params import TEMPLATE
+
+    source = (WEB / "src" / "lib" / "params.ts").read_text()
+    assert re.findall(r"^  (\w+): \"", source, re.MULTILINE) == list(TEMPLATE)
+
+
 def test_the_lock_file_names_no_registry() -> None:
     assert "resolved" not in (WEB / "package-lock.json").read_text()
 
@@ -119,6 +128,8 @@ def test_mistakes_are_shown_where_they_are(visited: tuple[RunningConsole, Any]) 
     console, page = visited
     page.goto(f"{console.client.base_url}/create")
     page.get_by_text("The function is fine.").wait_for()
+    page.locator(".cm-line", has_text='"is_offtrack"').get_by_text('"is_offtrack"').hover()
+    page.locator(".cm-tooltip", has_text="No wheel is on the road.").wait_for()
     editor = page.locator(".cm-content")
     editor.click()
     page.keyboard.press("ControlOrMeta+a")

@@ -4,10 +4,11 @@ import { python } from "@codemirror/lang-python";
 import { HighlightStyle, syntaxHighlighting } from "@codemirror/language";
 import { lintGutter, setDiagnostics } from "@codemirror/lint";
 import { Compartment } from "@codemirror/state";
-import { EditorView, keymap } from "@codemirror/view";
+import { EditorView, hoverTooltip } from "@codemirror/view";
 import { tags } from "@lezer/highlight";
 import { basicSetup } from "codemirror";
-import { PARAMS } from "./params";
+import { t } from "../i18n/index.svelte";
+import { paramAt, PARAMS, type Param } from "./params";
 
 interface Mistake { line: number; column: number; severity: string; message: string }
 
@@ -25,6 +26,8 @@ const look = (isDark: boolean) =>
       ".cm-gutters": { backgroundColor: "var(--page)", color: "var(--quiet)", border: "none" },
       ".cm-activeLine, .cm-activeLineGutter": { backgroundColor: "color-mix(in srgb, var(--ink) 5%, transparent)" },
       ".cm-cursor": { borderLeftColor: "var(--ink)" },
+      ".cm-param": { padding: "8px 12px", maxWidth: "340px", fontFamily: "var(--font)" },
+      ".cm-param span": { marginLeft: "10px", color: "var(--quiet)", fontFamily: "var(--mono)" },
       ".cm-tooltip": { backgroundColor: "var(--card)", border: "1px solid var(--line)", borderRadius: "8px" },
     },
     { dark: isDark },
@@ -34,8 +37,25 @@ function complete(context: CompletionContext) {
   const word = context.matchBefore(/params\[["']\w*|params\.get\(["']\w*/);
   if (!word) return null;
   const from = word.from + word.text.search(/\w*$/);
-  return { from, options: PARAMS.map(([label, type, info]) => ({ label, type: "property", detail: type, info })) };
+  const names = Object.keys(PARAMS) as Param[];
+  return { from, options: names.map((name) => ({ label: name, type: "property", detail: PARAMS[name], info: t(`param_${name}`) })) };
 }
+
+/** What a key of params says, where the pointer rests on it. */
+const explain = hoverTooltip((view, position) => {
+  const line = view.state.doc.lineAt(position);
+  const found = paramAt(line.text, position - line.from);
+  if (!found) return null;
+  const create = () => {
+    const dom = document.createElement("div");
+    dom.className = "cm-param";
+    const [head, type, text] = [document.createElement("strong"), document.createElement("span"), document.createElement("p")];
+    [head.textContent, type.textContent, text.textContent] = [found.name, PARAMS[found.name], t(`param_${found.name}`)];
+    dom.append(head, type, text);
+    return { dom };
+  };
+  return { pos: line.from + found.from, end: line.from + found.to, above: true, create };
+});
 
 export function openEditor(parent: HTMLElement, text: string, label: string, onChange: (text: string) => void) {
   const nonce = document.querySelector<HTMLMetaElement>('meta[name="csp-nonce"]')?.content ?? "";
@@ -49,7 +69,7 @@ export function openEditor(parent: HTMLElement, text: string, label: string, onC
       syntaxHighlighting(colours),
       lintGutter(),
       autocompletion({ override: [complete] }),
-      keymap.of([]),
+      explain,
       theme.of(look(false)),
       EditorView.cspNonce.of(nonce),
       EditorView.contentAttributes.of({ "aria-label": label }),

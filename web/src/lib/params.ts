@@ -1,29 +1,44 @@
-/** The keys of params: name, type, and what each says, as in docs/rewards.md. */
-export const PARAMS: readonly (readonly [string, string, string])[] = [
-  ["all_wheels_on_track", "bool", "All four wheels are on the road."],
-  ["x", "float, m", "Place, 0.14 m ahead of the car's middle."],
-  ["y", "float, m", "Place, 0.14 m ahead of the car's middle."],
-  ["heading", "float, degrees", "Direction of the car, -180 to 180, 0 along x, to the left positive."],
-  ["distance_from_center", "float, m", "Distance from the centre line, never negative."],
-  ["projection_distance", "float, m", "Distance along the centre line."],
-  ["progress", "float, %", "Share of the lap since the start, 0 to 100."],
-  ["steps", "float", "Steps of the episode; the first call has 2."],
-  ["speed", "float, m/s", "Speed that was asked for."],
-  ["steering_angle", "float, degrees", "Steering that was asked for, left positive."],
-  ["track_width", "float, m", "Width of the road here."],
-  ["track_length", "float, m", "Length of the lap."],
-  ["waypoints", "list of (x, y)", "The centre line in driving direction."],
-  ["closest_waypoints", "[int, int]", "Indices of the waypoints behind and ahead."],
-  ["is_left_of_center", "bool", "Left of the centre line."],
-  ["is_reversed", "bool", "The track is driven the other way."],
-  ["is_crashed", "bool", "The car hit something."],
-  ["is_offtrack", "bool", "No wheel is on the road."],
-  ["closest_objects", "[int, int]", "Indices of the objects behind and ahead."],
-  ["objects_location", "list of (x, y)", "Places of the objects."],
-  ["objects_left_of_center", "list of bool", "Which are left of the centre line."],
-  ["objects_distance", "list of float", "Distances along the centre line, m."],
-  ["objects_distance_from_center", "list of float", "Distances from the centre line, m."],
-  ["objects_heading", "list of float", "Directions, radians."],
-  ["objects_speed", "list of float", "Speeds, m/s."],
-  ["object_in_camera", "bool", "An object is in view."],
-];
+/** The keys of params with their types; what each says is in the catalogues, as `param_KEY`. */
+export const PARAMS = {
+  all_wheels_on_track: "bool",
+  x: "float, m",
+  y: "float, m",
+  heading: "float, °",
+  distance_from_center: "float, m",
+  projection_distance: "float, m",
+  progress: "float, %",
+  steps: "float",
+  speed: "float, m/s",
+  steering_angle: "float, °",
+  track_width: "float, m",
+  track_length: "float, m",
+  waypoints: "[(x, y), …], m",
+  closest_waypoints: "[int, int]",
+  is_left_of_center: "bool",
+  is_reversed: "bool",
+  closest_objects: "[int, int]",
+  objects_location: "[(x, y), …], m",
+  objects_left_of_center: "[bool, …]",
+  object_in_camera: "bool",
+  objects_speed: "[float, …], m/s",
+  objects_heading: "[float, …], rad",
+  objects_distance_from_center: "[float, …], m",
+  objects_distance: "[float, …], m",
+  is_crashed: "bool",
+  is_offtrack: "bool",
+  sim_time: "float, s",
+} as const;
+
+export type Param = keyof typeof PARAMS;
+
+export const isParam = (word: string): word is Param => Object.hasOwn(PARAMS, word);
+
+/** The key that a line's text names at a column, in quotes as params want it, and where it stands. */
+export function paramAt(line: string, column: number): { name: Param; from: number; to: number } | undefined {
+  for (const found of line.matchAll(/(["'])(\w+)\1/g)) {
+    const from = found.index + 1;
+    const name = found[2]!;
+    if (column >= from && column <= from + name.length && isParam(name)) return { name, from, to: from + name.length };
+  }
+  return undefined;
+}

@@ -6,6 +6,7 @@ import { draw } from "./draw";
 import { drive } from "./drive";
 import { evaluation } from "./evaluation";
 import { garage } from "./garage";
+import { params } from "./params";
 import { races } from "./races";
 import { replay } from "./replay";
 import { settings } from "./settings";
@@ -14,4 +15,4 @@ import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
 
-export const de: Record<Key, string> = { ...shell, ...replay, ...analysis, ...create, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings };
+export const de: Record<Key, string> = { ...shell, ...replay, ...analysis, ...create, ...params, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings };

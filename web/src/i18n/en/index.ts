@@ -5,6 +5,7 @@ import { draw } from "./draw";
 import { drive } from "./drive";
 import { evaluation } from "./evaluation";
 import { garage } from "./garage";
+import { params } from "./params";
 import { races } from "./races";
 import { replay } from "./replay";
 import { settings } from "./settings";
@@ -13,6 +14,6 @@ import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
 
-export const en = { ...shell, ...replay, ...analysis, ...create, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings } as const;
+export const en = { ...shell, ...replay, ...analysis, ...create, ...params, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings } as const;
 
 export type Key = keyof typeof en;

@@ -1,0 +1,32 @@
+/** Die Schlüssel von params in einer Belohnungsfunktion. */
+import type { params as english } from "../en/params";
+
+export const params: Record<keyof typeof english, string> = {
+  param_all_wheels_on_track: "Die Mitten aller vier Räder sind auf der Straße.",
+  param_x: "Ort des Punktes 0,14 m vor der Mitte des Autos.",
+  param_y: "Ort des Punktes 0,14 m vor der Mitte des Autos.",
+  param_heading: "Richtung des Autos, -180 bis 180: 0 ist entlang x, nach links positiv.",
+  param_distance_from_center: "Abstand von der Mittellinie, 0 oder mehr.",
+  param_projection_distance: "Strecke entlang der Mittellinie ab ihrem ersten Punkt.",
+  param_progress: "Anteil der Runde seit dem Start der Episode; unter 0 hinter dem Start.",
+  param_steps: "Schritte dieser Episode; der erste Aufruf sieht 2.",
+  param_speed: "Geschwindigkeit, die die Policy in diesem Schritt verlangt.",
+  param_steering_angle: "Lenkung, die die Policy in diesem Schritt verlangt, nach links positiv.",
+  param_track_width: "Breite der Straße beim Auto.",
+  param_track_length: "Länge der Runde entlang der Mittellinie.",
+  param_waypoints: "Punkte der Mittellinie in Fahrtrichtung.",
+  param_closest_waypoints: "Nummern der Punkte hinter und vor dem Auto.",
+  param_is_left_of_center: "Links der Mittellinie, in Fahrtrichtung gesehen.",
+  param_is_reversed: "Das Auto soll gegen die Richtung der Strecke fahren; nicht: es steht verkehrt herum.",
+  param_closest_objects: "Nummern der Objekte hinter und vor dem Auto; [0, 0] ohne Objekte.",
+  param_objects_location: "Orte der Objekte.",
+  param_objects_left_of_center: "Welche Objekte links der Mittellinie sind.",
+  param_object_in_camera: "Das nächste Objekt ist im Bild der Kamera.",
+  param_objects_speed: "Geschwindigkeiten der Objekte, 0 für alles, was steht.",
+  param_objects_heading: "Richtungen der Objekte, in Radiant.",
+  param_objects_distance_from_center: "Abstände der Objekte von der Mittellinie.",
+  param_objects_distance: "Strecken der Objekte entlang der Mittellinie.",
+  param_is_crashed: "Das Auto ist in diesem Schritt gegen etwas gefahren.",
+  param_is_offtrack: "Kein Rad ist auf der Straße.",
+  param_sim_time: "Simulierte Zeit seit dem Zurücksetzen; ein Schritt ist 1/15 s.",
+};
