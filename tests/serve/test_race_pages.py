@@ -78,6 +78,28 @@ def test_the_settings_say_where_things_are(visit: Visit) -> None:
     page.get_by_role("button", name="English").click()
 
 
+def test_every_page_has_a_title_and_wrong_addresses_lead_on(visit: Visit) -> None:
+    titles = {
+        "/": "Garage",
+        "/create": "New model",
+        "/models/ada/race": "ada: Race",
+        "/tracks": "Tracks",
+        "/drive/oval": "Drive: oval",
+        "/races/new": "New race",
+        "/settings": "Settings",
+    }
+    for path, title in titles.items():
+        assert visit.open(path).title() == f"{title} · Racecraft"
+    for path in ("/nowhere", "/models/nobody", "/races/99", "/races/nonsense", "/drive/nowhere"):
+        page = visit.open(path)
+        page.get_by_role("heading", name="There is nothing here").wait_for()
+        page.locator("main").get_by_role("link").click()
+        page.get_by_role("heading", name="There is nothing here").wait_for(state="detached")
+    # the browser's words about addresses that the server does not have
+    assert all(complaint.startswith("Failed to load resource") for complaint in visit.complaints)
+    visit.complaints.clear()
+
+
 @needs_axe
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_axe_finds_nothing_serious_and_nothing_sticks_out(visit: Visit, theme: str) -> None:
