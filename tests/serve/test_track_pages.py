@@ -25,11 +25,14 @@ def test_the_gallery_filters_imports_deletes_and_undoes(visit: Visit) -> None:
     page.get_by_role("heading", name="Paperclip").wait_for()
     assert page.locator("li.card").count() < 4
     page.get_by_role("searchbox").fill("")
-    page.get_by_role("button", name="Narrow").click()
+    page.get_by_role("button", name="Hard").click()
+    page.get_by_role("heading", name="Needle").wait_for()
+    page.get_by_role("heading", name="Paperclip").wait_for(state="detached")
     page.get_by_role("button", name="Wide").click()
+    page.get_by_role("button", name="Clockwise", exact=True).click()
     page.get_by_text("No track fits").wait_for()
-    page.get_by_role("button", name="Narrow").click()
-    page.get_by_role("button", name="Wide").click()
+    for trait in ("Hard", "Wide", "Clockwise"):
+        page.get_by_role("button", name=trait, exact=True).click()
 
     route = visit.console.client.get("/api/tracks/oval/route.npy").content
     file = {"name": "Living room.npy", "mimeType": "application/octet-stream", "buffer": route}

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { ActionPreset, NumberChoice } from "../src/api/client";
-import { actionAt, grid, metadataOf, sameSpace, scaleOf, tidy, tip } from "../src/lib/actions";
+import { actionAt, grid, metadataOf, rings, sameSpace, scaleOf, tidy, tip } from "../src/lib/actions";
 import { around, differences, diffLines } from "../src/lib/diff";
 import { estimate, fromSlider, isSafe, toSlider } from "../src/lib/numberscale";
 
@@ -18,6 +18,9 @@ describe("an action space", () => {
   });
   it("leaves room to pull the fastest arrow", () => {
     expect([scaleOf(space([{ steering_angle: 0, speed: 1 }]).actions), scaleOf([{ steering_angle: 0, speed: 2 }]), scaleOf([{ steering_angle: 0, speed: 3 }])]).toEqual([1, 2.5, 4]);
+  });
+  it("has rings at round speeds", () => {
+    expect([1, 1.5, 2.5, 4].map(rings)).toEqual([[0.25, 0.5, 0.75, 1], [0.5, 1, 1.5], [0.5, 1, 1.5, 2, 2.5], [1, 2, 3, 4]]);
   });
   it("is made as the original's console makes it", () => {
     expect(grid(30, 3, 1, 2).map((action) => [action.steering_angle, action.speed])).toEqual([[-30, 0.5], [-30, 1], [0, 0.5], [0, 1], [30, 0.5], [30, 1]]);

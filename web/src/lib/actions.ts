@@ -17,6 +17,12 @@ export const tidy = (action: Action): Action => ({
 /** The speed that the longest arrow stands for: room to pull beyond the fastest action. */
 export const scaleOf = (actions: Action[]): number => [1, 1.5, 2.5].find((top) => actions.every((action) => action.speed <= top)) ?? MAX_SPEED;
 
+/** Round speeds for the rings of the picture. */
+export function rings(top: number): number[] {
+  const step = top <= 1 ? 0.25 : top <= 2.5 ? 0.5 : 1;
+  return Array.from({ length: Math.round(top / step) }, (_, index) => (index + 1) * step);
+}
+
 /** Where an arrow ends on the picture; steering is drawn twice as wide as it is. */
 export function tip(action: Action, top: number): [number, number] {
   const turn = (2 * action.steering_angle * Math.PI) / 180;
