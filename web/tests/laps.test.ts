@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { chartSvg, ticks } from "../src/lib/chartsvg";
+import { endingOf } from "../src/lib/endings";
 import { alongLap, before, byPace, cornerReport, interpolate, PLACES, poseAt, timeDelta, type EvaluationLaps, type LapTrace } from "../src/lib/laps";
 import { fileName, toCsv } from "../src/lib/save";
 
@@ -54,6 +55,13 @@ describe("laps", () => {
     expect(report[0]!.lost).toBeCloseTo(5 - 1.25);
     expect(report[1]!.lost).toBeCloseTo(2.5);
     expect(cornerReport(all, part)[1]!.lost).toBeNull();
+  });
+});
+
+describe("endings", () => {
+  it("are known in both spellings", () => {
+    expect(["Lap complete", "lap_complete", "Time Up", "off_track"].map(endingOf)).toEqual(["end_lap_complete", "end_lap_complete", "end_time_up", "end_off_track"]);
+    expect(endingOf("Park")).toBeUndefined();
   });
 });
 

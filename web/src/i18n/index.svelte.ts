@@ -21,3 +21,6 @@ export function speak(choice: Language): void {
 export function t(key: Key, values: Record<string, string | number> = {}): string {
   return catalogues[language.choice][key].replace(/\{(\w+)\}/g, (_, name: string) => String(values[name] ?? ""));
 }
+
+/** The text of a key, or what there is where the catalogue has none. */
+export const known = (key: Key | undefined, otherwise: string): string => (key ? t(key) : otherwise);

@@ -1,4 +1,6 @@
 /** A line chart as an SVG text of its own, for reports and slides. */
+import { span } from "./colors";
+
 export interface ChartLine {
   label: string;
   values: (number | null)[];
@@ -22,11 +24,12 @@ export function ticks(low: number, high: number, count = 6, isWhole = false): nu
   return found;
 }
 
-export function chartSvg(chart: { title: string; x: number[]; lines: ChartLine[]; xLabel: string; isPercent?: boolean; isWhole?: boolean; marks?: number[]; mark?: string; height?: number; ink: string; quiet: string; grid: string; card: string }): string {
+export function chartSvg(chart: { title: string; x: number[]; lines: ChartLine[]; xLabel: string; isPercent?: boolean; isWhole?: boolean; least?: number; marks?: number[]; mark?: string; height?: number; ink: string; quiet: string; grid: string; card: string }): string {
   const height = chart.height ?? 420;
   const known = chart.lines.flatMap((line) => line.values.filter((value): value is number => value !== null));
   const [x0, x1] = chart.x.length ? [Math.min(...chart.x), Math.max(...chart.x)] : [0, 1];
-  let [y0, y1] = known.length ? [Math.min(...known), Math.max(...known)] : [0, 1];
+  let [y0, y1] = known.length ? [known.reduce((a, b) => Math.min(a, b)), known.reduce((a, b) => Math.max(a, b))] : [0, 1];
+  if (chart.least) [y0, y1] = span([y0, y1], chart.least);
   if (chart.isPercent) [y0, y1] = [Math.min(0, y0), Math.max(1, y1)];
   const space = (y1 - y0) * 0.05 || 0.5;
   [y0, y1] = chart.isPercent ? [y0, y1 + 0.04] : [y0 - space, y1 + space];

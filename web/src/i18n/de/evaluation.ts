@@ -22,5 +22,12 @@ export const evaluation: Record<keyof typeof english, string> = {
   telemetry: "Telemetrie",
   telemetry_lead: "Nach dem Ort auf der Strecke, damit man Runden vergleichen kann.",
   lap: "Runde",
+  end_lap_complete: "Runde geschafft",
+  end_off_track: "Neben der Strecke",
+  end_crashed: "Unfall",
+  end_reversed: "Falsche Richtung",
+  end_immobilized: "Stehen geblieben",
+  end_time_up: "Zeit abgelaufen",
+  end_in_progress: "Unterwegs",
   train_first: "Trainiere das Modell zuerst: Noch gibt es nichts, womit es fahren könnte.",
 };

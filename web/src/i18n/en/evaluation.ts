@@ -20,5 +20,12 @@ export const evaluation = {
   telemetry: "Telemetry",
   telemetry_lead: "By place on the track, so that laps can be compared.",
   lap: "Lap",
+  end_lap_complete: "Lap complete",
+  end_off_track: "Off track",
+  end_crashed: "Crashed",
+  end_reversed: "Wrong way",
+  end_immobilized: "Stood still",
+  end_time_up: "Time up",
+  end_in_progress: "Under way",
   train_first: "Train the model first: it has no checkpoint to race with.",
 } as const;
