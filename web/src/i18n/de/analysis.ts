@@ -44,5 +44,6 @@ export const analysis: Record<keyof typeof english, string> = {
   compare_code: "Belohnungscode",
   compare_same_code: "Der Belohnungscode ist derselbe.",
   setting: "Einstellung",
+  value: "Wert",
   x_steps: "Schritte",
 };

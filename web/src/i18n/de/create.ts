@@ -63,6 +63,7 @@ export const create: Record<keyof typeof english, string> = {
   learning_reset: "Zurück zur Vorgabe",
   algorithm: "Verfahren",
   algorithm_lead: "Wie die Strategie besser wird.",
+  algorithm_distill: "Ein Lehrer, der den wahren Zustand sieht, findet die schnelle Linie; das Auto lernt sie von ihm mit seiner Kamera.",
   algorithm_sac: "SAC lernt aus allem, was je gefahren wurde; es braucht stetige Aktionen, die jetzt eingestellt sind.",
   network: "Netz",
   network_lead: "Größere lernen langsamer; die von AWS passen zu seinem Auto.",

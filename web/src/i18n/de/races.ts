@@ -70,7 +70,7 @@ export const races: Record<keyof typeof english, string> = {
   races_gap: "Abstand",
   races_first_place: "führt",
   races_crashes: "Aufpralle",
-  races_attempts: "Meldungen",
+  races_attempts_count: "bester von {count} Starts",
   races_verified: "Geprüft",
   races_verified_yes: "Aus den Aktionen noch einmal gefahren: Jedes Bit kam gleich heraus.",
   races_verified_no: "weicht ab",

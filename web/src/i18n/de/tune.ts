@@ -51,6 +51,7 @@ export const tune: Record<keyof typeof english, string> = {
   tune_trial_cut: "Zeit um",
   tune_trial_fail: "fehlgeschlagen",
   tune_keep_best: "Aus dem besten ein Modell machen",
-  tune_keep: "Ein Modell daraus machen",
+  tune_keep: "Behalten",
+  tune_keep_title: "Aus diesem Versuch ein Modell machen",
   tune_kept: "{name} steht in der Garage.",
 };

@@ -42,5 +42,6 @@ export const analysis = {
   compare_code: "Reward code",
   compare_same_code: "The reward code is the same.",
   setting: "Setting",
+  value: "Value",
   x_steps: "Steps",
 } as const;

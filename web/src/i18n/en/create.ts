@@ -61,6 +61,7 @@ export const create = {
   learning_reset: "Back to the defaults",
   algorithm: "Algorithm",
   algorithm_lead: "How the policy is improved.",
+  algorithm_distill: "A teacher that sees the true state finds the fast line; the car learns from it by its camera.",
   algorithm_sac: "SAC learns from all it ever drove; it needs continuous actions, which are set now.",
   network: "Network",
   network_lead: "Larger ones learn more slowly; AWS's fit its car.",

@@ -68,7 +68,7 @@ export const races = {
   races_gap: "Gap",
   races_first_place: "leads",
   races_crashes: "Crashes",
-  races_attempts: "Entries",
+  races_attempts_count: "best of {count} entries",
   races_verified: "Checked",
   races_verified_yes: "Driven again from its actions: every bit came out the same.",
   races_verified_no: "differs",

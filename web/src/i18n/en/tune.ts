@@ -49,6 +49,7 @@ export const tune = {
   tune_trial_cut: "out of time",
   tune_trial_fail: "failed",
   tune_keep_best: "Make a model of the best",
-  tune_keep: "Make a model of it",
+  tune_keep: "Keep it",
+  tune_keep_title: "Make a model of this trial",
   tune_kept: "{name} is in the garage.",
 } as const;
