@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from itertools import pairwise
 
 import pytest
 from browsers import needs_browser, needs_pages, visiting
@@ -37,6 +38,6 @@ def test_a_graph_has_no_gap_after_a_time_without_server(tmp_path_factory: pytest
         with running_console(runs, "--port", str(port)) as second:
             second.wait_for(lambda: seconds()[-1] > before + AWAY)
             points = seconds()
-            assert max(after - at for at, after in zip(points[:-1], points[1:], strict=True)) < USUAL
+            assert max(after - at for at, after in pairwise(points)) < USUAL
             page.get_by_text("learning at once").wait_for()
             second.client.post("/api/models/away/stop")
