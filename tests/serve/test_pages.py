@@ -45,6 +45,19 @@ def test_the_editor_knows_every_key_of_params() -> None:
     assert re.findall(r"^  (\w+): \"", source, re.MULTILINE) == list(TEMPLATE)
 
 
+def test_what_the_server_names_is_in_the_catalogue() -> None:
+    import re
+
+    from racecraft.serve.routes.rewards import list_actions, list_rewards
+
+    catalogue = (WEB / "src" / "i18n" / "en" / "presets.ts").read_text()
+    known = dict(re.findall(r'^  (\w+): "(.*)",$', catalogue, re.MULTILINE))
+    assert {f"preset_{reward.name}" for reward in list_rewards()} <= known.keys()
+    assert {known[f"space_{space.name}"]: space.name for space in list_actions()} == {
+        space.description: space.name for space in list_actions()
+    }
+
+
 def test_the_lock_file_names_no_registry() -> None:
     assert "resolved" not in (WEB / "package-lock.json").read_text()
 

@@ -24,3 +24,9 @@ export function t(key: Key, values: Record<string, string | number> = {}): strin
 
 /** The text of a key, or what there is where the catalogue has none. */
 export const known = (key: Key | undefined, otherwise: string): string => (key ? t(key) : otherwise);
+
+/** What the server calls something, in the page's language where the catalogue knows it. */
+export function named(group: "preset" | "space" | "situation", name: string, otherwise: string): string {
+  const key = `${group}_${name.replaceAll(" ", "_")}`;
+  return Object.hasOwn(en, key) ? t(key as Key) : otherwise;
+}

@@ -7,6 +7,7 @@ import { drive } from "./drive";
 import { evaluation } from "./evaluation";
 import { garage } from "./garage";
 import { params } from "./params";
+import { presets } from "./presets";
 import { races } from "./races";
 import { replay } from "./replay";
 import { settings } from "./settings";
@@ -15,4 +16,4 @@ import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
 
-export const de: Record<Key, string> = { ...shell, ...replay, ...analysis, ...create, ...params, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings };
+export const de: Record<Key, string> = { ...shell, ...replay, ...analysis, ...create, ...params, ...presets, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings };

@@ -20,7 +20,7 @@ export const evaluation = {
   telemetry: "Telemetry",
   telemetry_lead: "By place on the track, so that laps can be compared.",
   lap: "Lap",
-  end_lap_complete: "Lap complete",
+  end_lap_complete: "Complete",
   end_off_track: "Off track",
   end_crashed: "Crashed",
   end_reversed: "Wrong way",

@@ -6,6 +6,7 @@ import { drive } from "./drive";
 import { evaluation } from "./evaluation";
 import { garage } from "./garage";
 import { params } from "./params";
+import { presets } from "./presets";
 import { races } from "./races";
 import { replay } from "./replay";
 import { settings } from "./settings";
@@ -14,6 +15,6 @@ import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
 
-export const en = { ...shell, ...replay, ...analysis, ...create, ...params, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings } as const;
+export const en = { ...shell, ...replay, ...analysis, ...create, ...params, ...presets, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings } as const;
 
 export type Key = keyof typeof en;
