@@ -85,6 +85,15 @@ describe("hints", () => {
     expect(hints(curves, 10)).toEqual([{ key: "forgot", values: { best: "100 %", step: "5000", now: "60 %" } }]);
     expect(logOf(curves).map((entry) => entry.kind)).toEqual(["evaluation", "evaluation", "evaluation", "best"]);
   });
+  it("see it in a short training, too, but not from one lucky iteration", () => {
+    const short = (reward: (share: number) => number) => {
+      const curves = new Curves();
+      curves.add(Array.from({ length: 30 }, (_, index) => ({ kind: "iteration", step: 1000 * (index + 1), seconds: index, reward: reward(index / 29), completion: 0.1, entropy: 1, value_loss: 1 })));
+      return hints(curves, 10).map((hint) => hint.key);
+    };
+    expect(short((share) => 1 + 50 * share)).toEqual(["exploit"]);
+    expect(short((share) => (share === 1 ? 9 : 5))).toEqual([]);
+  });
   it("see a car that is stuck", () => {
     expect(run(() => ({ reward: 1, completion: 0.05 }))).toEqual(["stuck"]);
   });

@@ -67,6 +67,7 @@ export interface Hint {
 }
 
 const FEW = 20; // iterations before which nothing is said
+const MUCH = 20_000; // steps in which a usual training gets round
 const percent = (share: number) => `${Math.round(100 * share)} %`;
 
 /** What the curves say when something goes wrong, with the numbers that say it. */
@@ -91,14 +92,18 @@ export function hints(curves: Curves, numActions: number): Hint[] {
   const usual = steps[steps.length >> 1]!;
   if (usual > 0.15) found.push({ key: "kl", values: { now: usual.toFixed(2) } });
 
-  if (points.length >= 60) {
-    const early = points[Math.floor(points.length / 3)]!;
-    const [r0, r1] = [number(early, "reward"), number(last, "reward")];
-    const [c0, c1] = [number(early, "completion"), number(last, "completion")];
+  if (last.step >= MUCH) {
+    // what was usual in the first half of the way, after its beginning, against what is usual now
+    const mean = (from: number, to: number, name: string) => {
+      const known = points.slice(Math.floor(from * points.length), Math.ceil(to * points.length)).map((point) => number(point, name)).filter((value) => value !== null);
+      return known.length ? known.reduce((sum, value) => sum + value, 0) / known.length : null;
+    };
+    const [r0, r1] = [mean(0.1, 0.4, "reward"), mean(0.8, 1, "reward")];
+    const [c0, c1] = [mean(0.1, 0.4, "completion"), mean(0.8, 1, "completion")];
     if (r0 !== null && r1 !== null && c0 !== null && c1 !== null) {
       if (r1 > r0 + 0.5 * Math.abs(r0) && c1 < c0 + 0.02 && c1 < 0.5)
         found.push({ key: "exploit", values: { r0: r0.toFixed(1), r1: r1.toFixed(1), c0: percent(c0), c1: percent(c1) } });
-      else if (last.step > 60000 && c1 < 0.15) found.push({ key: "stuck", values: { completion: percent(c1), steps: String(last.step) } });
+      else if (last.step > 2 * MUCH && c1 < 0.15) found.push({ key: "stuck", values: { completion: percent(c1), steps: String(last.step) } });
     }
   }
 
