@@ -185,6 +185,43 @@ def test_models_are_chosen_in_the_garage_to_be_compared(studio: tuple[RunningCon
     assert page.get_by_role("region", name="Results").locator("tbody tr").count() == 2
 
 
+def test_the_garage_clones_renames_tags_finds_deletes_and_undoes(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/")
+    card = page.locator("li.card")
+
+    def of(name: str) -> Any:
+        return card.filter(has=page.get_by_role("heading", name=name, exact=True))
+
+    of("left").get_by_role("button", name="Clone").click()
+    copy = str(page.get_by_role("status").get_by_text("left").first.inner_text()).split()[0]
+    of(copy).get_by_role("button", name="Rename").click()
+    page.get_by_label("New name").fill("twin")
+    page.get_by_label("Tags").fill("oval, slow")
+    page.get_by_role("button", name="Save").click()
+    of("twin").get_by_text("oval, slow").wait_for()
+    page.get_by_role("searchbox").fill("slow")
+    of("left").wait_for(state="detached")
+    assert card.count() == 1
+    of("twin").get_by_role("button", name="Delete").click()
+    of("twin").wait_for(state="detached")
+    page.get_by_role("button", name="Undo").last.click()
+    of("twin").wait_for()
+    assert studio[0].client.get("/api/models/twin").json()["tags"] == ["oval", "slow"]
+    assert studio[0].client.delete("/api/models/twin").status_code < 300
+
+
+def test_tabs_and_tracks_are_chosen_with_arrow_keys(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/models/left/watch")
+    page.get_by_role("tab", name="Watch").press("ArrowRight")
+    page.wait_for_url("**/models/left/race")
+    assert page.evaluate("document.activeElement.textContent") == "Race"
+    page.keyboard.press("End")
+    page.wait_for_url("**/models/left/setup")
+    page = visit(studio, "/create")
+    page.get_by_role("radio", name="Las Vegas").press("ArrowLeft")
+    assert page.get_by_role("radio", name="Thunder Bowl").get_attribute("aria-checked") == "true"
+
+
 def test_numbers_are_searched_and_the_best_becomes_a_model(studio: tuple[RunningConsole, Any]) -> None:
     pytest.importorskip("optuna")
     page = visit(studio, "/models/left/tune")

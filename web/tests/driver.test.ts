@@ -1,4 +1,4 @@
-import { describe, expect, it } from "vitest";
+import { afterEach, describe, expect, it, vi } from "vitest";
 import { behind, Driver } from "../src/lib/driver";
 
 describe("Driver", () => {
@@ -32,5 +32,26 @@ describe("behind", () => {
   it("is what one lost or gained", () => {
     expect(behind(trace, [6000, 0], 75 / 15, 55).seconds).toBeCloseTo(1);
     expect(behind(trace, [6000, 0], 45 / 15, 55).seconds).toBeCloseTo(-1);
+  });
+});
+
+describe("a gamepad", () => {
+  const held = (axis: number, gas: number, brake: number) => ({ connected: true, mapping: "standard", axes: [axis], buttons: Array.from({ length: 17 }, (_, index) => ({ value: index === 7 ? gas : index === 6 ? brake : 0 })) });
+  const plug = (pad: unknown) => vi.stubGlobal("navigator", { getGamepads: () => [null, pad] });
+  afterEach(() => vi.unstubAllGlobals());
+
+  it("steers and speeds as far as it is pushed", () => {
+    plug(held(-1, 0.5, 0));
+    const driver = new Driver();
+    expect(driver.isDriving).toBe(true);
+    for (let step = 0; step < 30; step++) driver.advance(1 / 15);
+    expect(driver.speed).toBeCloseTo(0.5 * driver.top);
+    expect(driver.advance(1 / 15).steering).toBeGreaterThan(0.4); // to the left
+    plug(held(0, 0, 1));
+    expect(driver.advance(1).speed).toBe(0);
+  });
+  it("that the browser does not know the layout of is left alone", () => {
+    plug({ ...held(1, 1, 0), mapping: "" });
+    expect(new Driver().isDriving).toBe(false);
   });
 });
