@@ -126,6 +126,9 @@ def test_models_are_cloned_renamed_tagged_deleted_and_restored(console: RunningC
     client = console.client
     name = console.create(name="a", train=False, track="oval", seed=7)
     assert client.get(f"/api/models/{name}").json()["status"] == "new"
+    names = [client.post("/api/models/a/clone", json={}).json()["name"] for _ in range(2)]
+    assert names == ["a-2", "a-3"]
+    assert all(client.delete(f"/api/models/{one}").status_code == 204 for one in names)
     copy = client.post("/api/models/a/clone", json={"name": "b"}).json()
     assert copy["track"] == "oval"
     assert client.get("/api/models/b").json()["seed"] == 7

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import shutil
@@ -105,6 +106,11 @@ class Garage:
         """
         if (self._runs / name).exists():
             raise Conflict(f"There is a model {name!r} already.", hint="Choose another name.")
+
+    def name_beside(self, name: str) -> str:
+        """A name for a copy of a model that nothing has yet: the same with a number from 2 on."""
+        names = (f"{name[:58]}-{number}" for number in itertools.count(2))
+        return next(one for one in names if not (self._runs / one).exists())
 
     def checkpoints(self, folder: RunFolder) -> list[Checkpoint]:
         """The states of a model's policy that are kept."""

@@ -158,7 +158,7 @@ def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard
         metadata=folder.read_model_metadata(),
         hyperparameters=folder.read_hyperparameters(),
         root=context.garage.runs,
-        name=request.name,
+        name=request.name or context.garage.name_beside(name),
     )
     context.mirror.copy(copy.name)
     return context.garage.card(copy.name)
