@@ -102,6 +102,7 @@ def test_a_track_is_drawn_with_the_mouse_and_with_keys_tried_and_kept(visit: Vis
     page.get_by_label("Name of the track").fill("night-circuit")
     page.get_by_role("button", name="Save").click()
     page.get_by_text("night-circuit is kept").wait_for()
+    page.get_by_role("button", name="Close").click()  # or the next message is not told from this one
     sketch = visit.console.client.get("/api/tracks/night-circuit/sketch").json()
     assert len(sketch["points"]) == 8
 
