@@ -106,7 +106,7 @@ def test_axe_finds_nothing_serious_and_nothing_sticks_out(visit: Visit, theme: s
     visit.look(theme, "de" if theme == "dark" else "en")
     races = visit.console.client.get("/api/races").json()
     found: dict[str, Any] = {}
-    for path in ("/races", "/races/new", "/settings", *(f"/races/{race['id']}" for race in races[:1])):
+    for path in ("/races", "/races/new", "/settings", "/nowhere", *(f"/races/{race['id']}" for race in races[:1])):
         for width in (1440, 390):
             page = visit.open(path, width=width)
             page.wait_for_timeout(600)
