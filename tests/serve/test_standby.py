@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from racecraft.errors import RunError
+from racecraft.run.lock import exclusive_lock
 from racecraft.serve.database import Database
 from racecraft.serve.jobs import JobQueue
 from racecraft.serve.settings import ServeSettings
@@ -24,8 +26,8 @@ def settings(tmp_path: Path) -> ServeSettings:
 
 @pytest.fixture
 def standby(settings: ServeSettings) -> Iterator[Standby]:
-    log = settings.state / "jobs.log"
-    standby = Standby(settings.runs, database=settings.database_url, artifacts="", log=log)
+    folder, log = settings.state / "workers", settings.state / "jobs.log"
+    standby = Standby(settings.runs, workers=folder, database=settings.database_url, artifacts="", log=log)
     yield standby
     standby.close()
 
@@ -39,8 +41,8 @@ def test_the_waiting_worker_does_the_next_job(settings: ServeSettings, standby: 
     standby.prepare()
     assert standby._waiting is waiting
     job = queue.add("evaluate", "nothing", {})
-    assert queue.claim(("evaluate",), owner="me") is not None
-    worker = standby.start(job.id, owner="me")
+    assert queue.claim(("evaluate",), owner=standby.name()) is not None
+    worker = standby.start(job.id)
     assert worker is waiting
     assert worker.wait(PATIENCE) == 0
     ended = queue.get(job.id)
@@ -59,6 +61,19 @@ def test_one_that_died_is_replaced(standby: Standby) -> None:
     standby.prepare()
     assert standby._waiting is not None
     assert standby._waiting.pid != dead.pid
+
+
+def test_it_holds_its_lock_from_its_first_moment_to_its_last(settings: ServeSettings, standby: Standby) -> None:
+    standby.prepare()
+    (lock,) = (settings.state / "workers").iterdir()
+    assert lock.name == standby.name()
+    with pytest.raises(RunError), exclusive_lock(lock):  # so no server takes it for dead while it loads
+        pass
+    assert standby._waiting is not None
+    standby._waiting.kill()
+    standby._waiting.wait()
+    with exclusive_lock(lock):
+        pass
 
 
 def test_without_a_server_nobody_waits(standby: Standby) -> None:

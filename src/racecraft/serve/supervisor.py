@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import secrets
 import subprocess
 import time
 from contextlib import suppress
@@ -45,10 +44,12 @@ class Supervisor:
         self._is_stopping = False
         self._loop: asyncio.AbstractEventLoop | None = None
         log = settings.state / "jobs.log"
-        self._standby = Standby(settings.runs, database=database.url, artifacts=settings.artifacts, log=log)
         self._started = float("-inf")  # the newest job, in `time.monotonic()` seconds
         self._workers = settings.state / WORKERS
         self._workers.mkdir(parents=True, exist_ok=True)
+        self._standby = Standby(
+            settings.runs, workers=self._workers, database=database.url, artifacts=settings.artifacts, log=log
+        )
 
     def wake(self) -> None:
         """There is something new in the queue; safe from any thread."""
@@ -97,12 +98,11 @@ class Supervisor:
 
     def _start(self, kinds: tuple[str, ...]) -> bool:
         """Start the oldest job of these kinds; False when there is none."""
-        owner = secrets.token_hex(8)
+        owner = self._standby.name()
         job = self._queue.claim(kinds, owner=owner)
         if job is None:
             return False
-        (self._workers / owner).touch()
-        self._children[owner] = self._standby.start(job.id, owner=owner)
+        self._children[owner] = self._standby.start(job.id)
         self._started = time.monotonic()
         return True
 

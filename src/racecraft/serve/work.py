@@ -1,7 +1,7 @@
-"""The process of a job: ``python -m racecraft.serve.work RUNS``, with two URLs in the environment.
+"""The process of a job: ``python -m racecraft.serve.work RUNS LOCK``, with two URLs in the environment.
 
 It loads what jobs need, and waits for one line on its standard input: the job and the name that it was claimed under.
-Without a line the server has ended, and so does this.
+Without a line the server has ended, and so does this. LOCK is an open file, whose lock says that this process lives.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from racecraft.errors import RunError
 from racecraft.serve.quick import loading
 from racecraft.serve.settings import ARTIFACTS, DATABASE
 
@@ -19,8 +18,9 @@ NICENESS: Final = 5
 """Jobs leave most of the processor to pages and 3D views, which stay smooth beside a training."""
 
 
-def main(runs: str) -> int:
+def main(runs: str, lock: str) -> int:
     """Do one job; the exit status is 0 unless the process itself failed."""
+    os.set_inheritable(int(lock), False)  # it is to end with this process, not with what that starts
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     with loading():
@@ -31,10 +31,7 @@ def main(runs: str) -> int:
         return 0
     job_id, owner = told
     database_url, artifacts_url = os.environ.pop(DATABASE), os.environ.pop(ARTIFACTS, "")
-    try:
-        do_job(job_id, owner=owner, runs=Path(runs), database_url=database_url, artifacts_url=artifacts_url)
-    except RunError:
-        return 1  # a server is just taking it for dead
+    do_job(job_id, owner=owner, runs=Path(runs), database_url=database_url, artifacts_url=artifacts_url)
     return 0
 
 

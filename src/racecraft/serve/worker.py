@@ -19,12 +19,10 @@ from typing import Any, Final
 from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.errors import RacecraftError, RunError
-from racecraft.run.lock import exclusive_lock
 from racecraft.serve.artifacts import Artifacts
 from racecraft.serve.database import Database
 from racecraft.serve.jobs import LEASE, JobQueue
 from racecraft.serve.kinds import KINDS
-from racecraft.serve.settings import STATE_FOLDER, WORKERS
 from racecraft.serve.tables import Job
 from racecraft.serve.tasks import Task
 
@@ -153,14 +151,9 @@ def _described(error: Exception) -> dict[str, Any]:
 
 
 def do_job(job_id: str, *, owner: str, runs: Path, database_url: str, artifacts_url: str) -> None:
-    """Do a job that was claimed by `owner`, if it still is.
-
-    Raises:
-        RunError: A server is just taking this process for dead.
-    """
+    """Do a job that was claimed by `owner`, if it still is."""
     database = Database(database_url)
-    with exclusive_lock(runs / STATE_FOLDER / WORKERS / owner):
-        job = JobQueue(database).get(job_id)
-        if job is not None and job.owner == owner:  # else it was taken for dead before it was there
-            artifacts = Artifacts(artifacts_url) if artifacts_url else None
-            Worker(database, job, owner=owner, runs=runs, artifacts=artifacts).run()
+    job = JobQueue(database).get(job_id)
+    if job is not None and job.owner == owner:  # else it was taken for dead before it was there
+        artifacts = Artifacts(artifacts_url) if artifacts_url else None
+        Worker(database, job, owner=owner, runs=runs, artifacts=artifacts).run()
