@@ -149,6 +149,7 @@ def test_somebody_drives(visit: Visit) -> None:
     page.keyboard.up("ArrowUp")
     page.keyboard.press("p")
     page.get_by_text("Paused").wait_for()
+    page.wait_for_timeout(200)  # the step that was on its way
     stopped = clock.inner_text()
     page.wait_for_timeout(400)
     assert clock.inner_text() == stopped

@@ -48,7 +48,8 @@ def _environment() -> dict[str, str]:
     """Fixed hash seed, so that sets iterate alike in every run; one thread, as a worker gets one core."""
     environment = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     environment |= {"PYTHONHASHSEED": "0", "LC_ALL": "C.UTF-8", "PATH": "/usr/bin:/bin"}
-    for name in ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH"):  # some interpreters do not start without
+    # Some interpreters do not start without the first two; by the others a user chooses how NumPy multiplies.
+    for name in ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "OPENBLAS_CORETYPE", "MKL_CBWR", "NPY_DISABLE_CPU_FEATURES"):
         if name in os.environ:
             environment[name] = os.environ[name]
     return environment
