@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from sse_starlette import ServerSentEvent
 
+from racecraft.run.history import read_history
 from racecraft.serve.jobs import JobQueue
 from racecraft.serve.live import STALE, LiveReader, Look
 from racecraft.serve.schemas import JobInfo
@@ -20,6 +21,7 @@ from racecraft.serve.tables import Job
 
 FRESH: Final = 0.3  # s that a look at the jobs is good for
 MAX_MODELS: Final = 64  # that are remembered
+MAX_SHARED: Final = 1 << 16  # bytes of points that are kept for the next tab; a new one reads all there are by itself
 
 
 def job_info(job: Job) -> JobInfo:
@@ -35,6 +37,10 @@ class _Seen:
     sequence: int = -1
     live: bytes = b""
     live_at: float = float("-inf")
+    points: dict[int, tuple[int, bytes]] = field(default_factory=dict)
+    """The newest points as an event, and their end, by where they begin."""
+    points_until: float = 0.0
+    points_lock: asyncio.Lock = field(default_factory=asyncio.Lock)
     jobs: str = ""
     jobs_until: float = 0.0
     jobs_lock: asyncio.Lock = field(default_factory=asyncio.Lock)
@@ -61,6 +67,26 @@ class Hub:
             seen.sequence, seen.live, seen.live_at = look.sequence, event.encode(), time.monotonic()
         is_live = time.monotonic() - seen.live_at < STALE
         return (seen.sequence, seen.live) if is_live and seen.sequence != after else None
+
+    async def points(self, name: str, *, after: int) -> tuple[int, bytes] | None:
+        """The points of the curves behind an offset, as an event, and where they end; None when there are none."""
+        seen = self._of(name)
+        async with seen.points_lock:
+            if time.monotonic() >= seen.points_until:
+                seen.points.clear()
+                seen.points_until = time.monotonic() + FRESH / 2
+            found = seen.points.get(after)
+            if found is None:
+                found = await asyncio.to_thread(self._points, name, after)
+            if len(found[1]) <= MAX_SHARED:
+                seen.points[after] = found
+        return found if found[1] else None
+
+    def _points(self, name: str, after: int) -> tuple[int, bytes]:
+        points, end = read_history(self._runs / name / "metrics" / "history.jsonl", offset=after)
+        if not points:
+            return after, b""
+        return end, ServerSentEvent(json.dumps(points), event="points", id=str(end)).encode()
 
     async def jobs(self, name: str) -> str:
         """A model's newest jobs, as JSON, at most `FRESH` seconds old."""

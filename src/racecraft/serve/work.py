@@ -14,7 +14,7 @@ from typing import Final
 from racecraft.serve.quick import loading
 from racecraft.serve.settings import ARTIFACTS, DATABASE
 
-NICENESS: Final = 5
+NICENESS: Final = 15
 """Jobs leave most of the processor to pages and 3D views, which stay smooth beside a training."""
 
 

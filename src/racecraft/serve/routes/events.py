@@ -8,42 +8,39 @@ id: <offset>  event: points   points of the curves; Last-Event-ID goes on after 
 from __future__ import annotations
 
 import asyncio
-import json
+import time
 from collections.abc import AsyncIterator
 from typing import Final
 
-from fastapi import APIRouter, Header, Request
+from fastapi import APIRouter, Header
 from sse_starlette import EventSourceResponse, ServerSentEvent
 
-from racecraft.run.history import read_history
 from racecraft.serve.context import Context, InContext
 
 router = APIRouter(prefix="/api/events", tags=["events"])
 
-TICK: Final = 1 / 15  # s between two looks
-SLOW: Final = 5  # ticks between two looks at curves and jobs
+TICK: Final = 1 / 12  # s between two looks
+SLOW: Final = 4  # ticks between two looks at curves and jobs
 
 
 @router.get("/{name}")
 async def follow(
-    name: str, request: Request, context: InContext, offset: int = 0, last_event_id: str | None = Header(None)
+    name: str, context: InContext, offset: int = 0, last_event_id: str | None = Header(None)
 ) -> EventSourceResponse:
     """Follow a model: curves from an offset on, cars while it trains, its jobs."""
     context.garage.folder(name)
     if last_event_id is not None and last_event_id.isascii() and last_event_id.isdigit() and len(last_event_id) < 19:
         offset = int(last_event_id)
-    return EventSourceResponse(_stream(context, name, offset, request), ping=15)
+    return EventSourceResponse(_stream(context, name, offset), ping=15)
 
 
-async def _stream(context: Context, name: str, offset: int, request: Request) -> AsyncIterator[ServerSentEvent | bytes]:
-    history = context.garage.runs / name / "metrics" / "history.jsonl"
+async def _stream(context: Context, name: str, offset: int) -> AsyncIterator[ServerSentEvent | bytes]:
     sequence, jobs_seen, tick = -1, "", 0
-    while not await request.is_disconnected():
+    while True:  # the response cancels it when the tab is gone
         if tick % SLOW == 0:
-            points, end = await asyncio.to_thread(read_history, history, offset=offset)
-            if points:
-                offset = end
-                yield ServerSentEvent(json.dumps(points), event="points", id=str(end))
+            if (points := await context.hub.points(name, after=offset)) is not None:
+                offset, event = points
+                yield event
             if (jobs := await context.hub.jobs(name)) != jobs_seen:
                 jobs_seen = jobs
                 yield ServerSentEvent(jobs, event="jobs")
@@ -52,4 +49,5 @@ async def _stream(context: Context, name: str, offset: int, request: Request) ->
             sequence, event = look
             yield event
         tick += 1
-        await asyncio.sleep(TICK)
+        # All tabs at the same moments, so that what one of them had made serves the others.
+        await asyncio.sleep(TICK - time.monotonic() % TICK)

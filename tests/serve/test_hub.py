@@ -1,0 +1,74 @@
+"""What tabs share: points of the curves are read once for all that stand at the same place."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from racecraft.serve import hub as hub_module
+from racecraft.serve.hub import Hub
+from racecraft.serve.jobs import JobQueue
+
+
+@pytest.fixture
+def history(tmp_path: Path) -> Path:
+    path = tmp_path / "car" / "metrics" / "history.jsonl"
+    path.parent.mkdir(parents=True)
+    path.write_text("")
+    return path
+
+
+@pytest.fixture
+def hub(tmp_path: Path) -> Hub:
+    return Hub(tmp_path, cast(JobQueue, None))  # nobody asks for jobs here
+
+
+def line(step: int, text: str = "") -> str:
+    return json.dumps({"kind": "note", "step": step, "seconds": 0.0, "text": text}) + "\n"
+
+
+def points(found: tuple[int, bytes] | None) -> list[Any]:
+    assert found is not None
+    data = next(line for line in found[1].decode().splitlines() if line.startswith("data: "))
+    return cast("list[Any]", json.loads(data.removeprefix("data: ")))
+
+
+def test_tabs_at_one_place_are_given_the_same_bytes_and_one_ahead_nothing(hub: Hub, history: Path) -> None:
+    async def look() -> None:
+        assert await hub.points("car", after=0) is None
+        hub._seen.clear()
+        history.write_text(line(1) + line(2))
+        first, second = await asyncio.gather(hub.points("car", after=0), hub.points("car", after=0))
+        assert first is not None
+        assert first is second
+        assert [point["step"] for point in points(first)] == [1, 2]
+        assert await hub.points("car", after=first[0]) is None
+
+    asyncio.run(look())
+
+
+def test_new_points_come_after_a_moment(hub: Hub, history: Path) -> None:
+    async def look() -> None:
+        history.write_text(line(1))
+        first = await hub.points("car", after=0)
+        assert first is not None
+        assert await hub.points("car", after=first[0]) is None
+        with history.open("a") as file:
+            file.write(line(2))
+        await asyncio.sleep(hub_module.FRESH)
+        assert [point["step"] for point in points(await hub.points("car", after=first[0]))] == [2]
+
+    asyncio.run(look())
+
+
+def test_a_long_history_is_not_kept_in_memory(hub: Hub, history: Path) -> None:
+    async def look() -> None:
+        history.write_text("".join(line(step, "x" * 1000) for step in range(100)))
+        assert len(points(await hub.points("car", after=0))) == 100
+        assert hub._seen["car"].points == {}
+
+    asyncio.run(look())
