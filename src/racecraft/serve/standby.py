@@ -31,6 +31,7 @@ class Standby:
     """
 
     def __init__(self, runs: Path, *, workers: Path, database: str, artifacts: str, log: Path) -> None:
+        # -P: a random.py in the user's folder is not to be taken for Python's
         self._command = [sys.executable, "-P", "-m", "racecraft.serve.work", str(runs)]
         self._environment = {**os.environ, DATABASE: database, ARTIFACTS: artifacts}
         self._workers, self._log = workers, log
@@ -75,10 +76,7 @@ class Standby:
         with self._log.open("ab") as log, (self._workers / self._name).open("wb") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)  # of the open file, which the worker inherits
             return subprocess.Popen(
-                [
-                    *self._command,
-                    str(lock.fileno()),
-                ],  # -P: a random.py in the user's folder is not to be taken for Python's
+                [*self._command, str(lock.fileno())],
                 env=self._environment,
                 stdin=subprocess.PIPE,
                 stdout=log,
