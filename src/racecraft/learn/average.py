@@ -7,43 +7,68 @@ mean over a while is what it would be with small steps, at no cost in speed. The
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from racecraft.errors import CheckpointError
-from racecraft.learn.learner import Weights
+from racecraft.learn.learner import Learner, Weights, below
 
 
 class WeightAverage:
-    """A running mean of weights.
+    """A running mean of a learner's weights, and a checkpoint's entries of both.
 
     Args:
-        share: About which share of the iterations so far it covers, above 0, up to 1.
+        learner: Whose weights they are.
+        share: About which share of the iterations so far the mean covers, up to 1; 0: there is none.
     """
 
-    def __init__(self, share: float) -> None:
+    def __init__(self, learner: Learner, share: float) -> None:
+        self.learner = learner
         self.share = share
-        self._weights: Weights = {}
+        self._mean: Weights = {}
 
-    def add(self, weights: Weights, *, iteration: int) -> None:
-        """Count the weights after this iteration, from 1; takes hold of the arrays."""
-        part = 1.0 / (1.0 + self.share * (iteration - 1)) if self._weights else 1.0
-        if part == 1.0:
-            self._weights = weights
+    def add(self, *, iteration: int) -> None:
+        """Count the learner's weights after this iteration, from 1."""
+        if self.share == 0:
             return
-        for name, mean in self._weights.items():
+        weights = self.learner.weights()
+        part = 1.0 / (1.0 + self.share * (iteration - 1)) if self._mean else 1.0
+        if part == 1.0:
+            self._mean = weights
+            return
+        for name, mean in self._mean.items():
             mean += (weights[name] - mean) * np.float32(part)
 
-    def weights(self) -> Weights:
-        """The mean so far; not to be changed."""
-        return self._weights
+    def weights(self, *, is_preferred: bool = True) -> Weights:
+        """The mean where it is preferred and there is one, otherwise the learner's own; not to be changed."""
+        return (self._mean if is_preferred else {}) or self.learner.weights()
 
-    def load(self, weights: Weights, *, like: Weights) -> None:
-        """Continue from what ``weights`` gave.
+    # ---- resume
+
+    def state(self, *, is_preferred: bool) -> dict[str, NDArray[Any]]:
+        """What is to drive, the optimiser and, where a mean is kept, what goes on learning and the mean."""
+        own, mean = self.learner.weights(), {name: array.copy() for name, array in self._mean.items()}
+        parts = {"weights": (is_preferred and mean) or own}
+        if self.share > 0:
+            parts |= {"learning": own, "average": mean}
+        parts["optimizer"] = self.learner.optimizer_state()
+        return {f"{part}/{name}": array for part, arrays in parts.items() for name, array in arrays.items()}
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Continue from what ``state`` gave, and bring the learner there.
 
         Raises:
-            CheckpointError: They are of another network than `like`.
+            CheckpointError: It belongs to another network.
         """
-        shapes, expected = ({name: array.shape for name, array in part.items()} for part in (weights, like))
-        if shapes not in ({}, expected):
-            raise CheckpointError("The averaged weights are not of the same network as the others.")
-        self._weights = {name: np.array(array, np.float32) for name, array in weights.items()}
+        self.learner.load_weights(below("weights/", state))
+        if self.share > 0:
+            mean = below("average/", state)
+            shapes, expected = ({n: a.shape for n, a in part.items()} for part in (mean, self.learner.weights()))
+            if shapes not in ({}, expected):
+                raise CheckpointError("The averaged weights are not of the same network as the others.")
+            self._mean = {name: np.array(array, np.float32) for name, array in mean.items()}
+            self.learner.load_weights(below("learning/", state))
+        self.learner.load_optimizer_state(below("optimizer/", state))

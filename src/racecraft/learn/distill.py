@@ -13,8 +13,7 @@ What a camera sees of the state does not allow to drive as near the edge as a te
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,7 +23,7 @@ from numpy.typing import NDArray
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
-from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights
+from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below, holding
 from racecraft.learn.native_state_learner import NativeStateLearner
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
@@ -170,7 +169,7 @@ class Distill:
         self.total_steps = 0
         self.iteration = 0
         self.prefers_average = False
-        self._average = WeightAverage(0.06)
+        self._average = WeightAverage(learner, 0.06)
         capacity = config.buffer_size // config.num_envs * config.num_envs
         self._observations = np.zeros((capacity, *learner.observation_shape), np.uint8)
         self._answers = np.zeros((capacity, learner.spec.policy_size), np.float32)  # the teacher's outputs
@@ -216,7 +215,7 @@ class Distill:
             self._drive(rng, clocks, finished)
         started = time.perf_counter()
         losses = self._learn(rng)
-        self._average.add(self.learner.weights(), iteration=self.iteration)
+        self._average.add(iteration=self.iteration)
         return IterationStats(
             iteration=self.iteration,
             total_steps=self.total_steps,
@@ -348,21 +347,15 @@ class Distill:
         """The weights to judge and to save."""
         if self.refining is not None:
             return self.refining.driving_weights
-        return (self._average.weights() if self._drives_by_average else {}) or self.learner.weights()
+        return self._average.weights(is_preferred=self._drives_by_average)
 
     @property
     def _drives_by_average(self) -> bool:
         return self.prefers_average or self.total_steps >= AVERAGE_FROM
 
-    @contextmanager
-    def driving(self) -> Iterator[None]:
+    def driving(self) -> AbstractContextManager[None]:
         """Within, the learner holds the weights that are to drive; afterwards those it learns with."""
-        own = self.learner.weights()
-        self.learner.load_weights(self.driving_weights)
-        try:
-            yield
-        finally:
-            self.learner.load_weights(own)
+        return holding(self.learner, self.driving_weights)
 
     # ---- resume
 
@@ -374,28 +367,17 @@ class Distill:
         lessons |= {f"teacher/{name}": array for name, array in self.teacher.state().items()}
         if self.refining is not None:
             return {**self.refining.state(), **lessons}
-        own = self.learner.weights()
-        average = {name: array.copy() for name, array in self._average.weights().items()}
-        driving = (average if self._drives_by_average else {}) or own
-        arrays = {f"weights/{name}": array for name, array in driving.items()}
-        arrays |= {f"learning/{name}": array for name, array in own.items()}
-        arrays |= {f"average/{name}": array for name, array in average.items()}
-        arrays |= {f"optimizer/{name}": array for name, array in self.learner.optimizer_state().items()}
-        return {**arrays, **lessons}
+        return {**self._average.state(is_preferred=self._drives_by_average), **lessons}
 
     def load_state(self, state: dict[str, NDArray[Any]]) -> None:
         """Continue from what ``state`` gave, with no frames remembered; CheckpointError where it does not fit."""
-
-        def below(prefix: str) -> dict[str, NDArray[Any]]:
-            return {name.removeprefix(prefix): a for name, a in state.items() if name.startswith(prefix)}
-
         try:
             counters, episodes = state["distill/counters"], state["distill/episodes"]
         except KeyError as error:
             raise CheckpointError(f"The training state has no entry {error}.") from None
         if episodes.shape != (2, self.config.num_envs):
             raise CheckpointError(f"The training state is of {episodes.shape[-1]} cars, not of {self.config.num_envs}.")
-        self.teacher.load_state(below("teacher/"))
+        self.teacher.load_state(below("teacher/", state))
         self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
         self._totals, self._lengths = episodes[0].copy(), episodes[1].astype(np.int64)
         self.refining = None
@@ -403,6 +385,4 @@ class Distill:
             self.refining = self._make_refining()
             self.refining.load_state(state)
             return
-        self.learner.load_weights(below("learning/"))
-        self._average.load(below("average/"), like=self.learner.weights())
-        self.learner.load_optimizer_state(below("optimizer/"))
+        self._average.load_state(state)

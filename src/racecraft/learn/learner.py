@@ -12,6 +12,8 @@ Shape letters: N cars, M samples, B of them in a minibatch, A action dimensions,
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -155,3 +157,19 @@ class Learner(Protocol):
 
     def load_optimizer_state(self, state: Weights) -> None:
         """Replace what the optimiser remembers; the same errors as ``load_weights``."""
+
+
+@contextmanager
+def holding(learner: Learner, weights: Weights) -> Iterator[None]:
+    """Within, the learner holds these weights; afterwards its own again."""
+    own = learner.weights()
+    learner.load_weights(weights)
+    try:
+        yield
+    finally:
+        learner.load_weights(own)
+
+
+def below(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The arrays whose names begin so, under the rest of their names."""
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from racecraft import _native
 from racecraft.errors import CheckpointError, ConfigError, ShapeError
 from racecraft.learn import networks
-from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights
+from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below
 
 _NO_INDICES = np.zeros(0, np.int64)
 _NO_ACTIONS = np.zeros((0, 0), np.float32)
@@ -144,11 +144,7 @@ class NativeLearner:
 
     def load_optimizer_state(self, state: Weights) -> None:
         """Replace what ``optimizer_state`` gives; CheckpointError if names or shapes differ."""
-        flat = {}
-        for moment in ("moment1", "moment2"):
-            prefix = f"{moment}/"
-            named = {name.removeprefix(prefix): array for name, array in state.items() if name.startswith(prefix)}
-            flat[moment] = self._flat(named)
+        flat = {moment: self._flat(below(f"{moment}/", state)) for moment in ("moment1", "moment2")}
         if "step" not in state:
             raise CheckpointError("The optimiser's state has no 'step'.")
         for moment, values in flat.items():

@@ -12,8 +12,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
-from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights
+from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights, holding
 from racecraft.learn.rollout import Rollout
 
 _VALUE_BATCH = 4096  # observations whose values are computed at once
@@ -211,7 +210,7 @@ class PPO:
         self.return_scale = np.array([0.0, 1.0])  # running mean and spread of the returns, in units of reward
         self.prefers_average = False
         """Whether the averaged weights drive. The mean of beginners is none: set it once the policy drives well."""
-        self._average = WeightAverage(config.average_share)
+        self._average = WeightAverage(learner, config.average_share)
         self._growth = 1  # times its first size that the rollout under way has
         self._clocks = {"environment": 0.0, "policy": 0.0, "update": 0.0}
 
@@ -230,8 +229,7 @@ class PPO:
         started = time.perf_counter()
         advantages, returns = self._estimate()
         losses = self._update(advantages, returns, rng)
-        if self.config.average_share > 0:
-            self._average.add(self.learner.weights(), iteration=self.iteration + 1)
+        self._average.add(iteration=self.iteration + 1)
         self._clocks["update"] += time.perf_counter() - started
 
         rollout = self._rollout
@@ -260,17 +258,11 @@ class PPO:
     @property
     def driving_weights(self) -> Weights:
         """The weights to judge and to save; not to be changed."""
-        return (self._average.weights() if self.prefers_average else {}) or self.learner.weights()
+        return self._average.weights(is_preferred=self.prefers_average)
 
-    @contextmanager
-    def driving(self) -> Iterator[None]:
+    def driving(self) -> AbstractContextManager[None]:
         """Within, the learner holds the weights that are to drive; afterwards those it learns with."""
-        own = self.learner.weights()
-        self.learner.load_weights(self.driving_weights)
-        try:
-            yield
-        finally:
-            self.learner.load_weights(own)
+        return holding(self.learner, self.driving_weights)
 
     # ---- collect: drive until the rollout is full
 
@@ -450,14 +442,7 @@ class PPO:
             "ppo/episode_lengths": self._episode_lengths.copy(),
             "ppo/return_scale": self.return_scale.copy(),
         }
-        own = self.learner.weights()
-        average = {name: array.copy() for name, array in self._average.weights().items()}
-        arrays |= {f"weights/{name}": array for name, array in ((self.prefers_average and average) or own).items()}
-        if self.config.average_share > 0:
-            arrays |= {f"learning/{name}": array for name, array in own.items()}
-            arrays |= {f"average/{name}": array for name, array in average.items()}
-        arrays |= {f"optimizer/{name}": array for name, array in self.learner.optimizer_state().items()}
-        return arrays
+        return arrays | self._average.state(is_preferred=self.prefers_average)
 
     def load_state(self, state: dict[str, NDArray[Any]]) -> None:
         """Continue from what ``state`` gave.
@@ -476,18 +461,10 @@ class PPO:
                 f"The training state is of {len(returns)} cars, not of {len(self._episode_returns)}.",
                 hint=f"Resume with num_envs = {len(returns)}.",
             )
-        self.learner.load_weights(_below("weights/", state))
-        if self.config.average_share > 0:
-            self._average.load(_below("average/", state), like=self.learner.weights())
-            self.learner.load_weights(_below("learning/", state))
-        self.learner.load_optimizer_state(_below("optimizer/", state))
+        self._average.load_state(state)
         self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
         self._episode_returns, self._episode_lengths = returns.copy(), lengths.copy()
         self.return_scale = scale.copy()
-
-
-def _below(prefix: str, arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
 
 
 def _is_number(value: object, low: float, high: float = sys.float_info.max) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
-from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights
+from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights, below
 from racecraft.learn.ppo import Environment, IterationStats
 from racecraft.learn.replay_buffer import ReplayBuffer, Transitions
 
@@ -290,8 +290,7 @@ class SAC:
             raise CheckpointError(f"The training state has no entry {error}.") from None
         if returns.shape != (3, self.config.num_envs):
             raise CheckpointError(f"The training state is of {returns.shape[-1]} cars, not of {self.config.num_envs}.")
-        prefix = "sac/networks/"
-        self.backend.load_state({n.removeprefix(prefix): a for n, a in state.items() if n.startswith(prefix)})
+        self.backend.load_state(below("sac/networks/", state))
         self.seed, self.iteration, self.total_steps, self._num_updates = (int(number) for number in counters)
         self._moments = moments.copy()
         self._returns, self._episode_returns = returns[0].copy(), returns[1].copy()

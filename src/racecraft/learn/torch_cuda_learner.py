@@ -16,7 +16,7 @@ from torch.nn import functional
 
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import networks, torch_networks
-from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights
+from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below
 from racecraft.learn.torch_learner import log_probs_and_entropy
 
 _BETA1, _BETA2 = 0.9, 0.999
@@ -165,8 +165,7 @@ class CudaLearner:
     def load_optimizer_state(self, state: Weights) -> None:
         """Replace what ``optimizer_state`` gives; CheckpointError if names or shapes differ."""
         for key, flat in (("moment1", self._moment1), ("moment2", self._moment2)):
-            prefix = f"{key}/"
-            self._load(flat, {name[8:]: array for name, array in state.items() if name.startswith(prefix)})
+            self._load(flat, below(f"{key}/", state))
         if "step" not in state:
             raise CheckpointError("The optimiser's state has no 'step'.")
         self._num_updates.fill_(float(state["step"][0]))

@@ -131,8 +131,7 @@ class CudaPPO(PPO):
         collected = time.perf_counter()
         explained = self._estimate_all()
         losses = self._improve()
-        if self.config.average_share > 0:
-            self._average.add(self.learner.weights(), iteration=self.iteration + 1)
+        self._average.add(iteration=self.iteration + 1)
         steps = self.config.num_steps * self.config.num_envs
         self.iteration += 1
         self.total_steps += steps

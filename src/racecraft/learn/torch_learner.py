@@ -23,7 +23,7 @@ from torch.nn import functional
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import networks, torch_networks
 from racecraft.learn.distributions import LOG_STD_MAX, LOG_STD_MIN
-from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights
+from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below
 
 _BETA1, _BETA2 = 0.9, 0.999
 _SHARD_SIZES = (64, 256)  # samples; a smaller shard is mostly overhead, a larger one leaves the L2 cache
@@ -142,8 +142,7 @@ class TorchLearner:
     def load_optimizer_state(self, state: Weights) -> None:
         """Replace what ``optimizer_state`` gives; CheckpointError if names or shapes differ."""
         for key, flat in (("moment1", self._moment1), ("moment2", self._moment2)):
-            prefix = f"{key}/"
-            self._load(flat, {name[8:]: array for name, array in state.items() if name.startswith(prefix)})
+            self._load(flat, below(f"{key}/", state))
         if "step" not in state:
             raise CheckpointError("The optimiser's state has no 'step'.")
         self._num_updates = int(state["step"][0])

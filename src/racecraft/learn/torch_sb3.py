@@ -24,7 +24,7 @@ from torch import Tensor, nn
 
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import networks, torch_networks
-from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights
+from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights, below
 from racecraft.learn.ppo import Environment, IterationStats
 from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3Config
 from racecraft.learn.torch_subnormals import subnormals_flushed
@@ -176,10 +176,10 @@ class SB3:
         Raises:
             CheckpointError: It belongs to another network or algorithm.
         """
-        model, prefix = self._model, "sb3/policy/"
+        model = self._model
         try:
-            given = {n.removeprefix(prefix): torch.from_numpy(a) for n, a in state.items() if n.startswith(prefix)}
-            model.policy.load_state_dict(given)
+            given = below("sb3/policy/", state)
+            model.policy.load_state_dict({name: torch.from_numpy(array) for name, array in given.items()})
             for name, optimizer in self._optimizers().items():
                 found: dict[int, dict[str, Tensor]] = {}
                 for key, array in state.items():

@@ -11,6 +11,7 @@ from racecraft.agent.action_space import ActionSpace
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.errors import CheckpointError
 from racecraft.learn import Learner, NetworkSpec, distributions, make_learner
+from racecraft.learn.learner import below
 from racecraft.run.folder import RunFolder
 
 WEIGHTS = "weights/"
@@ -59,7 +60,7 @@ def load_policy(run: RunFolder, *, checkpoint: str | int = "best", num_threads: 
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"{saved.path} does not describe its network: {error}.") from error
     learner = make_learner(spec, seed=None, num_threads=num_threads)
-    given = {name.removeprefix(WEIGHTS): array for name, array in saved.arrays.items() if name.startswith(WEIGHTS)}
+    given = below(WEIGHTS, saved.arrays)
     if not any(name.startswith("critic.") for name in given):  # of an algorithm that judges otherwise
         given |= {name: array for name, array in learner.weights().items() if name.startswith("critic.")}
     learner.load_weights(given)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from racecraft.agent import ModelMetadata
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import Learner, NetworkSpec
+from racecraft.learn.learner import below
 from racecraft.learn.networks import weight_shapes
 from racecraft.run import Checkpoint, RunFolder
 
@@ -48,9 +49,7 @@ class Parent:
     @property
     def weights(self) -> Arrays:
         """The network's parameters by name: those that drove its evaluations."""
-        return {
-            name.removeprefix(WEIGHTS): array for name, array in self.saved.arrays.items() if name.startswith(WEIGHTS)
-        }
+        return below(WEIGHTS, self.saved.arrays)
 
     def record(self) -> dict[str, Any]:
         """For run.json."""
@@ -134,9 +133,8 @@ def begin_from(learner: Learner, saved: Checkpoint) -> None:
     Raises:
         CheckpointError: The copy of the parent's weights is not of this network.
     """
-    weights = {name.removeprefix(WEIGHTS): array for name, array in saved.arrays.items() if name.startswith(WEIGHTS)}
     try:
-        kept = fitting(weights, learner.spec)
+        kept = fitting(below(WEIGHTS, saved.arrays), learner.spec)
     except ConfigError as error:
         raise CheckpointError(f"{saved.path} cannot be begun from: {error}") from error
     learner.load_weights({**learner.weights(), **kept})
