@@ -16,21 +16,34 @@ from racecraft.errors import ConfigError
 MAX_BYTES = 1 << 20  # bytes; the largest file AWS's console wrote is under 10 kB
 
 
-def read_text(path: str | Path, *, max_bytes: int = MAX_BYTES) -> str:
-    """The UTF-8 text in a small file (a byte order mark is fine); never more than `max_bytes` are read.
+def read_bytes(path: str | Path, *, max_bytes: int, name: str = "") -> bytes:
+    """The content of a file; never more than one byte above `max_bytes` is read.
+
+    Args:
+        path: The file.
+        max_bytes: How large it may be.
+        name: What messages call it; its path where none is given.
+
+    Raises:
+        ConfigError: Not readable, or too large.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(max_bytes + 1)
+    except OSError as error:
+        raise ConfigError(f"{name or path} cannot be read: {error.strerror or error}.") from error
+    if len(data) > max_bytes:
+        raise ConfigError(f"{name or path} is larger than {max_bytes:,} bytes, too large for a file of its kind.")
+    return data
+
+
+def read_text(path: str | Path, *, max_bytes: int = MAX_BYTES, name: str = "") -> str:
+    """As :func:`read_bytes`, of UTF-8 text; a byte order mark is fine.
 
     Raises:
         ConfigError: Not readable, too large, or not UTF-8.
     """
-    path = Path(path)
-    try:
-        with path.open("rb") as file:
-            data = file.read(max_bytes + 1)
-    except OSError as error:
-        raise ConfigError(f"{path} cannot be read: {error.strerror or error}.") from error
-    if len(data) > max_bytes:
-        raise ConfigError(f"{path} is larger than {max_bytes:,} bytes, too large for a file of its kind.")
-    return decode_text(data, name=str(path))
+    return decode_text(read_bytes(path, max_bytes=max_bytes, name=name), name=name or str(path))
 
 
 def decode_text(data: bytes, *, name: str) -> str:

@@ -229,6 +229,12 @@ def test_what_is_no_replay_is_refused(tmp_path: Path) -> None:
         read_replay(tmp_path)
 
 
+def test_a_file_that_is_too_large_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("racecraft.race.race_replay.MAX_FILE_BYTES", 2000)
+    refused(tmp_path / "bad.replay", bytes(2000), "does not begin")
+    refused(tmp_path / "bad.replay", bytes(2001), "larger than 2,000 bytes")
+
+
 def test_other_versions_and_impossible_sizes_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "bad.replay"
     refused(path, sealed(bytes(10), version=2), "version 2")

@@ -18,7 +18,7 @@ from racecraft.errors import ConfigError, SourceError
 from racecraft.importing.archive import DEFAULT_LIMITS, read_archive
 from racecraft.importing.archive_guard import CHUNK, Limits
 from racecraft.importing.layout import HYPERPARAMETERS, METADATA, PLACES, REWARD, TRAINING_PARAMS, Role, is_plain, role
-from racecraft.json_file import decode_text
+from racecraft.json_file import read_text
 
 MAX_FILES: Final = 100_000
 MAX_DEPTH: Final = 20
@@ -71,12 +71,7 @@ class Source:
         path, limit = self.files[name].path, MAX_BYTES["settings"]
         if path is None or self.files[name].size > limit:
             raise ConfigError(f"{name} is larger than {limit:,} bytes, too large for a file of its kind.")
-        try:
-            with path.open("rb") as file:
-                data = file.read(limit + 1)
-        except OSError as error:
-            raise ConfigError(f"{name} cannot be read: {error.strerror or error}.") from error
-        return decode_text(data, name=name)
+        return read_text(path, max_bytes=limit, name=name)
 
 
 @contextmanager

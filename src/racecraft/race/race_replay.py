@@ -16,7 +16,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import RacecraftError, ReplayError
+from racecraft.errors import ConfigError, RacecraftError, ReplayError
+from racecraft.json_file import read_bytes
 from racecraft.race.conditions import Conditions
 from racecraft.race.placement import driven_track
 from racecraft.race.recording import Recording
@@ -142,16 +143,13 @@ def read_replay(path: str | Path) -> Replay:
     Raises:
         ReplayError: It is damaged, hostile, or of another version.
     """
-    path = Path(path)
     try:
-        with path.open("rb") as file:
-            data = file.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise ReplayError(f"{path} cannot be read: {error.strerror or error}.") from error
-    if len(data) > MAX_FILE_BYTES:
-        raise ReplayError(f"{path} has more than {MAX_FILE_BYTES:,} bytes.")
-    document, body = unpack(data, name=path.name)
-    return _replay(check_header(document, name=path.name), body, name=path.name)
+        data = read_bytes(path, max_bytes=MAX_FILE_BYTES)
+    except ConfigError as error:
+        raise ReplayError(str(error)) from error
+    name = Path(path).name
+    document, body = unpack(data, name=name)
+    return _replay(check_header(document, name=name), body, name=name)
 
 
 def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
