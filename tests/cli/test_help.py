@@ -1,0 +1,97 @@
+"""What every verb says about itself, and how little it loads to say it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from command_line import Run
+
+from racecraft import __version__, cli
+from racecraft.training import settings as training_settings
+
+VERBS = (
+    "train",
+    "import",
+    "evaluate",
+    "race",
+    "ladder",
+    "film",
+    "verify",
+    "report",
+    "tracks",
+    "tracks show",
+    "tracks sheet",
+    "tracks limit",
+    "reward",
+    "reward check",
+    "reward list",
+    "reward show",
+    "tune",
+    "replay",
+    "calibrate",
+    "serve",
+)
+
+
+@pytest.mark.parametrize("verb", ["", *VERBS, "doctor", "bench"])
+def test_every_verb_explains_itself_in_80_columns(racecraft: Run, verb: str) -> None:
+    outcome = racecraft(*verb.split(), "--help")
+    assert outcome.status == 0
+    assert outcome.out.startswith(f"Usage: racecraft {verb}".rstrip())
+    assert all(len(line) <= 80 for line in outcome.out.splitlines())
+    assert "..." not in re.sub(r"(ARGS\]|TRACKS\]|MODELS\}?|logs[\]}]?)\.\.\.", "", outcome.out)  # nothing is cut
+    assert racecraft(*verb.split(), "-h").out == outcome.out
+
+
+def test_the_version(racecraft: Run) -> None:
+    assert racecraft("--version") == (0, f"{__version__}\n", "")
+
+
+def test_without_a_verb_it_shows_the_help(racecraft: Run) -> None:
+    outcome = racecraft()
+    assert outcome.status == 2
+    assert "Commands:" in outcome.out + outcome.err
+
+
+def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:
+    import inspect
+
+    from racecraft import train
+    from racecraft.training import defaults
+
+    shown = {name: parameter.default for name, parameter in inspect.signature(cli.train.train).parameters.items()}
+    public = {name: parameter.default for name, parameter in inspect.signature(train).parameters.items()}
+    settings = training_settings.TrainSettings()
+    assert shown["track"] == [settings.track] == [training_settings.DEFAULT_TRACK]
+    for name in ("reward", "actions", "until", "sensors"):
+        assert not shown[name]  # as the race has it
+        assert not public[name]
+    assert defaults.TIME_TRIAL.until == str(settings.until)
+    for name in ("critic", "direction", "evaluate_every", "num_threads", "seed"):
+        assert shown[name] == getattr(settings, name)
+
+
+HEAVY = ("torch", "gymnasium", "scipy", "shapely", "PIL", "av", "tensorboard")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "absent"),
+    [
+        (["--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
+        (["train", "--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
+        (["tracks"], ("torch", "av", "PIL", "gymnasium", "scipy", "casadi")),
+        (["reward", "check", "centerline"], ("torch", "av", "PIL", "gymnasium")),
+    ],
+)
+def test_quick_verbs_import_nothing_heavy(tmp_path: Path, arguments: list[str], absent: tuple[str, ...]) -> None:
+    program = (
+        "import sys, atexit; from racecraft.cli import main; sys.argv[1:] = sys.argv[1:]; "
+        f"atexit.register(lambda: print('loaded', [n for n in {absent!r} if n in sys.modules])); main()"
+    )
+    done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "loaded []"

@@ -1,0 +1,125 @@
+"""Wrong usage, errors and bugs: status and one sentence, for people and as JSON."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from command_line import Run
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["trian"], "Did you mean 'train'?"),
+        (["tracks", "shwo"], "Did you mean 'show'?"),
+        (["reward", "chek"], "Did you mean 'check'?"),
+        (["train", "--trak", "oval"], "--track"),
+        (["train", "--seed", "many"], "--seed"),
+        (["train", "now"], "now"),
+        (["evaluate"], "run"),
+        (["tracks", "show"], "name"),
+        (["train", "--resume", "runs/x", "--seed", "4"], "--seed does not go with --resume"),
+        (["train", "--resume", "runs/x", "--track", "oval"], "--track does not go with --resume"),
+        (["train", "--resume", "runs/x", "--from", "runs/y"], "--from does not go with --resume"),
+    ],
+)
+def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str) -> None:
+    outcome = racecraft(*arguments)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert says in outcome.err
+    as_json = racecraft(*arguments, "--json")
+    assert as_json.status == 2
+    assert as_json.document["error"]["code"] == "UsageError"
+    assert says in as_json.document["error"]["message"]
+    assert "--help" in as_json.document["error"]["hint"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (["train", "--track", "ovla"], "TrackNotFound", "Did you mean 'oval'?"),
+        (["train", "--reward", "racign"], "RewardError", "Did you mean 'racing'?"),
+        (["train", "--until", "soon"], "ConfigError", "soon"),
+        (["train", "--vehicle", "v55"], "ConfigError", "Did you mean 'v5'?"),
+        (["train", "--actions", "contnuous"], "ConfigError", "continuous"),
+        (["train", "--critic", "priviliged"], "ConfigError", "Did you mean 'privileged'?"),
+        (["train", "--network", "SMALL"], "ConfigError", "RACECRAFT_SMALL"),
+        (["train", "--direction", "foward"], "ConfigError", "Did you mean 'forward'?"),
+        (["train", "--num-envs", "-1"], "ConfigError", "num_envs"),
+        (["train", "--race", "head-to-heads"], "ConfigError", "head-to-heads"),
+        (["train", "--race", "head-to-head", "--cars", "9"], "ConfigError", "2 to 8"),
+        (["train", "--race", "head-to-head", "--cars", "2", "--opponents", "bots"], "ConfigError", "--bots"),
+        (["train", "--race", "head-to-head", "--opponents", "runs/none"], "RunError", "none"),
+        (["train", "--race", "head-to-head", "--opponents", "self", "--opponents", "a"], "ConfigError", "'self' alone"),
+        (["train", "--cars", "3"], "ConfigError", "--race head-to-head"),
+        (["train", "--opponents", "self"], "ConfigError", "--race head-to-head"),
+        (["train", "--seed", "-1"], "ConfigError", "seed"),
+        (["train", "--name", "../x"], "RunError", "../x"),
+        (["train", "--hyperparameters", "none.json"], "ConfigError", "none.json"),
+        (["train", "--resume", "runs/none"], "RunError", "none"),
+        (["train", "--from", "runs/none@best"], "RunError", "none"),
+        (["evaluate", "runs/none"], "RunError", "none"),
+        (["import", "none"], "SourceError", "none"),
+        (["import", "."], "SourceError", "reward_function.py"),
+        (["tracks", "show", "ovla"], "TrackNotFound", "Did you mean 'oval'?"),
+        (["tracks", "show", "oval", "--width", "-5"], "TrackError", "-5"),
+        (["tracks", "show", "oval", "-o", "nowhere/oval.png"], "", "nowhere"),
+        (["tracks", "show", "oval", "-o", "oval.txt"], "TrackError", "txt"),
+        (["tracks", "limit", "straight"], "TrackError", "open"),
+        (["tracks", "limit", "oval", "--vehicle", "v7"], "ConfigError", "v7"),
+        (["tracks", "limit", "oval", "--direction", "up"], "ConfigError", "up"),
+        (["tracks", "sheet", "oval", "ovla"], "TrackNotFound", "Did you mean 'oval'?"),
+        (["tracks", "sheet", "oval", "--columns", "0"], "TrackError", "0"),
+        (["tracks", "sheet", "oval", "-o", "oval.txt"], "TrackError", "txt"),
+        (["reward", "check", "racign"], "RewardError", "Did you mean 'racing'?"),
+        (["reward", "show", "racign"], "RewardError", "Did you mean 'racing'?"),
+        (["bench", "--only", "simulatr"], "ConfigError", "Did you mean 'simulator'?"),
+        (["bench", "--seconds", "0"], "ConfigError", "seconds"),
+    ],
+)
+def test_a_mistake_is_status_1_and_one_sentence(racecraft: Run, arguments: list[str], code: str, says: str) -> None:
+    outcome = racecraft(*arguments)
+    assert (outcome.status, outcome.out) == (1, "")
+    assert says in outcome.err
+    assert "Traceback" not in outcome.err
+    assert outcome.err.startswith(f"{code}: " if code else "")
+    if arguments[:2] != ["reward", "show"]:
+        error = racecraft(*arguments, "--json").document
+        assert error.keys() == {"error"}
+        assert error["error"].keys() == {"code", "message", "hint"}
+        assert error["error"]["code"].startswith(code)
+        assert says in error["error"]["message"] + error["error"]["hint"]
+
+
+def test_debug_shows_the_stack_trace(racecraft: Run) -> None:
+    for arguments in (["--debug", "train", "--track", "ovla"], ["train", "--track", "ovla", "--debug"]):
+        outcome = racecraft(*arguments)
+        assert outcome.status == 1
+        assert "Traceback" in outcome.err
+        assert "TrackNotFound" in outcome.err
+
+
+def test_a_bug_is_told_as_one(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken() -> None:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr("racecraft.bench.doctor.examine", broken)
+    outcome = racecraft("doctor")
+    assert outcome.status == 1
+    assert outcome.err.startswith("ZeroDivisionError: division by zero\n")
+    assert "--debug" in outcome.err
+    assert "Traceback" not in outcome.err
+    assert racecraft("doctor", "--json").document["error"]["code"] == "ZeroDivisionError"
+
+
+def test_what_an_error_says_is_no_markup(racecraft: Run, tmp_path: Path) -> None:
+    assert "[bold]x[/bold]" in racecraft("train", "--critic", "[bold]x[/bold]").err
+
+
+def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
+    command = f"{sys.executable} -m racecraft tracks | true"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert "Traceback" not in done.stderr

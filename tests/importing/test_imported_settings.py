@@ -1,0 +1,154 @@
+"""What becomes of every setting of deepracer-for-cloud and of a console job."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import models
+import pytest
+
+from racecraft.errors import ConfigError
+from racecraft.importing import drfc as settings_of_drfc
+from racecraft.importing import import_run
+from racecraft.run import RunFolder
+from racecraft.sim import Bots, Objects, Obstacles, load_randomization
+from racecraft.training.start import read_settings
+
+DOCS = Path(__file__).parents[2] / "docs" / "import.md"
+
+EVERY = {
+    "DR_WORLD_NAME": "oval",
+    "DR_RACE_TYPE": "OBJECT_AVOIDANCE",
+    "DR_ENABLE_DOMAIN_RANDOMIZATION": "True",
+    "DR_TRAIN_REVERSE_DIRECTION": "True",
+    "DR_TRAIN_ALTERNATE_DRIVING_DIRECTION": "False",
+    "DR_CHANGE_START_POSITION": "True",
+    "DR_TRAIN_ROUND_ROBIN_ADVANCE_DISTANCE": "0.1",
+    "DR_TRAIN_START_POSITION_OFFSET": "0.5",
+    "DR_TRAIN_MIN_EVAL_TRIALS": "300",
+    "DR_TRAIN_BEST_MODEL_METRIC": "reward",
+    "DR_EVAL_NUMBER_OF_TRIALS": "4",
+    "DR_EVAL_IS_CONTINUOUS": "True",
+    "DR_EVAL_MAX_RESETS": "7",
+    "DR_EVAL_OFF_TRACK_PENALTY": "2.5",
+    "DR_COLLISION_PENALTY": "4.0",
+    "DR_EVAL_REVERSE_DIRECTION": "False",
+    "DR_OA_NUMBER_OF_OBSTACLES": "3",
+    "DR_OA_OBJECT_POSITIONS": '"0.23,-1;0.46,1"',
+    "DR_H2B_BOT_CAR_SPEED": "0.2",
+    "DR_LOCAL_S3_PRETRAINED": "True",
+    "DR_LOCAL_S3_PRETRAINED_PREFIX": "older",
+    "DR_LOCAL_S3_REWARD_KEY": "$DR_LOCAL_S3_CUSTOM_FILES_PREFIX/other_reward.py",
+    "DR_LOCAL_S3_MODEL_METADATA_KEY": "custom_files/meta.json",
+    "DR_CAR_COLOR": "Red",
+    "DR_TRAIN_RTF": "1.0",
+    "DR_WORLD_NAM": "x",
+    "MY_OWN": "x",
+    "DR_KINESIS_STREAM_NAME": "",
+    "DR_EVAL_CHECKPOINT": "${X}",
+}
+
+
+def test_every_setting_is_accounted_for(tmp_path: Path) -> None:
+    other = models.REWARD.replace("progress", "speed")
+    files = {
+        "run.env": "".join(f"{name}={value}\n" for name, value in EVERY.items()),
+        "custom_files/reward_function.py": models.REWARD,
+        "custom_files/other_reward.py": other,
+        "custom_files/meta.json": models.METADATA,
+    }
+    found = import_run(models.as_folder(files, tmp_path / "drfc"), name="x")
+    told = " ".join([*found.used, *found.unused, *found.unknown, *found.notes])
+    for name in EVERY:
+        assert settings_of_drfc.ALIASES.get(name, name) in told, name
+    assert found.unknown == {"DR_WORLD_NAM": "Did you mean 'DR_WORLD_NAME'?", "MY_OWN": ""}
+    assert any("fresh" in note for note in found.notes)
+    assert found.used["DR_RACE_TYPE=OBJECT_AVOIDANCE"] == "obstacles on the track"
+    assert found.used["DR_ENABLE_DOMAIN_RANDOMIZATION=True"] == "lamps of random colours"
+    assert found.used["DR_OA_NUMBER_OF_OBSTACLES=3"] == "objects on the track"
+    assert "DR_H2B_BOT_CAR_SPEED=0.2" in found.unused
+    assert "DR_TRAIN_BEST_MODEL_METRIC=reward" in found.unused
+
+    folder = RunFolder.open(found.run)
+    assert folder.read_reward_function() == other
+    settings = read_settings(folder)
+    assert (settings.direction, settings.evaluation_trials) == ("reverse", 100)
+    assert (settings.start.mode, settings.start.advance, settings.start.offset) == ("advance", 0.1, 0.5)
+    assert settings.objects == Objects(
+        obstacles=Obstacles(count=2, placement="fixed", positions=((0.23, -1), (0.46, 1)))
+    )
+    assert settings.randomize == load_randomization("aws")
+    rules = json.loads(folder.race_rules.read_text())
+    expected = {"laps": 4, "max_resets": 7, "offtrack_penalty": 2.5, "collision_penalty": 4.0, "direction": "forward"}
+    assert {name: rules[name] for name in expected} == expected
+    params = folder.read_training_params()
+    assert params is not None
+    assert (params.race_type, params.enable_domain_randomization, params.best_model_metric) == (
+        "OBJECT_AVOIDANCE",
+        True,
+        "reward",
+    )
+    assert dict(params.extra) == {
+        "NUMBER_OF_OBSTACLES": "3",
+        "OBJECT_POSITIONS": "0.23,-1;0.46,1",
+        "BOT_CAR_SPEED": "0.2",
+    }
+
+
+@pytest.mark.parametrize(
+    ("lines", "objects"),
+    [
+        ("RACE_TYPE: HEAD_TO_BOT\nNUMBER_OF_BOT_CARS: 2\nIS_LANE_CHANGE: true\n", Bots(count=2, changes_lane=True)),
+        (
+            "RACE_TYPE: OBJECT_AVOIDANCE\nOBJECT_POSITIONS: ['0.2,-1', '0.5,1']\n",
+            Obstacles(count=2, placement="fixed", positions=((0.2, -1), (0.5, 1))),
+        ),
+        ("RACE_TYPE: HEAD_TO_MODEL\nNUMBER_OF_OBSTACLES: 2\n", None),
+    ],
+)
+def test_objects_of_a_console_job(lines: str, objects: Bots | Obstacles | None, tmp_path: Path) -> None:
+    files = {**models.MODEL, "training_params.yaml": models.PARAMS + lines}
+    found = import_run(models.as_folder(files, tmp_path / "model"))
+    settings = read_settings(RunFolder.open(found.run))
+    expected = Objects(bots=objects) if isinstance(objects, Bots) else Objects(obstacles=objects)
+    assert settings.objects == expected
+    assert ("NUMBER_OF_OBSTACLES" in found.unused) == (objects is None)
+
+
+def test_a_wrong_setting_of_objects_leaves_no_run(tmp_path: Path) -> None:
+    env = "DR_WORLD_NAME=oval\nDR_RACE_TYPE=HEAD_TO_BOT\nDR_H2B_NUMBER_OF_BOT_CARS=many\n"
+    with pytest.raises(ConfigError, match="NUMBER_OF_BOT_CARS is 'many'; allowed is a whole number"):
+        import_run(models.as_folder({**models.DRFC, "run.env": env}, tmp_path / "drfc"), name="x")
+    assert not Path("runs/x").exists()
+
+
+def test_the_page_names_every_setting_that_is_known() -> None:
+    page = DOCS.read_text(encoding="utf-8")
+    table = page[page.index("## Settings of deepracer-for-cloud") :]
+    for name in (
+        *settings_of_drfc.TRAINING,
+        *settings_of_drfc.EVALUATION,
+        *settings_of_drfc.FILES,
+        *settings_of_drfc.ALIASES,
+        *settings_of_drfc.NO_EFFECT,
+        settings_of_drfc.MODEL_PREFIX,
+        settings_of_drfc.PRETRAINED,
+    ):
+        assert f"`{name}`" in table, name
+    named = set(re.findall(r"`(DR_[A-Z0-9_*]+)`", table)) - {"DR_OA_*", "DR_H2B_*"}
+    for name in named:
+        concrete = name.replace("*", "X")
+        known = {*settings_of_drfc.TRAINING, *settings_of_drfc.EVALUATION, *settings_of_drfc.FILES}
+        known |= settings_of_drfc.OBJECTS.keys()
+        known |= {*settings_of_drfc.ALIASES, settings_of_drfc.MODEL_PREFIX, settings_of_drfc.PRETRAINED}
+        assert name in known or settings_of_drfc.meaning(concrete) is not None, name
+
+
+def test_a_trial_that_is_not_continuous_forgives_nothing(tmp_path: Path) -> None:
+    env = "DR_WORLD_NAME=oval\nDR_TRAIN_REVERSE_DIRECTION=True\nDR_EVAL_IS_CONTINUOUS=False\nDR_EVAL_MAX_RESETS=9\n"
+    found = import_run(models.as_folder({**models.DRFC, "run.env": env}, tmp_path / "drfc"))
+    rules = json.loads((found.run / "race_rules.json").read_text())
+    assert (rules["is_continuous"], rules["max_resets"], rules["direction"]) == (False, 0, "reverse")
+    assert any("DR_EVAL_MAX_RESETS has no effect" in note for note in found.notes)

@@ -1,0 +1,187 @@
+"""Whatever a reward function does, the worker gives one clear error, in bounded time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+from workers import function, is_alive, running
+
+from racecraft.errors import RewardError
+from racecraft.reward.worker import MAX_BATCH
+
+FAULTS = [
+    (function("x = 1", "return x / 0"), 3, "ZeroDivisionError: division by zero"),
+    (function("return params['speeed']"), 2, "KeyError: 'speeed'"),
+    (function("return nothing"), 2, "NameError"),
+    (function("pass"), 2, "returned None"),
+    (function("if params['x'] < 0:", "    return 1.0"), 2, "returned None"),
+    (function("return float('nan')"), 2, "returned nan"),
+    (function("x = float('inf')", "return -x"), 3, "returned -inf"),
+    (function("return 100000.1"), 2, "returned 100000.1"),
+    (function("return -10**6"), 2, "returned -1000000.0"),
+    (function("return 10**400"), 2, "type int, which is not a number"),
+    (function("return 'fast'"), 2, "returned the text 'fast'"),
+    (function("return '1.0'"), 2, "returned the text '1.0'"),
+    (function("return [1.0]"), 2, "type list"),
+    (function("return 1j"), 2, "type complex"),
+    (function("return lambda: 1"), 2, "type function"),
+    (function("yield 1.0"), -1, "type generator"),
+    ("async def reward_function(params):\n    return 1.0", -1, "type coroutine"),
+    (function("return reward_function(params)"), 2, "RecursionError"),
+    (
+        function("return helper()", top="def helper():\n    raise ValueError('deep\\ndown')\n"),
+        2,
+        "ValueError: deep down",
+    ),
+    (function("import sys", "sys.exit(3)"), 3, "called sys.exit(3)"),
+    (function("raise KeyboardInterrupt"), 2, "KeyboardInterrupt"),
+    (function("raise SystemExit"), 2, "called sys.exit()"),
+    (function("return [0] * 10**11"), 2, "MemoryError"),
+    (function("x = bytearray(3 * 10**9)", "return 1.0"), 2, "MemoryError"),
+    (function("open('/tmp/racecraft-test', 'w').write('x' * 10000)", "return 1.0"), 2, "may not write files"),
+    (function("open('/dev/null', 'r+b')", "return 1.0"), 2, "may not write files"),
+    (function("import os", "os.open('/dev/null', os.O_WRONLY)", "return 1.0"), 3, "may not write files"),
+    (function("import os", "os.remove('/racecraft-test')", "return 1.0"), 3, "may not use os.remove"),
+    (function("import os", "os.rename('/racecraft-test', '/x')", "return 1.0"), 3, "may not use os.rename"),
+    (function("import os", "os.mkdir('/racecraft-test')", "return 1.0"), 3, "may not use os.mkdir"),
+    (function("import os", "os.fork()", "return 1.0"), 3, "may not use os.fork"),
+    (function("import subprocess", "subprocess.run(['true'])", "return 1.0"), 3, "may not use"),
+    (function("import os", "os.kill(os.getppid(), 9)", "return 1.0"), 3, "may not use os.kill"),
+    (function("import socket", "socket.socket()", "return 1.0"), 3, "may not use socket"),
+    (function("class Bad(Exception):", "    def __str__(self): raise self", "raise Bad"), 4, "Bad"),
+    (function("raise ValueError('x' * 10**7)"), 2, "ValueError: xxx"),
+]
+
+
+@pytest.mark.parametrize(("source", "line", "text"), FAULTS, ids=[text for _, _, text in FAULTS])
+def test_errors_name_line_and_params(track, rows, source, line, text):
+    with running(source, track) as worker:
+        with pytest.raises(RewardError) as caught:
+            worker(rows[3:])
+        error = caught.value
+        assert text in str(error)
+        assert error.row_index == 0
+        assert error.params is not None
+        assert error.params["x"] == 3.0
+        assert len(error.params["waypoints"]) == 25
+        assert "'x': 3.0" in str(error)
+        assert len(str(error)) < 4000
+        if line > 0:
+            assert error.line == line
+            assert f"line {line}" in str(error)
+            assert source.splitlines()[line - 1].strip() in str(error)
+        with pytest.raises(RewardError, match="cannot be called again"):
+            worker(rows)
+
+
+def test_the_row_at_fault_is_named(track, rows):
+    many = np.tile(rows, (MAX_BATCH // 10 + 1, 1))
+    many[:, 2] = np.arange(len(many))
+    with (
+        running(function("return 1.0 / (params['x'] - 4099)"), track) as worker,
+        pytest.raises(RewardError) as caught,
+    ):
+        worker(many)
+    assert caught.value.row_index == 4099
+    assert caught.value.params["x"] == 4099.0
+
+
+@pytest.mark.parametrize(
+    ("body", "line"),
+    [
+        (("while True:", "    pass"), (2, 3)),
+        (("return 9**9**9",), (2,)),
+        (("import time", "time.sleep(99)"), (3,)),
+    ],
+)
+def test_a_hang_is_ended(track, rows, body, line):
+    start = time.perf_counter()
+    with running(function(*body), track, timeout_s=0.3) as worker:
+        process_id = worker.process_id
+        with pytest.raises(RewardError, match=r"did not return within 0\.3 s") as caught:
+            worker(rows)
+    assert caught.value.line in line
+    assert caught.value.row_index == 0
+    assert time.perf_counter() - start < 3.0
+    assert not is_alive(process_id)
+
+
+def test_the_time_limit_is_for_one_call_and_not_for_the_batch(track, rows):
+    source = function("import time", "time.sleep(0.12)", "return 1.0")
+    with running(source, track, timeout_s=0.3) as worker:
+        assert worker(rows).sum() == 10.0
+
+
+def test_a_hang_in_the_middle_of_a_batch_names_its_row(track, rows):
+    source = function("while params['x'] == 6.0:", "    pass", "return 1.0")
+    with running(source, track, timeout_s=0.2) as worker, pytest.raises(RewardError) as caught:
+        worker(rows)
+    assert caught.value.row_index == 6
+    assert caught.value.params["x"] == 6.0
+
+
+@pytest.mark.parametrize(
+    ("body", "text"),
+    [
+        (("import os", "os._exit(3)"), "exit status 3"),
+        (("import os", "os._exit(0)"), "exit status 0"),
+        (("import os", "os.abort()"), "SIGABRT"),
+        (("import faulthandler", "faulthandler._sigsegv()"), "SIGSEGV"),
+    ],
+)
+def test_a_crash_is_told(track, rows, body, text):
+    with running(function("if params['x'] < 2: return 1.0", *body), track) as worker:
+        with pytest.raises(RewardError, match=text) as caught:
+            worker(rows)
+        assert caught.value.row_index == 2
+        with pytest.raises(RewardError, match="cannot be called again"):
+            worker(rows)
+
+
+def test_endless_recursion_in_c_is_told_with_its_line(track, rows):
+    top = "import sys\nsys.setrecursionlimit(10**9)\nclass A:\n    def __repr__(self): return repr(self) + repr(A())\n"
+    with (
+        running(function("return repr(A())", top=top), track) as worker,
+        pytest.raises(RewardError) as caught,
+    ):
+        worker(rows)
+    assert caught.value.line in (4, 6)
+
+
+def test_killed_from_outside(track, rows):
+    with running(function("return 1.0"), track) as worker:
+        worker(rows)
+        os.kill(worker.process_id, signal.SIGKILL)
+        with pytest.raises(RewardError, match="SIGKILL"):
+            worker(rows)
+
+
+def test_a_memory_bomb_ends(track, rows):
+    source = function("x = []", "while True: x.append(bytearray(10**7))")
+    options = {"timeout_s": 10.0, "memory_limit_mb": 300}
+    with running(source, track, **options) as worker, pytest.raises(RewardError, match="MemoryError") as caught:
+        worker(rows)
+    assert caught.value.line == 3
+
+
+@pytest.mark.parametrize("junk", ["b'x'", "b'\\\\x02' * 13", "b'\\\\x03' * 13", "b'junk' * 50"])
+def test_writing_into_the_pipes_is_no_reward(track, rows, junk):
+    source = function(
+        "for descriptor in range(3, 20):",
+        "    try: os.write(descriptor, " + junk.replace("\\\\", "\\") + ")",
+        "    except OSError: pass",
+        "os._exit(0)",
+        top="import os\n",
+    )
+    with running(source, track) as worker, pytest.raises(RewardError):
+        worker(rows)
+
+
+def test_closing_every_descriptor_is_an_error(track, rows):
+    source = function("import os", "os.closerange(0, 100)", "return 1.0")
+    with running(source, track) as worker, pytest.raises(RewardError):
+        worker(rows)

@@ -1,0 +1,55 @@
+"""Sources that do not load, and what is out of reach of those that do."""
+
+from __future__ import annotations
+
+import pytest
+from workers import function, running
+
+from racecraft.errors import RewardError
+from racecraft.reward.worker import RewardWorker
+
+
+@pytest.mark.parametrize(
+    ("source", "line", "text"),
+    [
+        ("def reward_function(params:\n    return 1", 1, "SyntaxError"),
+        ("x = 1\n y = 2", 2, "IndentationError"),
+        ("x = 1", None, "no function 'reward_function"),
+        ("reward_function = 3", None, "no function 'reward_function"),
+        ("import nothing_like_this\n" + function("return 1.0"), 1, "ModuleNotFoundError"),
+        ("x = 1\nraise ValueError('no')\n" + function("return 1.0"), 2, "ValueError: no"),
+        ("import os\nos._exit(5)", None, "exit status 5"),
+        ("import sys\nsys.exit()", 2, "sys.exit"),
+        ("", None, "no function"),
+        ("x = '\0'", None, "null bytes"),
+    ],
+)
+def test_a_source_that_does_not_load(track, source, line, text):
+    with pytest.raises(RewardError, match=r"before the first call") as caught:
+        RewardWorker(source, track)
+    assert text in str(caught.value)
+    assert caught.value.line == line
+    assert caught.value.row_index is None
+    assert caught.value.params is None
+
+
+def test_a_missing_package_says_how_to_get_it(track, monkeypatch):
+    monkeypatch.setattr("racecraft.reward.launch.package_paths", list)
+    with pytest.raises(RewardError, match=r"needs shapely, which is not installed here: pip install shapely") as caught:
+        RewardWorker("import math\nimport shapely\n" + function("return 1.0"), track)
+    assert caught.value.line == 2
+
+
+def test_a_source_that_hangs_while_it_loads(track):
+    with pytest.raises(RewardError, match=r"within 0\.3 s") as caught:
+        RewardWorker("x = 1\nwhile True: pass", track, start_timeout_s=0.3)
+    assert caught.value.line == 2
+
+
+def test_racecraft_and_the_environment_are_out_of_reach(track, rows, monkeypatch):
+    monkeypatch.setenv("RACECRAFT_TEST_SECRET", "1")
+    source = function(
+        "import os, sys", "return float('RACECRAFT_TEST_SECRET' in os.environ) + ('racecraft' in sys.modules)"
+    )
+    with running(source, track) as worker:
+        assert worker(rows[:1]).tolist() == [0.0]
