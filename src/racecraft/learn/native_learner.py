@@ -4,7 +4,7 @@ Results are the same bits for any number of threads and on any machine with fuse
 
     NetworkSpec ──networks──▶ _native.Learner: parameters, forward passes, gradient, Adam (native/src/learner.hpp)
 
-Parameters cross the border as one flat vector in the order of ``racecraft.learn.networks.weight_shapes``.
+Parameters cross the border as one flat vector as ``racecraft.learn.flat_weights`` joins them.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from racecraft import _native
 from racecraft.errors import CheckpointError, ConfigError, ShapeError
 from racecraft.learn import networks
+from racecraft.learn.flat_weights import join_weights, split_weights
 from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below
 
 _NO_INDICES = np.zeros(0, np.int64)
@@ -39,7 +40,6 @@ class NativeLearner:
     def __init__(self, spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0) -> None:
         self.spec = spec
         self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
-        self._shapes = networks.weight_shapes(spec)
         try:
             self._native = self._make(spec, num_threads)
         except ValueError as error:
@@ -133,7 +133,7 @@ class NativeLearner:
 
     def load_weights(self, weights: Weights) -> None:
         """Replace the parameters; CheckpointError if names or shapes differ."""
-        self._native.write("weights", self._flat(weights))
+        self._native.write("weights", join_weights(weights, self.spec))
 
     def optimizer_state(self) -> Weights:
         """Copy of Adam's moments, ``moment1/<weight>`` and ``moment2/<weight>``, and ``step`` (1,)."""
@@ -144,7 +144,7 @@ class NativeLearner:
 
     def load_optimizer_state(self, state: Weights) -> None:
         """Replace what ``optimizer_state`` gives; CheckpointError if names or shapes differ."""
-        flat = {moment: self._flat(below(f"{moment}/", state)) for moment in ("moment1", "moment2")}
+        flat = {moment: join_weights(below(f"{moment}/", state), self.spec) for moment in ("moment1", "moment2")}
         if "step" not in state:
             raise CheckpointError("The optimiser's state has no 'step'.")
         for moment, values in flat.items():
@@ -152,21 +152,7 @@ class NativeLearner:
         self._native.num_updates = int(state["step"][0])
 
     def _read(self, part: str) -> Weights:
-        flat = self._native.read(part)
-        ends = np.cumsum([int(np.prod(shape)) for shape in self._shapes.values()])
-        parts = np.split(flat, ends[:-1])
-        return {name: values.reshape(shape) for (name, shape), values in zip(self._shapes.items(), parts, strict=True)}
-
-    def _flat(self, arrays: Weights) -> NDArray[np.float32]:
-        """The arrays one after the other, in the network's order."""
-        shapes = {name: tuple(array.shape) for name, array in arrays.items()}
-        if shapes != self._shapes:
-            different = sorted(name for name, _ in set(shapes.items()) ^ set(self._shapes.items()))
-            raise CheckpointError(
-                f"The weights do not fit the network {self.spec.name}: {', '.join(dict.fromkeys(different))} "
-                "are missing, superfluous or of another shape."
-            )
-        return np.concatenate([np.asarray(arrays[name], np.float32).ravel() for name in self._shapes])
+        return split_weights(self._native.read(part), self.spec)
 
     def _sensed(self, minibatch: Minibatch, size: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """What the core is to see of a minibatch: bytes and states."""

@@ -16,6 +16,7 @@ from torch.nn import functional
 
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import networks, torch_networks
+from racecraft.learn.flat_weights import join_weights, split_weights
 from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below
 from racecraft.learn.torch_learner import log_probs_and_entropy
 
@@ -220,21 +221,10 @@ class CudaLearner:
         return {name: part.view(shape) for (name, shape), part in zip(self._shapes.items(), parts, strict=True)}
 
     def _arrays(self, flat: Tensor) -> Weights:
-        host = flat.detach().cpu().numpy().copy()
-        ends = np.cumsum([int(np.prod(shape)) for shape in self._shapes.values()])
-        parts = np.split(host, ends[:-1])
-        return {name: part.reshape(shape) for (name, shape), part in zip(self._shapes.items(), parts, strict=True)}
+        return split_weights(flat.detach().cpu().numpy().copy(), self.spec)
 
     def _load(self, flat: Tensor, arrays: Weights) -> None:
-        shapes = {name: tuple(array.shape) for name, array in arrays.items()}
-        if shapes != self._shapes:
-            different = sorted(name for name, _ in set(shapes.items()) ^ set(self._shapes.items()))
-            raise CheckpointError(
-                f"The weights do not fit the network {self.spec.name}: {', '.join(dict.fromkeys(different))} "
-                "are missing, superfluous or of another shape."
-            )
-        joined = np.concatenate([np.asarray(arrays[name], np.float32).reshape(-1) for name in self._shapes])
-        flat.copy_(torch.from_numpy(joined))
+        flat.copy_(torch.from_numpy(join_weights(arrays, self.spec)))
 
     def _choose(self, precision: str) -> torch.dtype:
         choices = {"float32": torch.float32, "bfloat16": torch.bfloat16}

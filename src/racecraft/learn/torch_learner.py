@@ -23,6 +23,7 @@ from torch.nn import functional
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import networks, torch_networks
 from racecraft.learn.distributions import LOG_STD_MAX, LOG_STD_MIN
+from racecraft.learn.flat_weights import join_weights
 from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below
 
 _BETA1, _BETA2 = 0.9, 0.999
@@ -207,15 +208,7 @@ class TorchLearner:
         return {name: part.view(shape) for (name, shape), part in zip(self._shapes.items(), parts, strict=True)}
 
     def _load(self, flat: Tensor, arrays: Weights) -> None:
-        shapes = {name: tuple(array.shape) for name, array in arrays.items()}
-        if shapes != self._shapes:
-            different = sorted(name for name, _ in set(shapes.items()) ^ set(self._shapes.items()))
-            raise CheckpointError(
-                f"The weights do not fit the network {self.spec.name}: {', '.join(dict.fromkeys(different))} "
-                "are missing, superfluous or of another shape."
-            )
-        for name, view in self._views(flat).items():
-            view.copy_(torch.from_numpy(np.asarray(arrays[name], np.float32)))
+        flat.copy_(torch.from_numpy(join_weights(arrays, self.spec)))
 
 
 def log_probs_and_entropy(outputs: Tensor, actions: Tensor, *, is_discrete: bool) -> tuple[Tensor, Tensor]:
