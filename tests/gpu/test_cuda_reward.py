@@ -10,8 +10,7 @@ from host_device import HostDevice
 
 import racecraft.reward
 from racecraft import _native
-from racecraft.errors import ConfigError
-from racecraft.gpu import compile_program, open_device
+from racecraft.gpu import compile_program
 from racecraft.reward import RewardWorker
 from racecraft.reward.cuda import CudaReward
 from racecraft.reward.cuda_source import cuda_source
@@ -76,16 +75,6 @@ def rows():
         kept.append(simulation.rows.copy())
         simulation.reset(simulation.terminated)
     return np.concatenate(kept)
-
-
-@pytest.fixture(params=["host", "gpu"])
-def device(request):
-    if request.param == "host":
-        return HostDevice()
-    try:
-        return open_device("cuda")
-    except ConfigError as reason:
-        pytest.skip(str(reason))
 
 
 def reward_of(source: str, device) -> CudaReward:

@@ -8,7 +8,6 @@ from host_device import HostDevice
 
 from racecraft import _native
 from racecraft.errors import ConfigError, ShapeError
-from racecraft.gpu import open_device
 from racecraft.sim import Bots, CameraSpec, Objects, Obstacles, Simulation, Start
 from racecraft.sim.cuda_simulation import CudaSimulation
 from racecraft.track import load_track
@@ -44,17 +43,6 @@ def actions_of(step: int, cars: int) -> np.ndarray:
     steering = rng.uniform(-0.7, 0.7, cars) * np.where(np.arange(cars) % 3, 0.4, 1.0)
     speed = np.where(np.arange(cars) % 5 == 4, 0.0, rng.uniform(-0.2, 4.5, cars))
     return np.column_stack([steering, speed]).astype(np.float32)
-
-
-@pytest.fixture(params=["host", "gpu"])
-def device(request):
-    """The kernels' own text on the CPU, and the real thing."""
-    if request.param == "host":
-        return HostDevice()
-    try:
-        return open_device("cuda")
-    except ConfigError as reason:
-        pytest.skip(str(reason))
 
 
 def on_host(array) -> np.ndarray:
