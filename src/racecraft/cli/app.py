@@ -21,6 +21,7 @@ app = typer.Typer(
 INTERRUPTED = 130  # 128 + SIGINT, as shells say it
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout instead of text.")]
+AwsLog = Annotated[str, typer.Option("--aws-log", help="File for the log lines that AWS's tools read; - for stdout.")]
 TrackOption = Annotated[str, typer.Option("--track", "-t", help="Name of a track, or path of a track file.")]
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import Json, app, is_given, print_json, text
+from racecraft.cli.app import AwsLog, Json, app, is_given, print_json, text
 
 RACE_ONLY: Final = ("track", "laps", "rules", "offtrack_penalty", "max_resets", "video", "aws_log", "ghost")
 
@@ -37,12 +37,8 @@ def evaluate(
     randomize: Annotated[
         str, typer.Option("--randomize", help="What differs from trial to trial: light, strong, aws or a JSON file.")
     ] = "none",
-    offtrack_penalty: Annotated[
-        float | None, typer.Option("--offtrack-penalty", help="Seconds; by default the rules'.")
-    ] = None,
-    collision_penalty: Annotated[
-        float | None, typer.Option("--collision-penalty", help="Seconds; by default the rules'.")
-    ] = None,
+    offtrack_penalty: race_options.OfftrackPenalty = None,
+    collision_penalty: race_options.CollisionPenalty = None,
     race: race_options.Race = "",
     objects: race_options.NumObjects = 0,
     bots: race_options.NumBots = 0,
@@ -55,9 +51,7 @@ def evaluate(
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of the starts.")] = 0,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of the best trial.")] = True,
     ghost: race_options.Ghosts = None,
-    aws_log: Annotated[
-        str, typer.Option("--aws-log", help="File for the log lines that AWS's tools read; - for stdout.")
-    ] = "",
+    aws_log: AwsLog = "",
     as_json: Json = False,
 ) -> None:
     """Race a run's policy against the clock and film it.

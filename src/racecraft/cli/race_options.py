@@ -1,4 +1,4 @@
-"""What stands or drives on the track: the options that `train`, `evaluate` and `race` share."""
+"""Options that verbs share: what stands or drives on the track, penalties, ghosts."""
 
 from __future__ import annotations
 
@@ -33,6 +33,8 @@ BotSpeed = Annotated[
 LaneChanges = Annotated[bool, typer.Option("--lane-changes", help="Bot cars change lanes every 3 to 5 s.")]
 ParkedCars = Annotated[bool, typer.Option("--parked-cars", help="Obstacles are parked cars, not boxes.")]
 Placement = Annotated[str, typer.Option("--placement", help="Of objects: random (each episode anew), even or fixed.")]
+OfftrackPenalty = Annotated[float | None, typer.Option("--offtrack-penalty", help="Seconds; by default the rules'.")]
+CollisionPenalty = Annotated[float | None, typer.Option("--collision-penalty", help="Seconds; by default the rules'.")]
 Ghosts = Annotated[
     list[str] | None,
     typer.Option("--ghost", help="Ghost in the video: a replay file, RUN[@STEP], @STEP or best-lap; repeatable."),

@@ -19,6 +19,10 @@ Kind = Annotated[
     str,
     typer.Option("--type", help="time-trial, object-avoidance, head-to-bot, head-to-model or grid."),
 ]
+Rules = Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")]
+Vehicle = Annotated[
+    str, typer.Option("--vehicle", help="Everybody's: v4, v5, v6 or a file; by default the first model's.")
+]
 
 
 @app.command()
@@ -28,18 +32,14 @@ def race(
     track: TrackOption = "reinvent_2018",
     kind: Kind = "time-trial",
     laps: Annotated[int | None, typer.Option("--laps", "-l", help="By default the rules'.")] = None,
-    rules: Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")] = "drfc",
+    rules: Rules = "drfc",
     ranking: Annotated[str, typer.Option("--ranking", help="total, best or average.")] = "total",
     minimum_laps: Annotated[
         int | None, typer.Option("--minimum-laps", help="Laps that a model must complete to be ranked.")
     ] = None,
     time_limit: Annotated[float | None, typer.Option("--time-limit", help="Seconds on the clock; 0 for none.")] = None,
-    offtrack_penalty: Annotated[
-        float | None, typer.Option("--offtrack-penalty", help="Seconds; by default the rules'.")
-    ] = None,
-    collision_penalty: Annotated[
-        float | None, typer.Option("--collision-penalty", help="Seconds; by default the rules'.")
-    ] = None,
+    offtrack_penalty: race_options.OfftrackPenalty = None,
+    collision_penalty: race_options.CollisionPenalty = None,
     max_resets: Annotated[int | None, typer.Option("--max-resets", help="Resets to a race.")] = None,
     direction: Annotated[str, typer.Option("--direction", help="forward or reverse.")] = "",
     objects: race_options.NumObjects = 0,
@@ -49,9 +49,7 @@ def race(
     parked_cars: race_options.ParkedCars = False,
     placement: race_options.Placement = "",
     positions: race_options.Positions = "",
-    vehicle: Annotated[
-        str, typer.Option("--vehicle", help="Everybody's: v4, v5, v6 or a file; by default the first model's.")
-    ] = "",
+    vehicle: Vehicle = "",
     randomize: Annotated[str, typer.Option("--randomize", help="none, light, strong, aws or a JSON file.")] = "none",
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts and objects.")] = 0,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of every entry.")] = True,
@@ -109,7 +107,7 @@ def ladder(
     starts: Annotated[int, typer.Option("--starts", help="Different starts on each track.")] = 3,
     rounds: Annotated[int, typer.Option("--rounds", help="Of a Swiss schedule; by default one for every start.")] = 0,
     laps: Annotated[int, typer.Option("--laps", "-l", help="To a race.")] = 1,
-    rules: Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")] = "drfc",
+    rules: Rules = "drfc",
     time_limit: Annotated[float, typer.Option("--time-limit", help="Seconds on the clock; 0 for none.")] = 180.0,
     objects: race_options.NumObjects = 0,
     bots: race_options.NumBots = 0,
@@ -118,9 +116,7 @@ def ladder(
     parked_cars: race_options.ParkedCars = False,
     placement: race_options.Placement = "",
     positions: race_options.Positions = "",
-    vehicle: Annotated[
-        str, typer.Option("--vehicle", help="Everybody's: v4, v5, v6 or a file; by default the first model's.")
-    ] = "",
+    vehicle: Vehicle = "",
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts, objects and the order of races.")] = 0,
     as_json: Json = False,
 ) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import INTERRUPTED, Json, app, is_given, print_json, text
+from racecraft.cli.app import INTERRUPTED, AwsLog, Json, app, is_given, print_json, text
 
 DEFAULT_TRACK: Final = "reinvent_2018"
 _OPTIONS_OF: Final = {
@@ -99,9 +99,7 @@ def train(
     video: Annotated[
         bool, typer.Option("--video", help="Afterwards evaluate the best checkpoint and film it.")
     ] = False,
-    aws_log: Annotated[
-        str, typer.Option("--aws-log", help="File for the log lines that AWS's tools read; - for stdout.")
-    ] = "",
+    aws_log: AwsLog = "",
     as_json: Json = False,
 ) -> None:
     """Train a car from camera pixels with a reward function."""
