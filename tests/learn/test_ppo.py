@@ -71,33 +71,6 @@ def test_the_step_size_falls_with_the_steps_driven(config):
     assert list(dict.fromkeys(rates)) == pytest.approx(expected)
 
 
-def test_rollouts_and_minibatches_grow_with_the_steps_driven(config):
-    one = config.num_envs * config.num_steps
-    ppo = ppo_for(dataclasses.replace(config, growth_steps=2 * one))
-    sizes: list[int] = []
-    update = ppo.learner.update
-    ppo.learner.update = lambda minibatch, objective: (
-        sizes.append(len(minibatch.rows)),
-        update(minibatch, objective),
-    )[1]
-    stats = [ppo.iterate() for _ in range(7)]
-    assert [s.num_steps // one for s in stats] == [1, 1, 2, 3, 4, 4, 4]
-    assert list(dict.fromkeys(sizes)) == [n * config.minibatch_size for n in (1, 2, 3, 4)]
-    with pytest.raises(ConfigError, match="growth_steps is 9, expected 0 where"):
-        dataclasses.replace(config, growth_steps=9, episodes_per_iteration=4)
-
-
-def test_growing_rollouts_resume_to_the_same_bits(config):
-    config = dataclasses.replace(config, growth_steps=config.num_envs * config.num_steps)
-    whole, again = ppo_for(config), ppo_for(config)
-    for _ in range(2):
-        whole.iterate()
-    again.load_state(whole.state())
-    again.environment = whole.environment
-    again.iterate()
-    assert again.total_steps == (1 + 2 + 4) * config.num_envs * config.num_steps
-
-
 def test_the_same_seed_gives_the_same_bits(config):
     first, second, other = (ppo_for(config, seed=seed) for seed in (3, 3, 4))
     for ppo in (first, second, other):

@@ -12,9 +12,13 @@ from tiny_runs import Recorder, Train, assert_same, logs, weights
 from racecraft import training
 from racecraft.errors import CheckpointError, ConfigError, RunError
 from racecraft.run import RunFolder
+from racecraft.sim import Simulation
+from racecraft.sim.objects import NO_OBJECTS, Objects, Obstacles
+from racecraft.track import load_track
 from racecraft.training import resume
 from racecraft.training.job import Training
-from racecraft.training.opponents import CURRENT, OpponentPool, Opponents
+from racecraft.training.opponents import BESIDE_REACH, BESIDE_SPEED, CURRENT, OpponentPool, Opponents
+from racecraft.training.settings import RACING
 
 SELF = Opponents(cars=3, pool_size=4, snapshot_every=64)
 
@@ -65,16 +69,64 @@ def test_the_pool_spans_the_training_evenly(tiny: Train) -> None:
 
 def test_the_learner_meets_every_place_of_the_grid(tiny: Train) -> None:
     seen: list[OpponentPool] = []
+    roads: list[bool] = []
 
     class Watch(Training):
         def _train(self, session):  # type: ignore[no-untyped-def]
             seen.append(session.opponents)
+            roads.append(session.environment.goes_on)
             return super()._train(session)
 
     result = tiny(name="watch", opponents=SELF, until="64 steps", evaluate_every=64)
     Watch(RunFolder.open(result.run), until=training.Until(steps=128)).run()
     assert (seen[0].own % 3).tolist() == [0, 1, 2, 0, 1, 2, 0, 1]
     assert (seen[0].own // 3).tolist() == list(range(8))
+    assert roads == [True]  # no place of the lap is the last to a learner
+
+
+def races(opponents: Opponents, *, objects: Objects = NO_OBJECTS, seed: int = 3) -> Simulation:
+    simulation = Simulation(
+        load_track("oval"),
+        num_envs=60 * opponents.cars,
+        cars_per_race=opponents.cars,
+        start=RACING,
+        objects=objects,
+        seed=seed,
+    )
+    OpponentPool(opponents, simulation, None, seed=seed)  # type: ignore[arg-type]  # nobody drives here
+    return simulation
+
+
+def test_half_of_the_races_of_two_begin_rolling_side_by_side() -> None:
+    simulation = races(Opponents())
+    speed = simulation.vehicles[3].reshape(60, 2)
+    offset, place = (simulation.column(name).reshape(60, 2) for name in ("offset", "projection_distance"))
+    rolls = speed[:, 0] > 0.0
+    assert 20 <= rolls.sum() <= 40
+    assert (speed[:, 0] == speed[:, 1]).all()
+    assert speed.max() <= BESIDE_SPEED
+    assert (offset[rolls, 0] * offset[rolls, 1] < 0.0).all()
+    length = simulation.tracks[0].length
+    gap = (place[rolls, 1] - place[rolls, 0] + 0.5 * length) % length - 0.5 * length
+    assert np.abs(gap).max() <= BESIDE_REACH + 0.2  # a lane's metres are not those of the centre line
+    assert gap.min() < -0.3
+    assert gap.max() > 0.3
+    simulation.step(np.tile(np.float32([0.0, 2.0]), (120, 1)))
+    assert not simulation.terminated.any()
+    assert (races(Opponents()).column("x") == races(Opponents()).column("x")).all()
+
+
+@pytest.mark.parametrize(
+    ("opponents", "objects"),
+    [
+        (Opponents(beside_share=0.0), NO_OBJECTS),
+        (Opponents(cars=3), NO_OBJECTS),
+        (Opponents(), Objects(obstacles=Obstacles(count=2))),
+    ],
+)
+def test_other_races_begin_on_the_grid(opponents, objects) -> None:
+    simulation = races(opponents, objects=objects)
+    assert (simulation.vehicles[3] == 0.0).all()
 
 
 def test_other_runs_drive_the_other_cars(tiny: Train) -> None:
@@ -116,6 +168,7 @@ def test_a_checkpoint_of_other_races_is_refused(tiny: Train) -> None:
         {"snapshot_every": 0},
         {"current_share": 1.5},
         {"current_share": "half"},
+        {"beside_share": -0.1},
         {"drivers": ()},
         {"drivers": "self"},
         {"drivers": ("self", "runs/a")},

@@ -27,8 +27,6 @@ from racecraft.learn.rollout import Rollout
 
 _VALUE_BATCH = 4096  # observations whose values are computed at once
 _MAX_COUNT = 10**9
-MOST_GROWTH = 4
-"""Times its first size that a rollout of growing ones reaches."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,8 +45,6 @@ class PPOConfig:
     """Adam's step size; AWS's 3e-4 is safe for days of training, this is for the first laps in seconds."""
     rate_steps: int = 0
     """Camera steps after which the step size is a half of learning_rate, after twice as many a third; 0: never."""
-    growth_steps: int = 0
-    """Camera steps after which rollouts and minibatches are twice as large, then three and four times; 0: never."""
     gamma: float = 0.98
     """Discount per step of 1/15 s; 0.98 looks about 3 s ahead."""
     gae_lambda: float = 0.95
@@ -92,7 +88,6 @@ class PPOConfig:
             ("episodes_per_iteration", 0),
             ("epsilon_steps", 0),
             ("rate_steps", 0),
-            ("growth_steps", 0),
         ):
             value = getattr(self, name)
             is_whole = isinstance(value, int) and not isinstance(value, bool)
@@ -101,8 +96,6 @@ class PPOConfig:
             _require(self, name, _is_number(getattr(self, name), 0.0, 1.0), "a number from 0 to 1")
         for name in ("learning_rate", "ent_coef", "vf_coef", "max_grad_norm"):
             _require(self, name, _is_number(getattr(self, name), 0.0), "a finite number, 0 or more")
-        is_fixed = self.growth_steps == 0 or self.episodes_per_iteration == 0
-        _require(self, "growth_steps", is_fixed, "0 where iterations are of whole episodes")
         is_open = _is_number(self.clip_coef, 0.0, 1.0) and 0 < self.clip_coef < 1
         _require(self, "clip_coef", is_open, "between 0 and 1")
         _require(self, "value_loss", self.value_loss in ("mse", "huber"), "'mse' or 'huber'")
@@ -189,7 +182,7 @@ class PPO:
         if config.episodes_per_iteration:
             capacity = -(-config.max_steps_per_iteration // min(config.num_envs, config.episodes_per_iteration))
         else:
-            capacity = config.num_steps * (MOST_GROWTH if config.growth_steps else 1)
+            capacity = config.num_steps
             samples = config.num_steps * config.num_envs
             is_filled = config.minibatch_size <= samples
             _require(config, "minibatch_size", is_filled, f"at most num_steps x num_envs = {samples}")
@@ -211,7 +204,6 @@ class PPO:
         self.prefers_average = False
         """Whether the averaged weights drive. The mean of beginners is none: set it once the policy drives well."""
         self._average = WeightAverage(learner, config.average_share)
-        self._growth = 1  # times its first size that the rollout under way has
         self._clocks = {"environment": 0.0, "policy": 0.0, "update": 0.0}
 
     def iterate(self) -> IterationStats:
@@ -221,8 +213,6 @@ class PPO:
             TrainingError: Loss or gradient is not finite; the weights are those of before that gradient step.
         """
         rng = np.random.default_rng([self.seed, self.iteration])
-        if self.config.growth_steps:
-            self._growth = 1 + min(self.total_steps // self.config.growth_steps, MOST_GROWTH - 1)
         self._clocks = dict.fromkeys(self._clocks, 0.0)
         finished = self._collect(rng)
 
@@ -271,7 +261,7 @@ class PPO:
         rollout, environment = self._rollout, self.environment
         num_envs, episodes = self.config.num_envs, self.config.episodes_per_iteration
         finished: list[tuple[float, int]] = []
-        size = self.config.num_steps * num_envs * self._growth
+        size = self.config.num_steps * num_envs
         budget = self.config.max_steps_per_iteration if episodes else size
         quota = np.full(num_envs, np.iinfo(np.int64).max)  # episodes each car may still begin
         if episodes:
@@ -401,7 +391,7 @@ class PPO:
             advantages=b_advantages,
             returns=b_returns,
         )
-        minibatch_size = min(config.minibatch_size * self._growth, len(used))
+        minibatch_size = min(config.minibatch_size, len(used))
         objective = config.objective
         if config.rate_steps:
             rate = config.learning_rate / (1.0 + self.total_steps / config.rate_steps)

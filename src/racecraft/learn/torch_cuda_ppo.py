@@ -79,10 +79,10 @@ class CudaPPO(PPO):
     def __init__(
         self, config: PPOConfig, learner: CudaLearner, environment: DeviceEnvironment, *, seed: int = 0
     ) -> None:
-        if config.episodes_per_iteration or config.growth_steps or config.exploration != "categorical":
+        if config.episodes_per_iteration or config.exploration != "categorical":
             raise ConfigError(
                 "Device 'cuda' trains after a fixed number of steps, with categorical exploration; these settings "
-                "ask for whole episodes, growing rollouts or e-greedy exploration.",
+                "ask for whole episodes or e-greedy exploration.",
                 hint="Use device 'cpu' for AWS's hyperparameters.",
             )
         super().__init__(config, learner, environment, seed=seed)  # type: ignore[arg-type]

@@ -213,7 +213,7 @@ class Training:
                     trace=trace,
                     prints=prints,
                     opponents=opponents,
-                    goes_on=settings.algorithm == "distill",
+                    goes_on=settings.algorithm == "distill" or opponents is not None,
                 )
             else:
                 environment = CudaTrainingEnvironment(

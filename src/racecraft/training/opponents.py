@@ -5,6 +5,7 @@ learner's weights --now and then--> pool --drawn for every car and race--> comma
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,10 @@ from racecraft.sim import Simulation
 SELF: Final = "self"
 MAX_CARS: Final = 8
 MAX_POOL: Final = 32
+BESIDE_REACH: Final = 0.75
+"""m that the other car of a race is at most ahead or behind where both begin beside each other: a place of the grid."""
+BESIDE_SPEED: Final = 2.5
+"""m/s that both then drive at most."""
 CURRENT: Final = -1
 """Number of the policy that learns, among those of a pool."""
 _PURPOSE: Final = 0x706F6F6C  # the draws of a pool never coincide with others of the same seed
@@ -39,6 +44,8 @@ class Opponents:
     """To a race, the learner's included: 2 to 8."""
     current_share: float = 0.5
     """How often a past self gives way to the present one."""
+    beside_share: float = 0.5
+    """How often a race of two begins rolling, side by side: amid a pass, which nobody comes to by chance."""
     pool_size: int = 8
     """Past selves that are kept: from the beginning to now, evenly."""
     snapshot_every: int = 25_000
@@ -60,9 +67,9 @@ class Opponents:
         ):
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 raise ConfigError(f"{name} of opponents is {value!r}; allowed is a whole number from {low} to {high}.")
-        share = self.current_share
-        if isinstance(share, bool) or not isinstance(share, int | float) or not 0.0 <= share <= 1.0:
-            raise ConfigError(f"current_share of opponents is {share!r}; allowed is a number from 0 to 1.")
+        for name, share in (("current_share", self.current_share), ("beside_share", self.beside_share)):
+            if isinstance(share, bool) or not isinstance(share, int | float) or not 0.0 <= share <= 1.0:
+                raise ConfigError(f"{name} of opponents is {share!r}; allowed is a number from 0 to 1.")
 
     @property
     def is_self(self) -> bool:
@@ -117,11 +124,13 @@ class OpponentPool:
             driver.sensors.read(simulation)
         self._steps: list[int] = []  # of the snapshots, rising
         self._interval = opponents.snapshot_every
+        is_closed = all(track.is_closed for track in simulation.tracks)
+        self._has_room = size == 2 and is_closed and simulation.objects.count == 0  # to begin beside each other
         self._drivers = np.full(simulation.num_envs, CURRENT, dtype=np.int32)  # by car
         self.draw(np.ones(len(races), dtype=np.bool_))
 
     def draw(self, races: NDArray[np.bool_]) -> None:
-        """Choose who drives in the masked races (races,), which have just begun."""
+        """Choose who drives in the masked races (races,), which have just begun, and which of them begin rolling."""
         size, known = self._simulation.cars_per_race, len(self._policies)
         numbers = self._simulation.column("episode")[self.own].astype(np.int64)
         for race in np.flatnonzero(races).tolist():
@@ -130,6 +139,17 @@ class OpponentPool:
             is_current = (chance < self._settings.current_share) if self._settings.is_self else np.zeros(size, np.bool_)
             drawn = np.minimum((choice * known).astype(np.int32), known - 1)
             self._drivers[race * size : (race + 1) * size] = np.where(is_current, CURRENT, drawn)
+            if self._has_room and rng.random() < self._settings.beside_share:
+                self._start_beside(race, rng)
+
+    def _start_beside(self, race: int, rng: np.random.Generator) -> None:
+        """Put the two cars of a race side by side, about where the learner stands, and let them roll."""
+        simulation, own = self._simulation, int(self.own[race])
+        gap, speed = rng.uniform(-BESIDE_REACH, BESIDE_REACH), rng.uniform(0.0, BESIDE_SPEED)
+        place, offset = (float(simulation.column(name)[own]) for name in ("projection_distance", "offset"))
+        lane = math.copysign(0.25 * simulation.driven_track(own).mean_width, offset)
+        simulation.place(own, place, offset=lane, speed=speed)
+        simulation.place(int(self._others[race]), place + gap, offset=-lane, speed=speed)
 
     def commands(self, own: NDArray[np.float32]) -> NDArray[np.float32]:
         """Commands of all cars (N, 2), from those of the learner's (races, 2)."""
