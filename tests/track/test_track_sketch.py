@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from racecraft.errors import RacecraftError, TrackError
@@ -35,6 +35,7 @@ def test_points_on_a_circle_draw_a_circle() -> None:
     st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(0.3, 2)), min_size=3, max_size=12),
     st.booleans(),
 )
+@example(places=[(2.0, 0.0, 1.0), (-1.0, 0.0, 1.0), (2.0, 0.0, 1.0)], is_closed=False)  # back on itself
 def test_the_line_goes_through_every_point(places: list[tuple[float, float, float]], is_closed: bool) -> None:
     try:
         sketch = Sketch(

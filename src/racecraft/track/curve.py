@@ -83,6 +83,8 @@ def road_along(line: Floats, width: float | Floats, *, name: str, is_clockwise: 
     if not is_closed:
         before, after = np.maximum(s - _FINE, 0.0), np.minimum(s + _FINE, arc[-1])
     tangent = interpolate(line, arc, after) - interpolate(line, arc, before)
+    turns = ~tangent.any(axis=1)  # the line goes back on itself: the road ends there as it came
+    tangent[turns] = centre[turns] - interpolate(line, arc, before[turns])
     tangent /= np.hypot(*tangent.T)[:, None]
     half = np.interp(s, arc, np.broadcast_to(width, len(line)))[:, None] / 2
     left = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1) * half
