@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,14 +30,18 @@ def test_the_name_that_errors_recommend_is_there() -> None:
     assert not hasattr(training, "Oponents")
 
 
-def test_a_run_against_itself_killed_at_any_iteration_resumes_as_if_it_never_was(tiny: Train, tmp_path: Path) -> None:
+@pytest.mark.parametrize("cars", [2, 3])
+def test_a_run_against_itself_killed_at_any_iteration_resumes_as_if_it_never_was(
+    tiny: Train, tmp_path: Path, cars: int
+) -> None:
     copies: list[Path] = []
 
     def copy(step: int) -> None:
         copies.append(tmp_path / "killed" / str(step))
         shutil.copytree(tmp_path / "runs" / "undisturbed", copies[-1])
 
-    settings = {"opponents": SELF, "until": "768 steps", "evaluate_every": 192, "actions": "default"}
+    opponents = replace(SELF, cars=cars)
+    settings = {"opponents": opponents, "until": "768 steps", "evaluate_every": 192, "actions": "default"}
     result = tiny(name="undisturbed", reporter=Recorder(copy), **settings)
     for path in copies[::3]:
         resumed = resume(path)
