@@ -62,7 +62,9 @@ def train(
         str, typer.Option("--algorithm", help="ppo, sac, distill, or Stable-Baselines3's sb3:ppo, a2c, dqn, sac, td3.")
     ] = "",
     network: Annotated[str, typer.Option("--network", help="RACECRAFT_SMALL or one of AWS's three names.")] = "",
-    critic: Annotated[str, typer.Option("--critic", help="What the critic sees: privileged or camera.")] = "privileged",
+    critic: Annotated[
+        str, typer.Option("--critic", help="What the critic sees: privileged, lap (head to head) or camera.")
+    ] = "",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
     direction: Annotated[str, typer.Option("--direction", help="forward, reverse or alternate.")] = "forward",
     randomize: Annotated[

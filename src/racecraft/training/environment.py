@@ -22,6 +22,7 @@ from racecraft.run import Episode, EpisodeCounter, PrintLog, SimTraceWriter
 from racecraft.sim import CudaSimulation, Simulation
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.track import Track
+from racecraft.training.lap_place import lap_place
 from racecraft.training.opponents import OpponentPool
 from racecraft.training.settings import TrainSettings
 
@@ -46,6 +47,7 @@ class TrainingEnvironment:
         goes_on: Whether the road goes on behind the finish line for who learns. Who is to be fast must cross it as one
             who drives on, and neither camera nor state says how far it is, so an end there would only look like
             chance: with this a lap's end cuts the episode, and the critic's value stands for what follows.
+        tells_place: Whether the privileged state ends in where on the lap the car is, as `lap_place` has it.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class TrainingEnvironment:
         prints: PrintLog | None = None,
         opponents: OpponentPool | None = None,
         goes_on: bool = False,
+        tells_place: bool = False,
     ) -> None:
         self.simulation = simulation
         self.worker = worker
@@ -70,6 +73,7 @@ class TrainingEnvironment:
         self.prints = prints
         self.opponents = opponents
         self.goes_on = goes_on
+        self.tells_place = tells_place
         self._own: slice | NDArray[np.intp] = slice(None) if opponents is None else opponents.own
         self.reward_seconds = 0.0
         self.trace_seconds = 0.0
@@ -87,8 +91,16 @@ class TrainingEnvironment:
         return self.simulation.num_envs // self.simulation.cars_per_race
 
     def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """What the sensors tell, as `SensorSuite.read` has it, and privileged state (N, S) at the current poses."""
-        return self.sensors.read(self.simulation)[self._own], self.simulation.state[self._own]
+        """What the sensors tell, as `SensorSuite.read` has it, and privileged state (N, S) at the current poses.
+
+        The place on the lap is that of the last judged step.
+        """
+        simulation, own = self.simulation, self._own
+        frames, state = self.sensors.read(simulation)[own], simulation.state[own]
+        if self.tells_place:
+            distance, length = (simulation.column(name)[own] for name in ("projection_distance", "track_length"))
+            state = np.concatenate([state, lap_place(distance, length)], axis=1)
+        return frames, state
 
     def step(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Drive one step: rewards, terminated, truncated, each (N,), the caller's to keep.

@@ -214,6 +214,7 @@ class Training:
                     prints=prints,
                     opponents=opponents,
                     goes_on=settings.algorithm == "distill" or opponents is not None,
+                    tells_place=settings.critic == "lap",
                 )
             else:
                 environment = CudaTrainingEnvironment(

@@ -17,6 +17,7 @@ from racecraft.sim.columns import state_width
 from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import DIRECTIONS
 from racecraft.track import join_names, load_tracks
+from racecraft.training.lap_place import LAP_COLUMNS
 from racecraft.training.opponents import Opponents
 from racecraft.training.stop import Until
 
@@ -29,7 +30,7 @@ _ADDED: Final = ("algorithm", "opponents", "sac", "distill", "sb3", "device")
 """Fields that runs of earlier versions lack."""
 _DROPPED: Final = (("growth_steps", 0),)
 """Settings of PPO that runs of earlier versions have, with the value that meant nothing."""
-CRITICS: Final = ("privileged", "camera")
+CRITICS: Final = ("privileged", "lap", "camera")
 EVALUATE_EVERY: Final = 4096
 FAR_EVALUATE_EVERY: Final = 50_000
 """Camera steps between two evaluations where there are several tracks: one of them drives hundreds of metres."""
@@ -87,7 +88,8 @@ class TrainSettings:
     network: str = "RACECRAFT_SMALL"
     """Architecture, one of `racecraft.learn.network_names()`."""
     critic: str = "privileged"
-    """What the critic sees while training: ``privileged`` state, or the ``camera`` alone, as AWS's."""
+    """What the critic sees while training: ``privileged`` state; that and where on the ``lap`` the car is; or the
+    ``camera`` alone, as AWS's."""
     vehicle: Vehicle = field(default_factory=Vehicle)
     """The car."""
     start: Start = field(default_factory=lambda: Start(spread=True))
@@ -144,6 +146,11 @@ class TrainSettings:
         kind, _, number = self.device.partition(":") if isinstance(self.device, str) else ("", "", "")
         if self.device != "cpu" and (kind != "cuda" or (":" in self.device and not number.isdecimal())):
             raise ConfigError(f"device is {self.device!r}; allowed are 'cpu', 'cuda', and 'cuda:1' for the second GPU.")
+        if self.critic == "lap" and (self.algorithm, self.device) != ("ppo", "cpu"):
+            raise ConfigError(
+                f"critic is 'lap', which is for algorithm 'ppo' on device 'cpu'; it is {self.algorithm!r} on "
+                f"{self.device!r}. Allowed there are 'privileged' and 'camera'."
+            )
         if self.device != "cpu" and self.algorithm != "ppo":
             raise ConfigError(f"algorithm is {self.algorithm!r}; device {self.device!r} trains 'ppo' only.")
         if self.opponents is not None and not isinstance(self.opponents, Opponents):
@@ -176,7 +183,7 @@ class TrainSettings:
             name=self.network,
             num_actions=space.size if is_discrete else 2,
             is_discrete=is_discrete,
-            state_size=state_width(self.num_objects) if self.critic == "privileged" else 0,
+            state_size=self.state_size,
             is_squashed=self.algorithm in SQUASHED,
             lenses=metadata.suite.lenses,
             lidar_size=metadata.suite.lidar_size,
@@ -191,6 +198,13 @@ class TrainSettings:
     def num_objects(self) -> int:
         """Around every car: boxes, bots, and the other cars of its race."""
         return self.objects.count + self.cars_per_race - 1
+
+    @property
+    def state_size(self) -> int:
+        """Columns that the critic sees beside or instead of the camera; 0 where it sees the camera alone."""
+        if self.critic == "camera":
+            return 0
+        return state_width(self.num_objects) + (LAP_COLUMNS if self.critic == "lap" else 0)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON, for run.json."""
@@ -238,6 +252,7 @@ def make_settings(
     randomize: Randomization | str | Path = "none",
     num_envs: int = 0,
     algorithm: str = "",
+    critic: str = "",
     ppo: PPOConfig | None = None,
     **settings: Any,
 ) -> TrainSettings:
@@ -256,6 +271,7 @@ def make_settings(
         randomize: Preset, file or ranges of what differs from episode to episode.
         num_envs: Cars driven at once; 0 decides by itself.
         algorithm: One of `ALGORITHMS`; by default the metadata's.
+        critic: One of `CRITICS`; by default ``privileged``, against opponents on one track ``lap``.
         ppo: How the policy improves, instead of hyperparameters.
         settings: Other fields of `TrainSettings`.
 
@@ -291,6 +307,8 @@ def make_settings(
         settings["evaluate_every"] = max(often, CUDA_EVALUATE_EVERY) if is_cuda else often
     algorithm = algorithm or ("sac" if metadata.training_algorithm == "sac" else "ppo")
     _check_actions(algorithm, metadata)
+    if not critic:
+        critic = "lap" if is_duel and not is_far else "privileged"
     if algorithm == "sac" and "sac" not in settings:
         if hyperparameters is not None:
             hyperparameters.check_algorithm("sac")
@@ -325,6 +343,7 @@ def make_settings(
         vehicle=vehicle,
         network=network or metadata.neural_network,
         algorithm=algorithm,
+        critic=critic,
         ppo=ppo,
         **settings,
     )
