@@ -134,9 +134,10 @@ def test_dodge_pays_less_the_nearer_and_the_more_squarely_an_object_is_ahead(ahe
     assert reward("dodge", **{**objects, "is_crashed": True}) == -1.0
 
 
-def test_lap_time_pays_for_the_metres_gained_since_the_last_step_of_the_same_episode():
+@pytest.mark.parametrize(("name", "mistake"), [("lap_time", -1.0), ("duel", -4.0)])
+def test_the_metres_gained_since_the_last_step_of_the_same_episode_are_paid_for(name, mistake):
     namespace: dict = {}
-    exec(compile(load_preset("lap_time"), "lap_time", "exec"), namespace)
+    exec(compile(load_preset(name), name, "exec"), namespace)
     rewards = [
         namespace["reward_function"](
             TEMPLATE | ROAD | {"steps": steps, "progress": progress, "track_length": 20.0, "is_offtrack": off}
@@ -146,7 +147,9 @@ def test_lap_time_pays_for_the_metres_gained_since_the_last_step_of_the_same_epi
             *((5.0, 3.0, True), (2.0, 0.0, False), (3.0, 0.0, False), (90.0, 50.0, False)),
         ]
     ]
-    assert rewards == pytest.approx([0, 0.2, -0.1, -1, 0, 0, 0])
+    assert rewards == pytest.approx([0, 0.2, -0.1, mistake, 0, 0, 0])
+    crash = TEMPLATE | ROAD | {"steps": 91.0, "progress": 50.5, "is_crashed": True}
+    assert namespace["reward_function"](crash) == mistake
 
 
 @pytest.mark.parametrize("name", preset_names())

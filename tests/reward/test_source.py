@@ -15,6 +15,7 @@ def test_the_presets():
         "anti_zigzag",
         "centerline",
         "dodge",
+        "duel",
         "heading",
         "lap_time",
         "object_avoidance",

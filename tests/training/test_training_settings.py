@@ -279,7 +279,8 @@ def test_against_other_models_training_takes_its_time() -> None:
     assert (alone.ppo, alone.evaluate_every) == (PPOConfig(ent_coef=0.0), EVALUATE_EVERY)
     plan = make_plan(opponents=rivals)
     assert (plan.settings.until, plan.metadata.action_space) == (Until(seconds=600), action_space("continuous"))
-    assert plan.reward == load_reward("lap_time")
+    assert plan.reward == load_reward("duel")
+    assert plan.settings.critic == "lap"
 
 
 def test_a_training_among_objects_has_the_reward_and_the_actions_of_its_race(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ def train(
     reward: Annotated[
         str,
         typer.Option(
-            "--reward", "-r", help="Preset or reward_function.py; racing, among objects dodge, head to head lap_time."
+            "--reward", "-r", help="Preset or reward_function.py; racing, among objects dodge, head to head duel."
         ),
     ] = "",
     until: Annotated[

@@ -217,7 +217,7 @@ class NewModel(Message):
     algorithm: str = Field("", max_length=40)
     """``ppo`` or ``sac``, which needs a continuous action space; by default the metadata's."""
     critic: str = Field("privileged", max_length=40)
-    """What the critic sees while training: ``privileged`` state, or the ``camera``."""
+    """What the critic sees while training: ``privileged`` state, that and the ``lap``'s place, or the ``camera``."""
     network: str = ""
     vehicle: str = ""
     seed: int = Field(0, ge=0, le=2**32 - 1)

@@ -66,7 +66,7 @@ def train(
         track: Name of a track, or path of a track file; or several, as `racecraft.track.load_tracks` reads them; by
             default ``reinvent_2018``.
         reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``, among objects ``dodge``,
-            against opponents ``lap_time``.
+            against opponents ``duel``.
         until: When to stop: ``"5 laps"`` (the default), ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or
             several joined by ``or``; among objects by default ``"20 laps or 5 minutes"``, against opponents
             ``"10 minutes"``.

@@ -27,8 +27,8 @@ TIME_TRIAL: Final = Defaults("racing", "default", "5 laps", ("FRONT_FACING_CAMER
 RACE: Final = Defaults("dodge", "steady", "20 laps or 5 minutes", ("FRONT_FACING_CAMERA", "LIDAR"))
 """Among objects: 1 m/s, a reward that knows what is ahead, and a LIDAR, which sees what is beside the car."""
 
-DUEL: Final = Defaults("lap_time", "continuous", "10 minutes", ("FRONT_FACING_CAMERA", "LIDAR"))
-"""Against other models: the speed that a race is won by, time to find it, and a LIDAR that sees who is beside."""
+DUEL: Final = Defaults("duel", "continuous", "10 minutes", ("FRONT_FACING_CAMERA", "LIDAR"))
+"""Against other models: pace, and mistakes as dear as in a race; time to find both; a LIDAR that sees who is beside."""
 
 
 def defaults_for(objects: Objects, opponents: Opponents | None = None) -> Defaults:
