@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,9 @@ from tiny_runs import Recorder
 from racecraft import evaluate, train
 from racecraft.learn import PPOConfig
 from racecraft.learn.native_learner import NativeLearner
+from racecraft.race.run_ladder import rate_models
 from racecraft.sim import Bots, Objects
+from racecraft.training import Opponents, resume
 
 BUDGET = 60_000  # camera steps; about 8,000 are usual
 
@@ -75,3 +78,16 @@ def test_without_learning_bots_are_run_into(tmp_path: Path) -> None:
     idle = replace(PPOConfig(), learning_rate=0.0)
     result = train("oval", until="6 laps or 20000 steps", ppo=idle, root=tmp_path, **RACE)
     assert result.reason == "steps"
+
+
+@pytest.mark.slow
+def test_who_races_itself_beats_what_it_was(tmp_path: Path) -> None:
+    """The plain command's training, a part of its first minute; every other race the newer one starts behind."""
+    run = train("speedway", opponents=Opponents(), until="60000 steps", seed=1, root=tmp_path, name="duel").run
+    before = shutil.copytree(run, tmp_path / "before")
+    resume(run, until="330000 steps")
+    ladder = rate_models(
+        [f"{run}@last", f"{before}@last"], tracks="speedway", kind="head-to-model", starts=20, seed=3, num_threads=1
+    )
+    wins = {row.name.split("@")[0]: row.wins for row in ladder.rows}
+    assert wins["duel"] >= 16, wins  # against itself it would win 10
