@@ -75,6 +75,12 @@ def test_against_others_on_one_track_it_is_the_default(settings, critic) -> None
     assert make_settings(metadata=METADATA, **settings).critic == critic
 
 
+@pytest.mark.parametrize(("name", "value"), [("algorithm", "sac"), ("device", "cuda")])
+def test_who_did_not_ask_for_it_is_not_told_of_it(name, value) -> None:
+    with pytest.raises(ConfigError, match=f"^{name} is '{value}'"):
+        make_settings(metadata=METADATA, opponents=Opponents(), **{name: value})
+
+
 @pytest.mark.parametrize("settings", [{"algorithm": "sac"}, {"algorithm": "distill"}, {"device": "cuda"}])
 def test_who_cannot_be_told_says_so(settings) -> None:
     with pytest.raises(ConfigError, match=r"critic is 'lap', which is for algorithm 'ppo' on device 'cpu'"):

@@ -28,7 +28,7 @@ RACE: Final = Defaults("dodge", "steady", "20 laps or 5 minutes", ("FRONT_FACING
 """Among objects: 1 m/s, a reward that knows what is ahead, and a LIDAR, which sees what is beside the car."""
 
 DUEL: Final = Defaults("duel", "continuous", "10 minutes", ("FRONT_FACING_CAMERA", "LIDAR"))
-"""Against other models: pace, and mistakes as dear as in a race; time to find both; a LIDAR that sees who is beside."""
+"""Against other models: pace, with dearer mistakes; time to find it; a LIDAR that sees who is beside."""
 
 
 def defaults_for(objects: Objects, opponents: Opponents | None = None) -> Defaults:

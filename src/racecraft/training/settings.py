@@ -146,11 +146,6 @@ class TrainSettings:
         kind, _, number = self.device.partition(":") if isinstance(self.device, str) else ("", "", "")
         if self.device != "cpu" and (kind != "cuda" or (":" in self.device and not number.isdecimal())):
             raise ConfigError(f"device is {self.device!r}; allowed are 'cpu', 'cuda', and 'cuda:1' for the second GPU.")
-        if self.critic == "lap" and (self.algorithm, self.device) != ("ppo", "cpu"):
-            raise ConfigError(
-                f"critic is 'lap', which is for algorithm 'ppo' on device 'cpu'; it is {self.algorithm!r} on "
-                f"{self.device!r}. Allowed there are 'privileged' and 'camera'."
-            )
         if self.device != "cpu" and self.algorithm != "ppo":
             raise ConfigError(f"algorithm is {self.algorithm!r}; device {self.device!r} trains 'ppo' only.")
         if self.opponents is not None and not isinstance(self.opponents, Opponents):
@@ -159,6 +154,11 @@ class TrainSettings:
             raise ConfigError(f"algorithm is {self.algorithm!r}; among other cars only ppo learns in this version.")
         if self.opponents is not None and self.device != "cpu":
             raise ConfigError(f"device is {self.device!r}; races of several cars are driven on the cpu.")
+        if self.critic == "lap" and (self.algorithm, self.device) != ("ppo", "cpu"):
+            raise ConfigError(
+                f"critic is 'lap', which is for algorithm 'ppo' on device 'cpu'; it is {self.algorithm!r} on "
+                f"{self.device!r}. Allowed there are 'privileged' and 'camera'."
+            )
         if not isinstance(self.until, Until):
             raise ConfigError(f"until is {self.until!r}; allowed is a text such as '5 laps'.")
         if self.until.laps > self.evaluation_trials:
@@ -201,7 +201,7 @@ class TrainSettings:
 
     @property
     def state_size(self) -> int:
-        """Columns that the critic sees beside or instead of the camera; 0 where it sees the camera alone."""
+        """Columns of state that the critic sees; 0 where it sees the camera alone."""
         if self.critic == "camera":
             return 0
         return state_width(self.num_objects) + (LAP_COLUMNS if self.critic == "lap" else 0)

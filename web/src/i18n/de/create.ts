@@ -70,7 +70,7 @@ export const create: Record<keyof typeof english, string> = {
   critic: "Der Kritiker sieht",
   critic_lead: "Nur im Training; das Auto fährt immer nach seiner Kamera.",
   critic_privileged: "den wahren Zustand des Autos (schneller)",
-  critic_lap: "seinen Zustand und die Stelle auf der Runde",
+  critic_lap: "Zustand und Position",
   critic_camera: "die Kamera, wie bei AWS",
   hp_safe: "Sicher: {low} bis {high}.",
   hp_unsafe: "Außerhalb des Sicheren: {low} bis {high}. Sieh oft nach den Kurven.",

@@ -5,7 +5,7 @@ export const presets: Record<keyof typeof english, string> = {
   preset_anti_zigzag: "Der Mittellinie folgen, ohne zu pendeln: Starkes Lenken kostet ein Fünftel der Belohnung.",
   preset_centerline: "Der Mittellinie folgen: je näher, desto besser. Das ist die übliche Belohnung des Originals.",
   preset_dodge: "Zwischen Kisten und anderen Autos fahren: Jeder Meter zählt, weniger, je mehr das nächste Hindernis im Weg steht.",
-  preset_duel: "Zu zweit fahren: Es zählt jeder wirklich gewonnene Meter, und Fehler kosten so viel wie im Rennen.",
+  preset_duel: "Zu zweit fahren: Es zählt jeder wirklich gewonnene Meter, und Fehler sind teurer als allein.",
   preset_heading: "Das Auto entlang der Strecke ausrichten: Bei mehr als zehn Grad Abweichung geht die halbe Belohnung verloren.",
   preset_lap_time: "Gegen die Uhr: Es zählt jeder Meter der Runde, den das Auto seit dem letzten Schritt wirklich gewonnen hat.",
   preset_object_avoidance: "Auf der Straße bleiben und Kisten und Autos ausweichen: Die Lücke voraus zählt mehr als die Spur.",

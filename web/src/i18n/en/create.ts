@@ -68,7 +68,7 @@ export const create = {
   critic: "The critic sees",
   critic_lead: "While training only; the car drives by its camera in any case.",
   critic_privileged: "the car's true state (faster)",
-  critic_lap: "its state and where on the lap it is",
+  critic_lap: "state, place on the lap",
   critic_camera: "the camera, as AWS's",
   hp_safe: "Safe: {low} to {high}.",
   hp_unsafe: "Outside of what is safe: {low} to {high}. Look at the curves often.",
