@@ -33,19 +33,19 @@ _HOME = {
     "action_space": "agent",
     "check_reward": "reward",
     "draw_track": "track",
-    "evaluate": "race.run_evaluation:evaluate_run",
-    "generalize": "race.run_generalization:generalize_run",
+    "evaluate": "judging.evaluation:evaluate_run",
+    "generalize": "judging.generalization:generalize_run",
     "generate_track": "track",
     "load_reward": "reward",
     "load_track": "track",
     "load_tracks": "track",
-    "race_models": "race.run_race",
-    "rate_models": "race.run_ladder",
-    "read_replay": "race",
+    "race_models": "judging.race",
+    "rate_models": "judging.ladder",
+    "read_replay": "replay",
     "resume": "training",
     "track_names": "track",
     "train": "training",
-    "verify": "race",
+    "verify": "replay",
 }
 """Where each public name lives below ``racecraft``, and after a colon what it is called there."""
 
@@ -56,13 +56,13 @@ if TYPE_CHECKING:
     from racecraft.env import RacecraftEnv as RacecraftEnv
     from racecraft.env import RacecraftVectorEnv as RacecraftVectorEnv
     from racecraft.errors import RacecraftError as RacecraftError
+    from racecraft.judging.evaluation import evaluate_run
+    from racecraft.judging.generalization import generalize_run
+    from racecraft.judging.ladder import rate_models as rate_models
+    from racecraft.judging.race import race_models as race_models
     from racecraft.race import RaceRules as RaceRules
-    from racecraft.race import read_replay as read_replay
-    from racecraft.race import verify as verify
-    from racecraft.race.run_evaluation import evaluate_run
-    from racecraft.race.run_generalization import generalize_run
-    from racecraft.race.run_ladder import rate_models as rate_models
-    from racecraft.race.run_race import race_models as race_models
+    from racecraft.replay import read_replay as read_replay
+    from racecraft.replay import verify as verify
     from racecraft.reward import RewardWorker as RewardWorker
     from racecraft.reward import check_reward as check_reward
     from racecraft.reward import load_reward as load_reward

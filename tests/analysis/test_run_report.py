@@ -13,7 +13,7 @@ from racecraft.agent import ModelMetadata, action_space
 from racecraft.analysis import pay_laps, write_report
 from racecraft.analysis.svg import Chart, Curve, line_chart, nice_ticks
 from racecraft.errors import RewardError, RunError
-from racecraft.race.run_evaluation import evaluate_run
+from racecraft.judging.evaluation import evaluate_run
 from racecraft.run import RunFolder
 from racecraft.track import load_track
 from racecraft.training import Until

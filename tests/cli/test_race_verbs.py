@@ -31,7 +31,7 @@ def test_race_verify_and_ladder(racecraft: Run, trained: Path, tmp_path: Path) -
     assert Path(filmed["video"]).stat().st_size > 10_000
     assert racecraft("film", replays[0], "--car", "2").err.startswith("ConfigError: Car 2")
 
-    from racecraft.race import read_replay, write_replay
+    from racecraft.replay import read_replay, write_replay
 
     forged = read_replay(replays[0])
     forged.rewards[0][5] += 1.0

@@ -73,7 +73,7 @@ def test_the_log_of_aws_on_stdout_is_all_there_is_on_stdout(racecraft: Run, trai
 
 
 def test_train_with_a_video_evaluates_in_the_same_object(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    from racecraft.race import run_evaluation
+    from racecraft.judging import evaluation as run_evaluation
 
     asked: list[Path] = []
 

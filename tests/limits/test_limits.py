@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from racecraft.errors import ConfigError, TrackError
+from racecraft.film.limit_picture import draw_limit
 from racecraft.limits import MEDALS, Medals, TrackLimit, compute_limit, known_limit, track_limit
 from racecraft.limits import limit as limits
 from racecraft.limits.car import body_rates, load_casadi
 from racecraft.limits.ideal import smooth_lap
 from racecraft.limits.road import smooth_road
-from racecraft.race.limit_picture import draw_limit
 from racecraft.sim import Simulation, Start, Vehicle, load_vehicle
 from racecraft.track import Track, load_track
 

@@ -10,7 +10,7 @@ import pytest
 from tiny_runs import TINY
 
 from racecraft import evaluate, load_track, train
-from racecraft.replay import replay
+from racecraft.fidelity import replay
 from racecraft.run import read_metrics
 
 matplotlib = pytest.importorskip("matplotlib")

@@ -11,9 +11,9 @@ import pytest
 from tiny_runs import Recorder
 
 from racecraft import evaluate, train
+from racecraft.judging.ladder import rate_models
 from racecraft.learn import PPOConfig
 from racecraft.learn.native_learner import NativeLearner
-from racecraft.race.run_ladder import rate_models
 from racecraft.sim import Bots, Objects
 from racecraft.training import Opponents, resume
 

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.replay.logs import Faults, Log, read_logs
-from racecraft.replay.rules import TrackRules
+from racecraft.fidelity.logs import Faults, Log, read_logs
+from racecraft.fidelity.rules import TrackRules
 from racecraft.reward.worker import RewardWorker
 from racecraft.track import Track
 

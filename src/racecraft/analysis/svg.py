@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.race.racing_line import speed_color, speed_range
+from racecraft.film.racing_line import speed_color, speed_range
 from racecraft.track import Track
 
 Floats = NDArray[np.float64]

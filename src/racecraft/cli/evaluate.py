@@ -74,7 +74,7 @@ def evaluate(
         return
     if as_json and aws_log == "-":
         context.fail("--json and --aws-log - both want stdout; give the log a file.")
-    from racecraft.race.run_evaluation import evaluate_run
+    from racecraft.judging.evaluation import evaluate_run
 
     given = race_options.objects_of(race, context.params)
     outcome = evaluate_run(
@@ -107,7 +107,7 @@ def _generalize(context: typer.Context, run: Path, *, as_json: bool, **settings:
     for option in context.command.params:
         if option.name in RACE_ONLY and is_given(context, str(option.name)):
             context.fail(f"{option.opts[0]} does not go with --tracks: each track is one lap without a reset.")
-    from racecraft.race.run_generalization import generalize_run
+    from racecraft.judging.generalization import generalize_run
 
     outcome = generalize_run(run, **settings)
     if as_json:

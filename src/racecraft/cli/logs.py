@@ -41,8 +41,8 @@ def replay(
     if frame is not None:
         _replay_frame(frame, track, palette, picture, as_json)
         return
-    from racecraft.replay import draw_comparison
-    from racecraft.replay import replay as compare
+    from racecraft.fidelity import draw_comparison
+    from racecraft.fidelity import replay as compare
     from racecraft.reward import load_reward
 
     source = load_reward(reward) if reward else None
@@ -58,7 +58,7 @@ def replay(
 
 
 def _replay_frame(frame: Path, track: str, palette: str, picture: Path | None, as_json: bool) -> None:
-    from racecraft.replay import draw_frame, fit_frame
+    from racecraft.fidelity import draw_frame, fit_frame
 
     fit = fit_frame(frame, track=track, palette=palette)
     if picture is not None:
@@ -82,7 +82,7 @@ def calibrate(
     as_json: Json = False,
 ) -> None:
     """Fit a car to your own logs and write a vehicle file."""
-    from racecraft.replay import calibrate as fit
+    from racecraft.fidelity import calibrate as fit
 
     result = fit(logs, vehicle=vehicle, track=track or None)
     result.vehicle.save(output)

@@ -61,7 +61,7 @@ def race(
 
     Writes results, and for every entry a replay, a sim-trace and a film.
     """
-    from racecraft.race.run_race import race_models
+    from racecraft.judging.race import race_models
 
     outcome = race_models(
         models,
@@ -121,7 +121,7 @@ def ladder(
     as_json: Json = False,
 ) -> None:
     """Rate models by many races."""
-    from racecraft.race.run_ladder import rate_models
+    from racecraft.judging.ladder import rate_models
 
     found = rate_models(
         models,
@@ -155,7 +155,7 @@ def film(
     as_json: Json = False,
 ) -> None:
     """Make a film of a replay."""
-    from racecraft.race.replay_film import film_replay
+    from racecraft.film.replay_film import film_replay
 
     path = film_replay(replay, output, car=car, ghosts=ghost or ())
     if as_json:
@@ -170,8 +170,8 @@ def verify(
     as_json: Json = False,
 ) -> None:
     """Drive a replay again and compare every bit."""
-    from racecraft.race import read_replay
-    from racecraft.race import verify as drive_again
+    from racecraft.replay import read_replay
+    from racecraft.replay import verify as drive_again
 
     found = drive_again(read_replay(replay))
     if as_json:
@@ -184,7 +184,7 @@ def verify(
 
 def _objects(kind: str, options: Mapping[str, Any]) -> Objects:
     """Those of the race's type; on a road that models share there are none unless boxes or bots are asked for."""
-    from racecraft.race.contest import TOGETHER
+    from racecraft.contest.contest import TOGETHER
 
     name = race_options.kind_of(kind)
     if name in TOGETHER:

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from racecraft.bench.doctor import Finding
+    from racecraft.contest.ladder import Ladder
+    from racecraft.fidelity import Calibration, Comparison, FrameFit
     from racecraft.importing import ImportedRun
+    from racecraft.judging.evaluation import RunEvaluation
+    from racecraft.judging.generalization import RunGeneralization
+    from racecraft.judging.race import RunRace
     from racecraft.limits import TrackLimit
-    from racecraft.race import Verification
-    from racecraft.race.ladder import Ladder
-    from racecraft.race.run_evaluation import RunEvaluation
-    from racecraft.race.run_generalization import RunGeneralization
-    from racecraft.race.run_race import RunRace
-    from racecraft.replay import Calibration, Comparison, FrameFit
+    from racecraft.replay import Verification
     from racecraft.reward import Outcome, Problem
     from racecraft.track import Track
     from racecraft.training import TrainResult

@@ -85,8 +85,8 @@ def limit_track(
 ) -> None:
     """Find a car's minimum lap time on a track, and the medals."""
     from racecraft.errors import ConfigError
+    from racecraft.film.limit_picture import draw_limit
     from racecraft.limits import compute_limit, track_limit
-    from racecraft.race.limit_picture import draw_limit
     from racecraft.sim import load_vehicle
     from racecraft.track import load_track
 

@@ -170,7 +170,7 @@ def train(
     if not is_quiet:
         text().say_trained(result)
     if video and result.reason != "interrupted":
-        from racecraft.race.run_evaluation import evaluate_run
+        from racecraft.judging.evaluation import evaluate_run
 
         outcome = evaluate_run(result.run)
         if not is_quiet:

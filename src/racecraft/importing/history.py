@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.errors import RacecraftError, RunError
+from racecraft.fidelity.logs import Faults, read_logs
 from racecraft.importing.layout import Role, is_plain, role
 from racecraft.importing.source import MAX_BYTES, SourceFile
-from racecraft.replay.logs import Faults, read_logs
 from racecraft.run import read_metrics
 
 HISTORY: Final[tuple[Role, ...]] = ("metrics", "trace", "log")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Final
 
 from racecraft.errors import ConfigError, did_you_mean
@@ -125,3 +125,19 @@ RULE_SETS: Final[dict[str, RaceRules]] = {
 ``live``: three minutes, as in a final.
 ``first_lap``: does the car get round once, with nobody to put it back? Evaluation during training asks that.
 """
+
+
+def rules_by_name(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
+    """A rule set, with single rules changed.
+
+    Raises:
+        ConfigError: There are no such rules, or a value is outside its range.
+    """
+    if isinstance(rules, str):
+        if rules not in RULE_SETS:
+            raise ConfigError(
+                f"Rules {rules!r} do not exist; allowed are {', '.join(RULE_SETS)}.",
+                hint=did_you_mean(rules, RULE_SETS),
+            )
+        rules = RULE_SETS[rules]
+    return replace(rules, **changes)

@@ -1,30 +1,6 @@
-"""Replay: logs that the original wrote, held against the simulator, and cars fitted to them.
+"""Replay files: everything that was driven, to be shown again, and driven again to prove it."""
 
-log -> *replay* -> rules (agreement), dynamics (error), rewards (agreement)
-log -> *calibrate* -> vehicle file
-camera frame -> *fit_frame* -> pose of the lens, likeness of our frame from there
-"""
+from racecraft.replay.replay import Replay, read_replay, write_replay
+from racecraft.replay.verification import Verification, verify
 
-from racecraft.replay.calibrate import Calibration, calibrate
-from racecraft.replay.comparison import Comparison, replay
-from racecraft.replay.differences import Difference, Differences
-from racecraft.replay.frame import FrameFit, draw_frame, fit_frame
-from racecraft.replay.logs import Log, read_logs
-from racecraft.replay.picture import draw_comparison
-from racecraft.replay.rules import TrackRules
-
-__all__ = [
-    "Calibration",
-    "Comparison",
-    "Difference",
-    "Differences",
-    "FrameFit",
-    "Log",
-    "TrackRules",
-    "calibrate",
-    "draw_comparison",
-    "draw_frame",
-    "fit_frame",
-    "read_logs",
-    "replay",
-]
+__all__ = ["Replay", "Verification", "read_replay", "verify", "write_replay"]

@@ -21,7 +21,7 @@ import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -201,6 +201,10 @@ class RunFolder:
         """Folder of the evaluation begun at ``stamp`` (YYYYmmddHHMMSS)."""
         return self.path / f"evaluation-{stamp}"
 
+    def new_evaluation(self) -> tuple[str, Path]:
+        """Make the folder of an evaluation that begins now; its time stamp and its path."""
+        return dated_folder(self.path, prefix="evaluation-")
+
     def evaluation_metrics(self, stamp: str) -> Path:
         """Results of that evaluation."""
         return self.path / "metrics" / f"EvaluationMetrics-{stamp}.json"
@@ -310,6 +314,28 @@ def list_runs(root: str | Path) -> list[RunFolder]:
         return [RunFolder(path.parent) for path in sorted(Path(root).glob("*/run.json"))]
     except OSError:
         return []
+
+
+def dated_folder(root: Path, *, prefix: str = "") -> tuple[str, Path]:
+    """Make a folder named after now, to the second, or a little later where one of this second exists.
+
+    Args:
+        root: Where; made when missing.
+        prefix: Before the time.
+
+    Returns:
+        Its time stamp, UTC as ``20260131235959``, and its path.
+    """
+    root.mkdir(parents=True, exist_ok=True)
+    moment = datetime.now(UTC)
+    while True:
+        stamp = moment.strftime("%Y%m%d%H%M%S")
+        path = root / f"{prefix}{stamp}"
+        try:
+            path.mkdir()
+            return stamp, path
+        except FileExistsError:
+            moment += timedelta(seconds=1)
 
 
 def sanitize_name(text: str) -> str:

@@ -16,9 +16,9 @@ def race(folder: RunFolder, payload: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         RacecraftError: It cannot be driven.
     """
-    from racecraft.race.race_replay import read_replay
-    from racecraft.race.run_evaluation import evaluate_run
-    from racecraft.race.verification import verify
+    from racecraft.judging.evaluation import evaluate_run
+    from racecraft.replay.replay import read_replay
+    from racecraft.replay.verification import verify
 
     rules = RaceRules.from_dict(payload["rules"])
     outcome = evaluate_run(

@@ -17,8 +17,9 @@ from typing import Any, Final
 
 import sqlalchemy as sa
 
+from racecraft.contest import places, ranking_score
 from racecraft.errors import ConfigError
-from racecraft.race import RaceRules, places, ranking_score
+from racecraft.race import RaceRules
 from racecraft.serve.courses import Courses
 from racecraft.serve.database import Database
 from racecraft.serve.garage import Garage

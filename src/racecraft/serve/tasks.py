@@ -69,7 +69,7 @@ def train(task: Task) -> dict[str, Any]:
 
 def evaluate(task: Task) -> dict[str, Any]:
     """Race a model against the clock, unless this very job did so before its process was killed."""
-    from racecraft.race.run_evaluation import evaluate_run
+    from racecraft.judging.evaluation import evaluate_run
 
     folder = task.folder
     if task.job.attempts > 1 and (done := _evaluated(folder, task.job.id)) is not None:

@@ -1,6 +1,6 @@
 """Drives somebody else ran, before the core: judged by its rules, and driven again by its cars.
 
-racecraft.replay reads the logs; these are its two calls of the native core.
+racecraft.fidelity reads the logs; these are its two calls of the native core.
 """
 
 from __future__ import annotations

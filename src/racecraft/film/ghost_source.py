@@ -1,0 +1,110 @@
+"""Where ghosts come from: a replay file, another model, an earlier checkpoint of the same run, the best lap.
+
+FILE.replay        its best car
+RUN, RUN@STEP      that model drives the same race, alone
+@STEP              the same run's checkpoint does
+best-lap           the fastest lap of what is filmed, from the start of every lap
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from racecraft.errors import ConfigError
+from racecraft.film.ghost import LIVERY, Ghost, best_lap_ghost, ghost_of
+from racecraft.race.conditions import Conditions
+from racecraft.race.entry import load_entry
+from racecraft.race.evaluation import evaluate
+from racecraft.race.placement import driven_track
+from racecraft.race.recording import Recording
+from racecraft.replay.replay import read_replay
+from racecraft.track.canvas import Color
+
+BEST_LAP: Final = "best-lap"
+MAX_GHOSTS: Final = 16
+
+
+def load_ghosts(
+    sources: Sequence[str],
+    conditions: Conditions,
+    *,
+    run: Path | None = None,
+    recordings: Sequence[Recording] = (),
+    colors: Sequence[Color] = LIVERY[1:],
+) -> list[Ghost]:
+    """The ghosts that somebody asks for.
+
+    Args:
+        sources: As above.
+        conditions: Of the race that they accompany: models drive by these, a replay must be of the same road.
+        run: What ``@STEP`` is a checkpoint of.
+        recordings: What ``best-lap`` is taken from.
+        colors: Of the ghosts, in order.
+
+    Raises:
+        ConfigError: A source means nothing here, or a replay is of another road.
+        RacecraftError: A replay or a model cannot be read.
+    """
+    if len(sources) > MAX_GHOSTS:
+        raise ConfigError(f"There are {len(sources)} ghosts; allowed are up to {MAX_GHOSTS}.")
+    found = []
+    for index, source in enumerate(sources):
+        color = (colors or LIVERY)[index % len(colors or LIVERY)]
+        if source == BEST_LAP:
+            if (ghost := best_lap_ghost(recordings, color=color)) is not None:
+                found.append(ghost)
+        elif Path(source).is_file():
+            found.append(_from_replay(Path(source), conditions, color))
+        else:
+            found.append(_from_model(source, conditions, color, run=run))
+    return found
+
+
+def check_sources(sources: Sequence[str], *, run: Path | None) -> None:
+    """Refuse what `load_ghosts` would, as far as that can be known before a race.
+
+    Raises:
+        ConfigError: A source means nothing here.
+        RacecraftError: A replay or a model cannot be read.
+    """
+    for source in sources:
+        if source != BEST_LAP and not Path(source).is_file():
+            load_entry(_model(source, run))
+
+
+def _from_replay(path: Path, conditions: Conditions, color: Color) -> Ghost:
+    replay = read_replay(path)
+    theirs, ours = (driven_track(one.track, one.rules) for one in (replay.conditions, conditions))
+    if theirs.digest != ours.digest:
+        raise ConfigError(
+            f"The ghost {path.name} drove on {theirs.name}, in another direction or of another form than {ours.name}.",
+            hint="Choose a replay of the same track and direction.",
+        )
+    best = replay.evaluation.best_trial
+    return ghost_of(best.recording, name=replay.title or replay.names[best.index], color=color)
+
+
+def _from_model(source: str, conditions: Conditions, color: Color, *, run: Path | None) -> Ghost:
+    entry = load_entry(_model(source, run))
+    evaluation = evaluate(
+        entry.policy,
+        conditions.track,
+        rules=replace(conditions.rules, lateral_jitter=0.0, heading_jitter=0.0),
+        num_trials=1,
+        seed=conditions.seed,
+        vehicle=conditions.vehicle,
+        objects=conditions.objects,
+        randomize=conditions.randomize,
+    )
+    return ghost_of(evaluation.trials[0].recording, name=entry.name, color=color)
+
+
+def _model(source: str, run: Path | None) -> str:
+    if not source.startswith("@"):
+        return source
+    if run is None:
+        raise ConfigError(f"The ghost {source!r} is a checkpoint of no run; name it as RUN{source}.")
+    return f"{run}{source}"

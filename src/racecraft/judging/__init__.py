@@ -1,0 +1,1 @@
+"""Runs are judged: each job loads policies from run folders, holds an evaluation or a race, and leaves its files."""

@@ -1,0 +1,82 @@
+"""`rate_models`: a ladder of runs, from their paths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from racecraft.contest.ladder import Ladder, check_ladder, hold_ladder
+from racecraft.judging.trained import trained_vehicle
+from racecraft.race.conditions import Conditions
+from racecraft.race.entry import load_entries
+from racecraft.race.rules import RaceRules, rules_by_name
+from racecraft.sim.objects import NO_OBJECTS, Objects
+from racecraft.sim.vehicle import Vehicle, load_vehicle
+from racecraft.track import load_tracks
+
+
+def rate_models(
+    models: Sequence[str | Path],
+    *,
+    tracks: str | Sequence[str],
+    kind: str = "time-trial",
+    schedule: str = "round-robin",
+    starts: int = 3,
+    rounds: int = 0,
+    laps: int = 1,
+    rules: str | RaceRules = "drfc",
+    objects: Objects = NO_OBJECTS,
+    vehicle: str | Vehicle | None = None,
+    changes: dict[str, Any] | None = None,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda text: None,
+    num_threads: int = 0,
+) -> Ladder:
+    """Rate models by their races against each other.
+
+    Args:
+        models: Run folders, ``RUN`` or ``RUN@CHECKPOINT``.
+        tracks: Names, files or selections of tracks, as `load_tracks` takes them.
+        kind: Of race.
+        schedule: ``round-robin`` or ``swiss``.
+        starts: On each track.
+        rounds: Of a Swiss schedule.
+        laps: To a race.
+        rules: A name of `RULE_SETS`, or rules.
+        objects: On the track.
+        vehicle: What everybody drives; by default what the first model was trained with.
+        changes: Single rules that differ, by name.
+        seed: Of the starts and of the order of matches.
+        progress: Is told what is being driven.
+        num_threads: 0 takes one per core.
+
+    Raises:
+        RacecraftError: A model, a track or a setting is not usable, or OpenSkill is not installed.
+    """
+    check_ladder(len(models), kind=kind, schedule=schedule, starts=starts, rounds=rounds)
+    entries = load_entries(models, num_threads=num_threads)
+    if vehicle is None:
+        vehicle = trained_vehicle(entries[0].info)
+    given = {name: value for name, value in (changes or {}).items() if value is not None}
+    courses = [
+        Conditions(
+            track=track,
+            rules=rules_by_name(rules, {**given, "laps": laps}),
+            seed=seed,
+            vehicle=vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle),
+            objects=objects,
+        )
+        for track in load_tracks(tracks)
+    ]
+    return hold_ladder(
+        entries,
+        courses,
+        kind=kind,
+        schedule=schedule,
+        starts=starts,
+        rounds=rounds,
+        seed=seed,
+        progress=progress,
+        num_threads=num_threads,
+    )

@@ -1,0 +1,191 @@
+"""`race_models`: hold a race between runs and write everything about it.
+
+races/<time>/race.json                  results, rules, files
+             <entry>.replay             every step, to be shown and driven again (race.replay where all share a road)
+             <entry>.mp4                filmed, with the others as ghosts where they were not there
+             <entry>/0-iteration.csv    sim-trace                  (AWS)
+             <entry>/metrics.json       every lap                  (AWS)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from racecraft.contest.contest import Contest, check_kind, hold_race
+from racecraft.errors import RunError
+from racecraft.film.ghost import LIVERY, Ghost, Rival, ghost_of
+from racecraft.film.ghost_source import check_sources, load_ghosts
+from racecraft.film.video import film
+from racecraft.judging.trained import trained_vehicle
+from racecraft.race.artifacts import write_metrics, write_simtrace
+from racecraft.race.conditions import Conditions
+from racecraft.race.entry import Entry, load_entries
+from racecraft.race.results import Evaluation
+from racecraft.race.rules import RaceRules, rules_by_name
+from racecraft.replay.replay import SUFFIX, write_replay
+from racecraft.run.atomic import write_json
+from racecraft.run.folder import dated_folder, sanitize_name
+from racecraft.sim.objects import NO_OBJECTS, Objects
+from racecraft.sim.randomization import Randomization, load_randomization
+from racecraft.sim.vehicle import Vehicle, load_vehicle
+from racecraft.track import Track, load_track
+
+FILMED: Final = 180.0
+"""s of each entry's race that are filmed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRace:
+    """A race that was held, and where it is written."""
+
+    contest: Contest
+    """Results."""
+    folder: Path
+    """Of the race."""
+    files: dict[str, Path]
+    """What was written, by what it is."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        files = {name: str(path) for name, path in self.files.items()}
+        return {**self.contest.to_dict(), "folder": str(self.folder), "files": files}
+
+
+def race_models(
+    models: Sequence[str | Path],
+    *,
+    track: str | Track,
+    kind: str = "time-trial",
+    laps: int | None = None,
+    rules: str | RaceRules = "drfc",
+    ranking: str = "total",
+    minimum_laps: int | None = None,
+    objects: Objects = NO_OBJECTS,
+    vehicle: str | Vehicle | None = None,
+    randomize: Randomization | str = "none",
+    seed: int = 0,
+    changes: dict[str, Any] | None = None,
+    video: bool = True,
+    ghosts: Sequence[str] = (),
+    root: str | Path = "races",
+    num_threads: int = 0,
+) -> RunRace:
+    """Race models against each other.
+
+    Args:
+        models: Run folders, ``RUN`` or ``RUN@CHECKPOINT``, in the order of the grid.
+        track: Where.
+        kind: Of `RACE_KINDS`.
+        laps: By default the rules'.
+        rules: A name of `RULE_SETS`, or rules.
+        ranking: ``total``, ``best`` or ``average``.
+        minimum_laps: Laps that a model must complete to be ranked.
+        objects: On the track.
+        vehicle: What everybody drives; by default what the first model was trained with.
+        randomize: What differs from what the models know; the same for all.
+        seed: Of the starts and of what stands on the track.
+        changes: Single rules that differ, by name.
+        video: Whether to film every entry.
+        ghosts: More ghosts for the films, as for `load_ghosts`.
+        root: Folder of all races.
+        num_threads: 0 takes one per core.
+
+    Raises:
+        RacecraftError: A model, the track or a setting is not usable, or nothing can be written.
+    """
+    check_kind(kind, len(models))
+    entries = load_entries(models, num_threads=num_threads)
+    given = {"laps": laps, **(changes or {})}
+    if vehicle is None:
+        vehicle = trained_vehicle(entries[0].info)
+    conditions = Conditions(
+        track=track if isinstance(track, Track) else load_track(track),
+        rules=rules_by_name(rules, {name: value for name, value in given.items() if value is not None}),
+        seed=seed,
+        vehicle=vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle),
+        objects=objects,
+        randomize=randomize if isinstance(randomize, Randomization) else load_randomization(randomize),
+    )
+    check_sources(ghosts, run=None)
+    contest = hold_race(
+        entries, conditions, kind=kind, ranking=ranking, minimum_laps=minimum_laps, num_threads=num_threads
+    )
+    recordings = [trial.recording for trial in contest.trials]
+    colors = LIVERY[len(entries) % len(LIVERY) :]
+    shown = load_ghosts(ghosts, conditions, recordings=recordings, colors=colors) if video else []
+    try:
+        folder = dated_folder(Path(root))[1]
+        files = _write(contest, entries, folder, ghosts=shown, is_filmed=video)
+    except OSError as error:
+        raise RunError(f"{error.filename or root} cannot be written: {error.strerror or error}.") from error
+    return RunRace(contest=contest, folder=folder, files=files)
+
+
+def _write(
+    contest: Contest, entries: Sequence[Entry], folder: Path, *, ghosts: Sequence[Ghost], is_filmed: bool
+) -> dict[str, Path]:
+    safe = _file_names(contest.names)
+    files = {}
+    for name, replay in contest.replays():
+        path = folder / f"{safe.get(name, name)}{SUFFIX}"
+        files[f"replay of {name}" if name in safe else "replay"] = write_replay(replay, path)
+    for index, (entry, trial) in enumerate(zip(entries, contest.trials, strict=True)):
+        inside = folder / safe[entry.name]
+        inside.mkdir()
+        alone = Evaluation(conditions=contest.conditions, trials=(trial,))
+        write_metrics(alone, inside / "metrics.json")
+        write_simtrace(alone, inside, action_space=entry.policy.action_space)
+        files[f"sim-trace of {entry.name}"] = inside / "0-iteration.csv"
+        if is_filmed:
+            files[f"video of {entry.name}"] = film(
+                trial.recording.until(FILMED),
+                folder / f"{safe[entry.name]}.mp4",
+                name=entry.name,
+                laps=contest.conditions.rules.laps,
+                color=LIVERY[index % len(LIVERY)],
+                ghosts=[*_others(contest, index), *ghosts],
+                rivals=_rivals(contest, index),
+                sensors=entry.policy.sensors,
+            )
+    document = contest.to_dict()
+    models = {entry.name: {"run": str(entry.run), "step": entry.step} for entry in entries}
+    names = {name: path.relative_to(folder).as_posix() for name, path in files.items()}
+    write_json(folder / "race.json", {**document, "models": models, "files": names})
+    return {"results": folder / "race.json", **files}
+
+
+def _others(contest: Contest, index: int) -> list[Ghost]:
+    """Everybody else, where they drove alone."""
+    if contest.shares_road:
+        return []
+    return [
+        ghost_of(trial.recording, name=contest.names[other], color=LIVERY[other % len(LIVERY)])
+        for other, trial in enumerate(contest.trials)
+        if other != index
+    ]
+
+
+def _rivals(contest: Contest, index: int) -> list[Rival]:
+    """Everybody else, where they drove on the same road."""
+    if not contest.shares_road:
+        return []
+    return [
+        Rival(contest.names[other], LIVERY[other % len(LIVERY)], trial.recording)
+        for other, trial in enumerate(contest.trials)
+        if other != index
+    ]
+
+
+def _file_names(names: Sequence[str]) -> dict[str, str]:
+    """A file name for each name, all different even where letters' case is not told apart."""
+    taken: dict[str, str] = {}
+    for name in names:
+        stem = sanitize_name(name)
+        number, chosen = 2, stem
+        while chosen.lower() in (other.lower() for other in (*taken.values(), "race")):
+            chosen, number = f"{stem}-{number}", number + 1
+        taken[name] = chosen
+    return taken

@@ -1,0 +1,41 @@
+"""What a run was trained with, where nothing else is asked for: its car, its objects and its track."""
+
+from __future__ import annotations
+
+from racecraft.errors import ConfigError, RunError
+from racecraft.run.folder import RunInfo
+from racecraft.sim.objects import Objects
+from racecraft.sim.vehicle import Vehicle
+from racecraft.track import Track, joint_digest, load_tracks
+
+
+def trained_vehicle(info: RunInfo) -> Vehicle:
+    """The vehicle of run.json.
+
+    Raises:
+        RunError: It is of another version.
+    """
+    try:
+        return Vehicle(**info.settings.get("vehicle", {}))
+    except TypeError as error:
+        raise RunError(f"The vehicle in run.json does not fit this version of Racecraft: {error}.") from error
+
+
+def trained_objects(info: RunInfo) -> Objects:
+    """The objects of run.json."""
+    return Objects.from_dict(info.settings.get("objects") or {})
+
+
+def trained_track(info: RunInfo) -> Track:
+    """The track of run.json, the first if there are several.
+
+    Raises:
+        ConfigError: There is another by that name now.
+    """
+    tracks = load_tracks(info.track)
+    if joint_digest(tracks) != info.track_digest:
+        raise ConfigError(
+            f"Track {info.track!r} has changed since the run was trained on it.",
+            hint="Say which one you mean with --track, be it the same name.",
+        )
+    return tracks[0]

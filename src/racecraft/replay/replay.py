@@ -1,0 +1,253 @@
+"""`Replay`: a race as a file, to be shown, compared and driven again.
+
+    evaluation or race -> write_replay -> FILE.replay -> read_replay -> poses, actions, rewards, events; films; verify
+
+docs/replay-file.md describes the file. Reading trusts nothing in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import ConfigError, RacecraftError, ReplayError
+from racecraft.json_file import read_bytes
+from racecraft.race.conditions import Conditions
+from racecraft.race.placement import driven_track
+from racecraft.race.recording import Recording
+from racecraft.race.results import Evaluation, Trial
+from racecraft.replay.codec import MAX_FILE_BYTES, TYPES, pack, pack_column, unpack, unpack_column
+from racecraft.replay.header import CarHeader, Header, check_header, conditions_of, header_of, lap_of
+from racecraft.run.atomic import write_file
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES, row_width
+from racecraft.sim.objects import OBJECT_KINDS
+from racecraft.track.track import Track
+from racecraft.track.validate import check_rows
+
+SUFFIX: Final = ".replay"
+MAX_CELLS: Final = 64_000_000
+"""Numbers in all rows of a replay: half a gigabyte in memory."""
+MAX_NUMBER: Final = 1e9
+"""Of any number in a row, whatever its unit."""
+ACTION_COLUMNS: Final = 2
+
+_STEPS, _TIME, _STATUS = (ROW_COLUMNS.index(name) for name in ("steps", "time", "status"))
+_FIRST_KIND: Final = len(ROW_COLUMNS) + len(OBJECT_HEADER) + OBJECT_COLUMNS.index("object_kind")
+_PREPARE: Final = STATUS_NAMES.index("prepare")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replay:
+    """A race, or an evaluation's trials side by side, step by step."""
+
+    title: str
+    """What was raced, for people."""
+    conditions: Conditions
+    """Track, rules, vehicle, objects and seed."""
+    names: tuple[str, ...]
+    """Who drove each car; nobody vouches for a name."""
+    cars: tuple[Trial, ...]
+    """Laps, results and recording of each car."""
+    rewards: tuple[NDArray[np.float64], ...]
+    """As stored, of each car  (T,)."""
+    written_by: str = field(default_factory=lambda: metadata.version("racecraft"))
+    """Version of Racecraft: another one may have other rules or physics."""
+
+    @classmethod
+    def of(cls, evaluation: Evaluation, *, title: str = "", names: tuple[str, ...] = ()) -> Replay:
+        """The replay of an evaluation; its trials are named after their numbers unless names are given."""
+        trials = evaluation.trials
+        return cls(
+            title=title,
+            conditions=evaluation.conditions,
+            names=names or tuple(f"trial {trial.index + 1}" for trial in trials),
+            cars=trials,
+            rewards=tuple(trial.recording.rewards for trial in trials),
+        )
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """Its laps and statistics, as when it was driven."""
+        return Evaluation(conditions=self.conditions, trials=self.cars)
+
+    @property
+    def num_steps(self) -> int:
+        """Steps of the longest car."""
+        return max(len(car.recording) for car in self.cars)
+
+    def poses(self, car: int) -> NDArray[np.float64]:
+        """X [m], y [m] and heading [rad] of a car's origin at every step, 15 a second  (T, 3)."""
+        return self.cars[car].recording.poses
+
+    def actions(self, car: int) -> NDArray[np.float32]:
+        """Steering angle [rad] and speed [m/s] that the driver asked for  (T, 2)."""
+        return self.cars[car].recording.actions
+
+    def events(self) -> Iterator[tuple[int, int, str]]:
+        """Car, step and kind of everything that happened, car by car."""
+        for index, car in enumerate(self.cars):
+            for step, kind in car.recording.events:
+                yield index, step, kind
+
+
+def write_replay(replay: Replay, path: str | Path) -> Path:
+    """Write a replay file; equal replays give equal bytes.
+
+    Raises:
+        ReplayError: It is too long, or holds a number that is NaN or infinite.
+        OSError: The file cannot be written.
+    """
+    path = Path(path)
+    track = replay.conditions.track
+    if sum(car.recording.rows.size for car in replay.cars) > MAX_CELLS:
+        raise ReplayError(f"The race is too long for a replay file: more than {MAX_CELLS:,} numbers.")
+    columns: list[bytes] = []
+    header: dict[str, Any] = {
+        "title": replay.title[:200],
+        "racecraft": replay.written_by[:200],
+        "track": {
+            "name": track.name[:200],
+            "waypoints": len(track.centerline),
+            "repeats": list(track.repeats),
+            "types": _pack(np.hstack([track.centerline, track.inner, track.outer]), columns),
+        },
+        **header_of(replay.conditions),
+        "cars": [],
+    }
+    for name, car, rewards in zip(replay.names, replay.cars, replay.rewards, strict=True):
+        recording = car.recording
+        rows = np.delete(recording.rows, _TIME, axis=1)
+        header["cars"].append(
+            {
+                "name": name[:200],
+                "steps": len(recording),
+                "status": car.status,
+                "completion": car.completion,
+                "laps": [vars(lap) for lap in car.laps],
+                "types": _pack(np.column_stack([recording.actions, rewards, rows]), columns),
+            }
+        )
+    write_file(path, pack(header, columns))
+    return path
+
+
+def read_replay(path: str | Path) -> Replay:
+    """Read a replay file, which may come from a stranger.
+
+    Raises:
+        ReplayError: It is damaged, hostile, or of another version.
+    """
+    try:
+        data = read_bytes(path, max_bytes=MAX_FILE_BYTES)
+    except ConfigError as error:
+        raise ReplayError(str(error)) from error
+    name = Path(path).name
+    document, body = unpack(data, name=name)
+    return _replay(check_header(document, name=name), body, name=name)
+
+
+def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
+    columns = _Columns(body, name)
+    lines = columns.table(header.track.waypoints, header.track.types)
+    try:
+        track = Track(header.track.name, lines[:, :2], lines[:, 2:4], lines[:, 4:], tuple(header.track.repeats))
+        check_rows({"centerline": track.centerline, "inner": track.inner, "outer": track.outer}, name=track.name)
+    except RacecraftError as error:
+        raise ReplayError(f"The track in {name} is not one: {error}") from error
+    if header.track.repeats and max(header.track.repeats) >= len(track.centerline):
+        raise ReplayError(f"The track in {name} repeats a waypoint that it does not have.")
+    conditions = conditions_of(header, track, name=name)
+    width = row_width(conditions.num_objects)
+    if len(header.cars) % conditions.cars_per_race:
+        raise ReplayError(f"{name} has {len(header.cars)} cars, {conditions.cars_per_race} of which share a road.")
+    if sum(car.steps for car in header.cars) * width > MAX_CELLS:
+        raise ReplayError(f"{name} holds more than {MAX_CELLS:,} numbers.")
+    driven = driven_track(track, conditions.rules)
+    cars, rewards = [], []
+    for index, car in enumerate(header.cars):
+        if len(car.types) != ACTION_COLUMNS + width:  # the reward takes the place of the time
+            raise ReplayError(f"Car {index} of {name} has {len(car.types)} columns; its objects ask for {width + 2}.")
+        table = columns.table(car.steps, car.types)
+        cars.append(_trial(index, car, table, driven, name=name, number=index % conditions.cars_per_race))
+        rewards.append(np.ascontiguousarray(table[:, ACTION_COLUMNS]))
+    columns.check_end()
+    return Replay(
+        title=_printable(header.title),
+        conditions=conditions,
+        names=tuple(_printable(car.name) for car in header.cars),
+        cars=tuple(cars),
+        rewards=tuple(rewards),
+        written_by=_printable(header.racecraft),
+    )
+
+
+def _printable(words: str) -> str:
+    """Somebody else's words, without what could drive a terminal."""
+    return "".join(mark if mark.isprintable() else "�" for mark in words)
+
+
+def _trial(index: int, car: CarHeader, table: NDArray[np.float64], track: Track, *, name: str, number: int) -> Trial:
+    rows = np.insert(table[:, ACTION_COLUMNS + 1 :], _TIME, 0.0, axis=1)
+    rows[:, _TIME] = rows[:, _STEPS] * (1.0 / 15.0)  # as the core counts it
+    status = rows[:, _STATUS]
+    if car.status not in STATUS_NAMES or not np.isin(status, np.arange(len(STATUS_NAMES))).all():
+        raise ReplayError(f"Car {index} of {name} has a status that does not exist.")
+    if not np.isin(rows[:, _FIRST_KIND :: len(OBJECT_COLUMNS)], np.arange(len(OBJECT_KINDS))).all():
+        raise ReplayError(f"Car {index} of {name} meets an object of a kind that does not exist.")
+    if np.abs(table).max() > MAX_NUMBER:
+        raise ReplayError(f"Car {index} of {name} has the number {np.abs(table).max():g}; allowed is {MAX_NUMBER:g}.")
+    if status[0] != _PREPARE:
+        raise ReplayError(f"Car {index} of {name} does not begin with its start.")
+    rows.flags.writeable = False
+    return Trial(
+        index=index,
+        laps=tuple(lap_of(lap) for lap in car.laps),
+        status=car.status,
+        completion=car.completion,
+        recording=Recording(track, rows, _clock(rows), table[:, :ACTION_COLUMNS].astype(np.float32), number),
+    )
+
+
+def _clock(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Seconds since the trial began: a standing start begins where the clock stood  (T,)."""
+    starts = np.flatnonzero(rows[:, _STATUS] == _PREPARE).tolist()
+    clock, began = np.empty(len(rows)), 0.0
+    for start, end in zip(starts, [*starts[1:], len(rows)], strict=True):
+        clock[start:end] = began + rows[start:end, _TIME]
+        began = float(clock[end - 1])
+    return clock
+
+
+def _pack(table: NDArray[Any], columns: list[bytes]) -> list[str]:
+    """Append a table's columns and say their types."""
+    packed = [pack_column(column) for column in np.asarray(table, dtype=np.float64).T]
+    columns.extend(data for _, data in packed)
+    return [kind for kind, _ in packed]
+
+
+class _Columns:
+    """Takes columns from the body, one after the other, and never more than there is."""
+
+    def __init__(self, body: memoryview, name: str) -> None:
+        self._rest = body
+        self._name = name
+
+    def table(self, length: int, kinds: list[Any]) -> NDArray[np.float64]:
+        size = length * sum(TYPES[kind] for kind in kinds)
+        if size > len(self._rest):
+            raise ReplayError(f"{self._name} ends before its numbers do: {size - len(self._rest):,} bytes are missing.")
+        out = np.empty((length, len(kinds)))
+        for index, kind in enumerate(kinds):
+            column, self._rest = self._rest[: length * TYPES[kind]], self._rest[length * TYPES[kind] :]
+            out[:, index] = unpack_column(kind, column)
+        return out
+
+    def check_end(self) -> None:
+        if len(self._rest):
+            raise ReplayError(f"{self._name} holds {len(self._rest):,} bytes more than its header speaks of.")

@@ -1,0 +1,173 @@
+"""Races and ladders of runs, with files: models that can hardly drive, by rules that end soon."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from racecraft import train
+from racecraft.errors import ConfigError, RunError
+from racecraft.judging.ladder import rate_models
+from racecraft.judging.race import race_models
+from racecraft.learn import PPOConfig
+from racecraft.replay import read_replay, verify
+from racecraft.run import read_simtrace
+from racecraft.sim import Objects, Obstacles
+
+BOXES = Objects(obstacles=Obstacles(count=3, placement="random"))
+SOON = {"max_resets": 1, "time_limit": 12.0}
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    ppo = PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1)
+    root = tmp_path_factory.mktemp("runs")
+    small: dict[str, Any] = {"ppo": ppo, "until": "64 steps", "evaluate_every": 64, "evaluation_trials": 1}
+    return [train("oval", **small, num_threads=1, seed=seed, name=f"m{seed}", root=root).run for seed in (1, 2)]
+
+
+def race(models: list[Any], root: Path, **settings: Any):
+    given = {"track": "oval", "laps": 1, "changes": SOON, "video": False, "num_threads": 1, **settings}
+    return race_models(models, root=root, **given)
+
+
+def test_a_race_writes_results_replays_and_sim_traces(models: list[Path], tmp_path: Path) -> None:
+    found = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=5)
+    document = json.loads((found.folder / "race.json").read_text())
+    assert document["results"] == json.loads(json.dumps(found.to_dict()["results"]))
+    assert {result["name"] for result in document["results"]} == {"m1", "m2"}
+    assert document["models"]["m1"]["step"] == 64
+    boxes = []
+    for name, trial in zip(("m1", "m2"), found.contest.trials, strict=True):
+        replay = read_replay(found.folder / document["files"][f"replay of {name}"])
+        assert verify(replay, num_threads=1).is_genuine
+        assert replay.names == (name,)
+        rows = read_simtrace(found.folder / document["files"][f"sim-trace of {name}"])
+        assert len(rows["episode"]) == len(trial.recording)
+        boxes.append([(view.x, view.y) for view in trial.recording.objects(0)])
+    assert boxes[0] == boxes[1]  # everybody meets the same boxes
+    again = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=5)
+    assert again.folder != found.folder
+    assert again.contest.standings == found.contest.standings
+    other = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=6).contest.trials[0]
+    assert [(view.x, view.y) for view in other.recording.objects(0)] != boxes[0]
+
+
+def test_a_model_ties_with_itself(models: list[Path], tmp_path: Path) -> None:
+    found = race([models[0], f"{models[0]}@64", models[0]], tmp_path)
+    assert found.contest.names == ("m1", "m1@64", "m1-2")
+    rows = [trial.recording.rows for trial in found.contest.trials]
+    assert np.array_equal(rows[0], rows[1])
+    assert np.array_equal(rows[0], rows[2])
+    assert [standing.place for standing in found.contest.standings] == [None] * 3  # nobody came round
+    assert len({path.name for path in found.files.values()}) >= 4
+
+
+def test_a_race_is_filmed_with_ghosts(models: list[Path], tmp_path: Path) -> None:
+    import av
+
+    found = race(models, tmp_path, video=True, ghosts=[f"{models[0]}@64"], changes={**SOON, "time_limit": 2.0})
+    for name in ("m1", "m2"):
+        with av.open(str(found.files[f"video of {name}"])) as film:
+            assert sum(1 for _ in film.decode(video=0)) > 30
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"kind": "time-trail"}, "time-trial"),
+        ({"kind": "head-to-model", "models": 3}, "allowed are 2"),
+        ({"kind": "grid", "models": 9}, "2 to 8"),
+        ({"ranking": "luck"}, "ranking"),
+        ({"minimum_laps": 2}, "1 to 1"),
+        ({"rules": "nobody's"}, "Rules"),
+        ({"changes": {"max_resets": -1}}, "max_resets"),
+    ],
+)
+def test_impossible_races_are_refused_before_anything_is_written(
+    models: list[Path], tmp_path: Path, settings: dict[str, Any], words: str
+) -> None:
+    field = (models * 5)[: settings.pop("models", 2)]
+    with pytest.raises(ConfigError) as refused:
+        race(field, tmp_path / "races", **settings)
+    assert words in f"{refused.value} {refused.value.hint}"
+    with pytest.raises(RunError):
+        race([tmp_path / "nobody"], tmp_path / "races")
+    assert not (tmp_path / "races").exists()
+
+
+# ---- ladders
+
+
+def ladder(models: list[Any], **settings: Any):
+    given = {"tracks": ["oval"], "starts": 2, "changes": SOON, "num_threads": 1, **settings}
+    return rate_models(models, **given)
+
+
+def test_a_ladder_is_the_same_again_from_its_seed(models: list[Path]) -> None:
+    field = [*models, f"{models[0]}@64"]
+    found = ladder(field, seed=4, tracks=["oval", "reinvent_2018"])
+    assert ladder(field, seed=4, tracks=["oval", "reinvent_2018"]).to_dict() == found.to_dict()
+    assert ladder(field, seed=5, tracks=["oval", "reinvent_2018"]).matches != found.matches
+    assert len(found.matches) == 3 * 2 * 2
+    rows = {row.name: row for row in found.rows}
+    assert sum(row.wins for row in rows.values()) == sum(row.losses for row in rows.values())
+    assert all(row.wins + row.draws + row.losses == 8 for row in rows.values())
+    assert rows["m1"].draws >= 4  # against itself
+    assert [row.place for row in found.rows] == sorted(row.place for row in found.rows)
+
+
+def test_a_swiss_ladder_has_its_rounds(models: list[Path]) -> None:
+    found = ladder([*models, models[0]], schedule="swiss", rounds=4)
+    assert len(found.matches) == 4  # one pair, one rests
+    assert {match.start for match in found.matches} == {0, 1}
+
+
+def test_a_model_that_always_ties_with_another_is_rated_like_it(models: list[Path]) -> None:
+    found = ladder([models[0], models[0]])
+    assert [row.place for row in found.rows] == [1, 1]
+    assert found.ratings[0] == found.ratings[1]
+
+
+def test_a_ladder_of_duels_is_driven_and_the_same_again(models: list[Path]) -> None:
+    found = ladder(models, kind="head-to-model", starts=3)
+    assert len(found.matches) == 3
+    assert ladder(models, kind="head-to-model", starts=3).to_dict() == found.to_dict()
+    same = ladder([models[0], models[0]], kind="head-to-model", starts=2)
+    assert len({match.places for match in same.matches}) <= 2
+
+
+def test_a_grid_race_has_one_replay_of_all(models: list[Path], tmp_path: Path) -> None:
+    found = race([*models, models[0]], tmp_path, kind="grid")
+    (path,) = tmp_path.glob("*/*.replay")
+    replay = read_replay(path)
+    assert replay.names == ("m1", "m2", "m1-2")
+    assert replay.conditions.cars_per_race == 3
+    assert verify(replay, num_threads=1).is_genuine
+    assert sorted(standing.place or 0 for standing in found.contest.standings)[0] == 1
+    forged = read_replay(path)
+    forged.cars[1].recording.actions[10] = [0.3, 3.0]
+    difference = verify(forged, num_threads=1).difference
+    assert difference is not None
+    assert (difference.car, difference.step) == (1, 10)
+    assert race([*models, models[0]], tmp_path, kind="grid").contest.standings == found.contest.standings
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"kind": "grid"}, "allowed are time-trial"),
+        ({"schedule": "swis"}, "round-robin, swiss"),
+        ({"starts": 0}, "1 to 1000"),
+        ({"rounds": -1}, "0 to 1000"),
+        ({"models": 1}, "2 to 200"),
+    ],
+)
+def test_impossible_ladders_are_refused(models: list[Path], settings: dict[str, Any], words: str) -> None:
+    field = models[: settings.pop("models", 2)]
+    with pytest.raises(ConfigError, match=words):
+        ladder(field, **settings)

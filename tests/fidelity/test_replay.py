@@ -1,0 +1,336 @@
+"""Logs of our own making: a drive of the simulator, written in every form, must come back without a difference."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from racecraft.agent import action_space
+from racecraft.errors import ConfigError, RunError
+from racecraft.fidelity import calibrate, draw_comparison, read_logs, replay
+from racecraft.fidelity.dynamics import clock_of, step_durations
+from racecraft.fidelity.logs import Faults
+from racecraft.race.artifacts import write_simtrace
+from racecraft.race.evaluation import evaluate
+from racecraft.run.simtrace import COLUMNS
+from racecraft.sim import ROW_COLUMNS, STATUS_NAMES, Simulation, Start
+from racecraft.track import load_track
+
+OVAL = load_track("oval")
+STAMPED = 15  # columns up to tstamp
+AT = {name: index for index, name in enumerate(ROW_COLUMNS)}
+
+
+def drive(*, episodes: int, direction: str = "forward", vehicle: str = "v5") -> list[list[str]]:
+    """Fields of a log of 19 columns, written from the simulation's rows."""
+    start = Start(mode="random", lateral_jitter=0.1)
+    simulation = Simulation(OVAL, camera=None, seed=4, start=start, direction=direction, vehicle=vehicle)
+    waypoints = (OVAL if direction == "forward" else OVAL.reversed()).centerline
+    rng, lines, clock = np.random.default_rng(3), [], 10.0
+    action = np.array([0.0, 1.0])
+    for episode in range(episodes):
+        simulation.reset()
+        row, is_over = simulation.rows[0].tolist(), False
+        while True:
+            behind, ahead = int(row[AT["closest_prev"]]), int(row[AT["closest_next"]])
+            here = row[AT["x"]], row[AT["y"]]
+            nearer = min((behind, ahead), key=lambda i: math.dist(waypoints[i], here))
+            clock += 1 / 15
+            status = STATUS_NAMES[int(row[AT["status"]])]
+            reward = 0.0 if status == "prepare" else row[AT["speed"]]
+            lines.append(
+                [
+                    *(str(episode), repr(row[AT["steps"]]), repr(here[0]), repr(here[1])),
+                    repr(math.degrees(row[AT["heading"]])),
+                    *(repr(math.degrees(row[AT["steering_angle"]])), repr(row[AT["speed"]]), "[1.0 2.0]"),
+                    *(repr(reward), str(is_over), str(row[AT["all_wheels_on_track"]] > 0)),
+                    "100" if row[AT["progress"]] >= 1 else repr(100 * row[AT["progress"]]),
+                    *(str(nearer), repr(OVAL.length), repr(clock), status, "0.0", "0", "1700000000.5"),
+                ]
+            )
+            if is_over:
+                break
+            s = simulation.state[0]
+            if rng.random() < 0.3:
+                action = np.array([rng.uniform(-0.3, 0.3), rng.uniform(0.8, 2.0)])
+            steer = -0.5 * s[4] - 1.2 * s[5] + 0.2 * s[9]
+            simulation.step([np.clip(action + np.array([steer, 0.0]), -0.5, 3.0)])
+            row, is_over = simulation.rows[0].tolist(), bool(simulation.terminated[0])
+    return lines
+
+
+@pytest.fixture(scope="module")
+def lines() -> list[list[str]]:
+    return drive(episodes=25)
+
+
+def write(path, lines, *, columns: int = 19, form: str = "csv"):
+    rows = [",".join(fields[:columns]) for fields in lines]
+    if form == "log":
+        rows = [f"2026-01-01 INFO something\nSIM_TRACE_LOG:{row}" for row in rows]
+    elif form == "csv":
+        rows.insert(0, ",".join(COLUMNS[:columns]))
+    data = ("\n".join(rows) + "\n").encode()
+    path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else data)
+    return path
+
+
+@pytest.mark.parametrize("columns", [15, 17, 18, 19])
+@pytest.mark.parametrize(("form", "name"), [("csv", "a.csv"), ("bare", "a.csv"), ("log", "a.log"), ("csv", "a.csv.gz")])
+def test_our_own_drive_comes_back_in_every_form(lines, tmp_path, columns, form, name):
+    found = replay(write(tmp_path / name, lines, columns=columns, form=form), track="oval").to_dict()
+    assert found["rows"] == len(lines)
+    assert found["broken_rows"] == 0
+    assert found["progress_agreement"] == found["closest_waypoint_agreement"] == found["episode_end_agreement"] == 1.0
+    assert found["all_wheels_agreement"] > 0.999  # single precision at a border
+    assert found["position_error_m"]["15"] < 0.02  # what remains: six rows do not tell the start exactly
+
+
+def test_the_direction_is_found(tmp_path):
+    result = replay(write(tmp_path / "a.csv", drive(episodes=3, direction="reverse")), track="oval")
+    assert result.reversed
+    assert result.to_dict()["progress_agreement"] == 1.0
+
+
+def test_rewards(lines, tmp_path):
+    path = write(tmp_path / "a.csv", lines)
+    right, wrong = ("def reward_function(params):\n    return params['speed']" + tail for tail in ("\n", " + 1\n"))
+    assert replay(path, track="oval", reward=right).to_dict()["reward_agreement"] == 1.0
+    result = replay(path, track="oval", reward=wrong)
+    assert result.to_dict()["reward_agreement"] == 0.0
+    assert str(result.differences.kept[0]).startswith("a.csv, line 3: reward 1.76152933, here 2.76152933")
+
+
+def test_another_cars_drive_is_told_apart_and_calibrated(tmp_path):
+    path = write(tmp_path / "a.csv", drive(episodes=40, vehicle="v6"))
+    assert replay(path, track="oval", vehicle="v5").to_dict()["position_error_m"]["15"] > 0.05
+    result = calibrate(path, vehicle="v5", track="oval")
+    fitted, preset = (np.median(errors[:, -1, 0]) for errors in (result.errors, result.preset_errors))
+    assert fitted < 0.25 * preset
+    result.vehicle.save(tmp_path / "car.json")
+    assert replay(path, track="oval", vehicle=str(tmp_path / "car.json")).to_dict()["position_error_m"]["15"] < 0.05
+
+
+def test_time_stamps_of_the_next_row_are_recognised(tmp_path, lines):
+    def clock(offset: int) -> str:
+        rng, told = np.random.default_rng(0), [list(fields) for fields in lines]
+        moved = [float(fields[2]) for fields in told], [float(fields[3]) for fields in told]
+        # The car of the log moved 1/15 s between rows; pretend that its speed was even and time was not.
+        distance = np.hypot(*(np.diff(values, append=values[-1]) for values in moved))
+        passed = np.where(distance > 0, distance, 1 / 15)
+        passed = 1 / 15 * passed / np.convolve(passed, np.ones(11) / 11, mode="same") + rng.normal(0, 1e-4, len(told))
+        stamps = np.cumsum(np.roll(passed, offset))
+        for fields, stamp in zip(told, stamps, strict=True):
+            fields[14] = repr(float(stamp))
+        (log,) = read_logs([write(tmp_path / f"{offset}.csv", told)], Faults())
+        lasts = step_durations(log, "late")
+        assert np.isnan(lasts[log.is_first]).all()
+        return clock_of([log])
+
+    assert clock(0) == "late"
+    assert clock(1) == "prompt"
+
+
+def test_broken_rows_are_counted_and_named(lines, tmp_path):
+    broken = [list(fields) for fields in lines]
+    broken[10][2], broken[20][3], broken[30] = "nan", "far", broken[30][:7]
+    result = replay(write(tmp_path / "a.csv", broken), track="oval")
+    assert result.to_dict()["broken_rows"] == 3
+    assert result.to_dict()["rows"] == len(lines) - 3
+    assert {note.split(":")[0] for note in result.faults.notes} == {f"a.csv, line {line}" for line in (12, 22, 32)}
+    assert result.to_dict()["progress_agreement"] > 0.99
+
+
+def test_every_row_that_differs_is_listed_with_both_values(lines, tmp_path):
+    wrong = [list(fields) for fields in lines]
+    wrong[4][11] = "55.5"  # progress
+    wrong[5][10] = str(wrong[5][10] == "False")  # wheels
+    wrong[6][12] = "999"  # waypoint
+    last = next(row for row in range(7, len(wrong)) if wrong[row][9] == "True")
+    wrong[last][15] = "reversed"
+    path = write(tmp_path / "a.csv", wrong)
+    result = replay(path, track="oval", rows=tmp_path / "out" / "rows.csv")
+    with (tmp_path / "out" / "rows.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    found = {(row["what"], int(row["line"])): row for row in rows}
+    assert found["progress", 6]["logged"] == "55.5"
+    assert float(found["progress", 6]["here"]) == pytest.approx(float(lines[4][11]))
+    assert found["all_wheels_on_track", 7]["logged"] == wrong[5][10]
+    assert "mm inside the border" in found["all_wheels_on_track", 7]["why"]
+    assert found["closest_waypoint", 8]["logged"] == "999"
+    assert found["closest_waypoint", 8]["here"] == lines[6][12]
+    end = found["episode_end", last + 2]
+    assert (end["logged"], end["here"], end["step"]) == ("reversed", lines[last][15], str(int(float(lines[last][1]))))
+    assert len(rows) == sum(result.differences.counts.values())
+    assert [str(row["line"]) for row in result.to_dict()["differences"]] == [row["line"] for row in rows]
+    with pytest.raises(RunError, match="cannot be written"):
+        replay(path, track="oval", rows=tmp_path)
+
+
+def test_each_episode_finds_its_own_direction(lines, tmp_path):
+    back = drive(episodes=4, direction="reverse")
+    both = lines + [[str(100 + int(fields[0])), *fields[1:]] for fields in back]
+    result = replay(write(tmp_path / "a.csv", both), track="oval")
+    found = result.to_dict()
+    assert found["progress_agreement"] == found["closest_waypoint_agreement"] == 1.0
+    assert result.rules.reversed == len(back)
+    assert not result.reversed
+
+
+def test_an_evaluation_of_ours_with_resets_and_flying_laps(tmp_path):
+    def swerves(state):
+        """Drives well, but runs off every now and then."""
+        steer = -0.5 * state[:, 4] - 1.2 * state[:, 5] + 0.2 * state[:, 9]
+        swerves.calls += 1
+        if swerves.calls % 90 > 70:
+            steer = np.full(len(state), 0.5)
+        return np.stack([steer, np.full(len(state), 2.0)], axis=1).astype(np.float32)
+
+    swerves.calls = 0
+    space = action_space("continuous")
+    evaluation = evaluate(swerves, OVAL, num_trials=2, sees="state")
+    assert evaluation.summary()["resets"] > 2
+    write_simtrace(evaluation, tmp_path, action_space=space)
+    result = replay(tmp_path / "0-iteration.csv", track="oval")
+    found = result.to_dict()
+    assert found["progress_agreement"] == found["closest_waypoint_agreement"] == 1.0
+    assert found["episodes"] == evaluation.laps_begun
+    assert found["episode_end_agreement"] == 1.0
+    assert found["broken_rows"] == 0
+
+
+def test_logs_as_they_come_out_of_other_tools(lines, tmp_path):
+    rows = [",".join(fields) for fields in lines]
+    names = ["episode", "steps", "x", "y", "yaw", "steering_angle", "speed", *COLUMNS[7:10], "on_track", *COLUMNS[11:]]
+    tables = {
+        "json.log": [json.dumps({"message": f"SIM_TRACE_LOG:{row}\n"}) for row in rows],
+        "tabs.log": [f"[agent-9] SIM_TRACE_LOG:{row}\t2026-01-01" for row in rows],
+        "utils.csv": [",".join(names), *rows],
+        "index.csv": ["," + ",".join(COLUMNS), *(f"{i},{row}" for i, row in enumerate(rows))],
+        "turned.csv": [",".join(reversed(COLUMNS)), *(",".join(reversed(fields)) for fields in lines)],
+        "prints.log": [
+            text for row in rows for text in ("{'episode': 1, 'steps': 2}", "SIM_TRACE_LOG:" + row, "9" * 50_000)
+        ],
+    }
+    for name, texts in tables.items():
+        (tmp_path / name).write_text("\r\n".join(texts) + "\r\n")
+    (tmp_path / "utf16.csv").write_text("\n".join([",".join(COLUMNS), *rows]), encoding="utf-16")
+    for name in (*tables, "utf16.csv"):
+        found = replay(tmp_path / name, track="oval").to_dict()
+        assert (name, found["rows"], found["broken_rows"]) == (name, len(lines), 0)
+        assert found["progress_agreement"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "holds no sim-trace"),
+        ("hello\nworld\n" * 100, "holds no sim-trace"),
+        ("\x00\xff" * 1000, "holds no sim-trace"),
+        ("episode,steps,X\n0,1,2\n", "lacks the column 'Y'"),
+        ("SIM_TRACE_LOG:1,2,3\n", "1 broken rows and 0 good"),
+        ("x" * 3_000_000, "holds no sim-trace"),
+    ],
+)
+def test_what_is_no_log_says_so(text, message, tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(RunError, match=message):
+        replay(path, track="oval")
+
+
+def test_files_that_cannot_be_read(tmp_path, lines):
+    with pytest.raises(RunError, match="cannot be read"):
+        replay(tmp_path / "none.csv", track="oval")
+    with pytest.raises(RunError, match="cannot be read"):
+        replay(tmp_path, track="oval")
+    whole = write(tmp_path / "a.csv.gz", lines).read_bytes()
+    (tmp_path / "half.csv.gz").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(RunError, match=r"half\.csv\.gz cannot be read"):
+        replay(tmp_path / "half.csv.gz", track="oval")
+
+
+def test_another_track_is_refused(lines, tmp_path):
+    path = write(tmp_path / "a.csv", lines)
+    with pytest.raises(RunError, match="was driven on a track of"):
+        replay(path, track="bowtie")
+    with pytest.raises(RunError, match="was driven on a track of"):
+        calibrate(path, track="bowtie")
+    moved = [[*fields[:2], str(float(fields[2]) + 0.4), *fields[3:]] for fields in lines]
+    with pytest.raises(RunError, match=r"was not driven on oval: \d+ % of the first .* 0.5 m off"):
+        replay(write(tmp_path / "b.csv", moved), track="oval")
+
+
+def test_too_little_to_calibrate(lines, tmp_path):
+    with pytest.raises(RunError, match="windows of 21 rows"):
+        calibrate(write(tmp_path / "a.csv", lines[:40]))
+    with pytest.raises(ConfigError, match="held_out"):
+        calibrate(write(tmp_path / "a.csv", lines), held_out=1.0)
+
+
+def test_picture(lines, tmp_path):
+    from PIL import Image
+
+    result = replay(write(tmp_path / "a.csv", lines), track="oval")
+    with Image.open(draw_comparison(result, tmp_path / "pictures" / "a.png")) as picture:
+        assert picture.size == (1600, 884)
+        assert len(picture.getcolors(1 << 20)) > 100
+    with pytest.raises(ConfigError, match=r"ends in '\.txt'"):
+        draw_comparison(result, tmp_path / "a.txt")
+    with pytest.raises(ConfigError, match="nothing to draw"):
+        draw_comparison(replay(write(tmp_path / "b.csv", lines[:10]), track="oval"), tmp_path / "b.png")
+
+
+def test_the_verbs(lines, tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    from racecraft.cli import app
+
+    monkeypatch.chdir(tmp_path)
+    path = str(write(tmp_path / "a.csv", lines))
+    done = CliRunner().invoke(app, ["replay", path, "--track", "oval", "--json"])
+    assert done.exit_code == 0
+    assert json.loads(done.stdout)["rows"] == len(lines)
+    assert not (tmp_path / "replay.png").exists()
+    done = CliRunner().invoke(app, ["replay", path, "--track", "oval"])
+    assert done.exit_code == 0
+    assert "progress" in done.stdout
+    assert (tmp_path / "replay.png").exists()
+    done = CliRunner().invoke(app, ["calibrate", path, "--track", "oval", "--output", "car.json"])
+    assert done.exit_code == 0
+    assert "car.json" in done.stdout
+    assert json.loads((tmp_path / "car.json").read_text())["mass"] == 7.5
+
+
+@pytest.mark.slow
+def test_a_long_log_does_not_fill_the_memory(lines, tmp_path):
+    # From /proc, not getrusage: that one starts a process at the peak of the parent it was forked from.
+    if not Path("/proc/self/status").exists():
+        pytest.skip("the peak memory of a process is read from /proc")
+    import subprocess
+    import sys
+
+    text = "".join(",".join(fields) + "\n" for fields in lines).encode()
+    repeats = [count // len(lines) for count in (100_000, 400_000)]
+    for name, repeat in zip(("short", "long"), repeats, strict=True):
+        with gzip.open(tmp_path / f"{name}.csv.gz", "wb", compresslevel=1) as file:
+            file.write(",".join(COLUMNS).encode() + b"\n")
+            for _ in range(repeat):
+                file.write(text)
+    code = (
+        "from racecraft.fidelity import replay\n"
+        "for name in ('short', 'long'):\n"
+        f"    print(replay({str(tmp_path)!r} + f'/{{name}}.csv.gz', track='oval').rules.rows)\n"
+        "    print(next(line for line in open('/proc/self/status') if line.startswith('VmHWM')).split()[1])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    short, before, long, after = map(int, done.stdout.split())
+    assert [short, long] == [repeat * len(lines) for repeat in repeats]
+    assert after < 250_000  # kB
+    assert after - before < 30_000  # 300,000 rows are 40 MB of text; 24 bytes of each are kept, for the percentiles
