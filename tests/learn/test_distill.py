@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scheduled_world import ScheduledWorld
 from stripe_world import StripeWorld
 
 from racecraft.errors import CheckpointError, ConfigError
@@ -124,6 +125,34 @@ def test_after_its_lessons_the_student_goes_on_with_the_reward_and_its_teachers_
             np.testing.assert_array_equal(array, critic[name], err_msg=name)
             assert name.endswith(".bias") or not np.array_equal(array, taught[name])
     assert abs(stats.losses.policy_loss) < 1e-3
+
+
+def test_the_student_takes_its_teachers_critic_in_the_teachers_unit() -> None:
+    """A critic's outputs mean a return only together with the unit it learned them in."""
+    trained = make(replace(CONFIG, student_steps=64))
+    for _ in range(2):
+        trained.iterate()
+    refining = trained._begin_refining()
+    world = StripeWorld(32, seed=2)
+    frames, states = world.observe()
+    told = trained.teacher._values(states, states)
+    np.testing.assert_array_equal(refining._values(refining.learner.encode(frames), states), told)
+    assert np.ptp(told) > 0.1
+    assert not np.array_equal(refining.return_scale, [0.0, 1.0])
+    assert (refining.iteration, refining.total_steps) == (trained.iteration - 1, trained.total_steps)
+
+
+def test_the_students_returns_and_lengths_are_those_of_the_episodes_that_ended() -> None:
+    world = ScheduledWorld([[3, 4], [6, 9]], [1.0, 0.5], cars_cut=[1])  # by turns; an iteration is 8 steps
+    world.reset(np.ones(2, bool))
+    config = replace(CONFIG, num_envs=2)
+    learner = make_learner(NetworkSpec(num_actions=3, state_size=2), num_threads=1)
+    trained = Distill(config, learner, world, StripeWorld(16, seed=4))
+    trained.iterate()  # the teacher
+    first, second = trained.iterate(), trained.iterate()
+    assert (first.episodes, first.mean_return, first.mean_length) == (3, (3 + 4 + 3) / 3, (3 + 4 + 6) / 3)
+    assert (second.episodes, second.mean_return, second.mean_length) == (3, (3 + 4 + 4.5) / 3, (3 + 4 + 9) / 3)
+    assert (first.num_steps, second.total_steps, tuple(world.begun)) == (16, 32, (5, 3))
 
 
 def test_a_student_whose_critic_sees_the_camera_only_learns_from_its_teacher() -> None:

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scheduled_world import ScheduledWorld
 from stripe_world import StripeWorld
 
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
@@ -198,6 +199,81 @@ def test_whole_episodes_are_shared_between_the_cars(config):
         assert stats.num_steps == rollout.is_valid[: rollout.num_steps].sum()
         for car in range(4):  # nothing counts after a car's last episode
             assert ends[np.flatnonzero(rollout.is_valid[: rollout.num_steps, car]).max(), car]
+
+
+def scheduled(config: PPOConfig, world: ScheduledWorld) -> PPO:
+    spec = NetworkSpec(num_actions=3, state_size=2)
+    return PPO(dataclasses.replace(config, num_envs=world.num_envs), TorchLearner(spec, num_threads=1), world)
+
+
+def test_returns_and_lengths_are_those_of_the_episodes_that_ended(config):
+    world = ScheduledWorld([[3, 4], [6, 9]], [1.0, 0.5])  # by turns; a rollout is 8 steps
+    ppo = scheduled(dataclasses.replace(config, minibatch_size=8), world)
+    world.reset(np.ones(2, bool))
+    first, second = ppo.iterate(), ppo.iterate()
+    # car 0 ends after steps 3, 7, 10, 14, car 1 after steps 6, 15: episodes go on from one rollout into the next
+    assert (first.episodes, first.mean_return, first.mean_length) == (3, (3 + 4 + 3) / 3, (3 + 4 + 6) / 3)
+    assert (second.episodes, second.mean_return, second.mean_length) == (3, (3 + 4 + 4.5) / 3, (3 + 4 + 9) / 3)
+    assert (first.total_steps, second.total_steps, second.num_steps) == (16, 32, 16)
+
+
+def test_where_no_episode_ended_there_is_no_mean(config):
+    world = ScheduledWorld([[100], [100]], [1.0, 1.0])
+    stats = scheduled(dataclasses.replace(config, minibatch_size=8), world).iterate()
+    assert stats.episodes == 0
+    assert np.isnan([stats.mean_return, stats.mean_length]).all()
+
+
+def test_cars_without_episodes_left_wait_unpaid_at_no_cost_and_do_not_begin_again(config):
+    world = ScheduledWorld([[5], [2, 25]], [1.0, 2.0])
+    config = dataclasses.replace(config, episodes_per_iteration=3, max_steps_per_iteration=60, minibatch_size=8)
+    ppo = scheduled(config, world)
+    for iteration in (1, 2):  # car 0 owes two episodes, car 1 one: of 2 steps, then of 25
+        stats = ppo.iterate()
+        begun = 2 * iteration, iteration
+        assert tuple(world.begun) == begun
+        assert stats.episodes == 3
+    assert (stats.num_steps, stats.total_steps) == (10 + 25, 10 + 2 + 35)
+    assert stats.mean_return == (5 + 5 + 50) / 3
+    assert stats.mean_length == (5 + 5 + 25) / 3
+    assert ppo._rollout.num_steps == 25
+
+
+def test_only_the_steps_of_driving_cars_use_up_an_iteration(config):
+    world = ScheduledWorld([[50], [50], [50]], [1.0, 1.0, 1.0])
+    config = dataclasses.replace(config, episodes_per_iteration=2, max_steps_per_iteration=20, minibatch_size=8)
+    ppo = scheduled(config, world)
+    stats = ppo.iterate()
+    assert ppo._rollout.num_steps == 10  # of two cars; the third one waits
+    assert (stats.num_steps, stats.total_steps, stats.episodes) == (20, 20, 0)
+
+
+def test_what_a_cut_iteration_left_unfinished_is_not_counted_in_the_next(config):
+    world = ScheduledWorld([[8], [8]], [1.0, 1.0])
+    config = dataclasses.replace(config, episodes_per_iteration=2, max_steps_per_iteration=10, minibatch_size=4)
+    ppo = scheduled(config, world)
+    assert ppo.iterate().episodes == 0
+    ppo.config = dataclasses.replace(ppo.config, max_steps_per_iteration=16)
+    ppo._rollout = scheduled(ppo.config, world)._rollout
+    stats = ppo.iterate()
+    assert (stats.episodes, stats.mean_return, stats.mean_length) == (2, 8, 8)
+
+
+def test_the_critics_unit_is_the_first_rollouts_and_then_follows_slowly(config):
+    ppo = ppo_for(dataclasses.replace(config, gamma=0.0, learning_rate=0.0))  # returns are the rewards
+    ppo.iterate()
+    first = ppo._rollout.rewards.copy()
+    np.testing.assert_allclose(ppo.return_scale, [first.mean(), first.std()], rtol=1e-5)
+    ppo.iterate()
+    second = ppo._rollout.rewards
+    expected = 0.9 * np.array([first.mean(), first.std()]) + 0.1 * np.array([second.mean(), second.std()])
+    np.testing.assert_allclose(ppo.return_scale, expected, rtol=1e-5)
+
+
+def test_without_normalization_the_critics_unit_is_the_rewards(config):
+    ppo = ppo_for(dataclasses.replace(config, normalize_returns=False))
+    ppo.iterate()
+    assert ppo.return_scale.tolist() == [0.0, 1.0]
 
 
 def test_fewer_episodes_than_cars(config):

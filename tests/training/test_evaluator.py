@@ -1,0 +1,127 @@
+"""Which evaluation of a training is the best: by outcomes that are told, so that their order is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from racecraft import load_track
+from racecraft.agent import action_space
+from racecraft.learn import NetworkSpec, make_learner
+from racecraft.race.evaluation import Completion
+from racecraft.race.policy import NetworkPolicy
+from racecraft.run import EpisodeCounter
+from racecraft.sim import Objects, Obstacles
+from racecraft.training import EvaluationReport, Until, evaluator
+from racecraft.training.evaluator import Evaluator
+from racecraft.training.settings import RACE_GOOD, TrainSettings
+
+SETTINGS = TrainSettings(track="oval", until=Until(steps=1000), evaluation_trials=2, num_threads=1)
+Judge = Callable[..., EvaluationReport]
+
+
+def evaluator_for(settings: TrainSettings) -> Evaluator:
+    space = action_space("default")
+    learner = make_learner(NetworkSpec(num_actions=space.size), num_threads=1)
+    return Evaluator(NetworkPolicy(learner, space), [load_track("oval")], settings)
+
+
+@pytest.fixture
+def judged() -> Evaluator:
+    return evaluator_for(SETTINGS)
+
+
+@pytest.fixture
+def judge(judged: Evaluator, monkeypatch: pytest.MonkeyPatch) -> Judge:
+    """One evaluation whose two trials end as told: how far each came, or the time of its whole lap."""
+
+    def tell(*trials: float, step: int = 0) -> EvaluationReport:
+        laps = np.array([trial if trial > 1 else math.nan for trial in trials])
+        outcome = Completion(
+            completions=np.minimum(trials, 1.0),
+            lap_times=laps,
+            rewards=np.array([3.5, 4.5]),
+            statuses=tuple("lap_complete" if trial > 1 else "off_track" for trial in trials),
+        )
+        monkeypatch.setattr(evaluator, "completion", lambda *arguments, **settings: outcome)
+        judged.evaluate(step=step, seconds=step / 10, counter=EpisodeCounter(2))
+        assert judged.last is not None
+        return judged.last
+
+    return tell
+
+
+def test_more_completion_is_better_and_then_a_faster_lap(judge: Judge, judged: Evaluator) -> None:
+    assert judge(0.3, 0.4).is_best  # the first
+    assert not judge(0.3, 0.2).is_best
+    assert judge(0.5, 0.4).is_best
+    assert judge(0.1, 12.0).is_best
+    assert judge(15.0, 14.0).is_best  # all of it, if slower
+    assert not judge(0.99, 9.0).is_best
+    assert not judge(16.0, 14.5).is_best
+    assert judge(13.0, 20.0).is_best  # the fastest lap of an evaluation counts
+    assert judged.best_score == (1.0, -13.0)
+
+
+def test_of_two_that_are_as_good_the_later_one_has_learned_longer_and_is_the_best(judge: Judge) -> None:
+    assert judge(0.5, 0.3).is_best
+    assert judge(0.5, 0.3).is_best
+    assert judge(0.3, 0.5).is_best
+
+
+def test_the_best_lap_is_the_fastest_ever_even_of_an_evaluation_that_is_not_the_best(
+    judge: Judge, judged: Evaluator
+) -> None:
+    judge(0.3, 0.4)
+    assert judged.best_lap is None
+    for trials, best in (((14.0, 13.0), 13.0), ((0.2, 12.0), 12.0), ((15.0, 14.0), 12.0), ((0.2, 0.2), 12.0)):
+        judge(*trials)
+        assert judged.best_lap == best
+
+
+def test_it_was_good_once_every_lap_was_completed_and_stays_so(judge: Judge, judged: Evaluator) -> None:
+    assert not judged.was_good
+    judge(0.98, 12.0)
+    assert not judged.was_good
+    judge(14.0, 12.0)
+    assert judged.was_good
+    judge(0.1, 0.1)
+    assert judged.was_good
+
+
+def test_among_objects_enough_of_the_way_is_good() -> None:
+    among = evaluator_for(replace(SETTINGS, objects=Objects(obstacles=Obstacles(count=2))))
+    for completion, is_good in ((RACE_GOOD - 0.01, False), (RACE_GOOD, True)):
+        among.best_score = (completion, -1e6)
+        assert among.was_good is is_good
+
+
+def test_trials_are_told_as_episodes_on_the_runs_clock(judged: Evaluator) -> None:
+    """Driven by a network that has learned nothing; the simulation tells how long each trial took."""
+    counter = EpisodeCounter(8, number=17, clock=50.0)
+    trials = judged.evaluate(step=640, seconds=3.0, counter=counter)
+    report = judged.last
+    assert report is not None
+    assert (report.step, report.seconds, judged.evaluated_at) == (640, 3.0, 640)
+    assert [(trial.env, trial.number) for trial in trials] == [(0, 17), (1, 17)]  # trainings' numbers go on
+    assert [trial.progress for trial in trials] == list(report.completions)
+    assert [trial.steps for trial in trials] == [round(15 * trial.duration) for trial in trials]
+    assert all(trial.duration > 0.5 for trial in trials)
+    assert [trials[0].start_time, trials[1].start_time] == [50.0, pytest.approx(50.0 + trials[0].duration + 1 / 15)]
+    assert counter.number == 17
+
+
+def test_what_a_resumed_run_is_told_goes_on_where_the_first_was(judge: Judge, judged: Evaluator) -> None:
+    judge(14.0, 13.0, step=64)
+    judge(0.5, 0.5, step=128)
+    again = evaluator_for(SETTINGS)
+    state: dict[str, Any] = judged.state()
+    again.load_state(state)
+    assert (again.last, again.best_score, again.best_lap) == (judged.last, (1.0, -13.0), 13.0)
+    assert again.evaluated_at == 128
+    assert again.was_good
