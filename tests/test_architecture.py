@@ -35,6 +35,31 @@ LAYERS = (
     "bench",
     "cli",
 )
+CONSOLE = (
+    "quick",
+    "settings",
+    "schemas",
+    "problems",
+    "store",
+    "jobs",
+    "live",
+    "door",
+    "tracks",
+    "evaluations",
+    "models",
+    "tuning",
+    "races",
+    "driving",
+    "rewards",
+    "machine",
+    "context",
+    "app",
+    "server",
+    "openapi",
+)
+"""Rooms of serve/, lowest first; a room's routes see the context, which is made of what all rooms know."""
+ROUTES = ("serve/models/archives.py", "serve/models/choices.py", "serve/evaluations/analysis.py")
+"""Besides those that are called routes.py."""
 FACADE = ("__init__", "__main__")
 TORCH = ("learn/torch_",)
 CORE = ("sim/", "learn/native_")
@@ -100,6 +125,25 @@ def violations(source: Path) -> list[str]:
     return found + [f"import cycle: {' -> '.join(cycle)}" for cycle in cycles(graph)]
 
 
+def console_violations(source: Path) -> list[str]:
+    """What a room of the console knows besides the rooms below it; its routes may know every room's messages."""
+    known = modules(source)
+    found = []
+    for name, path in known.items():
+        parts, file = name.split("."), path.relative_to(source).as_posix()
+        if parts[1:2] != ["serve"] or len(parts) < 3:
+            continue
+        if parts[2] not in CONSOLE:
+            found.append(f"{file} belongs to no room of the console")
+            continue
+        own = "context" if path.name == "routes.py" or file in ROUTES else parts[2]
+        for target in sorted(imports(path, name, known)):
+            room = target.split(".")[2] if target.startswith("racecraft.serve.") else own
+            if CONSOLE.index(room) > CONSOLE.index(own):
+                found.append(f"{file} imports {target}, a room above its own")
+    return found
+
+
 def cycles(graph: dict[str, set[str]]) -> list[list[str]]:
     """One way round for every import that leads back to where it came from."""
     found, done = [], set()
@@ -120,6 +164,7 @@ def cycles(graph: dict[str, set[str]]) -> list[list[str]]:
 def test_the_source_keeps_to_the_architecture():
     assert len(modules(SOURCE)) > 50
     assert violations(SOURCE) == []
+    assert console_violations(SOURCE) == []
 
 
 def test_native_files_keep_to_the_size_budget():
@@ -161,5 +206,26 @@ def test_a_made_up_tree_is_judged(tmp_path, files, expected):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     found = violations(tmp_path)
+    assert len(found) == (expected is not None), found
+    assert expected is None or expected in found[0]
+
+
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({"serve/races/races.py": "from racecraft.serve.jobs.queue import Q", "serve/jobs/queue.py": ""}, None),
+        ({"serve/jobs/queue.py": "from racecraft.serve.races.races import R"}, "serve/jobs/queue.py imports racecraft"),
+        ({"serve/jobs/queue.py": "from racecraft.serve.context import C"}, "a room above its own"),
+        ({"serve/jobs/routes.py": "from racecraft.serve.context import C"}, None),
+        ({"serve/jobs/routes.py": "from racecraft.serve.app import A"}, "a room above its own"),
+        ({"serve/loft/attic.py": ""}, "serve/loft/attic.py belongs to no room of the console"),
+    ],
+)
+def test_a_made_up_console_is_judged(tmp_path, files, expected):
+    for name, text in files.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    found = console_violations(tmp_path)
     assert len(found) == (expected is not None), found
     assert expected is None or expected in found[0]

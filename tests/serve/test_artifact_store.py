@@ -24,12 +24,12 @@ from racecraft.errors import ConfigError, RunError
 from racecraft.run import RunFolder
 
 pytest.importorskip("obstore")
-from racecraft.serve import mirror
-from racecraft.serve.artifacts import Artifacts
-from racecraft.serve.database import Database
-from racecraft.serve.jobs import JobQueue
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.supervisor import Supervisor
+from racecraft.serve.models import mirror
 from racecraft.serve.settings import ServeSettings
-from racecraft.serve.supervisor import Supervisor
+from racecraft.serve.store.artifacts import Artifacts
+from racecraft.serve.store.database import Database
 
 REWARD = "def reward_function(params):\n    return 1.0\n"
 

@@ -12,7 +12,7 @@ import pytest
 from running_consoles import RunningConsole
 
 from racecraft.race.recording import REFERENCE_AHEAD
-from racecraft.serve.drives import MAX_DRIVES
+from racecraft.serve.driving.drives import MAX_DRIVES
 from racecraft.track import Track, load_track
 
 

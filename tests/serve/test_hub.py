@@ -9,9 +9,9 @@ from typing import Any, cast
 
 import pytest
 
-from racecraft.serve import hub as hub_module
-from racecraft.serve.hub import Hub
-from racecraft.serve.jobs import JobQueue
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.live import hub as hub_module
+from racecraft.serve.live.hub import Hub
 
 
 @pytest.fixture

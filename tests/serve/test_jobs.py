@@ -13,10 +13,9 @@ import sqlalchemy as sa
 from running_consoles import running_console
 
 from racecraft.errors import RunError
-from racecraft.serve.database import Database
-from racecraft.serve.jobs import MAX_LOSSES, JobQueue
-from racecraft.serve.kinds import KINDS, kinds_of
-from racecraft.serve.tables import Job, Table, now
+from racecraft.serve.jobs.queue import KINDS, MAX_LOSSES, JobQueue, kinds_of
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Job, Table, now
 
 
 @pytest.fixture

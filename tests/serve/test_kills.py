@@ -32,7 +32,7 @@ def workers_of(runs: Path) -> list[int]:
     for entry in Path("/proc").iterdir():
         with suppress(OSError):
             command = (entry / "cmdline").read_bytes().split(b"\0") if entry.name.isdigit() else []
-            if b"racecraft.serve.work" in command and os.fsencode(runs) in command:
+            if b"racecraft.serve.jobs" in command and os.fsencode(runs) in command:
                 found.append(int(entry.name))
     return found
 

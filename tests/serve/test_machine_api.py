@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from running_consoles import RunningConsole
 
-from racecraft.serve import machine
+from racecraft.serve.machine import machine
 from racecraft.serve.settings import ServeSettings
 
 

@@ -48,7 +48,7 @@ def test_the_editor_knows_every_key_of_params() -> None:
 def test_what_the_server_names_is_in_the_catalogue() -> None:
     import re
 
-    from racecraft.serve.routes.rewards import list_actions, list_rewards
+    from racecraft.serve.rewards.routes import list_actions, list_rewards
 
     catalogue = (WEB / "src" / "i18n" / "en" / "presets.ts").read_text()
     known = dict(re.findall(r'^  (\w+): "(.*)",$', catalogue, re.MULTILINE))

@@ -12,13 +12,13 @@ import pytest
 import sqlalchemy as sa
 from running_consoles import RunningConsole
 
-from racecraft.serve.courses import Courses
-from racecraft.serve.database import Database
-from racecraft.serve.garage import Garage
-from racecraft.serve.jobs import JobQueue
-from racecraft.serve.race_schemas import NewRace
-from racecraft.serve.races import Races
-from racecraft.serve.tables import Entry, Job
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.models.garage import Garage
+from racecraft.serve.races.races import Races
+from racecraft.serve.races.schemas import NewRace
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Entry, Job
+from racecraft.serve.tracks.courses import Courses
 
 
 def refused(reply: httpx.Response, status: int) -> dict[str, Any]:

@@ -9,10 +9,10 @@ import pytest
 
 from racecraft.errors import RunError
 from racecraft.run.lock import exclusive_lock
-from racecraft.serve.database import Database
-from racecraft.serve.jobs import JobQueue
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.supervisor import Standby
 from racecraft.serve.settings import ServeSettings
-from racecraft.serve.standby import Standby
+from racecraft.serve.store.database import Database
 
 PATIENCE = 120.0  # s; the machine may be busy
 

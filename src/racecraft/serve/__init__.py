@@ -4,7 +4,8 @@
                                               supervisor ──starts──▶ work (a child process per job)
                              events ◀── history.jsonl, .live ◀── training
 
-Run folders are the truth about models; the database holds jobs, tags, sessions and races.
+Run folders are the truth about models; the database holds jobs, tags, sessions and races. A room for each subject, with
+its messages (schemas.py), its logic, its routes and its jobs (tasks.py).
 """
 
 from __future__ import annotations

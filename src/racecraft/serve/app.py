@@ -15,37 +15,34 @@ from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
 
 from racecraft.serve import problems
-from racecraft.serve.artifacts import Artifacts
 from racecraft.serve.context import Context
-from racecraft.serve.courses import Courses
-from racecraft.serve.database import Database
-from racecraft.serve.drives import Drives
-from racecraft.serve.garage import Garage
-from racecraft.serve.ghosts import Ghosts
-from racecraft.serve.hub import Hub
-from racecraft.serve.jobs import JobQueue
-from racecraft.serve.mirror import Mirror
-from racecraft.serve.races import Races
-from racecraft.serve.routes import (
-    analysis,
-    archives,
-    choices,
-    console,
-    drives,
-    evaluations,
-    events,
-    jobs,
-    models,
-    races,
-    rewards,
-    tracks,
-    tunings,
-)
+from racecraft.serve.door.guard import Guard, content_policy
+from racecraft.serve.driving import routes as drives
+from racecraft.serve.driving.drives import Drives
+from racecraft.serve.driving.ghosts import Ghosts
+from racecraft.serve.evaluations import analysis
+from racecraft.serve.evaluations import routes as evaluations
+from racecraft.serve.jobs import routes as jobs
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.supervisor import Supervisor
+from racecraft.serve.live import routes as events
+from racecraft.serve.live.hub import Hub
+from racecraft.serve.machine import routes as console
+from racecraft.serve.models import archives, choices
+from racecraft.serve.models import routes as models
+from racecraft.serve.models.garage import Garage
+from racecraft.serve.models.mirror import Mirror
+from racecraft.serve.races import routes as races
+from racecraft.serve.races.races import Races
+from racecraft.serve.rewards import routes as rewards
 from racecraft.serve.schemas import ProblemReply
-from racecraft.serve.security import Guard, content_policy
 from racecraft.serve.settings import ServeSettings, version
-from racecraft.serve.supervisor import Supervisor
-from racecraft.serve.tunings import Tunings
+from racecraft.serve.store.artifacts import Artifacts
+from racecraft.serve.store.database import Database
+from racecraft.serve.tracks import routes as tracks
+from racecraft.serve.tracks.courses import Courses
+from racecraft.serve.tuning import routes as tunings
+from racecraft.serve.tuning.tunings import Tunings
 
 PAGES: Final = Path(__file__).parent / "pages"
 """The built web client, part of the package."""

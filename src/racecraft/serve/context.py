@@ -7,18 +7,18 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
-from racecraft.serve.courses import Courses
-from racecraft.serve.database import Database
-from racecraft.serve.drives import Drives
-from racecraft.serve.garage import Garage
-from racecraft.serve.ghosts import Ghosts
-from racecraft.serve.hub import Hub
-from racecraft.serve.jobs import JobQueue
-from racecraft.serve.mirror import Mirror
-from racecraft.serve.races import Races
+from racecraft.serve.driving.drives import Drives
+from racecraft.serve.driving.ghosts import Ghosts
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.supervisor import Supervisor
+from racecraft.serve.live.hub import Hub
+from racecraft.serve.models.garage import Garage
+from racecraft.serve.models.mirror import Mirror
+from racecraft.serve.races.races import Races
 from racecraft.serve.settings import ServeSettings
-from racecraft.serve.supervisor import Supervisor
-from racecraft.serve.tunings import Tunings
+from racecraft.serve.store.database import Database
+from racecraft.serve.tracks.courses import Courses
+from racecraft.serve.tuning.tunings import Tunings
 
 
 @dataclass(frozen=True)

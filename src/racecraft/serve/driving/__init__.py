@@ -1,0 +1,1 @@
+"""Driving oneself, against ghosts."""

@@ -1,0 +1,1 @@
+"""Races against the clock, and what their laps say."""

@@ -1,0 +1,229 @@
+"""What a run's files say: laps and corners of an evaluation, maps of a training, saliency, the report."""
+
+from __future__ import annotations
+
+import base64
+import math
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from fastapi import APIRouter, Query, Response
+from numpy.typing import NDArray
+
+from racecraft.analysis import (
+    TracedLap,
+    draw_maps,
+    driven_direction,
+    iterations_of,
+    passages,
+    read_laps,
+    sectors_of,
+    start_place,
+)
+from racecraft.errors import RacecraftError
+from racecraft.json_file import read_json_object
+from racecraft.learn import NetworkSpec
+from racecraft.learn.learner import Weights
+from racecraft.learn.saliency import grad_cam
+from racecraft.race.policy import WEIGHTS, load_policy
+from racecraft.run import RunFolder
+from racecraft.serve.context import Context, InContext
+from racecraft.serve.evaluations.schemas import (
+    EvaluationLaps,
+    LapPassage,
+    LapTrace,
+    SaliencyPicture,
+    TrackSector,
+    TrainingMaps,
+)
+from racecraft.serve.problems import NotFound
+from racecraft.sim.views import driver_frames
+from racecraft.track import Track, load_tracks
+
+router = APIRouter(prefix="/api/models/{name}", tags=["analysis"])
+
+MAX_FILES: Final = 24
+"""Iterations that one map is drawn from; of more, every so many-th."""
+AHEAD: Final = 0.14
+"""m from a car's origin to the point that a trace speaks of."""
+
+
+@router.get("/evaluations/{stamp}/laps")
+def get_laps(name: str, stamp: str, context: InContext) -> EvaluationLaps:
+    """An evaluation's laps, step by step, and what each took for every sector of the track."""
+    folder = context.garage.folder(name)
+    track = evaluation_track(context, folder, stamp)
+    laps = read_laps(trace_of(folder, stamp))
+    driven = driven_direction(track, laps)
+    sectors = sectors_of(driven)
+    return EvaluationLaps(
+        track=track.name,
+        length=track.length,
+        is_reversed=driven is not track,
+        sectors=[TrackSector(number=s.number, start=s.start, end=s.end, apex=s.apex, turn=s.turn) for s in sectors],
+        laps=[_lap(driven, lap, [_passage(p) for p in passages(driven, lap, sectors)]) for lap in laps],
+    )
+
+
+@router.get("/evaluations/{stamp}/saliency")
+def get_saliency(
+    name: str,
+    stamp: str,
+    context: InContext,
+    lap: int = Query(ge=1, le=10**6),
+    row: int = Query(ge=0, le=10**6),
+    target: int | None = Query(None, ge=0, le=99),
+) -> SaliencyPicture:
+    """What the policy looked at in one step of a lap: its camera's image drawn anew, and Grad-CAM over it."""
+    folder = context.garage.folder(name)
+    track = evaluation_track(context, folder, stamp)
+    found = next((traced for traced in read_laps(trace_of(folder, stamp)) if traced.number == lap), None)
+    if found is None or row >= len(found.time):
+        raise NotFound(f"Evaluation {stamp} of {name!r} has no step {row} in lap {lap}.")
+    summary = read_json_object(folder.evaluation(stamp) / "evaluation.json")
+    step, spec, weights = _network(folder, summary.get("step"))
+    heading = float(found.heading[row])
+    origin = found.points[row] - AHEAD * np.array([math.cos(heading), math.sin(heading)])
+    driven = driven_direction(track, [found])
+    frame = driver_frames(driven, [[*origin.tolist(), heading]])[0]
+    if target is not None and target >= spec.num_actions:
+        raise NotFound(f"The policy of {name!r} has no output {target}; allowed are 0 to {spec.num_actions - 1}.")
+    seen = grad_cam(spec, weights, frame, target=target)
+    outputs = seen.outputs.astype(float)
+    shares = np.exp(outputs - outputs.max()) if spec.is_discrete else outputs.clip(-1.0, 1.0)
+    return SaliencyPicture(
+        method="Grad-CAM",
+        layer=seen.layer,
+        step=step,
+        height=frame.shape[0],
+        width=frame.shape[1],
+        frame=base64.b64encode(frame.tobytes()).decode(),
+        saliency=base64.b64encode((seen.picture * 255).round().astype(np.uint8).tobytes()).decode(),
+        policy=(shares / shares.sum() if spec.is_discrete else shares).round(5).tolist(),
+        target=seen.target,
+        is_discrete=spec.is_discrete,
+    )
+
+
+@router.get("/maps")
+def get_maps(
+    name: str,
+    context: InContext,
+    first: int = Query(0, ge=0, le=10**9),
+    last: int = Query(10**9, ge=0, le=10**9),
+) -> TrainingMaps:
+    """Rewards, speeds, actions and exits of a training on its track, of the iterations from `first` to `last`."""
+    folder = context.garage.folder(name)
+    track = load_tracks(folder.read_info().track)[0]
+    iterations = iterations_of(folder.training_simtrace)
+    wanted = [iteration for iteration in iterations if first <= iteration <= last]
+    if len(wanted) > MAX_FILES:
+        wanted = [wanted[index] for index in np.linspace(0, len(wanted) - 1, MAX_FILES).round().astype(int)]
+    maps = draw_maps(track, folder.training_simtrace, wanted)
+    return TrainingMaps(
+        iterations=iterations,
+        shown=wanted,
+        episodes=maps.episodes,
+        rows=maps.rows,
+        grid=maps.grid.round(3).tolist(),
+        visits=maps.visits.tolist(),
+        reward=_known(maps.reward),
+        speed=_known(maps.speed),
+        steering=_known(maps.steering_angle),
+        action=maps.action.tolist(),
+        usage=maps.usage.round(5).tolist(),
+        exits=maps.exits.round(3).tolist(),
+    )
+
+
+@router.get("/report", response_class=Response, responses={200: {"content": {"text/html": {}}}})
+def get_report(name: str, context: InContext) -> Response:
+    """The run's report: one HTML file that needs nothing else."""
+    from racecraft.analysis import report
+
+    folder = context.garage.folder(name)
+    headers = {"Content-Disposition": f'attachment; filename="{folder.name}-report.html"'}
+    return Response(report(folder), media_type="text/html", headers=headers)
+
+
+def trace_of(folder: RunFolder, stamp: str) -> Path:
+    """An evaluation's sim-trace.
+
+    Raises:
+        NotFound: There is no such evaluation.
+    """
+    path = folder.evaluation(stamp) / "evaluation-simtrace" / "0-iteration.csv"
+    if not (stamp.isascii() and stamp.isdigit()) or not path.is_file():
+        raise NotFound(f"Model {folder.name!r} has no evaluation {stamp[:40]!r}.")
+    return path
+
+
+def evaluation_track(context: Context, folder: RunFolder, stamp: str) -> Track:
+    """Where an evaluation was driven.
+
+    Raises:
+        NotFound: There is no such evaluation, or its track is gone.
+    """
+    trace_of(folder, stamp)
+    name = str(read_json_object(folder.evaluation(stamp) / "evaluation.json").get("track", ""))
+    for track in load_tracks(folder.read_info().track):
+        if track.name == name:
+            return track
+    return context.courses.load(name)
+
+
+@lru_cache(maxsize=4)
+def _weights(folder: Path, checkpoint: int | str, _: str) -> tuple[int, NetworkSpec, Weights]:
+    step, policy = load_policy(RunFolder(folder), checkpoint=checkpoint, num_threads=1)
+    return step, policy.learner.spec, policy.learner.weights()
+
+
+def _network(folder: RunFolder, step: Any) -> tuple[int, NetworkSpec, Weights]:
+    """The network that drove an evaluation, or the best there is where its checkpoint is no longer kept."""
+    entries = folder.checkpoints.entries()
+    kept: int | str = step if any(entry.step == step for entry in entries) else "best"
+    mark = ",".join(entry.file for entry in entries)
+    try:
+        return _weights(folder.path, kept, mark)
+    except RacecraftError:
+        raise
+    except (KeyError, ValueError) as error:
+        raise NotFound(f"Model {folder.name!r} has no checkpoint that can be read ({WEIGHTS}).") from error
+
+
+def _lap(track: Track, lap: TracedLap, through: list[LapPassage | None]) -> LapTrace:
+    return LapTrace(
+        number=lap.number,
+        status=lap.status,
+        is_complete=lap.is_complete,
+        seconds=round(lap.seconds, 3),
+        penalty_seconds=round(lap.penalty_seconds, 3),
+        start=round(start_place(track, lap), 3),
+        time=lap.time.round(4).tolist(),
+        share=lap.share.round(5).tolist(),
+        x=lap.points[:, 0].round(4).tolist(),
+        y=lap.points[:, 1].round(4).tolist(),
+        heading=lap.heading.round(4).tolist(),
+        speed=lap.speed.round(4).tolist(),
+        throttle=lap.throttle.round(4).tolist(),
+        steering=lap.steering_angle.round(5).tolist(),
+        reward=lap.reward.round(5).tolist(),
+        passages=through,
+    )
+
+
+def _passage(passage: Any) -> LapPassage | None:
+    if passage is None:
+        return None
+    return LapPassage(
+        seconds=round(passage.seconds, 4),
+        entry_speed=round(passage.entry_speed, 3),
+        slowest=round(passage.slowest, 3),
+        exit_speed=round(passage.exit_speed, 3),
+    )
+
+
+def _known(values: NDArray[np.float64]) -> list[list[float | None]]:
+    return [[round(value, 5) if math.isfinite(value) else None for value in row] for row in values.tolist()]

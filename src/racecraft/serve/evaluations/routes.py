@@ -1,0 +1,99 @@
+"""Evaluations: races against the clock, their laps, video and telemetry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from fastapi import APIRouter
+
+from racecraft.errors import RacecraftError
+from racecraft.json_file import read_json_object
+from racecraft.race.rules import RULE_SETS
+from racecraft.run import RunFolder
+from racecraft.serve.context import InContext
+from racecraft.serve.evaluations.schemas import EvaluateModel, EvaluationCard, Telemetry
+from racecraft.serve.jobs.schemas import JobInfo, job_info
+from racecraft.serve.problems import NotFound
+
+router = APIRouter(prefix="/api/models/{name}/evaluations", tags=["evaluations"])
+
+COLUMNS: Final = {
+    "episode": int,
+    "steps": float,
+    "X": float,
+    "Y": float,
+    "yaw": float,
+    "steer": float,
+    "throttle": float,
+    "reward": float,
+    "progress": float,
+    "tstamp": float,
+    "episode_status": str,
+}
+MAX_ROWS: Final = 60_000
+
+
+@router.get("")
+def list_evaluations(name: str, context: InContext) -> list[EvaluationCard]:
+    """A model's evaluations, newest first."""
+    folder = context.garage.folder(name)
+    found = []
+    for path in sorted(folder.path.glob("evaluation-*/evaluation.json"), reverse=True)[:200]:
+        try:
+            found.append(_card(folder, path))
+        except RacecraftError:
+            continue
+    return found
+
+
+@router.post("", status_code=202)
+def evaluate_model(name: str, request: EvaluateModel, context: InContext) -> JobInfo:
+    """Race a model against the clock."""
+    folder = context.garage.folder(name)
+    if request.rules not in RULE_SETS:
+        raise NotFound(f"There are no rules {request.rules[:40]!r}; allowed are {', '.join(RULE_SETS)}.")
+    payload: dict[str, Any] = request.model_dump(exclude_none=True)
+    if request.track is not None:
+        payload["track"] = context.courses.path_or_name(request.track)
+    job = context.queue.add("evaluate", folder.name, payload)
+    context.supervisor.wake()
+    return job_info(job)
+
+
+@router.get("/{stamp}/telemetry")
+def get_telemetry(name: str, stamp: str, context: InContext) -> Telemetry:
+    """Every step of an evaluation, as columns named as AWS names them."""
+    folder = context.garage.folder(name)
+    path = folder.evaluation(stamp) / "evaluation-simtrace" / "0-iteration.csv"
+    if not stamp.isdigit() or not path.is_file():
+        raise NotFound(f"Model {name!r} has no evaluation {stamp[:40]!r}.")
+    columns: dict[str, list[Any]] = {column: [] for column in COLUMNS}
+    with path.open(encoding="utf-8") as file:
+        header = file.readline().strip().split(",")
+        places = {column: header.index(column) for column in COLUMNS}
+        for number, line in enumerate(file):
+            if number >= MAX_ROWS:
+                break
+            cells = line.rstrip("\n").split(",")
+            for column, kind in COLUMNS.items():
+                columns[column].append(kind(cells[places[column]]))
+    return Telemetry(columns=columns)
+
+
+def _card(folder: RunFolder, path: Path) -> EvaluationCard:
+    stamp = path.parent.name.removeprefix("evaluation-")
+    summary = read_json_object(path)
+    metrics = folder.evaluation_metrics(stamp)
+    laps = read_json_object(metrics)["metrics"] if metrics.is_file() else []
+    picture = path.parent / "racing-line.png"
+    trace = path.parent / "evaluation-simtrace" / "0-iteration.csv"
+    return EvaluationCard(
+        stamp=stamp,
+        track=str(summary.get("track", "")),
+        summary=summary,
+        laps=laps,
+        picture=f"{path.parent.name}/{picture.name}" if picture.is_file() else None,
+        video=summary.get("video"),
+        telemetry=stamp if trace.is_file() else None,
+    )

@@ -1,0 +1,145 @@
+"""Messages about what a run's files say: laps, corners, maps, saliency, and the choices of the page for a new model."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from racecraft.serve.schemas import Message
+
+# ---- races against the clock
+
+
+class EvaluateModel(Message):
+    """Race a model against the clock."""
+
+    track: str | None = Field(None, max_length=200)
+    laps: int = Field(3, ge=1, le=100)
+    num_trials: int = Field(5, ge=1, le=100)
+    rules: str = "drfc"
+    checkpoint: str | int = "best"
+    seed: int = Field(0, ge=0, le=2**32 - 1)
+
+
+class EvaluationCard(Message):
+    """One evaluation's result."""
+
+    stamp: str
+    track: str
+    summary: dict[str, Any]
+    laps: list[dict[str, Any]]
+    """AWS's metrics, a lap each."""
+    picture: str | None
+    video: str | None
+    telemetry: str | None
+
+
+class Telemetry(Message):
+    """Every step of an evaluation's best trial, as columns."""
+
+    columns: dict[str, list[float | int | str]]
+
+
+# ---- laps
+
+
+class LapTrace(Message):
+    """One lap of an evaluation; all lists have one entry a control step."""
+
+    number: int
+    status: str
+    is_complete: bool
+    seconds: float
+    penalty_seconds: float
+    start: float
+    """Place along the centre line that `share` counts from, metres."""
+    time: list[float]
+    share: list[float]
+    x: list[float]
+    y: list[float]
+    heading: list[float]
+    speed: list[float]
+    """Driven."""
+    throttle: list[float]
+    """Asked for."""
+    steering: list[float]
+    """Asked for, radians, left positive."""
+    reward: list[float]
+    passages: list[LapPassage | None]
+    """Through every sector; null where it did not get through."""
+
+
+class LapPassage(Message):
+    """A lap through a sector."""
+
+    seconds: float
+    entry_speed: float
+    slowest: float
+    exit_speed: float
+
+
+class TrackSector(Message):
+    """A corner with half of the straights around it, metres along the centre line; turn in radians, left positive."""
+
+    number: int
+    start: float
+    end: float
+    apex: float
+    turn: float
+
+
+class EvaluationLaps(Message):
+    """All laps of an evaluation."""
+
+    track: str
+    length: float
+    is_reversed: bool
+    sectors: list[TrackSector]
+    laps: list[LapTrace]
+
+
+# ---- maps and saliency
+
+
+class TrainingMaps(Message):
+    """What a training did where, on a grid of P places along and O across the track; null where no car was."""
+
+    iterations: list[int]
+    """All that there are."""
+    shown: list[int]
+    episodes: int
+    rows: int
+    grid: list[list[list[float]]]
+    """Corners of the cells  (P + 1, O + 1, 2)."""
+    visits: list[list[int]]
+    reward: list[list[float | None]]
+    speed: list[list[float | None]]
+    steering: list[list[float | None]]
+    action: list[list[int]]
+    """Taken most, or -1."""
+    usage: list[float]
+    """Share of every action."""
+    exits: list[list[float]]
+
+
+class SaliencyPicture(Message):
+    """What a policy looked at in one moment."""
+
+    method: Literal["Grad-CAM"]
+    layer: str
+    step: int
+    """Of the checkpoint that was asked."""
+    height: int
+    width: int
+    frame: str
+    """The camera's image, grey, a byte a pixel, base64."""
+    saliency: str
+    """0 to 255 a pixel, base64."""
+    policy: list[float]
+    """Probabilities of actions, or mean steering and speed from -1 to 1."""
+    target: int
+    is_discrete: bool
+
+
+LapTrace.model_rebuild()

@@ -1,0 +1,1 @@
+"""Work for child processes: the queue, who starts them, and what they do."""

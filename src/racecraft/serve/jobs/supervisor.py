@@ -1,0 +1,203 @@
+"""Starts jobs in child processes, as many at once as there are slots, and notices when one has died.
+
+A child holds a lock on a file of its own, which the system drops with it. So a server sees at once that a child of the
+server before it is dead, too; what ran on another machine is taken over when its lease has run out. One child more has
+loaded what jobs need and waits for one, so that a click is followed by driving and not by imports.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import logging
+import os
+import secrets
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Final
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from racecraft.errors import RunError
+from racecraft.run.lock import exclusive_lock
+from racecraft.serve.jobs.queue import JobQueue, Slot, kinds_of
+from racecraft.serve.settings import ARTIFACTS, DATABASE, WORKERS, ServeSettings
+from racecraft.serve.store.database import Database
+
+POLL: Final = 0.5  # s between two looks at the queue; `wake` makes one at once
+GRACE: Final = 20.0  # s for a training to save itself when the server is stopped
+CALM: Final = 5.0  # s after the start of a job before the next worker loads: the job has the machine to itself first
+
+
+class Supervisor:
+    """One per server.
+
+    Args:
+        settings: Of the console.
+        database: Handed to the children by its URL.
+        queue: Of jobs.
+    """
+
+    def __init__(self, settings: ServeSettings, database: Database, queue: JobQueue) -> None:
+        self._settings, self._database, self._queue = settings, database, queue
+        self._children: dict[str, subprocess.Popen[bytes]] = {}  # by owner
+        self._awake = asyncio.Event()
+        self._is_stopping = False
+        self._loop: asyncio.AbstractEventLoop | None = None
+        log = settings.state / "jobs.log"
+        self._started = float("-inf")  # the newest job, in `time.monotonic()` seconds
+        self._workers = settings.state / WORKERS
+        self._workers.mkdir(parents=True, exist_ok=True)
+        self._standby = Standby(
+            settings.runs, workers=self._workers, database=database.url, artifacts=settings.artifacts, log=log
+        )
+
+    def wake(self) -> None:
+        """There is something new in the queue; safe from any thread."""
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._awake.set)
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        self._loop = asyncio.get_running_loop()
+        while True:
+            try:
+                await asyncio.to_thread(self._tend)
+            except (SQLAlchemyError, OSError) as error:  # the database is being restarted, the disk is full
+                logging.getLogger("racecraft.serve").error("Jobs cannot be tended: %s", str(error).splitlines()[0])
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._awake.wait(), POLL)
+            self._awake.clear()
+
+    async def stop(self) -> None:
+        """Let the children save themselves; what they were doing is queued again for the next server."""
+        self._is_stopping = True
+        self._standby.close()
+        for child in list(self._children.values()):
+            child.terminate()
+        deadline = asyncio.get_running_loop().time() + GRACE
+        while any(child.poll() is None for child in self._children.values()):
+            if asyncio.get_running_loop().time() > deadline:
+                for child in self._children.values():
+                    child.kill()
+            await asyncio.sleep(0.05)
+        for owner in self._children:
+            self._queue.hand_back(owner)
+        self._children.clear()
+
+    def _tend(self) -> None:
+        self._reap()
+        self._bury()
+        self._queue.take_back_expired()
+        places: dict[Slot, int] = {"training": self._settings.training_slots, "other": self._settings.other_slots}
+        for slot, count in places.items():
+            kinds = kinds_of(slot)
+            while not self._is_stopping and self._queue.num_running(kinds) < count and self._start(kinds):
+                pass
+        if not self._is_stopping and time.monotonic() - self._started > CALM:
+            self._standby.prepare()
+
+    def _start(self, kinds: tuple[str, ...]) -> bool:
+        """Start the oldest job of these kinds; False when there is none."""
+        owner = self._standby.name()
+        job = self._queue.claim(kinds, owner=owner)
+        if job is None:
+            return False
+        self._children[owner] = self._standby.start(job.id)
+        self._started = time.monotonic()
+        return True
+
+    def _reap(self) -> None:
+        """Take note of children that ended."""
+        for owner, child in list(self._children.items()):
+            if child.poll() is not None:
+                self._queue.release(owner)
+                (self._workers / owner).unlink(missing_ok=True)
+                del self._children[owner]
+
+    def _bury(self) -> None:
+        """Take note of children of earlier servers that are dead."""
+        for path in self._workers.iterdir():
+            if path.name not in self._children:
+                with suppress(RunError), exclusive_lock(path):  # a living one holds it
+                    self._queue.release(path.name)
+                    path.unlink(missing_ok=True)
+
+
+class Standby:
+    """Starts workers, at most one of them before there is something to do.
+
+    That one is given a job in a line on its standard input, which the system closes with the server, however that ends:
+    nobody waits in vain. Its lock is taken before it exists and inherited, so that no other server takes it for dead
+    while it loads.
+
+    Args:
+        runs: Folder of the runs.
+        workers: Folder of the locks: a file for each worker by its name, held as long as it lives.
+        database: The database's URL.
+        artifacts: Where runs are copied to, or empty.
+        log: File for what workers print.
+    """
+
+    def __init__(self, runs: Path, *, workers: Path, database: str, artifacts: str, log: Path) -> None:
+        # -P: a random.py in the user's folder is not to be taken for Python's
+        self._command = [sys.executable, "-P", "-m", "racecraft.serve.jobs", str(runs)]
+        self._environment = {**os.environ, DATABASE: database, ARTIFACTS: artifacts}
+        self._workers, self._log = workers, log
+        self._name = ""  # of the one that waits
+        self._waiting: subprocess.Popen[bytes] | None = None
+
+    def prepare(self) -> None:
+        """Have a worker wait."""
+        self.name()
+        if self._waiting is None:
+            self._waiting = self._launch()
+
+    def name(self) -> str:
+        """Of the worker that is next, under which its job is claimed."""
+        if self._waiting is not None and self._waiting.poll() is not None:  # it died
+            self._forget()
+        if self._waiting is None:
+            self._name = secrets.token_hex(8)
+        return self._name
+
+    def start(self, job_id: str) -> subprocess.Popen[bytes]:
+        """Have the worker that is next do a job, claimed under its name: the one that waits, or a new one."""
+        worker, self._waiting = self._waiting or self._launch(), None
+        with suppress(BrokenPipeError), _pipe(worker) as pipe:  # one that has just died is noticed like any other
+            pipe.write(f"{job_id} {self._name}\n".encode())
+        return worker
+
+    def close(self) -> None:
+        """Send the waiting one home."""
+        if self._waiting is not None:
+            self._waiting.terminate()
+            self._waiting.wait()
+            self._forget()
+
+    def _forget(self) -> None:
+        assert self._waiting is not None
+        _pipe(self._waiting).close()
+        (self._workers / self._name).unlink(missing_ok=True)
+        self._waiting = None
+
+    def _launch(self) -> subprocess.Popen[bytes]:
+        with self._log.open("ab") as log, (self._workers / self._name).open("wb") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # of the open file, which the worker inherits
+            return subprocess.Popen(
+                [*self._command, str(lock.fileno())],
+                env=self._environment,
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                pass_fds=[lock.fileno()],
+                start_new_session=True,  # Ctrl-C in the server's terminal is not for it
+            )
+
+
+def _pipe(worker: subprocess.Popen[bytes]) -> IO[bytes]:
+    assert worker.stdin is not None
+    return worker.stdin

@@ -1,0 +1,169 @@
+"""A job from beginning to end: it keeps its lease, works, and says how it ended.
+
+The server may die meanwhile: the job goes on, and the next server finds it running. When the job's own process dies,
+its lease runs out and somebody starts it again; a training then continues from its last checkpoint.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from racecraft.errors import RacecraftError, RunError
+from racecraft.serve.jobs.queue import KINDS, LEASE, JobKind, JobQueue
+from racecraft.serve.jobs.task import Task
+from racecraft.serve.store.artifacts import Artifacts
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Job
+
+HEARTBEAT: Final = 1.0  # s
+
+
+def work(task: Task) -> dict[str, Any]:
+    """Do a job.
+
+    Raises:
+        RacecraftError: It cannot be done.
+    """
+    if task.job.kind not in KINDS:
+        raise RunError(f"Jobs of kind {task.job.kind!r} are not known here.", hint="Update Racecraft.")
+    result: dict[str, Any] = _function(KINDS[task.job.kind])(task)
+    if task.artifacts is not None and task.job.run:
+        try:
+            task.artifacts.keep(task.folder)
+        except RunError as error:  # what was done is done; the next server copies what is missing
+            if task.job.kind == "store":
+                raise
+            result = {**result, "not_stored": f"{error} {error.hint}".strip()}
+    return result
+
+
+def load() -> None:
+    """Import what any job may need."""
+    for kind in KINDS.values():
+        _function(kind)
+
+
+def _function(kind: JobKind) -> Callable[[Task], dict[str, Any]]:
+    module, _, name = kind.work.partition(":")
+    found: Callable[[Task], dict[str, Any]] = getattr(import_module(module), name)
+    return found
+
+
+class Worker:
+    """One job from beginning to end.
+
+    Args:
+        database: Where the job is.
+        job: Claimed by `owner`.
+        owner: This process, by the name that it was started under.
+        runs: Folder of the runs.
+        artifacts: Where runs are copied to.
+    """
+
+    def __init__(
+        self, database: Database, job: Job, *, owner: str, runs: Path, artifacts: Artifacts | None = None
+    ) -> None:
+        self._queue = JobQueue(database)
+        self._job, self._owner = job, owner
+        self._stops: list[Callable[[], None]] = []
+        self._is_cancelled = False  # by the user
+        self._leaving = threading.Event()  # the server is going down
+        kind = KINDS.get(job.kind, KINDS["train"])
+        self._kept = runs / kind.progress.format(run=job.run, tuning=job.payload.get("tuning", ""))
+        self._task = Task(job=job, runs=runs, database=database, artifacts=artifacts, on_stop=self._stops.append)
+
+    def run(self) -> None:
+        """Do it, and say how it ended."""
+        signal.signal(signal.SIGTERM, lambda *_: self._leaving.set())
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which then tells us
+        threading.Thread(target=self._keep, name="heartbeat", daemon=True).start()
+        try:
+            result = work(self._task)
+        except Exception as error:
+            described = _described(error)
+            self._report(lambda: self._finish("failed", error=described))
+            return
+        if result.get("reason") == "interrupted" and not self._is_cancelled:
+            self._report(lambda: self._queue.hand_back(self._owner))  # the next server continues
+        else:
+            self._report(lambda: self._finish("done", result=result))
+
+    def _keep(self) -> None:
+        """Keep the lease, and hear of being cancelled."""
+        kept, begun = time.monotonic(), self._progress()
+        while True:
+            try:
+                answer = self._queue.heartbeat(
+                    self._job.id, owner=self._owner, has_progressed=self._progress() != begun
+                )
+                kept = time.monotonic()
+            except SQLAlchemyError:  # the database is being restarted, say
+                answer = "go on"
+            if answer == "lost" or time.monotonic() - kept > LEASE.total_seconds():
+                os._exit(3)  # it is another's now: touch nothing
+            if answer == "stop":
+                self._is_cancelled = True
+            if answer == "stop" or self._leaving.is_set():
+                self._stop()
+            self._leaving.wait(HEARTBEAT)
+            if self._leaving.is_set():
+                time.sleep(0.1)
+
+    def _stop(self) -> None:
+        for call in self._stops:
+            call()
+        if not self._stops:  # nothing to be saved
+            if self._is_cancelled:
+                self._finish("cancelled")
+            else:
+                self._queue.hand_back(self._owner)
+            os._exit(0)
+
+    def _finish(self, state: str, **outcome: Any) -> None:
+        self._queue.finish(self._job.id, owner=self._owner, state=state, **outcome)
+
+    def _report(self, tell: Callable[[], None]) -> None:
+        """Say how it ended; while the database is away, try again until the lease has run out."""
+        while True:
+            try:
+                return tell()
+            except SQLAlchemyError:
+                time.sleep(HEARTBEAT)
+
+    def _progress(self) -> float:
+        """Changes whenever something is kept for good, so that the next attempt does not begin at the start."""
+        try:
+            return self._kept.stat().st_mtime
+        except OSError:
+            return 0.0
+
+
+def _described(error: Exception) -> dict[str, Any]:
+    is_expected = isinstance(error, RacecraftError | OSError)
+    if not is_expected:
+        traceback.print_exception(error)
+    return {
+        "code": type(error).__name__,
+        "message": str(error),
+        "hint": getattr(error, "hint", "") if is_expected else "This is a bug in Racecraft.",
+        "line": getattr(error, "line", None),
+    }
+
+
+def do_job(job_id: str, *, owner: str, runs: Path, database_url: str, artifacts_url: str) -> None:
+    """Do a job that was claimed by `owner`, if it still is."""
+    database = Database(database_url)
+    job = JobQueue(database).get(job_id)
+    if job is not None and job.owner == owner:  # else it was taken for dead before it was there
+        artifacts = Artifacts(artifacts_url) if artifacts_url else None
+        Worker(database, job, owner=owner, runs=runs, artifacts=artifacts).run()

@@ -1,0 +1,1 @@
+"""What tabs see while a model learns."""

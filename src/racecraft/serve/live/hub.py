@@ -1,0 +1,118 @@
+"""What all tabs that look at a model are sent, made once for all of them: twenty viewers cost little more than one."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import json
+import time
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from sse_starlette import ServerSentEvent
+
+from racecraft.run.history import read_history
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.schemas import job_info
+from racecraft.serve.live.cars import STALE, LiveReader, Look
+
+FRESH: Final = 0.3  # s that a look at the jobs is good for
+MAX_MODELS: Final = 64  # that are remembered
+MAX_SHARED: Final = 1 << 16  # bytes of points that are kept for the next tab; a new one reads all there are by itself
+
+
+@dataclass
+class _Seen:
+    """What is known of one model."""
+
+    reader: LiveReader
+    sequence: int = -1
+    live: bytes = b""
+    live_at: float = float("-inf")
+    points: dict[int, tuple[int, bytes]] = field(default_factory=dict)
+    """The newest points as an event, and their end, by where they begin."""
+    points_until: float = 0.0
+    points_lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+    jobs: str = ""
+    jobs_until: float = 0.0
+    jobs_lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+
+class Hub:
+    """The newest events of each model; used from the event loop only.
+
+    Args:
+        runs: Folder of the runs.
+        queue: Of jobs.
+    """
+
+    def __init__(self, runs: Path, queue: JobQueue) -> None:
+        self._runs, self._queue = runs, queue
+        self._seen: OrderedDict[str, _Seen] = OrderedDict()
+
+    def live(self, name: str, *, after: int) -> tuple[int, bytes] | None:
+        """The cars as they are now, as an event, and its number; None when there is nothing after number `after`."""
+        seen = self._of(name)
+        look = seen.reader.look(after=seen.sequence)
+        if look is not None:
+            event = ServerSentEvent(json.dumps(_document(look), separators=(",", ":")), event="live")
+            seen.sequence, seen.live, seen.live_at = look.sequence, event.encode(), time.monotonic()
+        is_live = time.monotonic() - seen.live_at < STALE
+        return (seen.sequence, seen.live) if is_live and seen.sequence != after else None
+
+    async def points(self, name: str, *, after: int) -> tuple[int, bytes] | None:
+        """The points of the curves behind an offset, as an event, and where they end; None when there are none."""
+        seen = self._of(name)
+        async with seen.points_lock:
+            if time.monotonic() >= seen.points_until:
+                seen.points.clear()
+                seen.points_until = time.monotonic() + FRESH / 2
+            found = seen.points.get(after)
+            if found is None:
+                found = await asyncio.to_thread(self._points, name, after)
+            if len(found[1]) <= MAX_SHARED:
+                seen.points[after] = found
+        return found if found[1] else None
+
+    def _points(self, name: str, after: int) -> tuple[int, bytes]:
+        points, end = read_history(self._runs / name / "metrics" / "history.jsonl", offset=after)
+        if not points:
+            return after, b""
+        return end, ServerSentEvent(json.dumps(points), event="points", id=str(end)).encode()
+
+    async def jobs(self, name: str) -> str:
+        """A model's newest jobs, as JSON, at most `FRESH` seconds old."""
+        seen = self._of(name)
+        async with seen.jobs_lock:
+            if time.monotonic() >= seen.jobs_until:
+                seen.jobs = await asyncio.to_thread(self._jobs, name)
+                seen.jobs_until = time.monotonic() + FRESH
+        return seen.jobs
+
+    def _jobs(self, name: str) -> str:
+        listed = self._queue.list(run=name, limit=5)
+        return json.dumps([job_info(job).model_dump(mode="json") for job in listed])
+
+    def _of(self, name: str) -> _Seen:
+        if name not in self._seen:
+            self._seen[name] = _Seen(LiveReader(self._runs / name))
+            if len(self._seen) > MAX_MODELS:
+                self._seen.popitem(last=False)
+        self._seen.move_to_end(name)
+        return self._seen[name]
+
+
+def _document(look: Look) -> dict[str, Any]:
+    """Millimetres and milliradians as whole numbers: a third of the bytes."""
+    poses = (look.poses * 1000).round().astype(int)
+    return {
+        "step": look.step,
+        "poses": poses.tolist(),
+        "steps": look.steps.tolist(),
+        "policy": look.policy.round(4).tolist(),
+        "is_discrete": look.is_discrete,
+        "frame": base64.b64encode(look.frame.tobytes()).decode(),
+        "frame_shape": list(look.frame.shape),
+    }

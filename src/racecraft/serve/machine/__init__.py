@@ -1,0 +1,1 @@
+"""The console itself and the machine it runs on."""

@@ -1,0 +1,1 @@
+"""The garage: models, their archives, their copies in a store."""

@@ -1,0 +1,103 @@
+"""Models as files: an archive or a reward function becomes a model, a model becomes an archive."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import StreamingResponse
+
+from racecraft.errors import RunError, SourceError
+from racecraft.run import archive_chunks
+from racecraft.run.folder import sanitize_name
+from racecraft.serve.context import Context, InContext
+from racecraft.serve.models.schemas import ImportedModel
+from racecraft.serve.schemas import RunName
+
+router = APIRouter(prefix="/api/models", tags=["archives"])
+
+ENDINGS: Final = (".tar.gz", ".tgz", ".tar", ".zip", ".py")
+UPLOADS: Final = "uploads"  # inside the state folder
+
+
+@router.post(
+    "/import",
+    status_code=201,
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+        }
+    },
+)
+async def import_model(
+    filename: str, request: Request, context: InContext, name: RunName | None = None, track: str = ""
+) -> ImportedModel:
+    """A model from an archive of DeepRacer, deepracer-for-cloud or Racecraft, or from a reward function's file.
+
+    The request's body is the file. Nothing in it is run; the reward function is only read, and tried in its sandbox.
+    """
+    plain = _plain(filename)
+    if name is not None:
+        context.garage.require_new(name)
+    uploads = context.settings.state / UPLOADS
+    uploads.mkdir(exist_ok=True)
+    place = Path(tempfile.mkdtemp(dir=uploads))
+    try:
+        with (place / plain).open("xb") as file:
+            async for chunk in request.stream():
+                await run_in_threadpool(file.write, chunk)
+        return await run_in_threadpool(_import, context, place / plain, name, track)
+    except OSError as error:
+        raise RunError(f"The file cannot be kept: {error.strerror or error}.", hint="Free disk space.") from error
+    finally:
+        await run_in_threadpool(shutil.rmtree, place, ignore_errors=True)
+
+
+@router.get(
+    "/{name}/archive",
+    response_class=StreamingResponse,
+    responses={200: {"content": {"application/gzip": {"schema": {"type": "string", "format": "binary"}}}}},
+)
+def export_model(name: str, context: InContext) -> StreamingResponse:
+    """A model as one tar.gz in AWS's layout, with its weights."""
+    folder = context.garage.folder(name)
+    headers = {"Content-Disposition": f'attachment; filename="{folder.name}.tar.gz"'}
+    return StreamingResponse(archive_chunks(folder), media_type="application/gzip", headers=headers)
+
+
+def _import(context: Context, path: Path, name: str | None, track: str) -> ImportedModel:
+    from racecraft.importing import import_run  # takes a second to load, and the console has to be there at once
+
+    where = context.courses.path_or_name(track) if track else ""
+    if name is None and path.stem != "reward_function":
+        stem = path.name.removesuffix(next(ending for ending in ENDINGS if path.name.endswith(ending)))
+        name = stem if stem == sanitize_name(stem) and not (context.garage.runs / stem).exists() else None
+    report = import_run(path, root=context.garage.runs, name=name, track=where)
+    context.mirror.copy(report.run.name)
+    return ImportedModel(
+        model=context.garage.card(report.run.name),
+        kind=report.kind,
+        used=report.used,
+        unused=report.unused,
+        unknown=report.unknown,
+        notes=report.notes,
+    )
+
+
+def _plain(filename: str) -> str:
+    """A name of ours for what is uploaded, with the ending of theirs."""
+    base = PurePosixPath(filename.replace("\\", "/")).name
+    ending = next((ending for ending in ENDINGS if base.lower().endswith(ending)), None)
+    if ending is None:
+        raise SourceError(
+            f"{base[:80]!r} is not of a kind that can be imported; allowed are {', '.join(ENDINGS)}.",
+            hint="Pack the model's folder into a tar.gz or zip.",
+        )
+    stem = re.sub(r"[^A-Za-z0-9._-]+", "-", base[: -len(ending)]).strip("-._")[:60]
+    return (stem or "model") + ending

@@ -1,0 +1,285 @@
+"""The models of a console: run folders, what people say about them, and summaries made when a folder changed."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import sqlalchemy as sa
+from sqlalchemy.dialects import sqlite
+from sqlalchemy.orm import Session
+
+from racecraft.errors import RacecraftError, RunError
+from racecraft.run import RunFolder, list_runs
+from racecraft.run.history import read_history
+from racecraft.serve.models.schemas import Checkpoint, ModelCard
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Entry, Job, Model, now
+
+TRASH: Final = "trash"  # inside the state folder
+PICTURE: Final = "racing-line.png"
+NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
+SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
+Status = Literal["training", "queued", "stopped", "finished", "failed", "new"]
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+
+
+class Garage:
+    """Finds, describes, renames and removes models.
+
+    Args:
+        runs: Folder of the run folders.
+        state: The console's own folder.
+        database: Tags, summaries and jobs.
+    """
+
+    def __init__(self, runs: Path, state: Path, database: Database) -> None:
+        self._runs, self._trash, self._database = runs, state / TRASH, database
+
+    @property
+    def runs(self) -> Path:
+        """Folder of the run folders."""
+        return self._runs
+
+    def folder(self, name: str) -> RunFolder:
+        """A model's run folder.
+
+        Raises:
+            NotFound: There is none of this name; paths are no names.
+        """
+        if _NAME.fullmatch(name) and (self._runs / name / "run.json").is_file():
+            return RunFolder(self._runs / name)
+        raise NotFound(f"There is no model {name[:80]!r}.")
+
+    def cards(self) -> list[ModelCard]:
+        """All models, newest first."""
+        return sorted(self._cards(list_runs(self._runs)), key=lambda card: (card.created, card.name), reverse=True)
+
+    def card(self, name: str) -> ModelCard:
+        """One model."""
+        for card in self._cards([self.folder(name)]):
+            return card
+        raise NotFound(f"Model {name!r} cannot be read: its run.json is damaged.")
+
+    def _cards(self, folders: list[RunFolder]) -> list[ModelCard]:
+        """Cards of these folders; what changed is read while nobody waits for the database."""
+        only = [folders[0].name] if len(folders) == 1 else None
+        with self._database.transaction() as session:
+            known = {row.name: (row.fingerprint, row.summary, row.deleted is not None) for row in _rows(session, only)}
+        renewed: dict[str, tuple[str, dict[str, Any]]] = {}
+        for folder in folders:
+            mark = _fingerprint(folder)
+            if known.get(folder.name, ("", {}, True))[::2] != (mark, False):
+                summary, is_settled = _summary(folder)
+                renewed[folder.name] = (mark if is_settled else "", summary)
+        with self._database.transaction() as session:
+            if fresh := [name for name in renewed if name not in known]:
+                session.execute(_insert(session), [{"name": name, "owner_id": 1} for name in fresh])
+            for name, (mark, summary) in renewed.items():
+                change: dict[str, Any] = {"fingerprint": mark, "summary": summary}
+                if name in known and known[name][2]:  # a new one by the name of one in the trash
+                    change |= {"deleted": None, "tags": []}
+                session.execute(sa.update(Model).where(Model.name == name).values(change))
+            tags = {row.name: (row.tags, row.summary) for row in _rows(session, only)}
+            trainings = _latest_trainings(session, only)
+        cards = []
+        for name, (words, summary) in ((folder.name, tags[folder.name]) for folder in folders if folder.name in tags):
+            if summary:
+                status = _status(*trainings.get(name, ("", "")), has_steps=bool(summary["steps"]))
+                cards.append(ModelCard(name=name, tags=words, status=status, **summary))
+        return cards
+
+    def require_new(self, name: str) -> None:
+        """Refuse a name that is taken.
+
+        Raises:
+            Conflict: There is something of that name.
+        """
+        if (self._runs / name).exists():
+            raise Conflict(f"There is a model {name!r} already.", hint="Choose another name.")
+
+    def name_beside(self, name: str) -> str:
+        """A name for a copy of a model that nothing has yet: the same with a number from 2 on."""
+        names = (f"{name[:58]}-{number}" for number in itertools.count(2))
+        return next(one for one in names if not (self._runs / one).exists())
+
+    def checkpoints(self, folder: RunFolder) -> list[Checkpoint]:
+        """The states of a model's policy that are kept."""
+        store = folder.checkpoints
+        best = store.best
+        return [
+            Checkpoint(
+                step=entry.step,
+                is_best=best is not None and entry.step == best.step,
+                completion=entry.metrics.get("completion"),
+                best_lap=entry.metrics.get("best_lap_s"),
+            )
+            for entry in store.entries()
+        ]
+
+    def tag(self, name: str, tags: list[str]) -> None:
+        """Replace a model's tags."""
+        self.card(name)
+        with self._database.transaction() as session:
+            session.execute(sa.update(Model).where(Model.name == name).values(tags=list(dict.fromkeys(tags))))
+
+    def rename(self, old: str, new: str) -> None:
+        """Give a model another name.
+
+        Raises:
+            Conflict: The name is taken, or the model is in use.
+        """
+        folder = self.folder(old)
+        self.require_new(new)
+        with self._free(folder):
+            folder.path.rename(self._runs / new)
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Model).where(Model.name == new))
+            session.execute(sa.update(Model).where(Model.name == old).values(name=new))
+            for table in (Job, Entry):
+                session.execute(sa.update(table).where(table.run == old).values(run=new))
+
+    def remove(self, name: str) -> None:
+        """Put a model into the trash, from where `restore` brings it back.
+
+        Raises:
+            Conflict: It is in use.
+        """
+        folder = self.folder(name)
+        with self._free(folder):
+            self._trash.mkdir(parents=True, exist_ok=True)
+            shutil.rmtree(self._trash / name, ignore_errors=True)
+            folder.path.rename(self._trash / name)
+        with self._database.transaction() as session:
+            session.execute(sa.update(Model).where(Model.name == name).values(deleted=now()))
+
+    def restore(self, name: str) -> None:
+        """Bring a removed model back.
+
+        Raises:
+            NotFound: It is not in the trash.
+            Conflict: There is another of that name by now.
+        """
+        if not _NAME.fullmatch(name) or not (self._trash / name / "run.json").is_file():
+            raise NotFound(f"There is no model {name[:80]!r} in the trash.")
+        if (self._runs / name).exists():
+            raise Conflict(f"There is a model {name!r} again.", hint="Rename that one first.")
+        (self._trash / name).rename(self._runs / name)
+        with self._database.transaction() as session:
+            session.execute(sa.update(Model).where(Model.name == name).values(deleted=None))
+
+    @contextmanager
+    def _free(self, folder: RunFolder) -> Iterator[None]:
+        """Hold the run's lock; Conflict when it is in use, or soon will be."""
+        with self._database.transaction() as session:
+            waiting = sa.select(Job.kind).where(Job.run == folder.name, Job.state.in_(("queued", "running")))
+            kind = session.scalar(waiting.limit(1))
+        if kind is not None:
+            hint = "Stop it first." if kind in ("train", "tune") else "Wait until it has ended."
+            raise Conflict(f"Model {folder.name!r} is in use: there is a job of kind {kind!r}.", hint=hint)
+        with ExitStack() as stack:
+            try:
+                stack.enter_context(folder.lock())
+            except RunError as error:
+                raise Conflict(str(error), hint="Stop its training first.") from error
+            yield
+
+
+def _fingerprint(folder: RunFolder) -> str:
+    """Changes when a card may change: the settings, the checkpoints, an evaluation."""
+    marks = []
+    for path in (folder.path, folder.path / "run.json", folder.path / "checkpoints"):
+        try:
+            marks.append(str(path.stat().st_mtime_ns))
+        except OSError:
+            marks.append("-")
+    return " ".join(marks)
+
+
+def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
+    """What a card shows, as JSON, empty for a folder that cannot be read; and whether it will stay so for now."""
+    try:
+        info = folder.read_info()
+        best, last = folder.checkpoints.best, folder.checkpoints.last
+        created = datetime.fromisoformat(info.created).isoformat()
+    except (RacecraftError, ValueError, TypeError):
+        return {}, True
+    raced, picture, is_settled = _evaluations(folder)
+    metrics = best.metrics if best is not None else {}
+    return {
+        "track": Path(info.track).stem,
+        "created": created,
+        "steps": last.step if last is not None else 0,
+        "seconds": _seconds(folder),
+        "completion": metrics.get("completion"),
+        "best_lap": metrics.get("best_lap_s"),
+        "evaluations": raced,
+        "picture": picture,
+        "until": str(info.settings.get("until", "")),
+    }, is_settled
+
+
+def _evaluations(folder: RunFolder) -> tuple[int, str | None, bool]:
+    """How many evaluations there are, the newest picture, and whether none is under way; looks at the newest only."""
+    with os.scandir(folder.path) as entries:
+        names = sorted((entry.name for entry in entries if entry.name.startswith("evaluation-")), reverse=True)
+    newest = names[:NEWEST]
+    raced = [name for name in newest if (folder.path / name / "evaluation.json").exists()]
+    unfinished = set(newest).difference(raced)
+    youngest = max(((folder.path / name).stat().st_mtime for name in unfinished), default=0.0)
+    picture = next((f"{name}/{PICTURE}" for name in raced if (folder.path / name / PICTURE).is_file()), None)
+    return len(names) - len(unfinished), picture, time.time() - youngest > SETTLED
+
+
+def _seconds(folder: RunFolder) -> float:
+    """How long a model was trained, from the end of its history."""
+    try:
+        size = folder.history.stat().st_size
+    except OSError:
+        return 0.0
+    points, _ = read_history(folder.history, offset=max(0, size - 4096))
+    return max((float(point.get("seconds") or 0.0) for point in points), default=0.0)
+
+
+def _rows(session: Session, only: list[str] | None) -> list[Model]:
+    query = sa.select(Model) if only is None else sa.select(Model).where(Model.name.in_(only))
+    return list(session.scalars(query))
+
+
+_FRESH: Final[dict[str, Any]] = {"tags": [], "fingerprint": "", "summary": {}}
+
+
+def _insert(session: Session) -> sa.Insert:
+    """New rows; two who look at the same time do not collide."""
+    if session.get_bind().dialect.name == "postgresql":
+        from sqlalchemy.dialects import postgresql  # takes its time to load, and most consoles do without
+
+        return postgresql.insert(Model).values(**_FRESH).on_conflict_do_nothing()
+    return sqlite.insert(Model).values(**_FRESH).on_conflict_do_nothing()
+
+
+def _latest_trainings(session: Session, only: list[str] | None) -> dict[str, tuple[str, str]]:
+    """State and reason of the end of each run's newest training."""
+    query = sa.select(Job.run, Job.state, Job.result["reason"].as_string()).where(Job.kind == "train")
+    if only is not None:
+        query = query.where(Job.run.in_(only))
+    return {run: (state, reason or "") for run, state, reason in session.execute(query.order_by(Job.created))}
+
+
+def _status(state: str, reason: str, *, has_steps: bool) -> Status:
+    if state in ("queued", "running"):
+        return "training" if state == "running" else "queued"
+    if state == "failed":
+        return "failed"
+    if state == "cancelled" or reason == "interrupted":
+        return "stopped"
+    return "finished" if has_steps else "new"

@@ -1,0 +1,271 @@
+"""Models: the garage, new ones, training, and their files."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from fastapi import APIRouter, Response
+from fastapi.responses import FileResponse
+
+from racecraft.agent import Hyperparameters, ModelMetadata, action_space
+from racecraft.errors import ConfigError
+from racecraft.learn import PPOConfig
+from racecraft.reward import load_preset, preset_names
+from racecraft.run import RunFolder
+from racecraft.run.atomic import write_file
+from racecraft.run.history import read_history
+from racecraft.serve.context import Context, InContext
+from racecraft.serve.jobs.schemas import JobInfo, job_info
+from racecraft.serve.models.schemas import (
+    CloneModel,
+    HistoryPage,
+    ModelCard,
+    ModelChange,
+    ModelDetail,
+    NewModel,
+    TrainOn,
+    Tuning,
+)
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.sim import Objects
+from racecraft.sim.objects import objects_for_race
+from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
+from racecraft.track import load_track
+from racecraft.training import Until
+from racecraft.training.settings import make_settings
+from racecraft.training.start import read_settings, require_valid_reward, start_run
+
+router = APIRouter(prefix="/api/models", tags=["models"])
+
+FILES: Final = {".png": "image/png", ".mp4": "video/mp4", ".csv": "text/csv", ".json": "application/json"}
+FOLDERS: Final = ("evaluation-", "mp4", "metrics")
+
+
+@router.get("")
+def list_models(context: InContext) -> list[ModelCard]:
+    """The garage, newest first."""
+    return context.garage.cards()
+
+
+@router.post("", status_code=201)
+def create_model(request: NewModel, context: InContext) -> ModelCard:
+    """A new model from settings that may all be left out; training starts at once unless told otherwise."""
+    source = load_preset(request.reward) if request.reward in preset_names() else request.reward
+    metadata = _metadata(request)
+    parameters = None if request.hyperparameters is None else Hyperparameters.from_dict(request.hyperparameters)
+    settings = make_settings(
+        metadata=metadata,
+        hyperparameters=parameters,
+        track=context.courses.path_or_name(request.track),
+        direction=request.direction,
+        network=request.network,
+        vehicle=_vehicle(request.vehicle),
+        seed=request.seed,
+        until=Until.parse(request.until),
+        objects=_objects(request),
+        randomize=_randomization(request.randomize),
+        critic=request.critic,
+        algorithm=request.algorithm,
+    )
+    if request.tuning is not None:
+        if parameters is not None:
+            raise ConfigError("tuning and hyperparameters both say how the policy improves; give one of them.")
+        if settings.algorithm != "ppo":
+            raise ConfigError(f"tuning is for ppo; the algorithm is {settings.algorithm!r}.")
+        settings = replace(settings, ppo=_tuned(settings.ppo, request.tuning))
+    if request.name is not None:
+        context.garage.require_new(request.name)
+    folder = start_run(
+        settings,
+        reward=source,
+        metadata=metadata,
+        hyperparameters=parameters,
+        root=context.garage.runs,
+        name=request.name,
+    )
+    if request.train:
+        _train(context, folder, until=None)
+    context.mirror.copy(folder.name)
+    card = context.garage.card(folder.name)
+    if request.tags:
+        context.garage.tag(folder.name, request.tags)
+        card = card.model_copy(update={"tags": request.tags})
+    return card
+
+
+@router.get("/{name}")
+def get_model(name: str, context: InContext) -> ModelDetail:
+    """A model, whole."""
+    folder = context.garage.folder(name)
+    card = context.garage.card(name)
+    info = folder.read_info()
+    parameters = folder.read_hyperparameters()
+    jobs = [job for job in context.queue.list(run=name, limit=20) if job.kind == "train"]
+    return ModelDetail(
+        **card.model_dump(),
+        reward=folder.read_reward_function(),
+        model_metadata=folder.read_model_metadata().to_dict(),
+        hyperparameters=parameters.to_dict() if parameters is not None else None,
+        settings=_finite(info.settings),
+        seed=info.seed,
+        checkpoints=context.garage.checkpoints(folder),
+        job=job_info(jobs[0]) if jobs else None,
+    )
+
+
+@router.patch("/{name}")
+def change_model(name: str, request: ModelChange, context: InContext) -> ModelCard:
+    """Rename or tag a model."""
+    if request.tags is not None:
+        context.garage.tag(name, request.tags)
+    if request.name is not None and request.name != name:
+        context.garage.rename(name, request.name)
+        context.mirror.forget(name)
+        name = request.name
+        context.mirror.copy(name)
+    return context.garage.card(name)
+
+
+@router.delete("/{name}", status_code=204)
+def delete_model(name: str, context: InContext) -> Response:
+    """Put a model into the trash."""
+    context.garage.remove(name)
+    context.mirror.forget(name)
+    return Response(status_code=204)
+
+
+@router.post("/{name}/restore")
+def restore_model(name: str, context: InContext) -> ModelCard:
+    """Bring a deleted model back."""
+    context.garage.restore(name)
+    context.mirror.copy(name)
+    return context.garage.card(name)
+
+
+@router.post("/{name}/clone", status_code=201)
+def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard:
+    """A new model with the same settings, untrained."""
+    folder = context.garage.folder(name)
+    if request.name is not None:
+        context.garage.require_new(request.name)
+    copy = start_run(
+        read_settings(folder),
+        reward=folder.read_reward_function(),
+        metadata=folder.read_model_metadata(),
+        hyperparameters=folder.read_hyperparameters(),
+        root=context.garage.runs,
+        name=request.name or context.garage.name_beside(name),
+    )
+    context.mirror.copy(copy.name)
+    return context.garage.card(copy.name)
+
+
+@router.post("/{name}/train", status_code=202)
+def train_model(name: str, request: TrainOn, context: InContext) -> JobInfo:
+    """Train a model, or go on training it, if wanted with a changed reward function."""
+    folder = context.garage.folder(name)
+    if request.until is not None:
+        Until.parse(request.until)
+    if request.reward is not None:
+        require_valid_reward(request.reward, load_track(folder.read_info().track))
+        write_file(folder.reward_function, request.reward.encode())
+    return _train(context, folder, until=request.until)
+
+
+@router.post("/{name}/stop", status_code=202)
+def stop_model(name: str, context: InContext) -> JobInfo:
+    """Stop a model's training after the iteration under way; it is saved and can go on later."""
+    job = context.queue.active(context.garage.folder(name).name)
+    if job is None:
+        raise Conflict(f"Model {name!r} is not being trained.")
+    context.queue.cancel(job.id)
+    return job_info(context.queue.get(job.id) or job)
+
+
+@router.get("/{name}/history")
+def get_history(name: str, context: InContext, offset: int = 0) -> HistoryPage:
+    """Points of a training's curves from a byte offset on."""
+    points, end = read_history(context.garage.folder(name).history, offset=offset)
+    return HistoryPage(points=points, offset=end)
+
+
+@router.get("/{name}/files/{path:path}")
+def get_file(name: str, path: str, context: InContext) -> FileResponse:
+    """A picture, video or log of a model."""
+    folder = context.garage.folder(name)
+    parts = Path(path).parts
+    if not parts or ".." in parts or Path(path).is_absolute() or not parts[0].startswith(FOLDERS):
+        raise NotFound(f"Model {name!r} has no file {path[:80]!r}.")
+    file = folder.path.joinpath(*parts)
+    kind = FILES.get(file.suffix)
+    if kind is None or not file.is_file() or not file.resolve().is_relative_to(folder.path.resolve()):
+        raise NotFound(f"Model {name!r} has no file {path[:80]!r}.")
+    return FileResponse(file, media_type=kind)
+
+
+def _train(context: Context, folder: RunFolder, *, until: str | None) -> JobInfo:
+    if context.queue.active(folder.name) is not None:
+        raise Conflict(f"Model {folder.name!r} is being trained already.")
+    job = context.queue.add("train", folder.name, {"until": until})
+    context.supervisor.wake()
+    return job_info(job)
+
+
+def _metadata(request: NewModel) -> ModelMetadata:
+    if request.model_metadata is None:
+        sensors = tuple(request.sensors or ("FRONT_FACING_CAMERA",))
+        return ModelMetadata(
+            action_space=action_space(request.actions), sensors=sensors, neural_network="RACECRAFT_SMALL"
+        )
+    if request.sensors is not None:
+        raise ConfigError("sensors and model_metadata both name sensors; give one of them.")
+    return ModelMetadata.from_dict(request.model_metadata)
+
+
+def _objects(request: NewModel) -> Objects:
+    settings: dict[str, Any] = {} if request.race == "time-trial" else {"placement": "random"}
+    if request.objects is not None:
+        settings["count"] = request.objects
+    if request.race == "head-to-bot":
+        settings["changes_lane"] = request.lane_changes
+        if request.bot_speed is not None:
+            settings["speed"] = request.bot_speed
+    if request.race == "time-trial" and settings:
+        raise ConfigError("objects go with the races object-avoidance and head-to-bot; this one is a time-trial.")
+    return objects_for_race(request.race, settings=settings)
+
+
+def _randomization(name: str) -> str:
+    if name not in RANDOMIZATIONS:  # never a path
+        raise ConfigError(f"randomize is {name[:40]!r}; allowed are {', '.join(RANDOMIZATIONS)}.")
+    return name
+
+
+def _tuned(ppo: PPOConfig, tuning: Tuning) -> PPOConfig:
+    changes: dict[str, Any] = {
+        "learning_rate": tuning.lr,
+        "ent_coef": tuning.beta_entropy,
+        "gamma": tuning.discount_factor,
+        "update_epochs": tuning.num_epochs,
+        "minibatch_size": tuning.batch_size,
+        "value_loss": None if tuning.loss_type is None else "huber" if tuning.loss_type == "huber" else "mse",
+    }
+    return replace(ppo, **{name: value for name, value in changes.items() if value is not None})
+
+
+def _vehicle(name: str) -> str:
+    if name not in ("", "v4", "v5", "v6"):
+        raise ConfigError(f"vehicle is {name[:40]!r}; allowed are v4, v5 and v6.")
+    return name
+
+
+def _finite(value: Any) -> Any:
+    """A document whose numbers JSON can say."""
+    if isinstance(value, dict):
+        return {name: _finite(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,181 @@
+"""Messages about models."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from racecraft.serve.jobs.schemas import JobInfo
+from racecraft.serve.schemas import Message, RunName
+
+
+class Tuning(Message):
+    """Racecraft's own way of learning, turned a little; by AWS's names, within wider ranges."""
+
+    lr: float | None = Field(None, ge=1e-6, le=1e-2)
+    beta_entropy: float | None = Field(None, ge=0, le=1)
+    discount_factor: float | None = Field(None, ge=0.5, le=0.9999)
+    num_epochs: int | None = Field(None, ge=1, le=20)
+    batch_size: int | None = Field(None, ge=16, le=512)
+    loss_type: Literal["huber", "mean squared error"] | None = None
+
+
+class NewModel(Message):
+    """Everything about a new model; every field has a good default."""
+
+    name: RunName | None = None
+    track: str = Field("reinvent_2018", max_length=200)
+    direction: Literal["forward", "reverse", "alternate"] = "forward"
+    reward: str = Field("racing", max_length=140_000)
+    """Name of a preset, or the source of a reward function."""
+    actions: str = "default"
+    """Name of a preset."""
+    model_metadata: dict[str, Any] | None = None
+    """AWS's document; replaces actions."""
+    hyperparameters: dict[str, Any] | None = None
+    """AWS's document; Racecraft's own settings otherwise."""
+    tuning: Tuning | None = None
+    """Without hyperparameters: what is to differ from Racecraft's own settings."""
+    sensors: list[Annotated[str, Field(max_length=40)]] | None = Field(None, max_length=4)
+    """AWS's names; the front camera otherwise. Not beside model_metadata, which says it itself."""
+    race: str = Field("time-trial", max_length=40)
+    """``time-trial``, ``object-avoidance`` or ``head-to-bot``."""
+    objects: int | None = Field(None, ge=1, le=32)
+    """How many boxes or bot cars; 6 and 3 otherwise."""
+    bot_speed: float | None = Field(None, ge=0, le=4)
+    lane_changes: bool = False
+    randomize: str = Field("none", max_length=40)
+    """A preset of what differs from episode to episode."""
+    algorithm: str = Field("", max_length=40)
+    """``ppo`` or ``sac``, which needs a continuous action space; by default the metadata's."""
+    critic: str = Field("privileged", max_length=40)
+    """What the critic sees while training: ``privileged`` state, that and the ``lap``'s place, or the ``camera``."""
+    network: str = ""
+    vehicle: str = ""
+    seed: int = Field(0, ge=0, le=2**32 - 1)
+    until: str = Field("5 laps", max_length=200)
+    tags: list[Annotated[str, Field(min_length=1, max_length=40)]] = Field(default_factory=list, max_length=20)
+    train: bool = True
+    """Start training at once."""
+
+
+class ModelCard(Message):
+    """A model in the garage."""
+
+    name: str
+    track: str
+    created: datetime
+    status: Literal["training", "queued", "stopped", "finished", "failed", "new"]
+    tags: list[str]
+    steps: int
+    seconds: float
+    completion: float | None
+    """Of the best checkpoint's evaluation."""
+    best_lap: float | None
+    evaluations: int
+    """Races by the rules, not those during training."""
+    picture: str | None
+    """Address of its racing line."""
+    until: str
+
+
+class ImportedModel(Message):
+    """A model made from files of others, and what became of them."""
+
+    model: ModelCard
+    kind: str
+    """What was imported."""
+    used: dict[str, str]
+    """Files and settings that were understood, and what each became."""
+    unused: dict[str, str]
+    """Files and settings that have no effect, and why."""
+    unknown: dict[str, str]
+    """Settings that nobody knows, and a suggestion."""
+    notes: list[str]
+
+
+class Checkpoint(Message):
+    """A saved state of a policy."""
+
+    step: int
+    is_best: bool
+    completion: float | None
+    best_lap: float | None
+
+
+class ModelDetail(ModelCard):
+    """A model, whole."""
+
+    reward: str
+    model_metadata: dict[str, Any]
+    hyperparameters: dict[str, Any] | None
+    settings: dict[str, Any]
+    seed: int
+    checkpoints: list[Checkpoint]
+    job: JobInfo | None
+
+
+class ModelChange(Message):
+    """Rename or tag a model."""
+
+    name: RunName | None = None
+    tags: list[Annotated[str, Field(min_length=1, max_length=40)]] | None = Field(None, max_length=20)
+
+
+class CloneModel(Message):
+    """A copy of a model's settings under another name."""
+
+    name: RunName | None = None
+
+
+class TrainOn(Message):
+    """Train, or go on training."""
+
+    until: str | None = Field(None, max_length=200)
+    reward: str | None = Field(None, max_length=140_000)
+    """A changed reward function, from here on."""
+
+
+class HistoryPage(Message):
+    """Points of a training's curves, and the offset that the next page or the live stream begins at."""
+
+    points: list[dict[str, Any]]
+    offset: int
+
+
+class NumberChoice(Message):
+    """A number that can be set."""
+
+    name: str
+    default: float
+    low: float
+    high: float
+    safe_low: float
+    """Values that people do well with."""
+    safe_high: float
+    is_whole: bool
+    is_logarithmic: bool
+    """Steps feel even when each is the same factor."""
+    allowed: list[float] | None = None
+    """Where only some values are."""
+
+
+class Choices(Message):
+    """All that a new model can be made of; what is refused by this version is left out."""
+
+    networks: list[str]
+    vehicles: list[str]
+    sensors: list[str]
+    algorithms: list[str]
+    races: list[str]
+    critics: list[str]
+    randomizations: list[str]
+    hyperparameters: list[NumberChoice]
+    aws: dict[str, Any]
+    """AWS's hyperparameters by default."""
+    fast: dict[str, Any]
+    """Racecraft's own, by the same names."""
+    pace: float
+    """Camera steps a second that this machine trains, from the latest training; 0 where none is known."""

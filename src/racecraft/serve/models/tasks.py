@@ -1,0 +1,46 @@
+"""Jobs about models: training one, and copying one to the store."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from racecraft.race.policy import NetworkPolicy
+from racecraft.serve.jobs.task import Task
+from racecraft.serve.live.cars import LiveWriter
+from racecraft.sim import Simulation
+from racecraft.training import IterationReport, SilentReporter, TrainResult, Until
+from racecraft.training.job import Training
+
+
+class LiveReporter(SilentReporter):
+    """Shows a training's cars to whoever looks."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._writer: LiveWriter | None = None
+
+    def begin(self, simulation: Simulation, policy: NetworkPolicy) -> None:
+        """Open the window."""
+        self._writer = LiveWriter(self._folder, simulation, policy)
+        self._writer.look(step=0)
+
+    def iteration(self, report: IterationReport) -> None:
+        """Move the cars."""
+        if self._writer is not None:
+            self._writer.look(step=report.stats.total_steps)
+
+
+def train(task: Task) -> dict[str, Any]:
+    """Train, from the last checkpoint where there is one."""
+    until = task.job.payload.get("until")
+    folder = task.folder
+    training = Training(folder, until=Until.parse(until) if until else None, reporter=LiveReporter(folder.path))
+    task.on_stop(training.stop)
+    result: TrainResult = training.run()
+    return result.to_dict()
+
+
+def store(task: Task) -> dict[str, Any]:
+    """Nothing but what comes after every job: the run is copied to where artifacts are kept."""
+    return {"run": str(task.folder.path)}

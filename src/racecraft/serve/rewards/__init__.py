@@ -1,0 +1,1 @@
+"""Reward functions: presets, checks, and what they pay along a track."""

@@ -1,0 +1,147 @@
+"""Reward functions and action spaces: presets, the keys of params, and the check that paints a track."""
+
+from __future__ import annotations
+
+import ast
+import math
+from contextlib import suppress
+from typing import Final
+
+from fastapi import APIRouter
+
+from racecraft.agent import action_space
+from racecraft.agent.action_space import PRESETS, DiscreteActionSpace
+from racecraft.analysis import pay_laps
+from racecraft.errors import RacecraftError
+from racecraft.json_file import read_json_object
+from racecraft.reward import check_reward, dry_run, load_preset, preset_names
+from racecraft.reward.painting import paint_reward
+from racecraft.serve.context import Context, InContext
+from racecraft.serve.rewards.schemas import (
+    Action,
+    ActionPreset,
+    RewardCheck,
+    RewardLap,
+    RewardPainting,
+    RewardPreset,
+    RewardProblem,
+    RewardSituation,
+    RewardVerdict,
+)
+
+router = APIRouter(prefix="/api", tags=["rewards"])
+
+DESCRIPTIONS: Final = {
+    "default": "Five steering angles at 1 and 2 m/s: learns in seconds.",
+    "aws": "AWS's own: five steering angles at 0.5 and 1 m/s.",
+    "fast": "Seven steering angles at up to 4 m/s: for records.",
+    "safe": "Seven steering angles at 0.7 and 1.4 m/s: gets round everywhere.",
+    "steady": "Five steering angles at 1 m/s: among boxes and other cars.",
+    "continuous": "Any steering angle, any speed from 0.5 to 4 m/s.",
+}
+
+
+@router.get("/rewards")
+def list_rewards() -> list[RewardPreset]:
+    """The reward functions that ship with Racecraft."""
+    listed = []
+    for name in preset_names():
+        source = load_preset(name)
+        description = (ast.get_docstring(ast.parse(source)) or "").split("\n")[0]
+        listed.append(RewardPreset(name=name, description=description, source=source))
+    return listed
+
+
+@router.get("/actions")
+def list_actions() -> list[ActionPreset]:
+    """The action spaces that ship with Racecraft."""
+    listed = []
+    for name in PRESETS:
+        space = action_space(name)
+        text = DESCRIPTIONS.get(name, "")
+        if isinstance(space, DiscreteActionSpace):
+            actions = [
+                Action(steering_angle=round(math.degrees(angle), 3), speed=round(speed, 3))
+                for angle, speed in space.table.tolist()
+            ]
+            listed.append(ActionPreset(name=name, description=text, kind="discrete", actions=actions))
+        else:
+            limits = space.to_aws()
+            listed.append(
+                ActionPreset(
+                    name=name,
+                    description=text,
+                    kind="continuous",
+                    actions=[],
+                    steering_angle=[limits["steering_angle"]["low"], limits["steering_angle"]["high"]],
+                    speed=[limits["speed"]["low"], limits["speed"]["high"]],
+                )
+            )
+    return listed
+
+
+@router.post("/rewards/check")
+def check(request: RewardCheck, context: InContext) -> RewardVerdict:
+    """Look at a reward function, try it in a car's situations, and paint it along a track."""
+    problems = check_reward(request.source)
+    found = [
+        RewardProblem(line=p.line, column=p.column, severity=p.severity, message=p.message, hint=p.hint)
+        for p in problems
+    ]
+    if any(problem.severity == "error" for problem in problems):
+        return RewardVerdict(ok=False, problems=found, situations=[], painting=None)
+    track = context.courses.load(request.track)
+    outcomes = dry_run(request.source, track)
+    for outcome in outcomes:
+        if outcome.error is not None and outcome.error.line:
+            found.append(
+                RewardProblem(
+                    line=outcome.error.line,
+                    column=outcome.error.column or 1,
+                    severity="error",
+                    message=str(outcome.error),
+                    hint=outcome.error.hint,
+                )
+            )
+            break
+    situations = [
+        RewardSituation(
+            name=outcome.situation.name,
+            description=outcome.situation.description,
+            reward=outcome.reward,
+            error=str(outcome.error) if outcome.error is not None else None,
+            printed=outcome.printed[:4000],
+        )
+        for outcome in outcomes
+    ]
+    if any(outcome.error is not None for outcome in outcomes):
+        return RewardVerdict(ok=False, problems=found, situations=situations, painting=None)
+    painted = paint_reward(request.source, track)
+    painting = RewardPainting(
+        places=painted.places.round(3).tolist(),
+        offsets=painted.offsets.tolist(),
+        points=painted.points.round(3).tolist(),
+        rewards=[[value if math.isfinite(value) else None for value in row] for row in painted.rewards.tolist()],
+    )
+    laps = _laps(context, request) if request.run is not None else []
+    return RewardVerdict(ok=True, problems=found, situations=situations, painting=painting, laps=laps)
+
+
+def _laps(context: Context, request: RewardCheck) -> list[RewardLap]:
+    """The last laps of the model that was asked for, where it was evaluated on the track."""
+    folder = context.garage.folder(str(request.run))
+    track = context.courses.load(request.track)
+    for path in sorted(folder.path.glob("evaluation-*/evaluation.json"), reverse=True)[:20]:
+        trace = path.parent / "evaluation-simtrace" / "0-iteration.csv"
+        with suppress(RacecraftError):
+            if read_json_object(path).get("track") == track.name and trace.is_file():
+                return [
+                    RewardLap(
+                        number=lap.number,
+                        status=lap.status,
+                        points=lap.points.round(3).tolist(),
+                        rewards=[value if math.isfinite(value) else None for value in lap.rewards.tolist()],
+                    )
+                    for lap in pay_laps(request.source, track, trace)
+                ]
+    return []

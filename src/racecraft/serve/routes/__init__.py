@@ -1,1 +1,0 @@
-"""The HTTP interface below /api, a file per subject."""

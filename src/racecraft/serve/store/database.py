@@ -1,0 +1,101 @@
+"""The database: opened, brought up to date, handed out as short transactions. SQLite or PostgreSQL, the same code."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session, sessionmaker
+
+from racecraft.errors import RunError
+from racecraft.serve.store.tables import Table, User
+
+MIGRATIONS = Path(__file__).parent / "migrations"
+LOCAL_USER = "you"  # of a console of one's own
+
+
+class Database:
+    """A pool of connections.
+
+    Args:
+        url: SQLAlchemy URL.
+
+    Raises:
+        RunError: It cannot be opened or brought up to date.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        self.engine = sa.create_engine(url, pool_pre_ping=not url.startswith("sqlite"))
+        if url.startswith("sqlite"):
+            sa.event.listen(self.engine, "connect", _prepare_sqlite)
+        self._sessions = sessionmaker(self.engine, expire_on_commit=False)
+
+    def migrate(self) -> None:
+        """Bring the tables up to date; a fresh database gets them all."""
+        try:
+            version = self._version()
+            if version == "":
+                self._make(_newest())
+            elif version != _newest():
+                self._upgrade()
+            with self.transaction() as session:
+                if session.scalar(sa.select(User.id).limit(1)) is None:
+                    session.add(User(name=LOCAL_USER))
+        except SQLAlchemyError as error:
+            reason = str(getattr(error, "orig", None) or error).splitlines()[0]
+            raise RunError(f"The console's database cannot be opened: {reason}.") from error
+
+    def _version(self) -> str:
+        """Of the tables; empty for a fresh database."""
+        with self.engine.connect() as connection:
+            if not sa.inspect(connection).has_table("alembic_version"):
+                return ""
+            return str(connection.scalar(sa.text("SELECT version_num FROM alembic_version")))
+
+    def _make(self, version: str) -> None:
+        """All tables as they are now; tests hold the migrations to giving the same."""
+        with self.engine.begin() as connection:
+            Table.metadata.create_all(connection)
+            connection.execute(sa.text("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
+            connection.execute(sa.text("INSERT INTO alembic_version VALUES (:version)"), {"version": version})
+
+    def _upgrade(self) -> None:
+        from alembic import command  # takes its time to load, and most starts do without
+        from alembic.config import Config
+
+        config = Config()
+        config.set_main_option("script_location", str(MIGRATIONS))
+        with self.engine.begin() as connection:
+            config.attributes["connection"] = connection
+            command.upgrade(config, "head")
+
+    @contextmanager
+    def transaction(self) -> Iterator[Session]:
+        """A session whose changes are kept when the block ends well, and dropped otherwise."""
+        with self._sessions.begin() as session:
+            yield session
+
+    def close(self) -> None:
+        """Close all connections."""
+        self.engine.dispose()
+
+
+def _newest() -> str:
+    """The newest migration's revision; their files are in order."""
+    newest = max((MIGRATIONS / "versions").glob("[0-9]*.py"), key=lambda path: path.name)
+    found = re.search(r'^revision = "(.+)"$', newest.read_text(encoding="utf-8"), re.MULTILINE)
+    return found[1] if found else ""
+
+
+def _prepare_sqlite(connection: Any, _: object) -> None:
+    """Readers beside a writer, no lost commits, and a wait instead of an error when two write."""
+    cursor = connection.cursor()
+    for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "busy_timeout=10000", "foreign_keys=ON"):
+        cursor.execute(f"PRAGMA {pragma}")
+    cursor.close()

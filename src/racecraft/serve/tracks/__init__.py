@@ -1,0 +1,1 @@
+"""The gallery of tracks and the user's own."""

@@ -1,0 +1,183 @@
+"""Searches for better numbers of a model: folders beside the models; racecraft.serve.tuning_tasks fills them.
+
+runs/.racecraft/tunings/<id>/   what `racecraft tune` makes, too; a trial is a run folder
+"""
+
+from __future__ import annotations
+
+import re
+import secrets
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from racecraft.errors import ConfigError, RunError
+from racecraft.json_file import read_json_object
+from racecraft.run import RunFolder
+from racecraft.run.folder import sanitize_name
+from racecraft.serve.jobs.queue import ENDED, JobQueue
+from racecraft.serve.live.cars import NAME as LIVE
+from racecraft.serve.models.garage import Garage
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.store.tables import Job
+from racecraft.serve.tuning.schemas import KeepTrial, NewTuning, TunableNumber, TuningCard, TuningTrial
+
+if TYPE_CHECKING:
+    from racecraft.tuning import Parameter
+
+FOLDER: Final = "tunings"  # inside the state folder
+_ID: Final = re.compile(r"[0-9a-f]{16}")
+
+
+class Tunings:
+    """The searches of a console.
+
+    Args:
+        state: The console's own folder.
+        queue: Of jobs.
+        garage: Of models.
+    """
+
+    def __init__(self, state: Path, queue: JobQueue, garage: Garage) -> None:
+        self._folder, self._queue, self._garage = state / FOLDER, queue, garage
+
+    def space(self, name: str) -> list[TunableNumber]:
+        """Everything that may be searched of a model.
+
+        Raises:
+            RacecraftError: The model cannot be read.
+        """
+        from racecraft.tuning import HYPERPARAMETERS, find_constants, plan_of, space_of
+
+        plan = plan_of(self._garage.folder(name))
+        usual = {parameter.name for parameter in space_of(plan)}
+        constants = [name for name, value in find_constants(plan.reward).items() if value != 0]
+        is_ppo = plan.settings.algorithm == "ppo"
+        names = [*constants, *(name for name in HYPERPARAMETERS if is_ppo and name not in constants)]
+        return [_tunable(parameter, usual) for parameter in space_of(plan, names)]
+
+    def start(self, name: str, request: NewTuning) -> Job:
+        """Make a search and queue its job.
+
+        Raises:
+            RacecraftError: It makes no sense, or Optuna is not installed.
+        """
+        from racecraft.tuning import make_tuning, plan_of
+
+        search = [f"{number.name}={number.low!r}..{number.high!r}" for number in request.search or ()]
+        if request.search == []:
+            raise ConfigError("search is empty; name at least one number, or leave it out.")
+        tuning = secrets.token_hex(8)
+        make_tuning(
+            plan_of(self._garage.folder(name)),
+            search=search,
+            goal=request.goal,
+            trial_steps=request.trial_steps,
+            root=self._folder,
+            name=tuning,
+        )
+        payload = {"tuning": tuning, "minutes": request.minutes, "trials": request.trials}
+        return self._queue.add("tune", name, payload)
+
+    def cards(self, name: str) -> list[TuningCard]:
+        """A model's searches, newest first."""
+        folder = self._garage.folder(name)
+        cards = (self._card(job) for job in self._queue.list(run=folder.name, kind="tune"))
+        return [card for card in cards if card is not None]
+
+    def keep(self, name: str, tuning: str, request: KeepTrial) -> str:
+        """Make a model of a trial, trained as far as it was; its name.
+
+        Raises:
+            NotFound: There is no such trial, or it has no policy.
+            Conflict: There is a model of that name.
+        """
+        card, _ = self._find(name, tuning)
+        number = card.best if request.trial is None else request.trial
+        if number is None or not any(trial.number == number and trial.can_be_kept for trial in card.trials):
+            raise NotFound(f"The search has no trial {'yet' if number is None else number} that can be kept.")
+        fresh = request.name
+        if fresh is None:
+            stem = sanitize_name(f"{name[:50]}-tuned")
+            taken = {path.name for path in self._garage.runs.iterdir()}
+            fresh = next(one for one in (stem, *(f"{stem}-{n}" for n in range(2, 10_000))) if one not in taken)
+        self._garage.require_new(fresh)
+        source = self._folder / tuning / f"trial-{number:04d}"
+        copy = self._folder / f"{tuning}-{secrets.token_hex(4)}"
+        try:
+            shutil.copytree(source, copy, ignore=shutil.ignore_patterns(".lock", f"{LIVE}*"))
+            copy.rename(self._garage.runs / fresh)
+        except OSError as error:
+            shutil.rmtree(copy, ignore_errors=True)
+            raise RunError(
+                f"The trial cannot be copied: {error.strerror or error}.", hint="Free disk space."
+            ) from error
+        return fresh
+
+    def remove(self, name: str, tuning: str) -> None:
+        """Remove a search with its trials.
+
+        Raises:
+            Conflict: It is under way.
+        """
+        card, folder = self._find(name, tuning)
+        if card.state not in ENDED:
+            raise Conflict("The search is under way.", hint="Stop it first.")
+        shutil.rmtree(folder, ignore_errors=True)
+
+    def _find(self, name: str, tuning: str) -> tuple[TuningCard, Path]:
+        for card in self.cards(name):
+            if card.id == tuning:
+                return card, self._folder / tuning
+        raise NotFound(f"Model {name!r} has no search {tuning[:40]!r}.")
+
+    def _card(self, job: Job) -> TuningCard | None:
+        """What is known of a search; None where its folder is gone."""
+        tuning = str(job.payload.get("tuning", ""))
+        folder = self._folder / tuning
+        try:
+            document = read_json_object(folder / "tuning.json") if _ID.fullmatch(tuning) else None
+        except ConfigError:
+            document = None
+        if document is None:
+            return None
+        try:
+            found = read_json_object(folder / "result.json")
+        except ConfigError:  # no trial has ended yet
+            found = {"trials": [], "importances": {}, "best": None}
+        return TuningCard(
+            id=tuning,
+            job=job.id,
+            state=job.state,  # type: ignore[arg-type]
+            created=job.created,
+            started=job.started,
+            finished=job.finished,
+            goal=document["goal"],
+            minutes=job.payload["minutes"],
+            trials_wanted=job.payload["trials"],
+            trial_steps=document["trial_steps"],
+            space=[TunableNumber(**parameter, is_usual=False) for parameter in document["space"]],
+            trials=[_trial(folder, trial) for trial in found["trials"]],
+            best=found["best"]["number"] if found["best"] else None,
+            importances=found["importances"],
+            error=str((job.error or {}).get("message", "")),
+        )
+
+
+def _tunable(parameter: Parameter, usual: set[str]) -> TunableNumber:
+    return TunableNumber(**parameter.to_dict(), is_usual=parameter.name in usual)
+
+
+def _trial(folder: Path, trial: dict[str, Any]) -> TuningTrial:
+    run = RunFolder(folder / f"trial-{trial['number']:04d}")
+    return TuningTrial(
+        number=trial["number"],
+        state=trial["state"],
+        value=trial["value"],
+        params=trial["params"],
+        completion=trial["completion"],
+        best_lap=trial["best_lap_seconds"],
+        steps=trial["steps"],
+        error=trial["error"],
+        can_be_kept=(run.path / "run.json").is_file() and run.checkpoints.last is not None,
+    )
