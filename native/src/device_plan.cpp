@@ -99,6 +99,8 @@ DevicePlan::DevicePlan(const Engine& engine, size_t num_envs)
         const size_t samples = engine.tracks_[i].num_samples();
         point(at, &g.segments, &g, put(g.segments, segments));
         point(at, &g.lane_offsets, &g, put(g.lane_offsets, segments + 1));
+        point(at, &g.width_begin, &g, put(g.width_begin, segments + 1));
+        point(at, &g.width_pieces, &g, put(g.width_pieces, g.width_begin[segments]));
         point(at, &g.cell_kind, &g, put(g.cell_kind, cells));
         point(at, &g.segment_begin, &g, put(g.segment_begin, cells + 1));
         point(at, &g.segment_items, &g, put(g.segment_items, g.segment_begin[cells]));

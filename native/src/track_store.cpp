@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "racecraft/ground.hpp"
+#include "road_width.hpp"
 
 namespace racecraft {
 namespace {
@@ -12,9 +13,9 @@ constexpr double kMargin = 1.0;         // m of grid around the borders: a car t
 constexpr double kFinestCell = 0.1;     // m
 constexpr double kMostCells = 20000.0;  // coarser cells beyond, so that a long track still loads at once
 
-void append_ring(std::vector<double>& edges, const std::vector<double>& points) {
+void append_line(Edges& edges, const std::vector<double>& points, bool is_ring) {
     const size_t count = points.size() / 2;
-    for (size_t i = 0; i < count; ++i) {
+    for (size_t i = 0; i < (is_ring ? count : count - 1); ++i) {
         const size_t next = (i + 1) % count;
         edges.insert(edges.end(), {points[2 * i], points[2 * i + 1], points[2 * next], points[2 * next + 1]});
     }
@@ -73,12 +74,12 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
     std::vector<double> inner(outline.inner, outline.inner + 2 * count);
     std::vector<double> outer(outline.outer, outline.outer + 2 * count);
     if (outline.is_closed) {
-        append_ring(border_, inner);
-        append_ring(border_, outer);
+        append_line(border_, inner, true);
+        append_line(border_, outer, true);
     } else {
         std::vector<double> ring = outer;
         for (size_t i = count; i-- > 0;) ring.insert(ring.end(), {inner[2 * i], inner[2 * i + 1]});
-        append_ring(border_, ring);
+        append_line(border_, ring, true);
     }
 
     double x_min = inner[0], x_max = inner[0], y_min = inner[1], y_max = inner[1];
@@ -108,8 +109,23 @@ TrackStore::TrackStore(const TrackOutline& outline, const std::vector<float>& wi
     g.samples_per_metre = static_cast<float>(samples_per_metre);
     g.width_table = widths_.data();
     g.curvature_table = curvatures_.data();
+    build_widths(inner, outer);
     build_segments();
     build_bands();
+}
+
+void TrackStore::build_widths(const std::vector<double>& inner, const std::vector<double>& outer) {
+    Edges inner_edges, outer_edges;
+    append_line(inner_edges, inner, geometry_.is_closed != 0);
+    append_line(outer_edges, outer, geometry_.is_closed != 0);
+    width_begin_.push_back(0);
+    for (const Segment& segment : segments_) {
+        const std::vector<WidthPiece> pieces = width_pieces(segment, inner_edges, outer_edges);
+        width_pieces_.insert(width_pieces_.end(), pieces.begin(), pieces.end());
+        width_begin_.push_back(static_cast<uint32_t>(width_pieces_.size()));
+    }
+    geometry_.width_begin = width_begin_.data();
+    geometry_.width_pieces = width_pieces_.data();
 }
 
 void TrackStore::build_segments() {

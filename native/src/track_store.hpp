@@ -21,12 +21,15 @@ class TrackStore {
     size_t num_samples() const { return widths_.size(); }  // of the width and the curvature table
 
   private:
+    void build_widths(const std::vector<double>& inner, const std::vector<double>& outer);
     void build_segments();
     void build_bands();
 
     TrackGeometry geometry_{};
     std::vector<Segment> segments_;
     std::vector<LaneOffset> lane_offsets_;
+    std::vector<uint32_t> width_begin_;
+    std::vector<WidthPiece> width_pieces_;
     std::vector<double> border_;  // x0, y0, x1, y1 of every border edge
     std::vector<uint8_t> cell_kind_;
     std::vector<uint32_t> segment_begin_;

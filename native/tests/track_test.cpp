@@ -79,6 +79,23 @@ void for_points(const TrackGeometry& track, int count, Visitor&& visit) {
     }
 }
 
+// The place of a border that is nearest to p, by trying all of its edges.
+Point nearest_place(const std::vector<double>& line, Point p) {
+    Point best{};
+    double least = 1e300;
+    for (size_t i = 0; i + 1 < line.size() / 2; ++i) {
+        const double distance = distance_to_piece(line, i, p);
+        if (distance >= least) continue;
+        const double ax = line[2 * i], ay = line[2 * i + 1];
+        const double dx = line[2 * i + 2] - ax, dy = line[2 * i + 3] - ay;
+        const double along =
+            std::fmin(1.0, std::fmax(0.0, ((p.x - ax) * dx + (p.y - ay) * dy) / (dx * dx + dy * dy)));
+        least = distance;
+        best = {ax + along * dx, ay + along * dy};
+    }
+    return best;
+}
+
 }  // namespace
 
 TEST(projection_finds_the_nearest_segment) {
@@ -135,6 +152,38 @@ TEST(a_waypoint_belongs_to_the_segment_that_starts_there) {
     const Projection end = project(open, bend.center[bend.center.size() - 2] + 1.0, bend.center.back());
     CHECK_EQUAL(end.segment, open.num_segments - 1);
     CHECK_EQUAL(end.arc_length, open.length);
+}
+
+TEST(the_width_is_that_between_the_nearest_places_of_both_borders) {
+    // Where two places are equally near either may be meant, and the width has two values; else it has one.
+    std::vector<Outline> some = roads();
+    some.push_back(test::circuit(12));  // edges much longer than the road is wide
+    for (const Outline& road : some) {
+        const TrackStore store = test::store_of(road);
+        const TrackGeometry& track = store.geometry();
+        int doubtful = 0, many = 0;
+        for (int i = 0; i < track.num_segments; ++i) {
+            const Segment& segment = track.segments[i];
+            many += track.width_begin[i + 1] - track.width_begin[i] > 1;
+            for (double share = 0.0; share < 1.0; share += 1.0 / 64.0) {
+                const double along = share * segment.length;
+                const auto slowly = [&](double at) {
+                    const double part = at * segment.inverse_length;
+                    const Point p{segment.x + part * segment.dx, segment.y + part * segment.dy};
+                    const Point left = nearest_place(road.inner, p), right = nearest_place(road.outer, p);
+                    return std::hypot(left.x - right.x, left.y - right.y);
+                };
+                const Projection place{segment.arc_length + along, 0.0, i, 0};
+                const double width = width_at(track, place);
+                if (std::fabs(width - slowly(along)) < 1e-12) continue;
+                const double before = slowly(along - 1e-9), after = slowly(along + 1e-9);
+                CHECK(std::fabs(width - before) < 1e-7 || std::fabs(width - after) < 1e-7);
+                ++doubtful;
+            }
+        }
+        CHECK(doubtful <= 4);
+        CHECK(many > 0);
+    }
 }
 
 TEST(the_road_is_what_even_odd_says) {

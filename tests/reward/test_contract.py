@@ -43,7 +43,6 @@ TRACKS = {
     "aws": ("reinvent_base", "2024_reinvent_champ_cw", "Straight_track"),
 }
 START = 0.37  # of the lap
-TOLERANCE = {"track_width": 0.01}  # the simulator reads it from a table along the track
 EXACT = 1e-5  # positions are float32
 ROUNDING = 1e-9  # m
 STRIDE = 5  # calls; every one would take half a minute
@@ -65,7 +64,7 @@ def test_row_of_the_table(key: str, where: str):
         assert is_of_type(value, kind), (value, kind)
         if key == "closest_waypoints" and value != expected:  # on the outside of a bend many places project on one
             expected = moment.closest_waypoints(math.copysign(ROUNDING, value[0] - expected[0]))
-        assert is_same(value, expected, TOLERANCE.get(key, EXACT)), f"call {moment.call}: {value}, expected {expected}"
+        assert is_same(value, expected, EXACT), f"call {moment.call}: {value}, expected {expected}"
         seen.add(repr(value))
     never_changes = key.startswith("object") or key in ("closest_objects", "is_crashed")
     assert len(seen) == 1 if never_changes else len(seen) > 1  # the drive shows something of this key

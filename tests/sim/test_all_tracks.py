@@ -93,5 +93,5 @@ def test_the_core_agrees_with_the_track_on_every_route():
         apart = np.abs(simulation.column("projection_distance") - arc_length)
         assert (np.minimum(apart, track.length - apart) < 1e-6).all(), track.name
         np.testing.assert_allclose(simulation.column("offset"), offset, atol=1e-9)
-        np.testing.assert_allclose(simulation.column("track_width"), track.width_at(arc_length), atol=0.05)
+        np.testing.assert_allclose(simulation.column("track_width"), track.width_at(arc_length), atol=1e-9)
         assert simulation.column("track_length")[0] == pytest.approx(track.length, rel=1e-12)

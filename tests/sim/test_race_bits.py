@@ -19,7 +19,7 @@ CARS = 24  # in all, whatever the batch
 STEPS = 60
 
 # Judged rows, states, scans and vehicles of six races of four cars. Only a change on purpose changes it.
-GOLDEN = "2900a8bbdff34999117b7a43144e06aa983e3cc89d7dd96186b67384ff076bab"
+GOLDEN = "d44d49e7184c934fa7d66bbf434e474b7fd395f600039da2cee8f62d60a861df"
 
 
 def drive(races: int, num_threads: int, choose, *, camera: CameraSpec | None = None) -> str:

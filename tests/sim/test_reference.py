@@ -14,7 +14,7 @@ from racecraft.track import Track, generate_track, load_track
 
 FLOAT32 = 3e-5  # what single precision may cost in one control step, in any unit that a pose has
 EXACT = ("steps", "lap", "time", "status", "all_wheels_on_track", "is_offtrack", "closest_prev", "closest_next")
-TOLERANCE = {"track_width": 5e-3, "track_length": 1e-11}  # the width comes from a table of samples every 0.05 m
+TOLERANCE = {"track_length": 1e-11}
 PROJECTED = ("progress", "projection_distance", "offset", "closest_prev", "closest_next", "track_width")
 
 

@@ -46,7 +46,7 @@ enum class Status : int32_t {
     X(progress)            /* fraction of a lap since the start of the lap */                        \
     X(offset)              /* m, signed distance from the centre line, left positive */              \
     X(projection_distance) /* m, along the centre line */                                            \
-    X(track_width)         /* m, here */                                                             \
+    X(track_width)         /* m, beside the place on the centre line */                              \
     X(track_length)        /* m */                                                                   \
     X(closest_prev)        /* waypoint index */                                                      \
     X(closest_next)        /* waypoint index */                                                      \
@@ -164,8 +164,7 @@ RC_HD void write_row(const TrackGeometry& track, const Episode& episode, const V
     row[kRow_progress] = episode.progress;
     row[kRow_offset] = projection.offset;
     row[kRow_projection_distance] = projection.arc_length;
-    row[kRow_track_width] =
-        static_cast<double>(table_at(track.width_table, table_position(track, projection.arc_length)));
+    row[kRow_track_width] = width_at(track, projection);
     row[kRow_track_length] = track.length;
     const int32_t waypoint = track.segments[projection.segment].waypoint;
     row[kRow_closest_prev] = waypoint;

@@ -27,6 +27,14 @@ struct Segment {
     int32_t unused;         // 0
 };
 
+// A stretch of a segment in which the nearest points of both borders move evenly: from the outer one to the
+// inner one is (x + along dx, y + along dy), `along` metres after the segment's start.
+struct WidthPiece {
+    double end;     // m after the segment's start, where the stretch ends; infinite for a segment's last one
+    double x, y;    // m
+    double dx, dy;  // per m
+};
+
 // From a waypoint to the middle of each lane, half of the way to the border, m.
 struct LaneOffset {
     double inner_x, inner_y, outer_x, outer_y;
@@ -44,6 +52,8 @@ struct TrackGeometry {
     double length;                   // m, of the centre line
     const Segment* segments;         //                                       (W - 1,)
     const LaneOffset* lane_offsets;  // of every waypoint                    (W,)
+    const uint32_t* width_begin;     // first piece of the width of a segment (W,)
+    const WidthPiece* width_pieces;
 
     double grid_x, grid_y;  // m, lower left corner of the grid
     double inverse_cell;    // 1/m
@@ -60,7 +70,7 @@ struct TrackGeometry {
 
     // Samples along the centre line; they go on kTableReach beyond the end (around again, or standing still).
     float samples_per_metre;       // 1/m
-    const float* width_table;      // m, local track width
+    const float* width_table;      // m, local track width as a critic knows it
     const float* curvature_table;  // 1/m, left positive
 };
 
@@ -145,6 +155,17 @@ RC_HD bool is_on_road(const TrackGeometry& track, double x, double y) {
         crossings += spans & right;
     }
     return (crossings & 1) != 0;
+}
+
+// How wide the road is: from the inner border's nearest point to the outer one's, both seen from a projection
+// on the centre line, as the original measures it.
+RC_HD double width_at(const TrackGeometry& track, const Projection& place) {
+    const double along = place.arc_length - track.segments[place.segment].arc_length;
+    const WidthPiece* piece = track.width_pieces + track.width_begin[place.segment];
+    while (along > piece->end) ++piece;
+    const double x = piece->x + along * piece->dx;
+    const double y = piece->y + along * piece->dy;
+    return sqrt_of(x * x + y * y);
 }
 
 // Where a table is read for a place on the track, in samples.

@@ -32,7 +32,7 @@ TEMPLATE: dict[str, Any] = {
     "steps": 0.0,  # float: the first call of an episode sees 2.0
     "speed": 0.0,  # float, m/s: commanded
     "steering_angle": 0.0,  # float, degrees: commanded, left positive
-    "track_width": 0.0,  # float, m: at the car
+    "track_width": 0.0,  # float, m: beside the car's projection on the centre line
     "track_length": 0.0,  # float, m
     "waypoints": [],  # list of (x, y) in m, in the driving direction; first == last on a closed track
     "closest_waypoints": [0, 0],  # [int, int]: indices of the waypoint behind and the one ahead

@@ -19,7 +19,7 @@ ROW_COLUMNS: Final = (
     "progress",  # fraction of the lap since the start, 0 to 1; may be slightly negative
     "offset",  # m, signed distance from the centre line, left of the driving direction positive
     "projection_distance",  # m along the centre line
-    "track_width",  # m, at the car
+    "track_width",  # m, from border to border where both are nearest to the car's projection on the centre line
     "track_length",  # m
     "closest_prev",  # index of the waypoint behind
     "closest_next",  # index of the waypoint ahead

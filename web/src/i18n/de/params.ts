@@ -12,7 +12,7 @@ export const params: Record<keyof typeof english, string> = {
   param_steps: "Schritte dieser Episode; der erste Aufruf sieht 2.",
   param_speed: "Geschwindigkeit, die die Policy in diesem Schritt verlangt.",
   param_steering_angle: "Lenkung, die die Policy in diesem Schritt verlangt, nach links positiv.",
-  param_track_width: "Breite der Straße beim Auto.",
+  param_track_width: "Breite der Straße, von Rand zu Rand an der Stelle der Mittellinie neben dem Auto.",
   param_track_length: "Länge der Runde entlang der Mittellinie.",
   param_waypoints: "Punkte der Mittellinie in Fahrtrichtung.",
   param_closest_waypoints: "Nummern der Punkte hinter und vor dem Auto.",

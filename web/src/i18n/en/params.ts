@@ -10,7 +10,7 @@ export const params = {
   param_steps: "Steps of this episode; the first call sees 2.",
   param_speed: "Speed that the policy asks for in this step.",
   param_steering_angle: "Steering that the policy asks for in this step, to the left positive.",
-  param_track_width: "Width of the road at the car.",
+  param_track_width: "Width of the road, from border to border at the place on the centre line beside the car.",
   param_track_length: "Length of the lap along the centre line.",
   param_waypoints: "Points of the centre line in driving direction.",
   param_closest_waypoints: "Indices of the waypoints behind and ahead of the car.",
