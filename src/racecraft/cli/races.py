@@ -20,9 +20,7 @@ Kind = Annotated[
     typer.Option("--type", help="time-trial, object-avoidance, head-to-bot, head-to-model or grid."),
 ]
 Rules = Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")]
-Vehicle = Annotated[
-    str, typer.Option("--vehicle", help="Everybody's: v4, v5, v6 or a file; by default the first model's.")
-]
+Vehicle = Annotated[str, typer.Option("--vehicle", help="Everybody's: v4, v5, v6 or a file.")]
 
 
 @app.command()
@@ -49,7 +47,7 @@ def race(
     parked_cars: race_options.ParkedCars = False,
     placement: race_options.Placement = "",
     positions: race_options.Positions = "",
-    vehicle: Vehicle = "",
+    vehicle: Vehicle = "v5",
     randomize: Annotated[str, typer.Option("--randomize", help="none, light, strong, aws or a JSON file.")] = "none",
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts and objects.")] = 0,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of every entry.")] = True,
@@ -72,7 +70,7 @@ def race(
         ranking=ranking,
         minimum_laps=minimum_laps,
         objects=_objects(kind, context.params),
-        vehicle=vehicle or None,
+        vehicle=vehicle,
         randomize=randomize,
         seed=seed,
         changes={
@@ -116,7 +114,7 @@ def ladder(
     parked_cars: race_options.ParkedCars = False,
     placement: race_options.Placement = "",
     positions: race_options.Positions = "",
-    vehicle: Vehicle = "",
+    vehicle: Vehicle = "v5",
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts, objects and the order of races.")] = 0,
     as_json: Json = False,
 ) -> None:
@@ -134,7 +132,7 @@ def ladder(
         rules=rules,
         changes={"time_limit": time_limit},
         objects=_objects(kind, context.params),
-        vehicle=vehicle or None,
+        vehicle=vehicle,
         seed=seed,
         progress=(lambda line: None) if as_json else text().say_progress,
     )

@@ -153,7 +153,7 @@ def say_raced(outcome: RunRace) -> None:
         gap = "–" if standing.gap is None else f"+{standing.gap:.2f}" if standing.gap else ""
         table.add_row(
             "–" if standing.place is None else str(standing.place),
-            contest.names[standing.car],
+            Text(contest.names[standing.car]),
             f"{standing.laps}/{conditions.rules.laps}",
             "–" if standing.best is None else f"{standing.best:.2f} s",
             score,
@@ -183,7 +183,7 @@ def say_rated(found: Ladder) -> None:
     for row in found.rows:
         table.add_row(
             str(row.place),
-            row.name,
+            Text(row.name),
             f"{row.rating.mean:.1f}",
             f"± {1.96 * row.rating.deviation:.1f}",
             str(row.wins),
@@ -421,7 +421,12 @@ def say_measured(results: dict[str, Any]) -> None:
 
 def _table(*, title: str | None = None) -> Table:
     return Table(
-        title=title, title_justify="left", title_style="bold", header_style="bold", box=SIMPLE_HEAD, pad_edge=False
+        title=Text(title) if title else None,
+        title_justify="left",
+        title_style="bold",
+        header_style="bold",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
     )
 
 

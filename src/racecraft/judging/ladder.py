@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.contest.ladder import Ladder, check_ladder, hold_ladder
-from racecraft.judging.trained import trained_vehicle
-from racecraft.race.conditions import Conditions
+from racecraft.race.conditions import STANDARD_CAR, Conditions
 from racecraft.race.entry import load_entries
 from racecraft.race.rules import RaceRules, rules_by_name
 from racecraft.sim.objects import NO_OBJECTS, Objects
@@ -27,7 +26,7 @@ def rate_models(
     laps: int = 1,
     rules: str | RaceRules = "drfc",
     objects: Objects = NO_OBJECTS,
-    vehicle: str | Vehicle | None = None,
+    vehicle: str | Vehicle = STANDARD_CAR,
     changes: dict[str, Any] | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda text: None,
@@ -45,7 +44,7 @@ def rate_models(
         laps: To a race.
         rules: A name of `RULE_SETS`, or rules.
         objects: On the track.
-        vehicle: What everybody drives; by default what the first model was trained with.
+        vehicle: What everybody drives, whatever they were trained with.
         changes: Single rules that differ, by name.
         seed: Of the starts and of the order of matches.
         progress: Is told what is being driven.
@@ -56,8 +55,6 @@ def rate_models(
     """
     check_ladder(len(models), kind=kind, schedule=schedule, starts=starts, rounds=rounds)
     entries = load_entries(models, num_threads=num_threads)
-    if vehicle is None:
-        vehicle = trained_vehicle(entries[0].info)
     given = {name: value for name, value in (changes or {}).items() if value is not None}
     courses = [
         Conditions(

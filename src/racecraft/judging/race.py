@@ -19,9 +19,8 @@ from racecraft.errors import RunError
 from racecraft.film.ghost import LIVERY, Ghost, Rival, ghost_of
 from racecraft.film.ghost_source import check_sources, load_ghosts
 from racecraft.film.video import film
-from racecraft.judging.trained import trained_vehicle
 from racecraft.race.artifacts import write_metrics, write_simtrace
-from racecraft.race.conditions import Conditions
+from racecraft.race.conditions import STANDARD_CAR, Conditions
 from racecraft.race.entry import Entry, load_entries
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RaceRules, rules_by_name
@@ -64,7 +63,7 @@ def race_models(
     ranking: str = "total",
     minimum_laps: int | None = None,
     objects: Objects = NO_OBJECTS,
-    vehicle: str | Vehicle | None = None,
+    vehicle: str | Vehicle = STANDARD_CAR,
     randomize: Randomization | str = "none",
     seed: int = 0,
     changes: dict[str, Any] | None = None,
@@ -84,7 +83,7 @@ def race_models(
         ranking: ``total``, ``best`` or ``average``.
         minimum_laps: Laps that a model must complete to be ranked.
         objects: On the track.
-        vehicle: What everybody drives; by default what the first model was trained with.
+        vehicle: What everybody drives, whatever they were trained with.
         randomize: What differs from what the models know; the same for all.
         seed: Of the starts and of what stands on the track.
         changes: Single rules that differ, by name.
@@ -99,8 +98,6 @@ def race_models(
     check_kind(kind, len(models))
     entries = load_entries(models, num_threads=num_threads)
     given = {"laps": laps, **(changes or {})}
-    if vehicle is None:
-        vehicle = trained_vehicle(entries[0].info)
     conditions = Conditions(
         track=track if isinstance(track, Track) else load_track(track),
         rules=rules_by_name(rules, {name: value for name, value in given.items() if value is not None}),

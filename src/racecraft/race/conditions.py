@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from racecraft.race.rules import RaceRules
 from racecraft.sim.camera import CameraSpec
@@ -11,6 +12,9 @@ from racecraft.sim.randomization import PRESETS, Randomization
 from racecraft.sim.vehicle import PRESETS as VEHICLES
 from racecraft.sim.vehicle import Vehicle
 from racecraft.track.track import Track
+
+STANDARD_CAR: Final = "v5"
+"""The vehicle of a race that names no other; never an entrant's own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +27,7 @@ class Conditions:
     """Laps, resets, penalties, starts."""
     seed: int = 0
     """Of the starts, of what stands on the track and of the randomisation."""
-    vehicle: Vehicle = VEHICLES["v5"]
+    vehicle: Vehicle = VEHICLES[STANDARD_CAR]
     """What is driven."""
     camera: CameraSpec | None = None
     """What the rules take the driver's camera for (`object_in_camera`); None where no car has one."""

@@ -1,4 +1,7 @@
-"""Who takes part in a race: a run's policy, by the name of the run and its checkpoint."""
+"""Who takes part in a race: a run's policy, by the name of the run and its checkpoint.
+
+An entry is what drives, and nothing else: a race never asks a run how it was trained, in which car or by which rules.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from pathlib import Path
 
 from racecraft.errors import ConfigError
 from racecraft.race.policy import NetworkPolicy, load_policy
-from racecraft.run.folder import RunFolder, RunInfo
+from racecraft.run.folder import MAX_NAME, RunFolder
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,15 +19,13 @@ class Entry:
     """A model at the start."""
 
     name: str
-    """In results and videos; different for every entry of a race."""
+    """In results and videos: printable, and different for every entry of a race."""
     run: Path
     """Its run folder."""
     step: int
-    """Camera steps of training behind its checkpoint."""
+    """Camera steps of training behind its checkpoint, as the run says."""
     policy: NetworkPolicy
     """What drives."""
-    info: RunInfo
-    """How it was trained."""
 
 
 def load_entry(model: str | Path, *, num_threads: int = 0) -> Entry:
@@ -32,14 +33,14 @@ def load_entry(model: str | Path, *, num_threads: int = 0) -> Entry:
 
     Raises:
         RunError: There is no such run.
-        CheckpointError: There is no such checkpoint, or it is damaged.
-        ConfigError: The checkpoint is none of those.
+        CheckpointError: There is no such checkpoint, it is damaged, or holds what is not its network's.
+        ConfigError: The checkpoint is none of those, or the action space or the sensors are not allowed.
     """
     path, checkpoint = split_model(model)
     folder = RunFolder.open(path)
     step, policy = load_policy(folder, checkpoint=checkpoint or "best", num_threads=num_threads)
-    name = folder.path.resolve().name + (f"@{checkpoint}" if checkpoint else "")
-    return Entry(name, folder.path, step, policy, folder.read_info())
+    name = _shown(folder.path.resolve().name) + (f"@{checkpoint}" if checkpoint else "")
+    return Entry(name, folder.path, step, policy)
 
 
 def load_entries(models: Sequence[str | Path], *, num_threads: int = 0) -> list[Entry]:
@@ -67,3 +68,8 @@ def split_model(model: str | Path) -> tuple[str, str | int]:
     if checkpoint not in ("best", "last"):
         raise ConfigError(f"Checkpoint {checkpoint!r} of {path} is none; allowed are best, last and a number of steps.")
     return path, checkpoint
+
+
+def _shown(name: str) -> str:
+    """A folder's name, which may be anybody's, without what could drive a terminal, and as long as ours may be."""
+    return "".join(mark if mark.isprintable() else "�" for mark in name[:MAX_NAME])

@@ -13,6 +13,7 @@ import hashlib
 import json
 import math
 import re
+import stat
 import time
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -72,6 +73,33 @@ class Checkpoint:
     metrics: dict[str, float | None]
     score: tuple[float, ...] | None
     path: Path
+
+
+@dataclass(frozen=True, eq=False)
+class StoredCheckpoint:
+    """A checkpoint on disk that is whole; its arrays are read when they are asked for, and no others."""
+
+    step: int
+    metadata: dict[str, Any]
+    metrics: dict[str, float | None]
+    score: tuple[float, ...] | None
+    path: Path
+    kinds: dict[str, tuple[str, tuple[int, ...]]]
+    """Type, as the format calls it (``F32``), and shape of every array by name."""
+
+    def read(self, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+        """Some of its arrays; they are writable and belong to the caller.
+
+        Raises:
+            CheckpointError: The file cannot be read, or has no such array.
+        """
+        from safetensors import SafetensorError, safe_open
+
+        try:
+            with safe_open(self.path, framework="numpy") as file:
+                return {name: np.array(file.get_tensor(name)) for name in names}
+        except (OSError, SafetensorError, TypeError, ValueError) as error:
+            raise CheckpointError(f"{self.path} cannot be read: {error}.") from error
 
 
 class CheckpointStore:
@@ -142,7 +170,17 @@ class CheckpointStore:
         return self.folder / entry.file
 
     def load(self, which: str | int = "last") -> Checkpoint:
-        """Load the last, the best, or the checkpoint of a step.
+        """The last, the best, or the checkpoint of a step, as `find` finds it, with all its arrays.
+
+        Raises:
+            CheckpointError: There is none, or none that is whole.
+        """
+        found = self.find(which)
+        arrays = found.read(found.kinds)
+        return Checkpoint(found.step, arrays, found.metadata, found.metrics, found.score, found.path)
+
+    def find(self, which: str | int = "last") -> StoredCheckpoint:
+        """Find the last, the best, or the checkpoint of a step.
 
         A damaged last or best one is passed over with a `CheckpointWarning` for the next best there is.
 
@@ -251,30 +289,39 @@ class CheckpointStore:
         for path in self.folder.glob("*.safetensors"):
             name = _NAME.fullmatch(path.name)
             with suppress(ValueError, KeyError, TypeError):
-                data = _read_capped(path)
-                digest = hashlib.sha256(data).hexdigest()
-                if name is None or digest[:8] != name[2]:
+                size = path.stat().st_size
+                if name is None or not path.is_file() or size > MAX_FILE_BYTES:
                     continue
-                header = {**_decode(data)[1], "file": path.name, "size": len(data), "sha256": digest}
+                with path.open("rb") as file:
+                    digest = hashlib.file_digest(file, "sha256").hexdigest()
+                if digest[:8] != name[2]:
+                    continue
+                header = {**_header_of(path)[0], "file": path.name, "size": size, "sha256": digest}
                 entries.append(_entry(header))
         return sorted(entries, key=lambda entry: entry.time_stamp)
 
-    def _read(self, entry: Entry) -> Checkpoint:
+    def _read(self, entry: Entry) -> StoredCheckpoint:
         path = self.folder / entry.file
         try:
-            size = path.stat().st_size
-            if size != entry.size:
-                raise CheckpointError(f"{path} has {size:,} bytes instead of {entry.size:,}.")
-            data = _read_capped(path)
+            status = path.stat()
+            if not stat.S_ISREG(status.st_mode):  # a pipe would never end
+                raise CheckpointError(f"{path} is no file.")
+            if status.st_size != entry.size:
+                raise CheckpointError(f"{path} has {status.st_size:,} bytes instead of {entry.size:,}.")
+            if entry.size > MAX_FILE_BYTES:
+                raise CheckpointError(f"{path} is larger than {MAX_FILE_BYTES:,} bytes.")
+            with path.open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
         except OSError as error:
             raise CheckpointError(f"{path} cannot be read: {error.strerror or error}.") from error
-        if hashlib.sha256(data).hexdigest() != entry.sha256:
+        if digest != entry.sha256:
             raise CheckpointError(f"{path} is damaged: its checksum is wrong.")
         try:
-            arrays, header = _decode(data)
+            header, kinds = _header_of(path)
+            metadata = dict(header["metadata"])
         except (ValueError, KeyError, TypeError) as error:
             raise CheckpointError(f"{path} is not a checkpoint of Racecraft: {error}.") from error
-        return Checkpoint(entry.step, arrays, dict(header["metadata"]), entry.metrics, entry.score, path)
+        return StoredCheckpoint(entry.step, metadata, entry.metrics, entry.score, path, kinds)
 
     def _prune(self) -> None:
         """Remove files that the manifest on disk does not list: old checkpoints and unfinished ones."""
@@ -316,12 +363,6 @@ def _entry(line: Mapping[str, Any]) -> Entry:
     return entry
 
 
-def _read_capped(path: Path) -> bytes:
-    if path.stat().st_size > MAX_FILE_BYTES:
-        raise ValueError(f"{path} is larger than {MAX_FILE_BYTES:,} bytes")
-    return path.read_bytes()
-
-
 def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> list[memoryview]:
     plain = {name: np.asarray(values) for name, values in arrays.items()}
     for name, array in plain.items():
@@ -347,16 +388,18 @@ def _plain(value: object) -> object:
     raise TypeError(f"{type(value).__name__} {value!r} has no JSON form")
 
 
-def _decode(data: bytes) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    from safetensors import SafetensorError
-    from safetensors.numpy import load
+def _header_of(path: Path) -> tuple[dict[str, Any], dict[str, tuple[str, tuple[int, ...]]]]:
+    """What a file says of itself, and the type and shape of its arrays by name."""
+    from safetensors import SafetensorError, safe_open
 
     try:
-        arrays = {name: np.array(values) for name, values in load(data).items()}
-        length = int.from_bytes(data[:8], "little")
-        header = json.loads(json.loads(data[8 : 8 + length])["__metadata__"][_HEADER_KEY])
-    except (SafetensorError, RecursionError) as error:
+        with safe_open(path, framework="numpy") as file:
+            header = json.loads((file.metadata() or {})[_HEADER_KEY])
+            names: list[str] = file.keys()
+            slices = {name: file.get_slice(name) for name in names}
+            kinds = {name: (str(one.get_dtype()), tuple(one.get_shape())) for name, one in slices.items()}
+    except (OSError, SafetensorError, RecursionError) as error:
         raise ValueError(str(error)) from error
     if not isinstance(header, dict):
         raise ValueError("its header is not an object")
-    return arrays, header
+    return header, kinds
