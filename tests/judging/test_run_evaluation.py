@@ -44,8 +44,18 @@ def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path:
     assert len(list(run.glob("evaluation-*"))) == 2
     traces = [found.files["sim-trace"].read_text() for found in (first, again)]
     assert traces[0] == traces[1]
-    expected = {**first.evaluation.summary(), "step": first.step, "video": None}
+    expected = {**first.evaluation.summary(), "step": first.step, "video": None, "driven": first.to_dict()["driven"]}
     assert json.loads(first.files["summary"].read_text()) == expected
+
+
+def test_an_evaluation_in_a_car_of_ones_own_says_so(tmp_path: Path) -> None:
+    run = trained(tmp_path, vehicle=Vehicle(front_friction=1.9))
+    found = evaluate(run, **{**QUICK, "max_resets": 100})
+    for document in (found.to_dict(), json.loads(found.files["summary"].read_text())):
+        assert document["driven"]["own"] == ["vehicle"]
+        assert "front_friction 1.9 instead of 0.32" in document["driven"]["sentence"]
+    sentence = evaluate(run, **QUICK, vehicle="v5").to_dict()["driven"]["sentence"]
+    assert sentence.endswith("(max_resets 1 instead of 100, otherwise drfc) with the standard car v5 on oval")
 
 
 def test_a_track_that_changed_since_must_be_named(tmp_path: Path) -> None:

@@ -127,6 +127,8 @@ def say_evaluated(outcome: RunEvaluation) -> None:
         )
     console.print(table)
     _say(console, outcome.summary)
+    driven = outcome.provenance
+    _say(console, (f"{driven.sentence[:1].upper()}{driven.sentence[1:]}.", "bold yellow" if driven.own else "dim"))
     if outcome.limit is not None and evaluation.best_lap is not None:
         _say(console, f"Best lap: {outcome.limit.sentence(evaluation.best_lap)}")
     for placing in outcome.placings[:1]:
@@ -206,10 +208,9 @@ def say_verified(found: Verification) -> None:
         best = f", best {min(car.lap_times):.2f} s" if car.lap_times else ""
         laps = f"{len(car.lap_times)} laps{best}, {car.time:.2f} s in all"
         _say(console, f"  {_harmless(name)}: ", (laps, "dim"))
-    track = f"{_harmless(replay.conditions.track.name)} ({found.track_note})"
-    _say(console, f"Track {track}, vehicle {found.vehicle_note}, seed {replay.conditions.seed}.")
     if found.difference is None:
-        _say(console, ("Genuine: ", "bold green"), f"all {found.num_steps:,} steps come out the same, bit for bit.")
+        _say(console, ("Genuine", "bold green"), _harmless(found.provenance.verdict, width=1000), ".")
+        _say(console, f"All {found.num_steps:,} steps come out the same, bit for bit.")
     else:
         _say(console, ("Not genuine: ", "bold red"), found.difference.sentence)
         if found.version_note:
@@ -386,9 +387,9 @@ def say_calibrated(result: Calibration, output: Path) -> None:
     _say(console, "Drive it:     ", (f"racecraft train --vehicle {output}", "bold"))
 
 
-def _harmless(line: str) -> str:
+def _harmless(line: str, *, width: int = SHOWN_WIDTH) -> str:
     """A line of somebody else's text, short, and without what could drive a terminal."""
-    line = line[:SHOWN_WIDTH] + "…" * (len(line) > SHOWN_WIDTH)
+    line = line[:width] + "…" * (len(line) > width)
     return "".join(mark if mark.isprintable() else "�" for mark in line)
 
 

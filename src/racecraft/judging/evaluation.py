@@ -28,6 +28,7 @@ from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.evaluation import evaluate
 from racecraft.race.placement import driven_track
 from racecraft.race.policy import NetworkPolicy, load_policy
+from racecraft.race.provenance import Provenance, provenance
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RaceRules, rules_by_name
 from racecraft.race.yardstick import Placing, placings
@@ -68,6 +69,11 @@ class RunEvaluation:
         )
 
     @property
+    def provenance(self) -> Provenance:
+        """By whose rules, in whose car and on whose track."""
+        return provenance(self.evaluation.conditions)
+
+    @property
     def placings(self) -> list[Placing]:
         """Where it would have placed in the official races on this track, most entrants first."""
         return placings(self.evaluation)
@@ -78,6 +84,7 @@ class RunEvaluation:
             "run": str(self.run),
             "step": self.step,
             **self.evaluation.summary(),
+            "driven": self.provenance.to_dict(),
             "lap_seconds": [list(trial.lap_times) for trial in self.evaluation.trials],
             "limit": self._against_limit(),
             "official_races": [placing.to_dict() for placing in self.placings],
@@ -244,6 +251,7 @@ def _write(
             sensors=policy.sensors,
         )
     video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
-    summary = {**evaluation.summary(), "step": step, "video": video, **({"job": job} if job else {})}
+    driven = provenance(evaluation.conditions).to_dict()
+    summary = {**evaluation.summary(), "driven": driven, "step": step, "video": video, **({"job": job} if job else {})}
     write_json(inside / "evaluation.json", summary)
     return files

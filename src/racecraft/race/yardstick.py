@@ -18,6 +18,7 @@ import numpy as np
 
 from racecraft.errors import ConfigError
 from racecraft.race.results import Evaluation
+from racecraft.sim.vehicle import PRESETS as VEHICLES
 from racecraft.track.track import Track
 
 PERCENTILES: Final = (1.0, 5.0, 10.0, 25.0, 50.0, 75.0, 90.0)
@@ -153,9 +154,11 @@ def placings(evaluation: Evaluation) -> list[Placing]:
     """Where an evaluation would have placed in every official race on its track, most entrants first.
 
     Races ranked by the best lap take the evaluation's best lap; the others, penalties included, the mean of the laps
-    of the trials that were finished.
+    of the trials that were finished. A car that is none of the original's has no place among them.
     """
     rules, found = evaluation.rules, []
+    if evaluation.conditions.vehicle not in VEHICLES.values():
+        return []
     for race in official_races(evaluation.track, direction=rules.direction):
         if race.timing == "BEST_LAP_TIME":
             time = evaluation.best_lap

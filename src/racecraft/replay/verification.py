@@ -9,20 +9,20 @@ replay -> its conditions -> simulation, marshal <- its actions, step by step
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from importlib import metadata
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import ConfigError, RacecraftError, ReplayError, TrackNotFound
+from racecraft.errors import RacecraftError, ReplayError
 from racecraft.race.evaluation import race_simulation
 from racecraft.race.marshal import Marshal
+from racecraft.race.provenance import Provenance, provenance, track_note, vehicle_note
 from racecraft.race.results import Trial
 from racecraft.replay.replay import Replay
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
-from racecraft.sim.vehicle import PRESETS, Vehicle
-from racecraft.track import Track, load_track
 
 SMALLEST_CAMERA: Final = 8
 """Pixels: only where the camera looks is part of the rules, not what it sees."""
@@ -94,17 +94,31 @@ class Verification:
         """The preset's name, or that it is none."""
         return vehicle_note(self.replay.conditions.vehicle)
 
+    @cached_property
+    def provenance(self) -> Provenance:
+        """By whose rules, in whose car, on whose track: what a genuine replay is worth."""
+        return provenance(self.replay.conditions)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict: genuine or not, by whose rules, and what of them is not everybody's."""
+        if self.difference is not None:
+            return f"Not genuine: {self.difference.sentence}"
+        return f"Genuine{self.provenance.verdict}."
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
         found = self.difference
         return {
             "is_genuine": self.is_genuine,
+            "verdict": self.sentence,
             "title": self.replay.title,
             "cars": len(self.replay.cars),
             "steps": self.num_steps,
             "track": self.replay.conditions.track.name,
             "track_note": self.track_note,
             "vehicle": self.vehicle_note,
+            "driven": self.provenance.to_dict(),
             "written_by": self.replay.written_by,
             "difference": None
             if found is None
@@ -146,22 +160,6 @@ def verify(replay: Replay, *, num_threads: int = 0) -> Verification:
         if found is not None:
             return Verification(replay=replay, difference=found)
     return Verification(replay=replay, difference=None)
-
-
-def track_note(track: Track) -> str:
-    """Whether a track is the one that is known by its name."""
-    try:
-        known = load_track(track.name) if "/" not in track.name and "\\" not in track.name else None
-    except (TrackNotFound, ConfigError, ValueError, OSError):
-        known = None
-    if known is None:
-        return "known from the file only"
-    return "as in the library" if known.digest == track.digest else "not the one of this name in the library"
-
-
-def vehicle_note(vehicle: Vehicle) -> str:
-    """A preset's name, or ``custom``."""
-    return next((name for name, preset in PRESETS.items() if preset == vehicle), "custom")
 
 
 def _first_difference(stored: Trial, driven: Any, *, car: int, begin: int) -> Difference | None:
