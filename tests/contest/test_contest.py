@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from racecraft import train
+from racecraft import load_track, train
+from racecraft.contest.ladder import hold_ladder
 from racecraft.errors import ConfigError, RunError
 from racecraft.judging.ladder import rate_models
 from racecraft.judging.race import race_models
 from racecraft.learn import PPOConfig
+from racecraft.race import RaceRules
+from racecraft.race.conditions import Conditions
+from racecraft.race.entry import load_entries
 from racecraft.replay import read_replay, verify
 from racecraft.run import read_simtrace
 from racecraft.sim import Objects, Obstacles
@@ -137,8 +142,20 @@ def test_a_ladder_of_duels_is_driven_and_the_same_again(models: list[Path]) -> N
     found = ladder(models, kind="head-to-model", starts=3)
     assert len(found.matches) == 3
     assert ladder(models, kind="head-to-model", starts=3).to_dict() == found.to_dict()
-    same = ladder([models[0], models[0]], kind="head-to-model", starts=2)
-    assert len({match.places for match in same.matches}) <= 2
+
+
+def test_a_model_that_duels_with_itself_wins_by_where_it_starts(models: list[Path]) -> None:
+    """A course's second start, half a lap on, is the first of one that begins there, with the other car in front."""
+    rules = RaceRules(laps=1, max_resets=1, time_limit=12.0)
+    courses = [
+        Conditions(track=load_track("oval"), rules=replace(rules, start_offset=offset), seed=1) for offset in (0.0, 0.5)
+    ]
+    twice = load_entries([models[0], models[0]], num_threads=1)
+    found = hold_ladder(twice, courses, kind="head-to-model", starts=2, num_threads=1)
+    places = {start: sorted(match.places for match in found.matches if match.start == start) for start in (0, 1)}
+    assert [len(of_start) for of_start in places.values()] == [2, 2]
+    assert places[1] == sorted(other[::-1] for other in places[0])
+    assert (1, 1) not in places[0]
 
 
 def test_a_grid_race_has_one_replay_of_all(models: list[Path], tmp_path: Path) -> None:

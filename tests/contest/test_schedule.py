@@ -64,6 +64,11 @@ def test_winners_rise_losers_fall_and_everyone_becomes_surer() -> None:
     assert win_probability(winner, loser) + win_probability(loser, winner) == pytest.approx(1.0)
 
 
+def test_what_a_model_is_worth_almost_certainly_is_three_deviations_below_its_mean() -> None:
+    assert Rating(30.0, 2.5).floor == 22.5
+    assert Rating().floor == pytest.approx(0.0)
+
+
 def test_a_surprise_moves_more_than_what_was_expected() -> None:
     strong, weak = Rating(35.0, 4.0), Rating(15.0, 4.0)
     expected, surprise = rate([strong, weak], [1, 2]), rate([strong, weak], [2, 1])
