@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from racecraft.errors import ArchiveError
 from racecraft.importing.archive import DEFAULT_LIMITS, read_archive
-from racecraft.importing.archive_guard import Limits
+from racecraft.importing.archive_guard import Guard, Limits
 
 FILES = {
     "reward_function.py": b"def reward_function(params):\n    return 1.0\n",
@@ -267,6 +267,34 @@ def test_limits(tmp_path: Path) -> None:
         ):
             with pytest.raises(ArchiveError, match=says):
                 read(data, tmp_path, limits=limits)
+
+
+def test_what_reaches_a_limit_without_passing_it_is_read(tmp_path: Path) -> None:
+    files = {f"{number}": b"x" * 1000 for number in range(20)}
+    for data in (gzip.compress(make_tar(files)), make_zip(files)):
+        exact = Limits(members=20, member_bytes=1000, file_bytes=len(data))
+        assert read(data, tmp_path, limits=exact) == files
+        for over in (Limits(members=19), Limits(member_bytes=999), Limits(file_bytes=len(data) - 1)):
+            with pytest.raises(ArchiveError):
+                read(data, tmp_path, limits=over)
+    stored = make_zip(files, 0)
+    assert read(stored, tmp_path, limits=Limits(total_bytes=20_000)) == files
+    with pytest.raises(ArchiveError, match="more than 19,999 bytes"):
+        read(stored, tmp_path, limits=Limits(total_bytes=19_999))
+
+
+@pytest.mark.parametrize("name", ["a" * 500, "/".join("a" * 20)], ids=["500 characters", "20 deep"])
+def test_the_longest_name_and_the_deepest_folder(name: str, tmp_path: Path) -> None:
+    assert read(make_zip({name: b"1"}), tmp_path) == {name: b"1"}
+
+
+def test_a_guard_lets_the_ratio_be_reached_and_counts_small_members_as_no_bomb() -> None:
+    guard = Guard("x.zip", Limits(ratio=10, ratio_grace=100))
+    guard.check_ratio(100, 1)  # within the grace
+    guard.check_ratio(1000, 100)  # ten times, and no more
+    for unpacked, packed in ((101, 10), (1001, 100)):
+        with pytest.raises(ArchiveError, match="10 times its size"):
+            guard.check_ratio(unpacked, packed)
 
 
 @pytest.mark.parametrize("pack", [lambda files: gzip.compress(make_tar(files)), make_zip])

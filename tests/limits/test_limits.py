@@ -57,8 +57,18 @@ def test_a_round_road_is_round() -> None:
     assert road.curvature == pytest.approx(np.full(len(road.s), 1 / 3), rel=0.02)
     assert road.left == pytest.approx(np.full(len(road.s), 0.5), abs=0.02)
     assert road.right == pytest.approx(np.full(len(road.s), 0.5), abs=0.02)
-    assert road.narrowed(0.1).left == pytest.approx(road.left - 0.1)
     assert road.at(road.length + 1.0, road.left) == pytest.approx(road.at(1.0, road.left))
+
+
+def test_a_narrowed_road_has_lost_the_same_strip_on_both_sides() -> None:
+    angle = np.linspace(0.0, 2 * np.pi, 201)
+    unit = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    unit[-1] = unit[0]
+    road = smooth_road(Track("uneven", *(unit * radius for radius in (3.0, 2.6, 3.3))), spacing=0.05)  # left is inside
+    narrow = road.narrowed(0.1)
+    assert narrow.left == pytest.approx(np.full(len(road.s), 0.3), abs=0.02)
+    assert narrow.right == pytest.approx(np.full(len(road.s), 0.2), abs=0.02)
+    np.testing.assert_array_equal(narrow.places, road.places)
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@ import pytest
 
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
 from racecraft.race import Autopilot, RaceRules, completion, evaluate, trial_simulation
-from racecraft.race.placement import reset_pose, start_pose
+from racecraft.race.placement import line_up, reset_pose, start_pose
 from racecraft.sim import ROW_COLUMNS, STATE_COLUMNS, Vehicle
 from racecraft.track import Track, load_track
 
@@ -305,6 +305,19 @@ def test_completion_agrees_with_an_evaluation_of_the_first_lap():
         times = [trial.lap_times[0] if trial.lap_times else np.nan for trial in whole.trials]
         np.testing.assert_array_equal(quick.lap_times, times)
         assert quick.mean_completion == pytest.approx(whole.mean_completion)
+        rewards = [trial.recording.rewards.sum() for trial in whole.trials]  # a car that is out earns nothing more
+        assert quick.rewards == pytest.approx(rewards)
+
+
+def test_on_several_tracks_every_trial_starts_off_its_own():
+    tracks = (OVAL, RING, STRAIGHT)
+    for direction, driven in (("forward", tracks), ("reverse", [track.reversed() for track in tracks])):
+        rules = RaceRules(laps=1, direction=direction)
+        simulation = trial_simulation(tracks, rules=rules, num_trials=6, camera=None, vehicle=EVEN)
+        line_up(simulation, rules, seed=4)
+        for trial in range(6):
+            pose = start_pose(driven[trial % 3], rules, seed=4, trial=trial)
+            assert simulation.vehicles[:3, trial] == pytest.approx(pose, abs=1e-5), (direction, trial)
 
 
 def test_completion_stops_a_slow_car():

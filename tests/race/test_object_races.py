@@ -108,6 +108,17 @@ def test_mercy_comes_after_so_many_crashes_and_can_be_refused():
     assert counts == [1, 2]
 
 
+def test_after_mercy_crashes_are_counted_anew_and_every_lap_has_its_own_penalties():
+    """It hits the same box in every lap, and is put past it by the second crash each time."""
+    side = 1.0 if np.allclose(RING.left, RING.inner) else -1.0
+    driver = centerline_driver(RING, lane=0.5 * side)
+    rules = RaceRules(laps=3, max_resets=20, collision_penalty=0.2, mercy_after=2, lateral_jitter=0.0)
+    (trial,) = evaluate(driver, RING, rules=rules, num_trials=1, sees="state", objects=BOX).trials
+    assert trial.is_finished
+    assert [(lap.crash_count, lap.resets) for lap in trial.laps] == [(2, 2)] * 3
+    assert [lap.penalty_seconds for lap in trial.laps] == pytest.approx([0.4] * 3)
+
+
 def test_a_trial_ends_with_the_crash_when_no_resets_are_left():
     rules = RaceRules(laps=1, is_continuous=False, max_resets=0)
     side = 1.0 if np.allclose(RING.left, RING.inner) else -1.0

@@ -185,3 +185,22 @@ def test_closing_every_descriptor_is_an_error(track, rows):
     source = function("import os", "os.closerange(0, 100)", "return 1.0")
     with running(source, track) as worker, pytest.raises(RewardError):
         worker(rows)
+
+
+@pytest.mark.parametrize(("written", "is_believed"), [("1e5", True), ("1e5 + 0.1", False), ("-1e6", False)])
+def test_rewards_that_user_code_wrote_past_the_checks_are_checked_again(track, rows, written, is_believed):
+    """It runs in the process that checks its rewards, so the trainer does not take that process's word."""
+    source = function(
+        "frame = sys._getframe()",
+        "while 'self' not in frame.f_locals:",
+        "    frame = frame.f_back",
+        f"frame.f_locals['self']._rewards[0] = {written}",  # from the second row on, over what was good
+        "return 1.0",
+        top="import sys\n",
+    )
+    with running(source, track) as worker:
+        if is_believed:
+            assert worker(rows).tolist() == [1e5] + [1.0] * (len(rows) - 1)
+        else:
+            with pytest.raises(RewardError, match="wrote into its memory"):
+                worker(rows)

@@ -85,6 +85,19 @@ def test_last_four_and_best_are_kept(store):
     assert index["last_checkpoint"].keys() == {"name", "avg_eval_metric", "time_stamp"}
 
 
+def test_what_no_manifest_lists_is_removed_and_what_is_no_checkpoint_stays(store):
+    save(store, 100)
+    unlisted = store.folder / "000000050-0123abcd.safetensors"
+    unfinished = store.folder / "000000200-0123abcd.safetensors.tmp"
+    others = [store.folder / name for name in ("notes.txt", "mine.safetensors", "000000050.safetensors")]
+    for path in (unlisted, unfinished, *others):
+        path.write_bytes(b"x")
+    save(store, 200)
+    left = {path.name for path in store.folder.iterdir()}
+    assert left == {"manifest.json", *(entry.file for entry in store.entries()), *(path.name for path in others)}
+    assert [entry.step for entry in store.entries()] == [100, 200]
+
+
 def test_of_equal_scores_the_later_is_best_and_lap_time_decides_between_full_laps(store):
     save(store, 100, score=(1.0, -9.0))
     save(store, 200, score=(1.0, -8.0))

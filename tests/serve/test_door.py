@@ -32,6 +32,29 @@ def test_another_sites_page_is_refused(console: RunningConsole, origin: str) -> 
     assert console.client.get("/api/models", headers={"origin": origin}).status_code == 403
 
 
+def test_an_origin_that_only_begins_like_ours_is_refused(console: RunningConsole) -> None:
+    own = str(console.client.base_url).rstrip("/")
+    for origin in (f"{own}0", f"{own}.evil.example", f"{own}@evil.example", own.replace("http:", "https:"), own[:-1]):
+        assert console.client.post("/api/models", json={}, headers={"origin": origin}).status_code == 403, origin
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE"])
+def test_what_another_sites_page_would_change_is_refused_even_if_its_origin_is_not_told(
+    console: RunningConsole, method: str
+) -> None:
+    """A browser says where a request comes from also where it sends no origin."""
+    reply = console.client.request(method, "/api/models", headers={"sec-fetch-site": "cross-site"})
+    assert reply.status_code == 403
+    assert reply.json()["error"]["code"] == "Refused"
+    for site in ("same-origin", "none"):
+        assert console.client.request(method, "/api/models", headers={"sec-fetch-site": site}).status_code in (405, 422)
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD"])
+def test_a_link_on_another_sites_page_may_lead_here(console: RunningConsole, method: str) -> None:
+    assert console.client.request(method, "/garage", headers={"sec-fetch-site": "cross-site"}).status_code != 403
+
+
 def test_our_own_origin_is_let_in(console: RunningConsole) -> None:
     origin = str(console.client.base_url).rstrip("/")
     assert console.client.get("/api/models", headers={"origin": origin}).status_code == 200
