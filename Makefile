@@ -9,6 +9,7 @@ UV := $(BIN)/uv
 NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/* native/gpu/*)
 
 PAGES := src/racecraft/serve/pages/index.html
+NODE := web/node_modules/.package-lock.json
 WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/* web/src/*/*/*)
 
 .PHONY: help train console test test-fast lint format bench setup build stub clean requirements
@@ -28,16 +29,18 @@ test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every 
 test-fast: $(VENV)/.built $(VENV)/.dev  ## the tests that take seconds
 	$(BIN)/python -m pytest -m "not slow"
 
-lint: $(VENV)/.built $(VENV)/.dev  ## ruff, mypy --strict and clang-format, changing nothing
+lint: $(VENV)/.built $(VENV)/.dev $(NODE)  ## ruff, mypy --strict, clang-format, prettier and eslint, changing nothing
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/clang-format --dry-run --Werror native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/tests/*.cpp
+	cd web && npm run --silent lint
 
-format: $(VENV)/.dev  ## apply ruff and clang-format
+format: $(VENV)/.dev $(NODE)  ## apply ruff, clang-format and prettier
 	$(BIN)/ruff check --fix-only -q .
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/tests/*.cpp
+	cd web && npm run --silent format
 
 bench: $(VENV)/.built $(VENV)/.dev  ## measure everything, rivals included, and print the table
 	$(BIN)/racecraft bench
@@ -76,9 +79,13 @@ $(VENV)/.serve: $(UV) $(VENV)/.train requirements/serve.txt
 	$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/serve.txt
 	@touch $@
 
-$(PAGES): $(WEB)
+$(NODE): web/package.json web/package-lock.json
 	@command -v npm >/dev/null || { echo "The console's pages are built with Node and npm; neither was found on PATH."; exit 1; }
-	cd web && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
+	cd web && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
+$(PAGES): $(WEB) $(NODE)
+	cd web && npm run --silent build
 	@touch $@
 
 $(VENV)/.built: $(VENV)/.train $(NATIVE)

@@ -4,11 +4,20 @@ import { actionAt, grid, metadataOf, rings, sameSpace, scaleOf, tidy, tip } from
 import { around, differences, diffLines } from "../src/lib/diff";
 import { estimate, fromSlider, isSafe, toSlider } from "../src/lib/numberscale";
 
-const space = (actions: ActionPreset["actions"]): ActionPreset => ({ name: "", description: "", kind: "discrete", actions });
+const space = (actions: ActionPreset["actions"]): ActionPreset => ({
+  name: "",
+  description: "",
+  kind: "discrete",
+  actions,
+});
 
 describe("an action space", () => {
   it("is drawn and pulled back to the same action", () => {
-    for (const action of [{ steering_angle: -30, speed: 0.5 }, { steering_angle: 0, speed: 2 }, { steering_angle: 12.5, speed: 4 }])
+    for (const action of [
+      { steering_angle: -30, speed: 0.5 },
+      { steering_angle: 0, speed: 2 },
+      { steering_angle: 12.5, speed: 4 },
+    ])
       expect(actionAt(...tip(action, 4), 4)).toEqual(action);
   });
   it("stays within what the car can do", () => {
@@ -17,28 +26,66 @@ describe("an action space", () => {
     expect(Object.is(tidy({ steering_angle: -0.1, speed: 1 }).steering_angle, 0)).toBe(true);
   });
   it("leaves room to pull the fastest arrow", () => {
-    expect([scaleOf(space([{ steering_angle: 0, speed: 1 }]).actions), scaleOf([{ steering_angle: 0, speed: 2 }]), scaleOf([{ steering_angle: 0, speed: 3 }])]).toEqual([1, 2.5, 4]);
+    expect([
+      scaleOf(space([{ steering_angle: 0, speed: 1 }]).actions),
+      scaleOf([{ steering_angle: 0, speed: 2 }]),
+      scaleOf([{ steering_angle: 0, speed: 3 }]),
+    ]).toEqual([1, 2.5, 4]);
   });
   it("has rings at round speeds", () => {
-    expect([1, 1.5, 2.5, 4].map(rings)).toEqual([[0.25, 0.5, 0.75, 1], [0.5, 1, 1.5], [0.5, 1, 1.5, 2, 2.5], [1, 2, 3, 4]]);
+    expect([1, 1.5, 2.5, 4].map(rings)).toEqual([
+      [0.25, 0.5, 0.75, 1],
+      [0.5, 1, 1.5],
+      [0.5, 1, 1.5, 2, 2.5],
+      [1, 2, 3, 4],
+    ]);
   });
   it("is made as the original's console makes it", () => {
-    expect(grid(30, 3, 1, 2).map((action) => [action.steering_angle, action.speed])).toEqual([[-30, 0.5], [-30, 1], [0, 0.5], [0, 1], [30, 0.5], [30, 1]]);
+    expect(grid(30, 3, 1, 2).map((action) => [action.steering_angle, action.speed])).toEqual([
+      [-30, 0.5],
+      [-30, 1],
+      [0, 0.5],
+      [0, 1],
+      [30, 0.5],
+      [30, 1],
+    ]);
   });
   it("knows whether it is a preset's", () => {
     expect(sameSpace(space(grid(30, 3, 1, 2)), space(grid(30, 3, 1, 2)))).toBe(true);
     expect(sameSpace(space(grid(30, 3, 1, 2)), space(grid(29, 3, 1, 2)))).toBe(false);
-    const box = (low: number): ActionPreset => ({ ...space([]), kind: "continuous", steering_angle: [low, 30], speed: [0.5, 4] });
+    const box = (low: number): ActionPreset => ({
+      ...space([]),
+      kind: "continuous",
+      steering_angle: [low, 30],
+      speed: [0.5, 4],
+    });
     expect([sameSpace(box(-30), box(-30)), sameSpace(box(-30), box(-20))]).toEqual([true, false]);
     expect(metadataOf(box(-30))).toMatchObject({ action_space: { steering_angle: { low: -30, high: 30 } } });
   });
 });
 
 describe("numbers of learning", () => {
-  const rate: NumberChoice = { name: "lr", default: 3e-4, low: 1e-5, high: 1e-2, safe_low: 1e-4, safe_high: 2e-3, is_whole: false, is_logarithmic: true, allowed: null };
+  const rate: NumberChoice = {
+    name: "lr",
+    default: 3e-4,
+    low: 1e-5,
+    high: 1e-2,
+    safe_low: 1e-4,
+    safe_high: 2e-3,
+    is_whole: false,
+    is_logarithmic: true,
+    allowed: null,
+  };
   it("come back from their slider", () => {
     for (const value of [1e-5, 3e-4, 1e-2]) expect(fromSlider(rate, toSlider(rate, value))).toBeCloseTo(value, 5);
-    const batch = { ...rate, low: 32, high: 512, is_logarithmic: false, is_whole: true, allowed: [32, 64, 128, 256, 512] };
+    const batch = {
+      ...rate,
+      low: 32,
+      high: 512,
+      is_logarithmic: false,
+      is_whole: true,
+      allowed: [32, 64, 128, 256, 512],
+    };
     expect(fromSlider(batch, toSlider(batch, 128))).toBe(128);
     expect(toSlider(rate, Number.NaN)).toBe(0);
   });
@@ -72,6 +119,14 @@ describe("what differs", () => {
     expect(around(diffLines("a\nb", "a\nb"))).toEqual([]);
   });
   it("holds for settings, too", () => {
-    expect(differences([{ a: 1, b: { c: "x" } }, { a: 1, b: { c: "y" }, d: [1] }])).toEqual([{ name: "b.c", values: ["x", "y"] }, { name: "d", values: [undefined, "[1]"] }]);
+    expect(
+      differences([
+        { a: 1, b: { c: "x" } },
+        { a: 1, b: { c: "y" }, d: [1] },
+      ]),
+    ).toEqual([
+      { name: "b.c", values: ["x", "y"] },
+      { name: "d", values: [undefined, "[1]"] },
+    ]);
   });
 });

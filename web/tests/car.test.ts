@@ -5,7 +5,9 @@ import { roadGeometry } from "../src/lib/ground";
 
 const corners = (geometry: ReturnType<typeof carGeometry>) => {
   const [positions, index] = [geometry.getAttribute("position"), geometry.getIndex()];
-  return Array.from({ length: index?.count ?? positions.count }, (_, corner) => new Vector3().fromBufferAttribute(positions, index?.getX(corner) ?? corner));
+  return Array.from({ length: index?.count ?? positions.count }, (_, corner) =>
+    new Vector3().fromBufferAttribute(positions, index?.getX(corner) ?? corner),
+  );
 };
 
 /** Twice the area of each triangle, along its normal. */
@@ -34,9 +36,18 @@ describe("a car", () => {
 });
 
 describe("a road", () => {
-  const ring = (radius: number, turn: number) => Array.from({ length: 40 }, (_, point) => [radius * Math.cos((turn * point * Math.PI) / 20), radius * Math.sin((turn * point * Math.PI) / 20)]);
+  const ring = (radius: number, turn: number) =>
+    Array.from({ length: 40 }, (_, point) => [
+      radius * Math.cos((turn * point * Math.PI) / 20),
+      radius * Math.sin((turn * point * Math.PI) / 20),
+    ]);
   it.each([1, -1])("is seen from above, whichever way it turns (%i)", (turn) => {
-    const road = roadGeometry({ inner: ring(3, turn), outer: ring(4, turn), center: ring(3.5, turn), is_closed: true } as Parameters<typeof roadGeometry>[0]);
+    const road = roadGeometry({
+      inner: ring(3, turn),
+      outer: ring(4, turn),
+      center: ring(3.5, turn),
+      is_closed: true,
+    } as Parameters<typeof roadGeometry>[0]);
     for (const [, normal] of areas(road)) expect(normal.z).toBeGreaterThan(-1e-12);
   });
 });

@@ -1,7 +1,12 @@
 import { describe, expect, it } from "vitest";
 import { bestLapOf, completionOf, Curves, hints, logOf, smooth, type Point } from "../src/lib/curves";
 
-const iteration = (step: number, more: object = {}): Point => ({ kind: "iteration", step, seconds: step / 1000, ...more });
+const iteration = (step: number, more: object = {}): Point => ({
+  kind: "iteration",
+  step,
+  seconds: step / 1000,
+  ...more,
+});
 
 describe("curves", () => {
   it("replace what a run that was set back writes again", () => {
@@ -36,7 +41,14 @@ describe("curves", () => {
 
   it("know the best evaluation", () => {
     const curves = new Curves();
-    const judged = (step: number, is_best: boolean): Point => ({ kind: "evaluation", step, seconds: step, completions: [1, 0.5], lap_times: [9.5], is_best });
+    const judged = (step: number, is_best: boolean): Point => ({
+      kind: "evaluation",
+      step,
+      seconds: step,
+      completions: [1, 0.5],
+      lap_times: [9.5],
+      is_best,
+    });
     curves.add([judged(1, true), judged(2, true), judged(3, false)]);
     expect(curves.best!.step).toBe(2);
     expect(completionOf(curves.best!)).toBeCloseTo(0.75);
@@ -56,7 +68,8 @@ describe("smoothing", () => {
 describe("hints", () => {
   const run = (make: (share: number) => object) => {
     const curves = new Curves();
-    for (let index = 0; index < 100; index++) curves.add([iteration(1000 * (index + 1), { entropy: 2, value_loss: 1, ...make(index / 99) })]);
+    for (let index = 0; index < 100; index++)
+      curves.add([iteration(1000 * (index + 1), { entropy: 2, value_loss: 1, ...make(index / 99) })]);
     return hints(curves, 10).map((hint) => hint.key);
   };
 
@@ -67,7 +80,9 @@ describe("hints", () => {
     expect(run(() => ({ reward: 1, completion: 0.2, entropy: 0.01 }))).toEqual(["entropy"]);
   });
   it("see a value loss that runs away", () => {
-    expect(run((share) => ({ reward: 10 * share, completion: share, value_loss: share > 0.95 ? 1000 : 1 }))).toEqual(["value"]);
+    expect(run((share) => ({ reward: 10 * share, completion: share, value_loss: share > 0.95 ? 1000 : 1 }))).toEqual([
+      "value",
+    ]);
   });
   it("see a reward that is earned without driving", () => {
     expect(run((share) => ({ reward: 1 + 50 * share, completion: 0.1 }))).toEqual(["exploit"]);
@@ -77,8 +92,16 @@ describe("hints", () => {
   });
   it("see a policy that forgets what it could", () => {
     const curves = new Curves();
-    for (let index = 0; index < 30; index++) curves.add([iteration(1000 * (index + 1), { entropy: 2, value_loss: 1, reward: 1, completion: 0.9 })]);
-    const judged = (step: number, share: number, is_best: boolean): Point => ({ kind: "evaluation", step, seconds: step / 1000, completions: [share], lap_times: [], is_best });
+    for (let index = 0; index < 30; index++)
+      curves.add([iteration(1000 * (index + 1), { entropy: 2, value_loss: 1, reward: 1, completion: 0.9 })]);
+    const judged = (step: number, share: number, is_best: boolean): Point => ({
+      kind: "evaluation",
+      step,
+      seconds: step / 1000,
+      completions: [share],
+      lap_times: [],
+      is_best,
+    });
     curves.add([judged(5000, 1, true), judged(10000, 0.5, false), judged(20000, 0.4, false)]);
     expect(hints(curves, 10)).toEqual([]);
     curves.add([judged(30000, 0.6, false)]);
@@ -88,7 +111,17 @@ describe("hints", () => {
   it("see it in a short training, too, but not from one lucky iteration", () => {
     const short = (reward: (share: number) => number) => {
       const curves = new Curves();
-      curves.add(Array.from({ length: 30 }, (_, index) => ({ kind: "iteration", step: 1000 * (index + 1), seconds: index, reward: reward(index / 29), completion: 0.1, entropy: 1, value_loss: 1 })));
+      curves.add(
+        Array.from({ length: 30 }, (_, index) => ({
+          kind: "iteration",
+          step: 1000 * (index + 1),
+          seconds: index,
+          reward: reward(index / 29),
+          completion: 0.1,
+          entropy: 1,
+          value_loss: 1,
+        })),
+      );
       return hints(curves, 10).map((hint) => hint.key);
     };
     expect(short((share) => 1 + 50 * share)).toEqual(["exploit"]);

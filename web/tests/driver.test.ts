@@ -36,7 +36,12 @@ describe("behind", () => {
 });
 
 describe("a gamepad", () => {
-  const held = (axis: number, gas: number, brake: number) => ({ connected: true, mapping: "standard", axes: [axis], buttons: Array.from({ length: 17 }, (_, index) => ({ value: index === 7 ? gas : index === 6 ? brake : 0 })) });
+  const held = (axis: number, gas: number, brake: number) => ({
+    connected: true,
+    mapping: "standard",
+    axes: [axis],
+    buttons: Array.from({ length: 17 }, (_, index) => ({ value: index === 7 ? gas : index === 6 ? brake : 0 })),
+  });
   const plug = (pad: unknown) => vi.stubGlobal("navigator", { getGamepads: () => [null, pad] });
   afterEach(() => vi.unstubAllGlobals());
 

@@ -1,7 +1,18 @@
 import { describe, expect, it } from "vitest";
 import { chartSvg, ticks } from "../src/lib/chartsvg";
 import { endingOf } from "../src/lib/endings";
-import { alongLap, before, byPace, cornerReport, interpolate, PLACES, poseAt, timeDelta, type EvaluationLaps, type LapTrace } from "../src/lib/laps";
+import {
+  alongLap,
+  before,
+  byPace,
+  cornerReport,
+  interpolate,
+  PLACES,
+  poseAt,
+  timeDelta,
+  type EvaluationLaps,
+  type LapTrace,
+} from "../src/lib/laps";
 import { fileName, toCsv } from "../src/lib/save";
 
 /** A lap along a straight of so many metres at a constant speed. */
@@ -10,10 +21,25 @@ function lap(number: number, speed: number, share = 1, length = 10): LapTrace {
   const row = (make: (step: number) => number) => Array.from({ length: steps + 1 }, (_, step) => make(step));
   const done = share === 1;
   return {
-    number, status: done ? "lap_complete" : "off_track", is_complete: done, seconds: (share * length) / speed, penalty_seconds: 0, start: 0,
-    time: row((step) => step * 0.1), share: row((step) => (step * 0.1 * speed) / length), x: row((step) => step * 0.1 * speed), y: row(() => 0),
-    heading: row(() => 0), speed: row(() => speed), throttle: row(() => speed), steering: row(() => 0), reward: row(() => 1),
-    passages: [{ seconds: 5 / speed, entry_speed: speed, slowest: speed, exit_speed: speed }, done ? { seconds: 5 / speed + 0.1, entry_speed: speed, slowest: speed, exit_speed: speed } : null],
+    number,
+    status: done ? "lap_complete" : "off_track",
+    is_complete: done,
+    seconds: (share * length) / speed,
+    penalty_seconds: 0,
+    start: 0,
+    time: row((step) => step * 0.1),
+    share: row((step) => (step * 0.1 * speed) / length),
+    x: row((step) => step * 0.1 * speed),
+    y: row(() => 0),
+    heading: row(() => 0),
+    speed: row(() => speed),
+    throttle: row(() => speed),
+    steering: row(() => 0),
+    reward: row(() => 1),
+    passages: [
+      { seconds: 5 / speed, entry_speed: speed, slowest: speed, exit_speed: speed },
+      done ? { seconds: 5 / speed + 0.1, entry_speed: speed, slowest: speed, exit_speed: speed } : null,
+    ],
   };
 }
 
@@ -21,7 +47,9 @@ describe("laps", () => {
   const [fast, slow, part] = [lap(1, 2), lap(2, 1), lap(3, 4, 0.5)];
 
   it("are looked up by what never falls", () => {
-    expect([before([0, 1, 1, 3], 1), before([0, 1, 1, 3], 2), before([0, 1], -1), before([0, 1], 9)]).toEqual([2, 2, 0, 1]);
+    expect([before([0, 1, 1, 3], 1), before([0, 1, 1, 3], 2), before([0, 1], -1), before([0, 1], 9)]).toEqual([
+      2, 2, 0, 1,
+    ]);
     expect(interpolate(0.25, [0, 1], [10, 20])).toBeCloseTo(12.5);
     expect(interpolate(5, [0, 1], [10, 20])).toBe(20);
   });
@@ -50,7 +78,13 @@ describe("laps", () => {
     expect(byPace([part, slow, fast]).map((found) => found.number)).toEqual([1, 2, 3]);
   });
   it("tell where time is lost", () => {
-    const all = { track: "", length: 10, is_reversed: false, sectors: [1, 2].map((number) => ({ number, start: 0, end: 5, apex: 2, turn: 1 })), laps: [fast, slow, part] } as EvaluationLaps;
+    const all = {
+      track: "",
+      length: 10,
+      is_reversed: false,
+      sectors: [1, 2].map((number) => ({ number, start: 0, end: 5, apex: 2, turn: 1 })),
+      laps: [fast, slow, part],
+    } as EvaluationLaps;
     const report = cornerReport(all, slow);
     expect(report[0]!.lost).toBeCloseTo(5 - 1.25);
     expect(report[1]!.lost).toBeCloseTo(2.5);
@@ -60,21 +94,40 @@ describe("laps", () => {
 
 describe("endings", () => {
   it("are known in both spellings", () => {
-    expect(["Lap complete", "lap_complete", "Time Up", "off_track"].map(endingOf)).toEqual(["end_lap_complete", "end_lap_complete", "end_time_up", "end_off_track"]);
+    expect(["Lap complete", "lap_complete", "Time Up", "off_track"].map(endingOf)).toEqual([
+      "end_lap_complete",
+      "end_lap_complete",
+      "end_time_up",
+      "end_off_track",
+    ]);
     expect(endingOf("Park")).toBeUndefined();
   });
 });
 
 describe("files", () => {
   it("quote what has to be quoted, and no formula begins", () => {
-    expect(toCsv([{ label: "a,b", values: [1, null, 0.5] }, { label: "=x", values: ["say \"hi\"", "@b"] }])).toBe('"a,b",\'=x\n1,"say ""hi"""\n,\'@b\n0.5,\n');
+    expect(
+      toCsv([
+        { label: "a,b", values: [1, null, 0.5] },
+        { label: "=x", values: ['say "hi"', "@b"] },
+      ]),
+    ).toBe('"a,b",\'=x\n1,"say ""hi"""\n,\'@b\n0.5,\n');
     expect(toCsv([])).toBe("\n");
   });
   it("have names that every system takes", () => {
     expect([fileName("Speed, m/s"), fileName("../.."), fileName("Länge")]).toEqual(["speed-m-s", "chart", "länge"]);
   });
   it("draw a chart as a picture of its own", () => {
-    const svg = chartSvg({ title: "<b>", x: [0, 1, 2], lines: [{ label: "a", values: [1, null, 3], color: "red" }], xLabel: "m", ink: "#000", quiet: "#555", grid: "#ddd", card: "#fff" });
+    const svg = chartSvg({
+      title: "<b>",
+      x: [0, 1, 2],
+      lines: [{ label: "a", values: [1, null, 3], color: "red" }],
+      xLabel: "m",
+      ink: "#000",
+      quiet: "#555",
+      grid: "#ddd",
+      card: "#fff",
+    });
     expect(svg).toContain("&#60;b&#62;");
     expect(svg.match(/stroke="red"/g)!.length).toBe(1);
     expect(ticks(0, 1, 5)).toEqual([0, 0.2, 0.4, 0.6, 0.8, 1]);
@@ -84,7 +137,18 @@ describe("files", () => {
     expect(ticks(0, 3, 8)).toContain(0.5);
     expect(ticks(0, 3, 8, true)).toEqual([0, 1, 2, 3]);
     expect(ticks(0, 40, 8, true)).toEqual([0, 5, 10, 15, 20, 25, 30, 35, 40]);
-    const svg = chartSvg({ title: "", x: [0, 1], lines: [], xLabel: "", marks: [1], mark: "green", ink: "#000", quiet: "#555", grid: "#ddd", card: "#fff" });
+    const svg = chartSvg({
+      title: "",
+      x: [0, 1],
+      lines: [],
+      xLabel: "",
+      marks: [1],
+      mark: "green",
+      ink: "#000",
+      quiet: "#555",
+      grid: "#ddd",
+      card: "#fff",
+    });
     expect(svg).toContain('fill="green">★</text>');
   });
 });

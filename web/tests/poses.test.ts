@@ -6,11 +6,33 @@ import { between, halfway, turn, type Look } from "../src/lib/poses";
 import { de } from "../src/i18n/de";
 import { en } from "../src/i18n/en";
 
-const look = (poses: number[][], steps: number[]): Look => ({ step: 0, poses, steps, policy: [], is_discrete: true, frame: "", frame_shape: [0, 0] });
+const look = (poses: number[][], steps: number[]): Look => ({
+  step: 0,
+  poses,
+  steps,
+  policy: [],
+  is_discrete: true,
+  frame: "",
+  frame_shape: [0, 0],
+});
 
 describe("cars between two looks", () => {
-  const before = look([[0, 0, 3100, 0, 0, 0], [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]], [5, 90, 5]);
-  const now = look([[1000, 0, -3100, 0, 0, 0], [1000, 0, 0, 0, 0, 0], [9000, 0, 0, 0, 0, 0]], [6, 2, 6]);
+  const before = look(
+    [
+      [0, 0, 3100, 0, 0, 0],
+      [0, 0, 0, 0, 0, 0],
+      [0, 0, 0, 0, 0, 0],
+    ],
+    [5, 90, 5],
+  );
+  const now = look(
+    [
+      [1000, 0, -3100, 0, 0, 0],
+      [1000, 0, 0, 0, 0, 0],
+      [9000, 0, 0, 0, 0, 0],
+    ],
+    [6, 2, 6],
+  );
   const [smooth, restarted, far] = between(before, now, 0.5);
 
   it("drive on smoothly, the short way round", () => {
@@ -25,7 +47,14 @@ describe("cars between two looks", () => {
     expect(between(undefined, now, 0.3)[0]!.x).toBe(1);
   });
   it("go on from where they are when the next look comes early", () => {
-    const next = look([[2000, 0, -3100, 0, 0, 0], [2000, 0, 0, 0, 0, 0], [9000, 0, 0, 0, 0, 0]], [7, 3, 7]);
+    const next = look(
+      [
+        [2000, 0, -3100, 0, 0, 0],
+        [2000, 0, 0, 0, 0, 0],
+        [9000, 0, 0, 0, 0, 0],
+      ],
+      [7, 3, 7],
+    );
     const here = halfway(before, now, 0.5);
     expect(between(here, next, 0)[0]!.x).toBeCloseTo(0.5);
     expect(between(here, next, 0.5)[0]!.x).toBeCloseTo(1.25);
@@ -49,10 +78,26 @@ describe("what is drawn", () => {
     expect(span([2, 4], 0.5)).toEqual([2, 4]);
   });
   it("fits its frame", () => {
-    expect(viewBox([[[0, 0], [2, 1]]], 1)).toBe("-1.000 -2.000 4.000 3.000");
+    expect(
+      viewBox(
+        [
+          [
+            [0, 0],
+            [2, 1],
+          ],
+        ],
+        1,
+      ),
+    ).toBe("-1.000 -2.000 4.000 3.000");
   });
   it("reads well", () => {
-    expect([clock(75), clock(3700), clock(null), percent(0.126), seconds(9.3)]).toEqual(["1:15", "1:01:40", "–", "13 %", "9.30 s"]);
+    expect([clock(75), clock(3700), clock(null), percent(0.126), seconds(9.3)]).toEqual([
+      "1:15",
+      "1:01:40",
+      "–",
+      "13 %",
+      "9.30 s",
+    ]);
   });
 });
 

@@ -2,7 +2,11 @@ import { describe, expect, it } from "vitest";
 import { draw, mirror, oval, resize, reverse, simplify, turn, type ControlPoint } from "../src/lib/sketch";
 
 const ring = (count: number, radius: number, width = 0.8): ControlPoint[] =>
-  Array.from({ length: count }, (_, i) => ({ x: radius * Math.cos((2 * Math.PI * i) / count), y: radius * Math.sin((2 * Math.PI * i) / count), width }));
+  Array.from({ length: count }, (_, i) => ({
+    x: radius * Math.cos((2 * Math.PI * i) / count),
+    y: radius * Math.sin((2 * Math.PI * i) / count),
+    width,
+  }));
 
 describe("draw", () => {
   it("draws a circle through points on one, as the server does", () => {
@@ -13,7 +17,14 @@ describe("draw", () => {
     for (const [x, y] of road.right) expect(Math.abs(Math.hypot(x!, y!) - 3.4)).toBeLessThan(0.01);
   });
   it("ends an open road at its last point", () => {
-    const road = draw({ points: [{ x: 0, y: 0, width: 1 }, { x: 3, y: 1, width: 1 }, { x: 6, y: 0, width: 1 }], is_closed: false })!;
+    const road = draw({
+      points: [
+        { x: 0, y: 0, width: 1 },
+        { x: 3, y: 1, width: 1 },
+        { x: 6, y: 0, width: 1 },
+      ],
+      is_closed: false,
+    })!;
     expect(road.center[0]).toEqual([0, 0]);
     expect(road.center.at(-1)![0]).toBeCloseTo(6);
   });

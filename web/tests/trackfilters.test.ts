@@ -11,7 +11,8 @@ describe("tracks", () => {
     expect(difficulty({ ...oval, min_radius: null, corners: 0 })).toBe("track_easy");
   });
   it("are chosen by one trait of each group", () => {
-    const names = (...chosen: Parameters<typeof fits>[1]) => [oval, needle, lakeside].filter((track) => fits(track, chosen)).map((track) => track.length);
+    const names = (...chosen: Parameters<typeof fits>[1]) =>
+      [oval, needle, lakeside].filter((track) => fits(track, chosen)).map((track) => track.length);
     expect(names()).toHaveLength(3);
     expect(names("tracks_short", "long")).toHaveLength(3);
     expect(names("long", "tracks_right")).toEqual([35.6]);

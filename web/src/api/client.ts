@@ -37,10 +37,13 @@ export class Problem extends Error {
 }
 
 export const ask = <T>(method: string, path: string, body?: unknown): Promise<T> =>
-  body === undefined ? send(method, path, null, undefined) : send(method, path, JSON.stringify(body), "application/json");
+  body === undefined
+    ? send(method, path, null, undefined)
+    : send(method, path, JSON.stringify(body), "application/json");
 
 /** The same with a file as it is. */
-export const askBytes = <T>(method: string, path: string, body: Blob): Promise<T> => send(method, path, body, "application/octet-stream");
+export const askBytes = <T>(method: string, path: string, body: Blob): Promise<T> =>
+  send(method, path, body, "application/octet-stream");
 
 async function send<T>(method: string, path: string, body: BodyInit | null, kind: string | undefined): Promise<T> {
   let reply: Response;
@@ -93,8 +96,12 @@ export const api = {
     ask<JobInfo>("POST", `/models/${name(run)}/evaluations`, request),
   laps: (run: string, stamp: string) => ask<EvaluationLaps>("GET", `/models/${name(run)}/evaluations/${stamp}/laps`),
   saliency: (run: string, stamp: string, lap: number, row: number, target?: number) =>
-    ask<SaliencyPicture>("GET", `/models/${name(run)}/evaluations/${stamp}/saliency?lap=${lap}&row=${row}${target === undefined ? "" : `&target=${target}`}`),
-  maps: (run: string, first: number, last: number) => ask<TrainingMaps>("GET", `/models/${name(run)}/maps?first=${first}&last=${last}`),
+    ask<SaliencyPicture>(
+      "GET",
+      `/models/${name(run)}/evaluations/${stamp}/saliency?lap=${lap}&row=${row}${target === undefined ? "" : `&target=${target}`}`,
+    ),
+  maps: (run: string, first: number, last: number) =>
+    ask<TrainingMaps>("GET", `/models/${name(run)}/maps?first=${first}&last=${last}`),
   job: (id: string) => ask<JobInfo>("GET", `/jobs/${id}`),
 };
 

@@ -15,7 +15,8 @@ export const tidy = (action: Action): Action => ({
 });
 
 /** The speed that the longest arrow stands for: room to pull beyond the fastest action. */
-export const scaleOf = (actions: Action[]): number => [1, 1.5, 2.5].find((top) => actions.every((action) => action.speed <= top)) ?? MAX_SPEED;
+export const scaleOf = (actions: Action[]): number =>
+  [1, 1.5, 2.5].find((top) => actions.every((action) => action.speed <= top)) ?? MAX_SPEED;
 
 /** Round speeds for the rings of the picture. */
 export function rings(top: number): number[] {
@@ -42,7 +43,10 @@ export function grid(maxSteering: number, angles: number, maxSpeed: number, spee
   const found: Action[] = [];
   for (let angle = 0; angle < angles; angle++)
     for (let speed = 1; speed <= speeds; speed++)
-      found.push({ steering_angle: angles > 1 ? +(-maxSteering + (2 * maxSteering * angle) / (angles - 1)).toFixed(3) : 0, speed: +((maxSpeed * speed) / speeds).toFixed(3) });
+      found.push({
+        steering_angle: angles > 1 ? +(-maxSteering + (2 * maxSteering * angle) / (angles - 1)).toFixed(3) : 0,
+        speed: +((maxSpeed * speed) / speeds).toFixed(3),
+      });
   return found;
 }
 
@@ -51,8 +55,14 @@ const near = (a: number, b: number) => Math.abs(a - b) < 1e-3;
 export const sameSpace = (a: ActionPreset, b: ActionPreset): boolean =>
   a.kind === b.kind &&
   a.actions.length === b.actions.length &&
-  a.actions.every((action, index) => near(action.steering_angle, b.actions[index]!.steering_angle) && near(action.speed, b.actions[index]!.speed)) &&
-  (a.kind === "discrete" || [...(a.steering_angle ?? []), ...(a.speed ?? [])].every((value, index) => near(value, [...(b.steering_angle ?? []), ...(b.speed ?? [])][index]!)));
+  a.actions.every(
+    (action, index) =>
+      near(action.steering_angle, b.actions[index]!.steering_angle) && near(action.speed, b.actions[index]!.speed),
+  ) &&
+  (a.kind === "discrete" ||
+    [...(a.steering_angle ?? []), ...(a.speed ?? [])].every((value, index) =>
+      near(value, [...(b.steering_angle ?? []), ...(b.speed ?? [])][index]!),
+    ));
 
 /** The original's document of an action space. */
 export const metadataOf = (space: ActionPreset): Record<string, unknown> =>

@@ -20,42 +20,74 @@ export function ticks(low: number, high: number, count = 6, isWhole = false): nu
   const round = power * ([1, 2, 2.5, 5].find((factor) => power * factor >= rough * 0.999) ?? 10);
   const step = isWhole ? Math.max(1, Math.ceil(round)) : round;
   const found: number[] = [];
-  for (let index = Math.ceil(low / step - 1e-9); index * step <= high + 1e-9 * step; index++) found.push(+(index * step).toPrecision(12));
+  for (let index = Math.ceil(low / step - 1e-9); index * step <= high + 1e-9 * step; index++)
+    found.push(+(index * step).toPrecision(12));
   return found;
 }
 
-export function chartSvg(chart: { title: string; x: number[]; lines: ChartLine[]; xLabel: string; isPercent?: boolean; isWhole?: boolean; least?: number; marks?: number[]; mark?: string; height?: number; ink: string; quiet: string; grid: string; card: string }): string {
+export function chartSvg(chart: {
+  title: string;
+  x: number[];
+  lines: ChartLine[];
+  xLabel: string;
+  isPercent?: boolean;
+  isWhole?: boolean;
+  least?: number;
+  marks?: number[];
+  mark?: string;
+  height?: number;
+  ink: string;
+  quiet: string;
+  grid: string;
+  card: string;
+}): string {
   const height = chart.height ?? 420;
   const known = chart.lines.flatMap((line) => line.values.filter((value): value is number => value !== null));
   const [x0, x1] = chart.x.length ? [Math.min(...chart.x), Math.max(...chart.x)] : [0, 1];
-  let [y0, y1] = known.length ? [known.reduce((a, b) => Math.min(a, b)), known.reduce((a, b) => Math.max(a, b))] : [0, 1];
+  let [y0, y1] = known.length
+    ? [known.reduce((a, b) => Math.min(a, b)), known.reduce((a, b) => Math.max(a, b))]
+    : [0, 1];
   if (chart.least) [y0, y1] = span([y0, y1], chart.least);
   if (chart.isPercent) [y0, y1] = [Math.min(0, y0), Math.max(1, y1)];
   const space = (y1 - y0) * 0.05 || 0.5;
   [y0, y1] = chart.isPercent ? [y0, y1 + 0.04] : [y0 - space, y1 + space];
   const px = (x: number) => LEFT + ((WIDTH - LEFT - RIGHT) * (x - x0)) / (x1 - x0 || 1);
   const py = (y: number) => TOP + (height - TOP - BOTTOM) * (1 - (y - y0) / (y1 - y0));
-  const text = (x: number, y: number, words: string, more = "") => `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" ${more}>${escape(words)}</text>`;
+  const text = (x: number, y: number, words: string, more = "") =>
+    `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" ${more}>${escape(words)}</text>`;
   const parts: string[] = [];
   for (const tick of ticks(y0, y1)) {
     parts.push(`<path d="M${LEFT} ${py(tick).toFixed(1)}H${WIDTH - RIGHT}" stroke="${chart.grid}"/>`);
-    parts.push(text(LEFT - 8, py(tick) + 4, chart.isPercent ? `${Math.round(100 * tick)} %` : String(tick), 'text-anchor="end"'));
+    parts.push(
+      text(LEFT - 8, py(tick) + 4, chart.isPercent ? `${Math.round(100 * tick)} %` : String(tick), 'text-anchor="end"'),
+    );
   }
-  for (const tick of ticks(x0, x1, 8, chart.isWhole)) parts.push(text(px(tick), height - BOTTOM + 20, String(tick), 'text-anchor="middle"'));
+  for (const tick of ticks(x0, x1, 8, chart.isWhole))
+    parts.push(text(px(tick), height - BOTTOM + 20, String(tick), 'text-anchor="middle"'));
   parts.push(text(WIDTH - RIGHT, height - 8, chart.xLabel, 'text-anchor="end"'));
-  parts.push(`<text x="${LEFT}" y="24" font-weight="600" font-size="15" fill="${chart.ink}">${escape(chart.title)}</text>`);
+  parts.push(
+    `<text x="${LEFT}" y="24" font-weight="600" font-size="15" fill="${chart.ink}">${escape(chart.title)}</text>`,
+  );
   let place = WIDTH - RIGHT;
   for (const line of [...chart.lines].reverse()) {
     parts.push(text(place, 24, line.label, `text-anchor="end" fill="${line.color}"`));
     place -= 9 * line.label.length + 18;
   }
   for (const place of chart.marks ?? []) {
-    parts.push(`<path d="M${px(place).toFixed(1)} ${TOP}V${height - BOTTOM}" stroke="${chart.mark ?? chart.ink}" stroke-dasharray="4 4"/>`);
+    parts.push(
+      `<path d="M${px(place).toFixed(1)} ${TOP}V${height - BOTTOM}" stroke="${chart.mark ?? chart.ink}" stroke-dasharray="4 4"/>`,
+    );
     parts.push(text(px(place), TOP - 2, "★", `text-anchor="middle" font-size="14" fill="${chart.mark ?? chart.ink}"`));
   }
   for (const line of chart.lines) {
     if (line.points) {
-      line.values.forEach((value, index) => value !== null && parts.push(`<circle cx="${px(chart.x[index]!).toFixed(1)}" cy="${py(value).toFixed(1)}" r="3.5" fill="${line.color}"/>`));
+      line.values.forEach(
+        (value, index) =>
+          value !== null &&
+          parts.push(
+            `<circle cx="${px(chart.x[index]!).toFixed(1)}" cy="${py(value).toFixed(1)}" r="3.5" fill="${line.color}"/>`,
+          ),
+      );
       continue;
     }
     let d = "";

@@ -17,7 +17,8 @@ export class Curves {
   /** Add points in the order they were written; a run that was set back writes its later points again. */
   add(points: Point[]): void {
     for (const point of points) {
-      const list = point.kind === "evaluation" ? this.evaluations : point.kind === "note" ? this.notes : this.iterations;
+      const list =
+        point.kind === "evaluation" ? this.evaluations : point.kind === "note" ? this.notes : this.iterations;
       while (list.length && list[list.length - 1]!.step >= point.step && point.kind !== "note") list.pop();
       list.push(point);
     }
@@ -81,36 +82,53 @@ export function hints(curves: Curves, numActions: number): Hint[] {
   const completion = number(last, "completion") ?? 0;
   const most = Math.log(Math.max(numActions, 1));
   if (entropy !== null && numActions > 1 && entropy < 0.05 * most && completion < 0.5)
-    found.push({ key: "entropy", values: { now: entropy.toFixed(3), most: most.toFixed(2), completion: percent(completion) } });
+    found.push({
+      key: "entropy",
+      values: { now: entropy.toFixed(3), most: most.toFixed(2), completion: percent(completion) },
+    });
 
   const losses = points.slice(-40).map((point) => number(point, "value_loss") ?? 0);
   const before = Math.max(...losses.slice(0, 20), 1e-9);
   const after = losses[losses.length - 1]!;
-  if (losses.length === 40 && after > 50 * before) found.push({ key: "value", values: { before: before.toPrecision(2), after: after.toPrecision(2) } });
+  if (losses.length === 40 && after > 50 * before)
+    found.push({ key: "value", values: { before: before.toPrecision(2), after: after.toPrecision(2) } });
 
-  const steps = points.slice(-FEW).map((point) => Math.abs(number(point, "approx_kl") ?? 0)).sort((a, b) => a - b);
+  const steps = points
+    .slice(-FEW)
+    .map((point) => Math.abs(number(point, "approx_kl") ?? 0))
+    .sort((a, b) => a - b);
   const usual = steps[steps.length >> 1]!;
   if (usual > 0.15) found.push({ key: "kl", values: { now: usual.toFixed(2) } });
 
   if (last.step >= MUCH) {
     // what was usual in the first half of the way, after its beginning, against what is usual now
     const mean = (from: number, to: number, name: string) => {
-      const known = points.slice(Math.floor(from * points.length), Math.ceil(to * points.length)).map((point) => number(point, name)).filter((value) => value !== null);
+      const known = points
+        .slice(Math.floor(from * points.length), Math.ceil(to * points.length))
+        .map((point) => number(point, name))
+        .filter((value) => value !== null);
       return known.length ? known.reduce((sum, value) => sum + value, 0) / known.length : null;
     };
     const [r0, r1] = [mean(0.1, 0.4, "reward"), mean(0.8, 1, "reward")];
     const [c0, c1] = [mean(0.1, 0.4, "completion"), mean(0.8, 1, "completion")];
     if (r0 !== null && r1 !== null && c0 !== null && c1 !== null) {
       if (r1 > r0 + 0.5 * Math.abs(r0) && c1 < c0 + 0.02 && c1 < 0.5)
-        found.push({ key: "exploit", values: { r0: r0.toFixed(1), r1: r1.toFixed(1), c0: percent(c0), c1: percent(c1) } });
-      else if (last.step > 2 * MUCH && c1 < 0.15) found.push({ key: "stuck", values: { completion: percent(c1), steps: String(last.step) } });
+        found.push({
+          key: "exploit",
+          values: { r0: r0.toFixed(1), r1: r1.toFixed(1), c0: percent(c0), c1: percent(c1) },
+        });
+      else if (last.step > 2 * MUCH && c1 < 0.15)
+        found.push({ key: "stuck", values: { completion: percent(c1), steps: String(last.step) } });
     }
   }
 
   const best = curves.best;
   const recent = curves.evaluations.slice(-3).map(completionOf);
   if (best && recent.length === 3 && completionOf(best) >= 0.9 && Math.max(...recent) < completionOf(best) - 0.3)
-    found.push({ key: "forgot", values: { best: percent(completionOf(best)), step: String(best.step), now: percent(Math.max(...recent)) } });
+    found.push({
+      key: "forgot",
+      values: { best: percent(completionOf(best)), step: String(best.step), now: percent(Math.max(...recent)) },
+    });
   return found;
 }
 
@@ -124,7 +142,12 @@ export interface LogEntry {
 /** What happened, newest first. */
 export function logOf(curves: Curves, most = 60): LogEntry[] {
   const entries: LogEntry[] = [
-    ...curves.evaluations.map((point): LogEntry => ({ kind: point["is_best"] ? "best" : "evaluation", step: point.step, seconds: point.seconds, point })),
+    ...curves.evaluations.map((point): LogEntry => ({
+      kind: point["is_best"] ? "best" : "evaluation",
+      step: point.step,
+      seconds: point.seconds,
+      point,
+    })),
     ...curves.notes.map((point): LogEntry => ({ kind: "note", step: point.step, seconds: point.seconds, point })),
   ];
   return entries.sort((a, b) => b.seconds - a.seconds).slice(0, most);

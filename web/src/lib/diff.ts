@@ -28,7 +28,10 @@ export function diffLines(before: string, after: string): DiffLine[] {
     const rest = new Uint32Array((n + 1) * (m + 1));
     for (let i = n - 1; i >= 0; i--)
       for (let j = m - 1; j >= 0; j--)
-        rest[i * (m + 1) + j] = a[start + i] === b[start + j] ? rest[(i + 1) * (m + 1) + j + 1]! + 1 : Math.max(rest[(i + 1) * (m + 1) + j]!, rest[i * (m + 1) + j + 1]!);
+        rest[i * (m + 1) + j] =
+          a[start + i] === b[start + j]
+            ? rest[(i + 1) * (m + 1) + j + 1]! + 1
+            : Math.max(rest[(i + 1) * (m + 1) + j]!, rest[i * (m + 1) + j + 1]!);
     let [i, j] = [0, 0];
     while (i < n || j < m) {
       if (i < n && j < m && a[start + i] === b[start + j]) same(start + i++, start + j++);
@@ -42,7 +45,9 @@ export function diffLines(before: string, after: string): DiffLine[] {
 
 /** Unchanged stretches cut to some lines around what differs; null marks a cut. */
 export function around(lines: DiffLine[], reach = 3): (DiffLine | null)[] {
-  const near = lines.map((_, index) => lines.slice(Math.max(0, index - reach), index + reach + 1).some((line) => line.kind !== "same"));
+  const near = lines.map((_, index) =>
+    lines.slice(Math.max(0, index - reach), index + reach + 1).some((line) => line.kind !== "same"),
+  );
   const found: (DiffLine | null)[] = [];
   lines.forEach((line, index) => {
     if (near[index]) found.push(line);
@@ -55,7 +60,8 @@ export function around(lines: DiffLine[], reach = 3): (DiffLine | null)[] {
 export function flatten(value: unknown, name = ""): Map<string, string> {
   const found = new Map<string, string>();
   if (value !== null && typeof value === "object" && !Array.isArray(value)) {
-    for (const [key, item] of Object.entries(value)) for (const [inner, text] of flatten(item, name ? `${name}.${key}` : key)) found.set(inner, text);
+    for (const [key, item] of Object.entries(value))
+      for (const [inner, text] of flatten(item, name ? `${name}.${key}` : key)) found.set(inner, text);
   } else found.set(name, typeof value === "string" ? value : JSON.stringify(value));
   return found;
 }
@@ -64,5 +70,7 @@ export function flatten(value: unknown, name = ""): Map<string, string> {
 export function differences(documents: unknown[]): { name: string; values: (string | undefined)[] }[] {
   const flat = documents.map((document) => flatten(document));
   const names = [...new Set(flat.flatMap((one) => [...one.keys()]))].sort();
-  return names.map((name) => ({ name, values: flat.map((one) => one.get(name)) })).filter(({ values }) => new Set(values).size > 1);
+  return names
+    .map((name) => ({ name, values: flat.map((one) => one.get(name)) }))
+    .filter(({ values }) => new Set(values).size > 1);
 }

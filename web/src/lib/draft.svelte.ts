@@ -3,7 +3,11 @@ import type { Sketch } from "./sketch";
 
 const KEY = "racecraft-draft";
 
-interface Draft { sketch: Sketch; name: string; of: string }
+interface Draft {
+  sketch: Sketch;
+  name: string;
+  of: string;
+}
 
 function read(): Draft | undefined {
   try {

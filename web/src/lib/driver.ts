@@ -2,8 +2,19 @@
 export type Pedal = "left" | "right" | "gas" | "brake";
 
 export const KEYS: Record<string, Pedal> = {
-  ArrowLeft: "left", ArrowRight: "right", ArrowUp: "gas", ArrowDown: "brake",
-  a: "left", d: "right", w: "gas", s: "brake", A: "left", D: "right", W: "gas", S: "brake", " ": "brake",
+  ArrowLeft: "left",
+  ArrowRight: "right",
+  ArrowUp: "gas",
+  ArrowDown: "brake",
+  a: "left",
+  d: "right",
+  w: "gas",
+  s: "brake",
+  A: "left",
+  D: "right",
+  W: "gas",
+  S: "brake",
+  " ": "brake",
 };
 
 const LOCK = Math.PI / 6; // rad
@@ -13,7 +24,8 @@ const SPEEDING = 3.5; // m/s²
 const COASTING = 1.5;
 const BRAKING = 8;
 
-const towards = (from: number, to: number, step: number) => (from < to ? Math.min(to, from + step) : Math.max(to, from - step));
+const towards = (from: number, to: number, step: number) =>
+  from < to ? Math.min(to, from + step) : Math.max(to, from - step);
 
 export class Driver {
   readonly held = new Set<Pedal>();
@@ -49,11 +61,22 @@ export class Driver {
 function pad(): { side: number; gas: number; brake: number } | undefined {
   if (typeof navigator === "undefined" || !navigator.getGamepads) return undefined;
   const found = navigator.getGamepads().find((one) => one?.connected && one.mapping === "standard");
-  return found ? { side: found.axes[0] ?? 0, gas: Math.max(found.buttons[7]?.value ?? 0, found.buttons[0]?.value ?? 0), brake: Math.max(found.buttons[6]?.value ?? 0, found.buttons[1]?.value ?? 0) } : undefined;
+  return found
+    ? {
+        side: found.axes[0] ?? 0,
+        gas: Math.max(found.buttons[7]?.value ?? 0, found.buttons[0]?.value ?? 0),
+        brake: Math.max(found.buttons[6]?.value ?? 0, found.buttons[1]?.value ?? 0),
+      }
+    : undefined;
 }
 
 /** Seconds behind a ghost (negative: ahead), by where it was at the same place; and its step there. */
-export function behind(trace: number[][], pose: number[], clock: number, near: number): { seconds: number; step: number } {
+export function behind(
+  trace: number[][],
+  pose: number[],
+  clock: number,
+  near: number,
+): { seconds: number; step: number } {
   let [best, step] = [Infinity, near];
   for (let index = Math.max(0, near - 30); index < Math.min(trace.length, near + 60); index++) {
     const away = Math.hypot(trace[index]![0]! - pose[0]!, trace[index]![1]! - pose[1]!);

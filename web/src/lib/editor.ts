@@ -10,7 +10,12 @@ import { basicSetup } from "codemirror";
 import { t } from "../i18n/index.svelte";
 import { paramAt, PARAMS, type Param } from "./params";
 
-interface Mistake { line: number; column: number; severity: string; message: string }
+interface Mistake {
+  line: number;
+  column: number;
+  severity: string;
+  message: string;
+}
 
 const colours = HighlightStyle.define([
   { tag: [tags.keyword, tags.operatorKeyword, tags.bool, tags.null], color: "var(--accent)" },
@@ -38,7 +43,10 @@ function complete(context: CompletionContext) {
   if (!word) return null;
   const from = word.from + word.text.search(/\w*$/);
   const names = Object.keys(PARAMS) as Param[];
-  return { from, options: names.map((name) => ({ label: name, type: "property", detail: PARAMS[name], info: t(`param_${name}`) })) };
+  return {
+    from,
+    options: names.map((name) => ({ label: name, type: "property", detail: PARAMS[name], info: t(`param_${name}`) })),
+  };
 }
 
 /** What a key of params says, where the pointer rests on it. */
@@ -49,7 +57,11 @@ const explain = hoverTooltip((view, position) => {
   const create = () => {
     const dom = document.createElement("div");
     dom.className = "cm-param";
-    const [head, type, text] = [document.createElement("strong"), document.createElement("span"), document.createElement("p")];
+    const [head, type, text] = [
+      document.createElement("strong"),
+      document.createElement("span"),
+      document.createElement("p"),
+    ];
     [head.textContent, type.textContent, text.textContent] = [found.name, PARAMS[found.name], t(`param_${found.name}`)];
     dom.append(head, type, text);
     return { dom };

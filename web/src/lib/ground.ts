@@ -11,7 +11,14 @@ type Points = number[][];
 
 /** A band between two lines of the same number of points, to be seen from above whichever way they run. */
 function band(from: Points, to: Points, isClosed: boolean, height: number): three.BufferGeometry {
-  const positions = from.flatMap((point, index) => [point[0]!, point[1]!, height, to[index]![0]!, to[index]![1]!, height]);
+  const positions = from.flatMap((point, index) => [
+    point[0]!,
+    point[1]!,
+    height,
+    to[index]![0]!,
+    to[index]![1]!,
+    height,
+  ]);
   const indices: number[] = [];
   const last = isClosed ? from.length : from.length - 1;
   let area = 0; // m², negative where the other line is on the right
@@ -19,7 +26,10 @@ function band(from: Points, to: Points, isClosed: boolean, height: number): thre
     const next = (index + 1) % from.length;
     const [a, b] = [2 * index, 2 * next];
     indices.push(a, b, a + 1, b, b + 1, a + 1);
-    const [along, across] = [[from[next]![0]! - from[index]![0]!, from[next]![1]! - from[index]![1]!], [to[index]![0]! - from[index]![0]!, to[index]![1]! - from[index]![1]!]];
+    const [along, across] = [
+      [from[next]![0]! - from[index]![0]!, from[next]![1]! - from[index]![1]!],
+      [to[index]![0]! - from[index]![0]!, to[index]![1]! - from[index]![1]!],
+    ];
     area += along[0]! * across[1]! - along[1]! * across[0]!;
   }
   if (area < 0) indices.reverse();
@@ -69,4 +79,5 @@ export function roadGeometry({ inner, outer, center, is_closed: isClosed }: Trac
 }
 
 /** A disc of many triangles, as the haze is worked out at their corners. */
-export const fieldGeometry = (radius: number, color: number): three.BufferGeometry => paintGround(new three.RingGeometry(0, radius, 48, 16), color);
+export const fieldGeometry = (radius: number, color: number): three.BufferGeometry =>
+  paintGround(new three.RingGeometry(0, radius, 48, 16), color);

@@ -33,11 +33,22 @@ export function poseAt(lap: LapTrace, seconds: number): { x: number; y: number; 
   const jump = Math.hypot(lap.x[next]! - lap.x[row]!, lap.y[next]! - lap.y[row]!) > 1;
   const width = lap.time[next]! - lap.time[row]!;
   const share = jump || width <= 0 ? 0 : Math.min(Math.max((seconds - lap.time[row]!) / width, 0), 1);
-  const turn = Math.atan2(Math.sin(lap.heading[next]! - lap.heading[row]!), Math.cos(lap.heading[next]! - lap.heading[row]!));
+  const turn = Math.atan2(
+    Math.sin(lap.heading[next]! - lap.heading[row]!),
+    Math.cos(lap.heading[next]! - lap.heading[row]!),
+  );
   const heading = lap.heading[row]! + turn * share;
-  const [x, y] = [lap.x[row]! + (lap.x[next]! - lap.x[row]!) * share, lap.y[row]! + (lap.y[next]! - lap.y[row]!) * share];
+  const [x, y] = [
+    lap.x[row]! + (lap.x[next]! - lap.x[row]!) * share,
+    lap.y[row]! + (lap.y[next]! - lap.y[row]!) * share,
+  ];
   // a trace speaks of the point 0.14 m ahead of the car's middle
-  return { x: x - 0.14 * Math.cos(heading), y: y - 0.14 * Math.sin(heading), heading, share: interpolate(seconds, lap.time, lap.share) };
+  return {
+    x: x - 0.14 * Math.cos(heading),
+    y: y - 0.14 * Math.sin(heading),
+    heading,
+    share: interpolate(seconds, lap.time, lap.share),
+  };
 }
 
 /** Values of a column at equal shares of the lap, null beyond where it ended. */
@@ -57,7 +68,11 @@ export function timeDelta(lap: LapTrace, against: LapTrace): (number | null)[] {
 
 /** Laps from the fastest complete one on; those that were not completed by how far they came. */
 export const byPace = (laps: LapTrace[]): LapTrace[] =>
-  [...laps].sort((a, b) => Number(b.is_complete) - Number(a.is_complete) || (a.is_complete ? a.seconds - b.seconds : b.share.at(-1)! - a.share.at(-1)!));
+  [...laps].sort(
+    (a, b) =>
+      Number(b.is_complete) - Number(a.is_complete) ||
+      (a.is_complete ? a.seconds - b.seconds : b.share.at(-1)! - a.share.at(-1)!),
+  );
 
 export interface CornerRow {
   number: number;

@@ -16,11 +16,14 @@ export function fromSlider(choice: NumberChoice, place: number): number {
     const value = choice.low + share * (choice.high - choice.low);
     return choice.allowed.reduce((best, one) => (Math.abs(one - value) < Math.abs(best - value) ? one : best));
   }
-  const value = choice.is_logarithmic ? choice.low * (choice.high / choice.low) ** share : choice.low + share * (choice.high - choice.low);
+  const value = choice.is_logarithmic
+    ? choice.low * (choice.high / choice.low) ** share
+    : choice.low + share * (choice.high - choice.low);
   return choice.is_whole ? Math.round(value) : +value.toPrecision(choice.high > 0.9 && choice.low >= 0.5 ? 4 : 2);
 }
 
-export const isSafe = (choice: NumberChoice, value: number): boolean => value >= choice.safe_low * 0.999 && value <= choice.safe_high * 1.001;
+export const isSafe = (choice: NumberChoice, value: number): boolean =>
+  value >= choice.safe_low * 0.999 && value <= choice.safe_high * 1.001;
 
 /** Seconds until a limit of steps or time is reached; null where only skill counts. */
 export function estimate(until: string, pace: number): number | null {
@@ -30,7 +33,11 @@ export function estimate(until: string, pace: number): number | null {
     if (!match) continue;
     const amount = Number(match[1]!.replace(/[,_]/g, ""));
     const unit = match[2]!;
-    const seconds = unit.startsWith("step") ? (pace > 0 ? amount / pace : NaN) : amount * (unit.startsWith("h") ? 3600 : unit.startsWith("m") ? 60 : 1);
+    const seconds = unit.startsWith("step")
+      ? pace > 0
+        ? amount / pace
+        : NaN
+      : amount * (unit.startsWith("h") ? 3600 : unit.startsWith("m") ? 60 : 1);
     if (Number.isFinite(seconds)) found = found === null ? seconds : Math.min(found, seconds);
   }
   return found;

@@ -63,7 +63,10 @@ export function paintGround(geometry: three.BufferGeometry, color: number): thre
   const count = geometry.getAttribute("position").count;
   const tint = new three.Color(color).toArray();
   geometry.setAttribute("color", new three.Float32BufferAttribute(Array.from({ length: count }, () => tint).flat(), 3));
-  geometry.setAttribute("normal", new three.Float32BufferAttribute(Array.from({ length: count }, () => [0, 0, 1]).flat(), 3));
+  geometry.setAttribute(
+    "normal",
+    new three.Float32BufferAttribute(Array.from({ length: count }, () => [0, 0, 1]).flat(), 3),
+  );
   geometry.deleteAttribute("uv");
   return geometry;
 }

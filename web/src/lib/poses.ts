@@ -31,7 +31,12 @@ const pose = (row: number[]): Pose => ({
 
 /** A look with its cars where they were at a share of the way to it: whence they go on when the next look comes early. */
 export function halfway(before: Look | undefined, now: Look, share: number): Look {
-  const poses = between(before, now, share).map(({ x, y, heading }, car) => [x * 1000, y * 1000, heading * 1000, ...now.poses[car]!.slice(3)]);
+  const poses = between(before, now, share).map(({ x, y, heading }, car) => [
+    x * 1000,
+    y * 1000,
+    heading * 1000,
+    ...now.poses[car]!.slice(3),
+  ]);
   return { ...now, poses };
 }
 

@@ -77,7 +77,9 @@ export class Scene {
     this.sharpness = new Sharpness(finest, COARSEST, isSlow ? 0.85 : finest);
     this.renderer.setPixelRatio(this.sharpness.ratio);
     this.camera.up.set(0, 0, 1);
-    const box = new three.Box2().setFromPoints([...track.outer, ...track.inner].map(([x, y]) => new three.Vector2(x, y)));
+    const box = new three.Box2().setFromPoints(
+      [...track.outer, ...track.inner].map(([x, y]) => new three.Vector2(x, y)),
+    );
     const [center, extent] = [box.getCenter(new three.Vector2()), box.getSize(new three.Vector2())];
     this.middle.set(center.x, center.y, 0);
     this.size = Math.max(extent.x, extent.y * 1.5);
@@ -127,7 +129,13 @@ export class Scene {
     this.clearTrails();
     for (const { points, colors } of trails) {
       const geometry = new three.BufferGeometry();
-      geometry.setAttribute("position", new three.Float32BufferAttribute(points.flatMap(([x, y]) => [x!, y!, 4 * RISE]), 3));
+      geometry.setAttribute(
+        "position",
+        new three.Float32BufferAttribute(
+          points.flatMap(([x, y]) => [x!, y!, 4 * RISE]),
+          3,
+        ),
+      );
       const tints = colors.flatMap((css) => new three.Color(css).toArray() as number[]);
       geometry.setAttribute("color", new three.Float32BufferAttribute(tints, 3));
       this.trails.add(new three.Line(geometry, new three.LineBasicMaterial({ vertexColors: true })));
@@ -232,7 +240,12 @@ export class Scene {
       this.matrix.makeRotationZ(pose.heading).setPosition(pose.x, pose.y, 2 * RISE);
       this.cars.setMatrixAt(car, this.matrix);
       const tint = this.now?.tints?.[car];
-      this.cars.setColorAt(car, tint !== undefined ? colour.setHex(tint) : colour.setHSL(0.58 - 0.5 * Math.min(Math.max(pose.progress, 0), 1), 0.75, 0.55));
+      this.cars.setColorAt(
+        car,
+        tint !== undefined
+          ? colour.setHex(tint)
+          : colour.setHSL(0.58 - 0.5 * Math.min(Math.max(pose.progress, 0), 1), 0.75, 0.55),
+      );
     });
     leader = this.now?.focus ?? leader;
     this.cars.instanceMatrix.needsUpdate = true;

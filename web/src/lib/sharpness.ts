@@ -18,7 +18,11 @@ export class Sharpness {
   private fast = 0;
   private isTrying = false;
 
-  constructor(readonly finest: number, private readonly coarsest: number, start: number) {
+  constructor(
+    readonly finest: number,
+    private readonly coarsest: number,
+    start: number,
+  ) {
     this.ratio = Math.min(Math.max(start, coarsest), finest);
   }
 

@@ -1,7 +1,20 @@
 /** A road drawn by control points: the same centripetal cubic spline that the server draws, and what one does to points. */
-export interface ControlPoint { x: number; y: number; width: number }
-export interface Sketch { points: ControlPoint[]; is_closed: boolean }
-export interface Road { center: number[][]; left: number[][]; right: number[][]; length: number; pieces: number[] }
+export interface ControlPoint {
+  x: number;
+  y: number;
+  width: number;
+}
+export interface Sketch {
+  points: ControlPoint[];
+  is_closed: boolean;
+}
+export interface Road {
+  center: number[][];
+  left: number[][];
+  right: number[][];
+  length: number;
+  pieces: number[];
+}
 
 const STEP = 0.12; // m between samples
 
@@ -30,7 +43,10 @@ function solve(matrix: number[][], rhs: [number, number][]): [number, number][] 
 
 /** Second derivatives at the nodes. */
 function bends(points: [number, number][], steps: number[], isClosed: boolean): [number, number][] {
-  const slopes = steps.map((step, i) => [(points[i + 1]![0] - points[i]![0]) / step, (points[i + 1]![1] - points[i]![1]) / step]);
+  const slopes = steps.map((step, i) => [
+    (points[i + 1]![0] - points[i]![0]) / step,
+    (points[i + 1]![1] - points[i]![1]) / step,
+  ]);
   const first = isClosed ? 0 : 1;
   const size = isClosed ? steps.length : points.length - 2;
   const matrix = Array.from({ length: size }, () => new Array<number>(size).fill(0));
@@ -64,9 +80,13 @@ export function draw({ points, is_closed: isClosed }: Sketch): Road | undefined 
       const after = (step * sample) / count;
       const before = step - after;
       const at = (axis: 0 | 1) =>
-        (a[axis] * before ** 3 + b[axis] * after ** 3) / (6 * step) + (from[axis] / step - (a[axis] * step) / 6) * before + (to[axis] / step - (b[axis] * step) / 6) * after;
+        (a[axis] * before ** 3 + b[axis] * after ** 3) / (6 * step) +
+        (from[axis] / step - (a[axis] * step) / 6) * before +
+        (to[axis] / step - (b[axis] * step) / 6) * after;
       const along = (axis: 0 | 1) =>
-        (b[axis] * after ** 2 - a[axis] * before ** 2) / (2 * step) + (to[axis] - from[axis]) / step - ((b[axis] - a[axis]) * step) / 6;
+        (b[axis] * after ** 2 - a[axis] * before ** 2) / (2 * step) +
+        (to[axis] - from[axis]) / step -
+        ((b[axis] - a[axis]) * step) / 6;
       const [x, y, dx, dy] = [at(0), at(1), along(0), along(1)];
       const half = (ring[piece]!.width + (ring[piece + 1]!.width - ring[piece]!.width) * (sample / count)) / 2;
       const norm = Math.hypot(dx, dy) || 1;
@@ -78,14 +98,22 @@ export function draw({ points, is_closed: isClosed }: Sketch): Road | undefined 
       road.pieces.push(piece);
     }
   });
-  if (isClosed) road.length += Math.hypot(road.center[0]![0]! - road.center.at(-1)![0]!, road.center[0]![1]! - road.center.at(-1)![1]!);
+  if (isClosed)
+    road.length += Math.hypot(
+      road.center[0]![0]! - road.center.at(-1)![0]!,
+      road.center[0]![1]! - road.center.at(-1)![1]!,
+    );
   return road;
 }
 
 const round = (value: number, to = 0.01) => Math.round(value / to) * to;
 
 /** Points rounded to a centimetre, as the table shows them. */
-export const tidy = (point: ControlPoint): ControlPoint => ({ x: +round(point.x).toFixed(2), y: +round(point.y).toFixed(2), width: +round(point.width).toFixed(2) });
+export const tidy = (point: ControlPoint): ControlPoint => ({
+  x: +round(point.x).toFixed(2),
+  y: +round(point.y).toFixed(2),
+  width: +round(point.width).toFixed(2),
+});
 
 export const middle = (points: ControlPoint[]): [number, number] => {
   const [xs, ys] = [points.map((point) => point.x), points.map((point) => point.y)];
@@ -105,7 +133,13 @@ export const reverse = ({ points, is_closed: isClosed }: Sketch): ControlPoint[]
 export function turn(points: ControlPoint[], angle: number): ControlPoint[] {
   const [x, y] = middle(points);
   const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
-  return points.map((point) => tidy({ ...point, x: x + (point.x - x) * cos - (point.y - y) * sin, y: y + (point.x - x) * sin + (point.y - y) * cos }));
+  return points.map((point) =>
+    tidy({
+      ...point,
+      x: x + (point.x - x) * cos - (point.y - y) * sin,
+      y: y + (point.x - x) * sin + (point.y - y) * cos,
+    }),
+  );
 }
 
 /** Larger or smaller; the road keeps its width. */
@@ -150,4 +184,13 @@ export function simplify(line: number[][], width: number, tolerance = 0.12): Con
 
 /** A circuit to begin with. */
 export const oval = (width = 0.9): ControlPoint[] =>
-  [[0, -2.2], [3.4, -2.2], [5.2, 0], [3.4, 2.2], [0, 1.7], [-3.4, 2.2], [-5.2, 0], [-3.4, -2.2]].map(([x, y]) => ({ x: x!, y: y!, width }));
+  [
+    [0, -2.2],
+    [3.4, -2.2],
+    [5.2, 0],
+    [3.4, 2.2],
+    [0, 1.7],
+    [-3.4, 2.2],
+    [-5.2, 0],
+    [-3.4, -2.2],
+  ].map(([x, y]) => ({ x: x!, y: y!, width }));

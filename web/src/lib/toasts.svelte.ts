@@ -20,7 +20,13 @@ export function say(text: string, action?: Toast["action"]): void {
 
 export function fail(error: unknown): void {
   const hint = error instanceof Problem ? error.hint : "";
-  toasts.push({ id: next++, text: error instanceof Error ? error.message : String(error), hint, isError: true, action: undefined });
+  toasts.push({
+    id: next++,
+    text: error instanceof Error ? error.message : String(error),
+    hint,
+    isError: true,
+    action: undefined,
+  });
 }
 
 export function close(id: number): void {

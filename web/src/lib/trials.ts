@@ -11,7 +11,9 @@ export function ranked(trials: TuningTrial[]): TuningTrial[] {
 
 /** The trial with the numbers that the model has. */
 export function yours(search: TuningCard): TuningTrial | undefined {
-  return search.trials.find((trial) => trial.value !== null && search.space.every((number) => trial.params[number.name] === number.default));
+  return search.trials.find(
+    (trial) => trial.value !== null && search.space.every((number) => trial.params[number.name] === number.default),
+  );
 }
 
 /** What each completed trial came to, and the best until then. */

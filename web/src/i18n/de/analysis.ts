@@ -4,7 +4,8 @@ import type { analysis as english } from "../en/analysis";
 export const analysis: Record<keyof typeof english, string> = {
   analysis: "Untersuchen",
   maps: "Wo es geschah",
-  maps_lead: "Alle Schritte des Trainings auf der Strecke: was gezahlt wurde, wie schnell, welche Aktion, wo Episoden endeten.",
+  maps_lead:
+    "Alle Schritte des Trainings auf der Strecke: was gezahlt wurde, wie schnell, welche Aktion, wo Episoden endeten.",
   maps_none: "Noch keine Aufzeichnung: Trainiere das Modell zuerst.",
   maps_all: "Das ganze Training",
   maps_of_all: "{count} Iterationen",

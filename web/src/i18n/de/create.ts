@@ -63,7 +63,8 @@ export const create: Record<keyof typeof english, string> = {
   learning_reset: "Zurück zur Vorgabe",
   algorithm: "Verfahren",
   algorithm_lead: "Wie die Strategie besser wird.",
-  algorithm_distill: "Ein Lehrer, der den wahren Zustand sieht, findet die schnelle Linie; das Auto lernt sie von ihm mit seiner Kamera.",
+  algorithm_distill:
+    "Ein Lehrer, der den wahren Zustand sieht, findet die schnelle Linie; das Auto lernt sie von ihm mit seiner Kamera.",
   algorithm_sac: "SAC lernt aus allem, was je gefahren wurde; es braucht stetige Aktionen, die jetzt eingestellt sind.",
   network: "Netz",
   network_lead: "Größere lernen langsamer; die von AWS passen zu seinem Auto.",
@@ -75,17 +76,22 @@ export const create: Record<keyof typeof english, string> = {
   hp_safe: "Sicher: {low} bis {high}.",
   hp_unsafe: "Außerhalb des Sicheren: {low} bis {high}. Sieh oft nach den Kurven.",
   hp_lr: "Lernrate",
-  hp_lr_lead: "Wie weit jeder Schritt das Netz bewegt. Mehr lernt schneller, verlernt aber auch plötzlich; weniger ist langsam und stetig.",
+  hp_lr_lead:
+    "Wie weit jeder Schritt das Netz bewegt. Mehr lernt schneller, verlernt aber auch plötzlich; weniger ist langsam und stetig.",
   hp_beta_entropy: "Entropie-Bonus",
-  hp_beta_entropy_lead: "Was das Auto fürs Ausprobieren verdient. Mehr probiert länger; zu wenig, und es bleibt beim Ersten, was klappt.",
+  hp_beta_entropy_lead:
+    "Was das Auto fürs Ausprobieren verdient. Mehr probiert länger; zu wenig, und es bleibt beim Ersten, was klappt.",
   hp_discount_factor: "Diskontfaktor",
-  hp_discount_factor_lead: "Wie viel spätere Belohnung zählt. 0,98 blickt etwa 3 s voraus, 0,999 eine Minute: Weiter sieht mehr und schwankt mehr.",
+  hp_discount_factor_lead:
+    "Wie viel spätere Belohnung zählt. 0,98 blickt etwa 3 s voraus, 0,999 eine Minute: Weiter sieht mehr und schwankt mehr.",
   hp_num_epochs: "Epochen",
   hp_num_epochs_lead: "Wie oft aus jeder Erfahrung gelernt wird. Mehr holt mehr heraus, bis sie auswendig gelernt ist.",
   hp_batch_size: "Batchgröße",
-  hp_batch_size_lead: "Erfahrungen in einem Lernschritt. Mehr ist ruhiger und langsamer; weniger ist schnell und unruhig.",
+  hp_batch_size_lead:
+    "Erfahrungen in einem Lernschritt. Mehr ist ruhiger und langsamer; weniger ist schnell und unruhig.",
   hp_num_episodes_between_training: "Episoden zwischen den Trainings",
-  hp_num_episodes_between_training_lead: "Wie viel gefahren wird, bevor daraus gelernt wird. Mehr ist stetiger, weniger anfangs schneller.",
+  hp_num_episodes_between_training_lead:
+    "Wie viel gefahren wird, bevor daraus gelernt wird. Mehr ist stetiger, weniger anfangs schneller.",
   hp_loss_type: "Verlust",
   hp_loss_type_lead: "Wie Fehler der Vorhersage zählen: huber verzeiht große, der mittlere quadratische Fehler nicht.",
   paint_laps: "Entlang der letzten Runden malen von",
@@ -107,7 +113,8 @@ export const create: Record<keyof typeof english, string> = {
   reverse: "Andersherum",
   alternate: "Abwechselnd beide",
   actions: "Aktionen",
-  actions_lead: "Was das Auto 15-mal in der Sekunde tun kann. Jeder Pfeil ist eine Aktion: die Richtung der Lenkwinkel, die Länge das Tempo.",
+  actions_lead:
+    "Was das Auto 15-mal in der Sekunde tun kann. Jeder Pfeil ist eine Aktion: die Richtung der Lenkwinkel, die Länge das Tempo.",
   steering: "Lenkung",
   speed: "Tempo",
   degrees: "Grad",

@@ -8,7 +8,8 @@ export const draw: Record<keyof typeof english, string> = {
   draw_free_mode: "In einem Zug",
   draw_pan_mode: "Ansicht bewegen",
   draw_free_hint: "Drücken, eine Runde zeichnen, loslassen.",
-  draw_canvas: "Zeichnung der Strecke. Punkte lassen sich mit den Pfeiltasten bewegen; Umschalt bewegt weiter, Einfg fügt einen Punkt hinzu, Entf nimmt einen weg.",
+  draw_canvas:
+    "Zeichnung der Strecke. Punkte lassen sich mit den Pfeiltasten bewegen; Umschalt bewegt weiter, Einfg fügt einen Punkt hinzu, Entf nimmt einen weg.",
   draw_point: "Punkt {number}: {x}, {y}, {width} m breit",
   draw_width_all: "Breite der Straße",
   draw_width_here: "Breite an Punkt {number}",

@@ -16,4 +16,20 @@ import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
 
-export const de: Record<Key, string> = { ...shell, ...replay, ...analysis, ...create, ...params, ...presets, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings };
+export const de: Record<Key, string> = {
+  ...shell,
+  ...replay,
+  ...analysis,
+  ...create,
+  ...params,
+  ...presets,
+  ...watch,
+  ...tune,
+  ...garage,
+  ...evaluation,
+  ...tracks,
+  ...draw,
+  ...drive,
+  ...races,
+  ...settings,
+};

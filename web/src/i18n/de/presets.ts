@@ -4,16 +4,24 @@ import type { presets as english } from "../en/presets";
 export const presets: Record<keyof typeof english, string> = {
   preset_anti_zigzag: "Der Mittellinie folgen, ohne zu pendeln: Starkes Lenken kostet ein Fünftel der Belohnung.",
   preset_centerline: "Der Mittellinie folgen: je näher, desto besser. Das ist die übliche Belohnung des Originals.",
-  preset_dodge: "Zwischen Kisten und anderen Autos fahren: Jeder Meter zählt, weniger, je mehr das nächste Hindernis im Weg steht.",
+  preset_dodge:
+    "Zwischen Kisten und anderen Autos fahren: Jeder Meter zählt, weniger, je mehr das nächste Hindernis im Weg steht.",
   preset_duel: "Zu zweit fahren: Es zählt jeder wirklich gewonnene Meter, und Fehler sind teurer als allein.",
-  preset_heading: "Das Auto entlang der Strecke ausrichten: Bei mehr als zehn Grad Abweichung geht die halbe Belohnung verloren.",
-  preset_lap_time: "Gegen die Uhr: Es zählt jeder Meter der Runde, den das Auto seit dem letzten Schritt wirklich gewonnen hat.",
-  preset_object_avoidance: "Auf der Straße bleiben und Kisten und Autos ausweichen: Die Lücke voraus zählt mehr als die Spur.",
-  preset_overtake: "Überholen: weiterfahren, die Spur des Autos voraus meiden und für jeden Meter bezahlt werden, der aufgeholt ist.",
-  preset_progress_pace: "In weniger Schritten ankommen: alle hundert Schritte ein Zuschlag für ein Auto, das vor dem Zieltempo liegt.",
-  preset_racing: "Rennen: Jeder Meter entlang der Strecke in diesem Schritt zählt. Lernt schnell und lernt, schnell zu fahren.",
+  preset_heading:
+    "Das Auto entlang der Strecke ausrichten: Bei mehr als zehn Grad Abweichung geht die halbe Belohnung verloren.",
+  preset_lap_time:
+    "Gegen die Uhr: Es zählt jeder Meter der Runde, den das Auto seit dem letzten Schritt wirklich gewonnen hat.",
+  preset_object_avoidance:
+    "Auf der Straße bleiben und Kisten und Autos ausweichen: Die Lücke voraus zählt mehr als die Spur.",
+  preset_overtake:
+    "Überholen: weiterfahren, die Spur des Autos voraus meiden und für jeden Meter bezahlt werden, der aufgeholt ist.",
+  preset_progress_pace:
+    "In weniger Schritten ankommen: alle hundert Schritte ein Zuschlag für ein Auto, das vor dem Zieltempo liegt.",
+  preset_racing:
+    "Rennen: Jeder Meter entlang der Strecke in diesem Schritt zählt. Lernt schnell und lernt, schnell zu fahren.",
   preset_speed_gate: "Auf der Strecke bleiben und nicht trödeln: Unter einem Mindesttempo ist die halbe Belohnung weg.",
-  preset_stay_inside: "Innerhalb der Ränder bleiben: Jede Linie ist recht, solange alle Räder mit etwas Luft auf der Straße sind.",
+  preset_stay_inside:
+    "Innerhalb der Ränder bleiben: Jede Linie ist recht, solange alle Räder mit etwas Luft auf der Straße sind.",
   space_default: "Fünf Lenkwinkel bei 1 und 2 m/s: lernt in Sekunden.",
   space_aws: "Wie bei AWS: fünf Lenkwinkel bei 0,5 und 1 m/s.",
   space_fast: "Sieben Lenkwinkel bei bis zu 4 m/s: für Rekorde.",

@@ -6,7 +6,8 @@ export const replay: Record<keyof typeof english, string> = {
   camera: "Kamera",
   camera_driver: "Fahrersicht",
   replay: "Wiederholung",
-  replay_lead: "Zieh am Regler oder klick in eine Kurve: Autos, Linie und Kurven zeigen denselben Moment. Mit Geistern wird es ein Rennen.",
+  replay_lead:
+    "Zieh am Regler oder klick in eine Kurve: Autos, Linie und Kurven zeigen denselben Moment. Mit Geistern wird es ein Rennen.",
   ghosts: "Gezeigte Autos",
   ghost_add: "Geist dazu",
   ghost_remove: "Geist entfernen",

@@ -27,7 +27,8 @@ export const settings: Record<keyof typeof english, string> = {
   settings_sandbox: "Belohnungscode",
   settings_sandbox_level: "Geltende Stufe",
   settings_sandbox_process: "Eigener Prozess",
-  settings_sandbox_process_lead: "Belohnungsfunktionen laufen in einem getrennten, kargen Python mit Grenzen für Speicher und Zeit. Netz, Programme und Schreiben in Dateien werden dort verweigert. Das hält Fehler und achtlosen Code auf; eine Mauer gegen böse Absicht ist es nicht. Lass also nur Code laufen, den du gelesen hast oder dessen Verfasser du traust.",
+  settings_sandbox_process_lead:
+    "Belohnungsfunktionen laufen in einem getrennten, kargen Python mit Grenzen für Speicher und Zeit. Netz, Programme und Schreiben in Dateien werden dort verweigert. Das hält Fehler und achtlosen Code auf; eine Mauer gegen böse Absicht ist es nicht. Lass also nur Code laufen, den du gelesen hast oder dessen Verfasser du traust.",
   settings_keys: "Tasten",
   settings_keys_drive: "Lenken, fahren, bremsen",
   settings_keys_draw: "Einen Punkt bewegen; mit Umschalt weiter",

@@ -24,7 +24,8 @@ export const tracks: Record<keyof typeof english, string> = {
   tracks_draw: "Strecke zeichnen",
   tracks_import: "Datei einlesen",
   tracks_imported: "{name} wurde eingelesen.",
-  tracks_import_hint: "Eine AWS-Route (.npy) oder eine Mittellinie mit Breiten (.csv), höchstens 2 MB. Du kannst sie auch hierher ziehen.",
+  tracks_import_hint:
+    "Eine AWS-Route (.npy) oder eine Mittellinie mit Breiten (.csv), höchstens 2 MB. Du kannst sie auch hierher ziehen.",
   tracks_drop: "Streckendatei hier ablegen",
   tracks_drive: "Fahren",
   tracks_edit: "Bearbeiten",

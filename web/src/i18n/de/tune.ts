@@ -3,7 +3,8 @@ import type { tune as english } from "../en/tune";
 
 export const tune: Record<keyof typeof english, string> = {
   tune: "Abstimmen",
-  tune_lead: "Kurze Trainings probieren andere Zahlen, jedes etwas klüger als das vorige. Dein Modell bleibt, wie es ist; ein Versuch, der dir gefällt, wird ein neues.",
+  tune_lead:
+    "Kurze Trainings probieren andere Zahlen, jedes etwas klüger als das vorige. Dein Modell bleibt, wie es ist; ein Versuch, der dir gefällt, wird ein neues.",
   tune_what: "Was sich ändern darf",
   tune_constants: "Konstanten der Belohnung",
   tune_hyperparameters: "Hyperparameter",
@@ -39,7 +40,8 @@ export const tune: Record<keyof typeof english, string> = {
   tune_y_laps: "Schritte bis zu den ganzen Runden",
   tune_y_lap_time: "Rundenzeit, s",
   tune_mattered: "Worauf es ankam",
-  tune_mattered_lead: "Wie viel vom Unterschied zwischen guten Versuchen und den übrigen mit jeder Zahl einhergeht. Bei wenigen Versuchen ist das ein Hinweis und kein Beweis.",
+  tune_mattered_lead:
+    "Wie viel vom Unterschied zwischen guten Versuchen und den übrigen mit jeder Zahl einhergeht. Bei wenigen Versuchen ist das ein Hinweis und kein Beweis.",
   tune_mattered_not_yet: "Es sind noch zu wenige Versuche beendet, um zu sagen, worauf es ankam.",
   tune_number: "Zahl",
   tune_share: "Anteil",

@@ -3,8 +3,10 @@ import type { watch as english } from "../en/watch";
 
 export const watch: Record<keyof typeof english, string> = {
   hints: "Was die Kurven sagen",
-  hint_kl: "Jeder Lernschritt ändert die Strategie zu sehr. Eine kleinere Lernrate oder weniger Epochen machen sie stetiger.",
-  hint_forgot: "Es konnte schon mehr. Der beste Stand ist aufgehoben; weiter mit kleinerer Lernrate, oder hier aufhören.",
+  hint_kl:
+    "Jeder Lernschritt ändert die Strategie zu sehr. Eine kleinere Lernrate oder weniger Epochen machen sie stetiger.",
+  hint_forgot:
+    "Es konnte schon mehr. Der beste Stand ist aufgehoben; weiter mit kleinerer Lernrate, oder hier aufhören.",
   evidence_entropy: "die Entropie ist {now} von höchstens {most}, bei {completion} geschafft",
   evidence_value: "der Verlust der Vorhersage ging von {before} auf {after}",
   evidence_exploit: "die Belohnung ging von {r0} auf {r1}, geschafft wurden {c0}, dann {c1}",
@@ -56,10 +58,13 @@ export const watch: Record<keyof typeof english, string> = {
   log: "Protokoll",
   log_best: "Neues bestes Modell: {laps} von {trials} Runden, {completion}{lap}",
   log_evaluation: "Auswertung: {laps} von {trials} Runden, {completion}{lap}",
-  hint_entropy: "Das Auto hat sich zu früh festgelegt: Es probiert kaum noch Neues. Ein größerer Entropie-Bonus oder ein neuer Anfang hilft.",
+  hint_entropy:
+    "Das Auto hat sich zu früh festgelegt: Es probiert kaum noch Neues. Ein größerer Entropie-Bonus oder ein neuer Anfang hilft.",
   hint_value: "Die Vorhersage der Belohnung läuft davon. Kleinere Belohnungen oder eine kleinere Lernrate helfen.",
-  hint_exploit: "Die Belohnung steigt, aber das Auto kommt nicht weiter: Es wird bezahlt, ohne zu fahren. Sieh dir an, wofür die Belohnung zahlt.",
-  hint_stuck: "Das Auto verlässt die Strecke immer noch früh. Langsamere Aktionen oder eine breitere Strecke erleichtern den Anfang.",
+  hint_exploit:
+    "Die Belohnung steigt, aber das Auto kommt nicht weiter: Es wird bezahlt, ohne zu fahren. Sieh dir an, wofür die Belohnung zahlt.",
+  hint_stuck:
+    "Das Auto verlässt die Strecke immer noch früh. Langsamere Aktionen oder eine breitere Strecke erleichtern den Anfang.",
   evidence: "Beleg",
   failed: "Das Training ist fehlgeschlagen",
 };

@@ -73,17 +73,22 @@ export const create = {
   hp_safe: "Safe: {low} to {high}.",
   hp_unsafe: "Outside of what is safe: {low} to {high}. Look at the curves often.",
   hp_lr: "Learning rate",
-  hp_lr_lead: "How far every update moves the network. More learns faster but may unlearn suddenly; less is slow and steady.",
+  hp_lr_lead:
+    "How far every update moves the network. More learns faster but may unlearn suddenly; less is slow and steady.",
   hp_beta_entropy: "Entropy bonus",
-  hp_beta_entropy_lead: "What the car earns for trying things. More explores longer; too little, and it settles on the first thing that works.",
+  hp_beta_entropy_lead:
+    "What the car earns for trying things. More explores longer; too little, and it settles on the first thing that works.",
   hp_discount_factor: "Discount factor",
-  hp_discount_factor_lead: "How much later rewards count. 0.98 looks about 3 s ahead, 0.999 a minute: farther sees more, and is noisier.",
+  hp_discount_factor_lead:
+    "How much later rewards count. 0.98 looks about 3 s ahead, 0.999 a minute: farther sees more, and is noisier.",
   hp_num_epochs: "Epochs",
-  hp_num_epochs_lead: "How often each experience is learned from. More gets more out of it, until it is learned by heart.",
+  hp_num_epochs_lead:
+    "How often each experience is learned from. More gets more out of it, until it is learned by heart.",
   hp_batch_size: "Batch size",
   hp_batch_size_lead: "Experiences in one update. More is smoother and slower; fewer are quick and noisy.",
   hp_num_episodes_between_training: "Episodes between trainings",
-  hp_num_episodes_between_training_lead: "How much is driven before it is learned from. More is steadier, fewer is quicker at the beginning.",
+  hp_num_episodes_between_training_lead:
+    "How much is driven before it is learned from. More is steadier, fewer is quicker at the beginning.",
   hp_loss_type: "Loss",
   hp_loss_type_lead: "How mistakes of the forecast count: huber forgives large ones, the mean squared error does not.",
   paint_laps: "Paint it along the last laps of",
@@ -105,7 +110,8 @@ export const create = {
   reverse: "The other way",
   alternate: "Both in turn",
   actions: "Actions",
-  actions_lead: "What the car can do 15 times a second. Each arrow is one action: its direction the steering, its length the speed.",
+  actions_lead:
+    "What the car can do 15 times a second. Each arrow is one action: its direction the steering, its length the speed.",
   steering: "Steering",
   speed: "Speed",
   degrees: "degrees",

@@ -6,7 +6,8 @@ export const draw = {
   draw_free_mode: "Draw in one go",
   draw_pan_mode: "Move the view",
   draw_free_hint: "Press, draw one lap and let go.",
-  draw_canvas: "Drawing of the track. Points can be moved with the arrow keys; Shift moves further, Insert adds a point, Delete takes one away.",
+  draw_canvas:
+    "Drawing of the track. Points can be moved with the arrow keys; Shift moves further, Insert adds a point, Delete takes one away.",
   draw_point: "Point {number}: {x}, {y}, {width} m wide",
   draw_width_all: "Width of the road",
   draw_width_here: "Width at point {number}",

@@ -15,6 +15,22 @@ import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
 
-export const en = { ...shell, ...replay, ...analysis, ...create, ...params, ...presets, ...watch, ...tune, ...garage, ...evaluation, ...tracks, ...draw, ...drive, ...races, ...settings } as const;
+export const en = {
+  ...shell,
+  ...replay,
+  ...analysis,
+  ...create,
+  ...params,
+  ...presets,
+  ...watch,
+  ...tune,
+  ...garage,
+  ...evaluation,
+  ...tracks,
+  ...draw,
+  ...drive,
+  ...races,
+  ...settings,
+} as const;
 
 export type Key = keyof typeof en;

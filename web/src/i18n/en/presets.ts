@@ -2,16 +2,22 @@
 export const presets = {
   preset_anti_zigzag: "Follow the centre line without zigzagging: hard steering costs a fifth of the reward.",
   preset_centerline: "Follow the centre line: the closer, the better. This is the platform's default reward.",
-  preset_dodge: "Race among boxes and other cars: pay for every metre, less the more squarely the next object stands in the way.",
+  preset_dodge:
+    "Race among boxes and other cars: pay for every metre, less the more squarely the next object stands in the way.",
   preset_duel: "Race head to head: pay for every metre really gained, and make mistakes dearer than they are alone.",
   preset_heading: "Point the car along the track: half of the reward is lost when it looks more than ten degrees away.",
-  preset_lap_time: "Race against the clock: pay for every metre of the lap that the car really gained since the last step.",
-  preset_object_avoidance: "Keep to the road and out of the way of boxes and other cars: the gap ahead counts more than the lane.",
+  preset_lap_time:
+    "Race against the clock: pay for every metre of the lap that the car really gained since the last step.",
+  preset_object_avoidance:
+    "Keep to the road and out of the way of boxes and other cars: the gap ahead counts more than the lane.",
   preset_overtake: "Overtake: race on, keep out of the lane of a car ahead, and be paid for the metres gained on it.",
-  preset_progress_pace: "Finish in fewer steps: a bonus every hundred steps for a car that is ahead of the target pace.",
-  preset_racing: "Race: pay for every metre gained along the track in this step. Learns fast, and learns to drive fast.",
+  preset_progress_pace:
+    "Finish in fewer steps: a bonus every hundred steps for a car that is ahead of the target pace.",
+  preset_racing:
+    "Race: pay for every metre gained along the track in this step. Learns fast, and learns to drive fast.",
   preset_speed_gate: "Stay on the track and do not dawdle: below a speed threshold half of the reward is gone.",
-  preset_stay_inside: "Stay inside the borders: any line will do, as long as all wheels are on the road with room to spare.",
+  preset_stay_inside:
+    "Stay inside the borders: any line will do, as long as all wheels are on the road with room to spare.",
   space_default: "Five steering angles at 1 and 2 m/s: learns in seconds.",
   space_aws: "AWS's own: five steering angles at 0.5 and 1 m/s.",
   space_fast: "Seven steering angles at up to 4 m/s: for records.",

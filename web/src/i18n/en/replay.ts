@@ -4,7 +4,8 @@ export const replay = {
   camera: "Camera",
   camera_driver: "Driver",
   replay: "Replay",
-  replay_lead: "Scrub, or click into a graph: cars, line and graphs show the same moment. Add ghosts to race a lap against.",
+  replay_lead:
+    "Scrub, or click into a graph: cars, line and graphs show the same moment. Add ghosts to race a lap against.",
   ghosts: "Cars shown",
   ghost_add: "Add a ghost",
   ghost_remove: "Remove the ghost",

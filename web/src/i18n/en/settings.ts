@@ -25,7 +25,8 @@ export const settings = {
   settings_sandbox: "Reward code",
   settings_sandbox_level: "Level in force",
   settings_sandbox_process: "Process of its own",
-  settings_sandbox_process_lead: "Reward functions run in a separate, bare Python with limits on memory and time. Networks, programs and writing to files are refused there. This stops mistakes and careless code; it is no wall against somebody who means harm, so run only code that you have read or whose author you trust.",
+  settings_sandbox_process_lead:
+    "Reward functions run in a separate, bare Python with limits on memory and time. Networks, programs and writing to files are refused there. This stops mistakes and careless code; it is no wall against somebody who means harm, so run only code that you have read or whose author you trust.",
   settings_keys: "Keys",
   settings_keys_drive: "Steer, go, brake",
   settings_keys_draw: "Move a point; with Shift further",

@@ -22,7 +22,8 @@ export const tracks = {
   tracks_draw: "Draw a track",
   tracks_import: "Import a file",
   tracks_imported: "{name} was imported.",
-  tracks_import_hint: "An AWS route (.npy) or a centre line with widths (.csv), at most 2 MB. You can also drop it here.",
+  tracks_import_hint:
+    "An AWS route (.npy) or a centre line with widths (.csv), at most 2 MB. You can also drop it here.",
   tracks_drop: "Drop the track file here",
   tracks_drive: "Drive",
   tracks_edit: "Edit",

@@ -1,7 +1,8 @@
 /** Searching better numbers. */
 export const tune = {
   tune: "Tune",
-  tune_lead: "Short trainings try other numbers, each a little wiser than the last. Your model stays as it is; a trial that you like becomes a new one.",
+  tune_lead:
+    "Short trainings try other numbers, each a little wiser than the last. Your model stays as it is; a trial that you like becomes a new one.",
   tune_what: "What may change",
   tune_constants: "Constants of the reward",
   tune_hyperparameters: "Hyperparameters",
@@ -37,7 +38,8 @@ export const tune = {
   tune_y_laps: "Steps until the laps are completed",
   tune_y_lap_time: "Lap time, s",
   tune_mattered: "What mattered",
-  tune_mattered_lead: "How much of the difference between good trials and the rest goes with each number. With few trials that is a hint and no proof.",
+  tune_mattered_lead:
+    "How much of the difference between good trials and the rest goes with each number. With few trials that is a hint and no proof.",
   tune_mattered_not_yet: "Too few trials have ended to say what mattered.",
   tune_number: "Number",
   tune_share: "Share",

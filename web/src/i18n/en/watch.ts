@@ -2,7 +2,8 @@
 export const watch = {
   hints: "What the curves say",
   hint_kl: "Every update changes the policy too much. A smaller learning rate or fewer epochs make it steadier.",
-  hint_forgot: "It could do better before. The best checkpoint is kept; go on with a smaller learning rate, or stop here.",
+  hint_forgot:
+    "It could do better before. The best checkpoint is kept; go on with a smaller learning rate, or stop here.",
   evidence_entropy: "the entropy is {now} of at most {most}, at a completion of {completion}",
   evidence_value: "the value loss went from {before} to {after}",
   evidence_exploit: "the reward went from {r0} to {r1}, the completion from {c0} to {c1}",
@@ -54,9 +55,11 @@ export const watch = {
   log: "Log",
   log_best: "New best: {laps} of {trials} laps, {completion}{lap}",
   log_evaluation: "Evaluation: {laps} of {trials} laps, {completion}{lap}",
-  hint_entropy: "The car has made up its mind too early: it hardly tries anything new. A larger entropy bonus, or a fresh start, helps.",
+  hint_entropy:
+    "The car has made up its mind too early: it hardly tries anything new. A larger entropy bonus, or a fresh start, helps.",
   hint_value: "The forecast of future reward is running away. Smaller rewards or a smaller learning rate help.",
-  hint_exploit: "The reward rises, but the car gets no further: it has found a way to be paid without driving. Look at what the reward pays for.",
+  hint_exploit:
+    "The reward rises, but the car gets no further: it has found a way to be paid without driving. Look at what the reward pays for.",
   hint_stuck: "The car still leaves the track early. Slower actions or a wider track make the beginning easier.",
   evidence: "Evidence",
   failed: "The training failed",

@@ -1,0 +1,73 @@
+/** What a person chose for a new model, and the request that it becomes. */
+import type { ActionPreset, Choices, NewModel, RewardPreset } from "../api/client";
+import { metadataOf, sameSpace } from "./actions";
+
+export type Learning = "learning_fast" | "learning_aws";
+export type Numbers = Record<string, number | string>;
+
+export interface Wishes {
+  name: string;
+  track: string;
+  direction: "forward" | "reverse" | "alternate";
+  space: ActionPreset;
+  sensors: string[]; // none: the front camera
+  source: string;
+  until: string;
+  seed: number;
+  vehicle: string;
+  network: string;
+  algorithm: string;
+  critic: string;
+  randomize: string;
+  race: string;
+  objects: number;
+  botSpeed: number;
+  laneChanges: boolean;
+  learning: Learning;
+  tuned: Numbers;
+}
+
+export interface Known {
+  rewards: RewardPreset[];
+  spaces: ActionPreset[];
+  choices: Choices | undefined;
+}
+
+/** The numbers that learning begins with unless they are changed. */
+export const defaultsOf = (learning: Learning, choices: Choices | undefined): Numbers | undefined =>
+  (learning === "learning_aws" ? choices?.aws : choices?.fast) as Numbers | undefined;
+
+/** The preset that a space is equal to, whatever it was made from. */
+export const presetOf = (space: ActionPreset | undefined, spaces: ActionPreset[]): ActionPreset | undefined =>
+  space && spaces.find((preset) => sameSpace(preset, space));
+
+/** Presets travel by name, the rest as AWS's documents; what is not chosen is left to the server. */
+export function newModel(wishes: Wishes, known: Known): NewModel {
+  const { name, track, direction, until, seed, vehicle, network, algorithm, critic, randomize, race } = wishes;
+  const reward = known.rewards.find((preset) => preset.source === wishes.source)?.name ?? wishes.source;
+  return {
+    ...(name ? { name } : {}),
+    ...{ track, direction, until, seed, vehicle, network, algorithm, critic, randomize, race, reward },
+    ...actionsOf(wishes, known),
+    ...(race === "time-trial" ? {} : { objects: wishes.objects }),
+    ...(race === "head-to-bot" ? { bot_speed: wishes.botSpeed, lane_changes: wishes.laneChanges } : {}),
+    ...numbersOf(wishes, known),
+  };
+}
+
+function actionsOf({ space, sensors }: Wishes, { spaces }: Known): Partial<NewModel> {
+  const preset = presetOf(space, spaces);
+  if (preset) return { actions: preset.name, ...(sensors.length ? { sensors } : {}) };
+  const sensor = sensors.length ? sensors : ["FRONT_FACING_CAMERA"];
+  return { model_metadata: { ...metadataOf(space), sensor, neural_network: "RACECRAFT_SMALL", version: "5" } };
+}
+
+function numbersOf({ algorithm, learning, tuned }: Wishes, { choices }: Known): Partial<NewModel> {
+  if (algorithm !== "ppo") return {};
+  const defaults = defaultsOf(learning, choices) ?? {};
+  const changed = Object.fromEntries(
+    Object.entries(tuned).filter(([key, value]) => key in defaults && defaults[key] !== value),
+  );
+  if (learning === "learning_aws") return { hyperparameters: { ...choices?.aws, ...changed } };
+  return Object.keys(changed).length ? { tuning: changed } : {};
+}

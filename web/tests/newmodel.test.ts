@@ -1,0 +1,95 @@
+import { describe, expect, it } from "vitest";
+import type { ActionPreset, Choices } from "../src/api/client";
+import { newModel, type Known, type Wishes } from "../src/lib/newmodel";
+
+const space: ActionPreset = {
+  name: "default",
+  description: "",
+  kind: "discrete",
+  actions: [
+    { steering_angle: -30, speed: 1 },
+    { steering_angle: 30, speed: 1 },
+  ],
+  steering_angle: null,
+  speed: null,
+};
+const known: Known = {
+  rewards: [{ name: "racing", description: "", source: "def reward_function(params): ..." }],
+  spaces: [space],
+  choices: { fast: { lr: 1e-3 }, aws: { lr: 3e-4, batch_size: 64 } } as unknown as Choices,
+};
+const wishes: Wishes = {
+  name: "",
+  track: "oval",
+  direction: "forward",
+  space,
+  sensors: [],
+  source: known.rewards[0]!.source,
+  until: "5 laps",
+  seed: 7,
+  vehicle: "",
+  network: "",
+  algorithm: "ppo",
+  critic: "privileged",
+  randomize: "none",
+  race: "time-trial",
+  objects: 6,
+  botSpeed: 0.2,
+  laneChanges: true,
+  learning: "learning_fast",
+  tuned: {},
+};
+const made = (changes: Partial<Wishes> = {}) => newModel({ ...wishes, ...changes }, known);
+
+describe("the request for a new model", () => {
+  it("names presets and leaves out what is the server's to choose", () => {
+    expect(made()).toEqual({
+      track: "oval",
+      direction: "forward",
+      until: "5 laps",
+      seed: 7,
+      vehicle: "",
+      network: "",
+      algorithm: "ppo",
+      critic: "privileged",
+      randomize: "none",
+      race: "time-trial",
+      reward: "racing",
+      actions: "default",
+    });
+  });
+
+  it("sends a changed reward as it is written, and a name if there is one", () => {
+    expect(made({ source: "def f(): ...", name: "heron" })).toMatchObject({ reward: "def f(): ...", name: "heron" });
+  });
+
+  it("sends an edited space as AWS's document, with the sensors in it and not beside it", () => {
+    const edited = { ...space, actions: [...space.actions, { steering_angle: 0, speed: 2 }] };
+    const request = made({ space: edited, sensors: ["STEREO_CAMERAS"] });
+    expect(request).not.toHaveProperty("actions");
+    expect(request).not.toHaveProperty("sensors");
+    expect(request.model_metadata).toMatchObject({ sensor: ["STEREO_CAMERAS"], action_space_type: "discrete" });
+    expect((request.model_metadata?.["action_space"] as unknown[]).length).toBe(3);
+    expect(made({ space: edited }).model_metadata).toMatchObject({ sensor: ["FRONT_FACING_CAMERA"] });
+    expect(made({ sensors: ["LIDAR"] })).toMatchObject({ actions: "default", sensors: ["LIDAR"] });
+  });
+
+  it("speaks of objects only where there are some, and of bots only where they drive", () => {
+    expect(made()).not.toHaveProperty("objects");
+    expect(made({ race: "object-avoidance" })).toMatchObject({ objects: 6 });
+    expect(made({ race: "object-avoidance" })).not.toHaveProperty("bot_speed");
+    expect(made({ race: "head-to-bot" })).toMatchObject({ objects: 6, bot_speed: 0.2, lane_changes: true });
+  });
+
+  it("sends the numbers that differ, AWS's whole, and none where the algorithm has none", () => {
+    expect(made({ tuned: { lr: 1e-3 } })).not.toHaveProperty("tuning");
+    expect(made({ tuned: { lr: 2e-3, unknown: 1 } }).tuning).toEqual({ lr: 2e-3 });
+    expect(made({ learning: "learning_aws", tuned: { lr: 1e-4 } }).hyperparameters).toEqual({
+      lr: 1e-4,
+      batch_size: 64,
+    });
+    const sac = made({ algorithm: "sac", learning: "learning_aws", tuned: { lr: 1e-4 } });
+    expect(sac).not.toHaveProperty("hyperparameters");
+    expect(sac).not.toHaveProperty("tuning");
+  });
+});
