@@ -42,7 +42,7 @@ def test_the_editor_knows_every_key_of_params() -> None:
     from racecraft.reward.params import TEMPLATE
 
     source = (WEB / "src" / "lib" / "params.ts").read_text()
-    assert re.findall(r"^  (\w+): \"", source, re.MULTILINE) == list(TEMPLATE)
+    assert re.findall(r"^  (\w+):\s+\"", source, re.MULTILINE) == list(TEMPLATE)
 
 
 def test_what_the_server_names_is_in_the_catalogue() -> None:
@@ -51,7 +51,7 @@ def test_what_the_server_names_is_in_the_catalogue() -> None:
     from racecraft.serve.rewards.routes import list_actions, list_rewards
 
     catalogue = (WEB / "src" / "i18n" / "en" / "presets.ts").read_text()
-    known = dict(re.findall(r'^  (\w+): "(.*)",$', catalogue, re.MULTILINE))
+    known = dict(re.findall(r'^  (\w+):\s+"(.*)",$', catalogue, re.MULTILINE))
     assert {f"preset_{reward.name}" for reward in list_rewards()} <= known.keys()
     assert {known[f"space_{space.name}"]: space.name for space in list_actions()} == {
         space.description: space.name for space in list_actions()
