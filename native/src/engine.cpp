@@ -346,9 +346,11 @@ void Engine::restore(const uint8_t* bytes) {
     });
 }
 
-// The bytes may come from a file: nothing in them may lead outside this engine's memory or into a NaN.
+// The bytes may come from a file: nothing in them may lead outside this engine's memory, beyond an integer or
+// into a NaN.
 const char* Engine::find_fault() const {
-    const auto is_number = [](float value) { return std::abs(value) < 1e6f; };
+    const auto is_number = [](auto value) { return std::abs(value) < 1e6f; };
+    const auto is_count = [](int32_t value) { return value >= 0 && value < 1'000'000'000; };
     for (size_t env = 0; env < num_envs(); ++env) {
         const Episode& episode = episodes_[env];
         const bool has_tracks = episode.track >= 0 && static_cast<size_t>(episode.track) < tracks_.size() &&
@@ -359,7 +361,17 @@ const char* Engine::find_fault() const {
         const int status = static_cast<int>(episode.status);
         if (status < 0 || status > static_cast<int>(Status::park))
             return "holds a status that does not exist.";
+        const int32_t counts[] = {episode.episode, episode.steps, episode.laps, episode.falling_steps,
+                                  episode.still_steps};
+        if (!std::all_of(std::begin(counts), std::end(counts), is_count) || episode.frozen_steps < 0)
+            return "holds a count that cannot be.";
+        const double places[] = {episode.progress, episode.start, episode.last_x, episode.last_y};
+        if (!std::all_of(std::begin(places), std::end(places), is_number))
+            return "holds an episode that is nowhere.";
     }
+    if (!std::all_of(races_.begin(), races_.end(), is_count)) return "holds a count that cannot be.";
+    if (!std::all_of(rows_.begin(), rows_.end(), [](double value) { return std::isfinite(value); }))
+        return "holds a row that cannot be.";
     if (!std::all_of(vehicles_.begin(), vehicles_.end(), is_number)) return "holds a car that is nowhere.";
     if (!std::all_of(earlier_.begin(), earlier_.end(), is_number)) return "holds a command that cannot be.";
     if (!std::all_of(parameters_.begin(), parameters_.end(), is_number)) return "holds a car that cannot be.";

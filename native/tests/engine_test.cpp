@@ -2,6 +2,7 @@
 // anywhere.
 #include "engine.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 
@@ -196,23 +197,60 @@ TEST(a_damaged_state_is_refused_and_changes_nothing) {
     const std::vector<uint8_t> good = engine->save();
     CHECK_THROWS(engine->load(good.data(), good.size() - 1), std::invalid_argument);
     CHECK_THROWS(engine->load(good.data(), 0), std::invalid_argument);
+    const auto is_finite = [](const auto* values, size_t count) {
+        return std::all_of(values, values + count, [](auto value) { return std::isfinite(value); });
+    };
     int refused = 0;
-    for (size_t at = 0; at + 4 <= good.size(); at += 12) {
+    for (size_t at = 0; at + 8 <= good.size(); at += 4) {
+        for (const auto& [byte, size] : {std::pair{0xff, 4}, std::pair{0xff, 8}, std::pair{0x7f, 4}}) {
+            std::vector<uint8_t> bad = good;
+            std::memset(&bad[at], byte, static_cast<size_t>(size));
+            try {
+                engine->load(bad.data(), bad.size());
+                for (const int action : {0, 1, 2}) {
+                    if (action == 1) engine->step(actions.data());
+                    if (action == 2) engine->reset(nullptr);
+                    CHECK(is_finite(engine->rows(), 3 * kNumRowColumns));
+                    CHECK(is_finite(engine->state(), 3 * kNumStateColumns));
+                }
+            } catch (const std::invalid_argument&) {
+                ++refused;
+                CHECK(engine->save() == good);
+            }
+            engine->load(good.data(), good.size());
+        }
+    }
+    CHECK(refused > 500);
+    CHECK(engine->save() == good);
+}
+
+TEST(a_state_whose_car_is_nowhere_is_refused_whatever_number_of_it_is_wrong) {
+    const auto engine = make_engine({.num_envs = 3});
+    const std::vector<float> actions = {0.1f, 1.0f, -0.1f, 2.0f, 0.0f, 3.0f};
+    for (int i = 0; i < 5; ++i) engine->step(actions.data());
+    const std::vector<uint8_t> good = engine->save();
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    const auto refusal = [&](size_t number, float value) -> std::string {
         std::vector<uint8_t> bad = good;
-        std::memset(&bad[at], 0xff, 4);
+        std::memcpy(&bad[number * sizeof(float)], &value, sizeof(value));
         try {
             engine->load(bad.data(), bad.size());
-            engine->step(actions.data());
-            engine->reset(nullptr);
-        } catch (const std::invalid_argument&) {
-            ++refused;
-            // Bits, since a NaN may have been read from the good state as well.
+        } catch (const std::invalid_argument& error) {
             CHECK(engine->save() == good);
+            return error.what();
         }
+        return "";
+    };
+    // The poses come first, then the parameters, one number of every car beside the other.
+    for (size_t number = 0; number < 3 * (7 + kNumVehicleParameters); ++number) {
+        for (const float value : {std::nanf(""), infinity, -infinity, 1e7f, -1e7f}) {
+            const std::string expected =
+                number < 3 * 7 ? "holds a car that is nowhere." : "holds a car that cannot be.";
+            CHECK_EQUAL(refusal(number, value), "Saved simulation state " + expected);
+        }
+        CHECK_EQUAL(refusal(number, 0.5f), "");
         engine->load(good.data(), good.size());
     }
-    CHECK(refused > 15);
-    CHECK(engine->save() == good);
 }
 
 TEST(no_parameter_or_pose_leads_outside_the_memory) {
