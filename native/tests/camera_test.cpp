@@ -5,6 +5,7 @@
 #include "../src/camera_model.hpp"
 #include "../src/dispatch.hpp"
 #include "check.hpp"
+#include "racecraft/random.hpp"
 #include "ray_cast.hpp"
 #include "tracks.hpp"
 
@@ -176,6 +177,118 @@ TEST(grain_fades_with_distance) {
     CHECK_NEAR(sum / (160 * 120), 0.0, 0.1);
     for (int row = 110; row < 120; ++row) CHECK(contrast[row] > 2.0 && contrast[row] < 5.0);
     for (int row = 0; row < 35; ++row) CHECK_NEAR(contrast[row], 0.0, 0.3);
+}
+
+// The lens is ahead of the car and to its left, whichever way the car points.
+TEST(the_lens_is_where_the_car_carries_it) {
+    const GroundMap ground(octagon().view());
+    CameraSpec spec;
+    spec.forward = 0.15f;
+    spec.left = 0.03f;
+    spec.yaw = 0.2f;
+    const CameraModel camera(spec);
+    const double headings[] = {0.0, 0.5 * M_PI, M_PI, -0.5 * M_PI, 0.7};
+    for (const double heading : headings) {
+        const LensPose lens =
+            place_lens(camera.view(), ground.view(), 0.4f, -0.3f, static_cast<float>(heading));
+        CHECK_NEAR(lens.x, 0.4 + 0.15 * std::cos(heading) - 0.03 * std::sin(heading), 1e-6);
+        CHECK_NEAR(lens.y, -0.3 + 0.15 * std::sin(heading) + 0.03 * std::cos(heading), 1e-6);
+        CHECK_NEAR(lens.cosine, std::cos(heading + 0.2), 1e-6);
+        CHECK_NEAR(lens.sine, std::sin(heading + 0.2), 1e-6);
+    }
+}
+
+TEST(a_walk_is_cut_at_the_walls_to_the_pixel) {
+    GroundView room{};
+    room.min_x = -2.0f;
+    room.max_x = 3.0f;
+    room.min_y = -1.0f;
+    room.max_y = 1.5f;
+    constexpr int32_t width = 50;
+    const auto is_inside = [&](float x, float y) {
+        return x >= room.min_x && x <= room.max_x && y >= room.min_y && y <= room.max_y;
+    };
+    int cut = 0, whole = 0, none = 0;
+    for (uint32_t trial = 0; trial < 4000; ++trial) {
+        const RandomBlock random = philox(1, trial, 0, 0, Purpose::start_pose);
+        const float x = 4.0f * symmetric_of(random.words[0]);
+        const float y = 2.5f * symmetric_of(random.words[1]);
+        const float step_x = 0.12f * symmetric_of(random.words[2]);
+        const float step_y = 0.12f * symmetric_of(random.words[3]);
+        const PixelSpan span = clip_walk(room, x, y, step_x, step_y, width);
+        CHECK(span.begin >= 0 && span.begin <= span.end && span.end <= width);
+        for (int32_t i = 0; i < width; ++i) {
+            const float at = static_cast<float>(i);
+            const bool inside = is_inside(x + at * step_x, y + at * step_y);
+            // A pixel that lies on a wall to the last bits may go either way.
+            const bool almost = is_inside(x + (at - 1e-4f) * step_x, y + (at - 1e-4f) * step_y) !=
+                                is_inside(x + (at + 1e-4f) * step_x, y + (at + 1e-4f) * step_y);
+            if (!almost) CHECK_EQUAL(i >= span.begin && i < span.end, inside);
+        }
+        const int32_t pixels = span.end - span.begin;
+        (pixels == 0 ? none : pixels == width ? whole : cut) += 1;
+    }
+    CHECK(cut > 500 && whole > 100 && none > 500);
+}
+
+// The corners of a room lie where a pinhole sees them: upright edges, in every row of the picture.
+TEST(walls_meet_where_a_pinhole_sees_their_corner) {
+    const GroundMap ground(octagon().view());
+    CameraSpec spec;
+    spec.pitch = 0.3f;
+    const CameraModel camera(spec);
+    const CameraView& view = camera.view();
+    const double focal = 0.5 * spec.width / std::tan(0.5 * spec.hfov);
+    for (int32_t row = 0; row < spec.height; ++row) {
+        const double b = (row + 0.5 - 0.5 * spec.height) / focal;
+        const double ahead = std::cos(0.3) - b * std::sin(0.3);
+        CHECK_NEAR(view.corner_scale[row], focal * ahead, 1e-3);
+    }
+    CHECK_EQUAL(view.row_begin[0], 0);
+    CHECK_EQUAL(view.row_begin[spec.height], view.num_samples);
+    for (int32_t row = 0; row < spec.height; ++row) {
+        const int32_t count = view.row_begin[row + 1] - view.row_begin[row];
+        CHECK(count == 1 || count == 2 || count == 4 || count == 8);
+        for (int32_t k = 0; k < count; ++k) {
+            const int32_t sample = view.row_begin[row] + k;
+            if (view.kind[sample] != kSampleGround) continue;
+            const double b = (row + (k + 0.5) / count - 0.5 * spec.height) / focal;
+            const double fall = std::sin(0.3) + b * std::cos(0.3);
+            const double reach = spec.above / fall;
+            CHECK_NEAR(view.distance[sample], reach * (std::cos(0.3) - b * std::sin(0.3)), 1e-3 * reach);
+            CHECK_NEAR(view.step[sample], reach / focal, 1e-5 * reach);
+            // Pixel 0 is half of the picture to the left, give or take half a pixel of shift.
+            CHECK_NEAR(view.start[sample] / view.step[sample], -0.5 * spec.width + 0.5, 0.5);
+        }
+    }
+}
+
+TEST(walls_are_told_from_left_to_right_with_the_corners_between_them) {
+    const GroundMap ground(octagon().view());
+    const GroundView& view = ground.view();
+    const struct {
+        float heading;
+        int32_t wall;
+    } ahead[] = {{0.0f, 0}, {0.5f * kPi, 1}, {kPi, 2}, {-0.5f * kPi, 3}};
+    for (const auto& [heading, wall] : ahead) {
+        LensPose lens{.x = 0.3f, .y = -0.2f, .sine = 0.0f, .cosine = 1.0f};
+        sincos_of(heading, lens.sine, lens.cosine);
+        WallSpan spans[kNumWalls];
+        const int32_t count = walls_in_view(view, lens, spans);
+        CHECK_EQUAL(count, 3);
+        CHECK_EQUAL(spans[1].wall, wall);
+        CHECK_EQUAL(spans[0].wall, (wall + 1) % 4);  // to the left
+        CHECK_EQUAL(spans[2].wall, (wall + 3) % 4);
+        for (int32_t i = 0; i + 1 < count; ++i) CHECK_NEAR(spans[i].right, spans[i + 1].left, 1e-5);
+        const bool is_along_x = wall % 2 == 0;
+        const double to_wall = wall == 0   ? view.max_x - lens.x
+                               : wall == 1 ? view.max_y - lens.y
+                               : wall == 2 ? lens.x - view.min_x
+                                           : lens.y - view.min_y;
+        const double left_end = is_along_x ? (wall == 0 ? view.max_y - lens.y : lens.y - view.min_y)
+                                           : (wall == 1 ? lens.x - view.min_x : view.max_x - lens.x);
+        CHECK_NEAR(spans[1].left, -left_end / to_wall, 1e-4);
+    }
 }
 
 TEST(palette_reaches_every_part_of_a_frame) {

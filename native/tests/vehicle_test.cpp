@@ -136,6 +136,52 @@ TEST(from_rest_the_drive_limit_is_the_acceleration) {
     CHECK_NEAR(state.speed, limit, 0.02 * limit);
 }
 
+TEST(drive_and_brakes_give_no_more_than_three_times_the_slipperier_axle) {
+    for (const bool is_front_slippery : {false, true}) {
+        VehicleParameters car = true_car();
+        car.front_friction = is_front_slippery ? 0.1f : 0.8f;
+        car.rear_friction = is_front_slippery ? 0.8f : 0.1f;
+        car.drive_acceleration = car.brake_acceleration = 30.0f;
+        const double limit = 3.0 * 9.8 * 0.1;
+        // Half a second from rest, and half a second of braking: the force is near its limit all along.
+        const VehicleState driven = drive(car, VehicleState{}, 0.0f, 4.0f, 60);
+        CHECK_NEAR(driven.speed, 0.5 * limit, 0.05 * limit);
+        CHECK(driven.speed < 0.5 * limit);
+        VehicleState fast{};
+        fast.speed = 4.0f;
+        const VehicleState braked = drive(car, fast, 0.0f, 0.0f, 60);
+        CHECK_NEAR(4.0f - braked.speed, 0.5 * limit, 0.05 * limit);
+        CHECK(4.0f - braked.speed < 0.5 * limit);
+    }
+}
+
+TEST(drive_and_brakes_have_limits_of_their_own) {
+    VehicleParameters car = true_car();
+    car.front_friction = car.rear_friction = 1.0f;
+    car.drive_acceleration = 2.0f;
+    car.brake_acceleration = 5.0f;
+    CHECK_NEAR(drive(car, VehicleState{}, 0.0f, 4.0f, 60).speed, 1.0, 0.02);
+    VehicleState fast{};
+    fast.speed = 4.0f;
+    CHECK_NEAR(drive(car, fast, 0.0f, 0.0f, 60).speed, 1.5, 0.1);
+}
+
+TEST(a_heading_is_told_within_a_turn) {
+    // Round and round to either side, for minutes: a heading that grew would lose bits.
+    for (const float steering : {-0.4f, 0.4f}) {
+        VehicleState state{};
+        double turned = 0.0;
+        for (int i = 0; i < 120 * 15 * kSubsteps; ++i) {
+            const float before = state.heading;
+            state = drive(true_car(), state, steering, 1.5f, 1);
+            CHECK(std::abs(state.heading) <= kPi + 1e-6f);
+            turned += std::remainder(static_cast<double>(state.heading) - before, 2.0 * M_PI);
+        }
+        CHECK(std::abs(turned) > 50.0);
+        CHECK_NEAR(std::remainder(turned - static_cast<double>(state.heading), 2.0 * M_PI), 0.0, 1e-2);
+    }
+}
+
 TEST(steering_follows_its_command_with_the_time_constant_and_the_rate) {
     VehicleParameters car = true_car();
     car.steering_time_constant = 0.15f;

@@ -236,6 +236,7 @@ def test_lane_changes_take_their_time_and_way():
         offsets.append(simulation.object_column("object_offset")[:, 0].copy())
     lane = float(OVAL.width_at(0.0)) / 4
     offsets = np.array(offsets) / lane
+    assert np.abs(np.diff(offsets, axis=0)).max() < 1.1 * 2 * 1.5 / 15  # a smooth step over 1 m, however often
     in_lane = np.abs(offsets) > 0.97
     assert in_lane.mean() > 0.7
     for env in range(20):

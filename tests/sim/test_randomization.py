@@ -132,6 +132,23 @@ def test_a_saved_simulation_goes_on_as_if_nothing_had_happened():
         np.testing.assert_array_equal(getattr(saved_one, name), getattr(other, name))
 
 
+def test_a_saved_episode_comes_back_with_its_conditions():
+    """Conditions, cameras and latencies are not saved but drawn again, by seed, car and episode."""
+    saved_one = Simulation(OVAL, num_envs=3, camera=SMALL, seed=1, randomize="strong", lidar=True)
+    saved_one.reset()
+    drive(saved_one, 3)
+    saved_one.reset(np.array([True, False, True]))
+    drive(saved_one, 5)
+    other = Simulation(OVAL, num_envs=3, camera=SMALL, seed=2, randomize="strong", lidar=True)
+    assert (other.conditions != saved_one.conditions).all()
+    other.load(saved_one.save())
+    for _ in range(10):
+        for name in ("conditions", "frames", "lidar", "state", "vehicles", "rows"):
+            np.testing.assert_array_equal(getattr(other, name), getattr(saved_one, name))
+        for simulation in (saved_one, other):
+            simulation.step(np.tile(np.float32([0.3, 3.0]), (3, 1)))
+
+
 # ---- what each quantity does
 
 
@@ -144,6 +161,7 @@ def test_conditions_reach_the_car():
     assert car["rear_friction"] == pytest.approx(0.7 * base.rear_friction)
     assert car["mass"] / car["yaw_inertia"] == pytest.approx(base.mass / base.yaw_inertia)
     assert car["drive_acceleration"] == pytest.approx(base.drive_acceleration / 1.25)
+    assert car["brake_acceleration"] == pytest.approx(base.brake_acceleration / 1.25)
     assert car["speed_gain"] == pytest.approx(0.9 * base.speed_gain)
     assert car["steering_bias"] == pytest.approx(base.steering_bias + 0.01)
     assert car["front_axle"] == pytest.approx(base.front_axle)

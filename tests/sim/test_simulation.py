@@ -244,6 +244,23 @@ def test_driving_back_ends_an_episode_after_fifteen_falling_steps(road, status):
     assert status(simulation) == "reversed"
 
 
+def test_a_car_put_elsewhere_has_neither_stood_nor_driven_back(road, status):
+    simulation = Simulation(road, num_envs=2, camera=None, vehicle=STRAIGHT)
+    simulation.set_pose(0, 20.0, 0.0, math.pi, speed=2.0)
+    simulation.set_pose(1, 20.0, 0.0, 0.0)
+    commands = [[0.0, 2.0], [0.0, 0.0]]
+    for _ in range(14):  # the first of the standing car is a movement
+        simulation.step(commands)
+    for at in (15.0, 10.0):  # farther back, so that the jump itself is one more falling step
+        simulation.set_pose(0, at, 0.0, math.pi, speed=2.0)
+        simulation.set_pose(1, at, 0.0, 0.0)
+        for _ in range(14):
+            simulation.step(commands)
+            assert [status(simulation, env) for env in range(2)] == ["in_progress"] * 2
+    simulation.step(commands)
+    assert [status(simulation, env) for env in range(2)] == ["reversed", "immobilized"]
+
+
 def test_limits_truncate_and_the_last_action_still_acts(status):
     simulation = Simulation(OVAL, camera=None, vehicle=STRAIGHT, time_limit=2.0)
     while not simulation.truncated[0]:
