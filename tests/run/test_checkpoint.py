@@ -77,7 +77,7 @@ def test_last_four_and_best_are_kept(store):
     assert (store.best.step, store.last.step) == (200, 700)
     for which in ("best", "last", 500):
         assert_good(store.load(which))
-    assert store.load("best").step == 200
+    assert store.load("best").step == store.load("200").step == 200
     index = json.loads(store.aws_index.read_text())
     assert index["best_checkpoint"]["avg_eval_metric"] == 9.0
     assert index["last_checkpoint"]["name"] == store.last.file
@@ -116,7 +116,14 @@ def test_last_is_what_was_saved_last_whatever_its_step(store):
 
 @pytest.mark.parametrize(
     ("which", "words"),
-    [("worst", "allowed: 'last', 'best' or a step"), (300, "no checkpoint of step 300, allowed: 100, 200")],
+    [
+        ("worst", "allowed: 'last', 'best' or a step"),
+        ("²", "allowed: 'last', 'best' or a step"),
+        ("٣", "allowed: 'last', 'best' or a step"),
+        ("1" * 5000, "allowed: 'last', 'best' or a step"),
+        (300, "no checkpoint of step 300, allowed: 100, 200"),
+        ("0", "no checkpoint of step 0, allowed: 100, 200"),
+    ],
 )
 def test_wrong_choice_is_told(store, which, words):
     save(store, 100, 200)

@@ -471,5 +471,7 @@ def test_deepracer_for_cloud_settings():
     ):
         with pytest.raises(ConfigError, match=f"{name} is '{value}'"):
             objects_from_aws({**bot_settings, name: value})
+    with pytest.raises(ConfigError, match="is '²'; allowed is a whole number"):
+        objects_from_aws({**avoidance, "DR_OA_NUMBER_OF_OBSTACLES": "²"})
     with pytest.raises(ConfigError, match="DR_OA_OBJECT_POSITIONS"):
         objects_from_aws({**avoidance, "DR_OA_OBJECT_POSITIONS": "here"})

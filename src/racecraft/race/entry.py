@@ -5,12 +5,14 @@ An entry is what drives, and nothing else: a race never asks a run how it was tr
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from racecraft.errors import ConfigError
 from racecraft.race.policy import NetworkPolicy, load_policy
+from racecraft.run.checkpoint import is_step
 from racecraft.run.folder import MAX_NAME, RunFolder
 
 
@@ -56,16 +58,14 @@ def load_entries(models: Sequence[str | Path], *, num_threads: int = 0) -> list[
     return entries
 
 
-def split_model(model: str | Path) -> tuple[str, str | int]:
+def split_model(model: str | Path) -> tuple[str, str]:
     """``RUN@CHECKPOINT`` as path and checkpoint; the checkpoint is empty where none is named."""
     path, _, checkpoint = str(model).rpartition("@")
     if not path and not checkpoint:
         raise ConfigError("A model has no name; give the path of a run folder.")
-    if not path or "/" in checkpoint or Path(str(model)).exists():
+    if not path or "/" in checkpoint or os.path.exists(model):
         return str(model), ""
-    if checkpoint.isdigit():
-        return path, int(checkpoint)
-    if checkpoint not in ("best", "last"):
+    if checkpoint not in ("best", "last") and not is_step(checkpoint):
         raise ConfigError(f"Checkpoint {checkpoint!r} of {path} is none; allowed are best, last and a number of steps.")
     return path, checkpoint
 

@@ -35,6 +35,7 @@ MAX_FILE_BYTES = 1 << 33  # 8 GiB; AWS's networks with Adam's state take 140 MB
 MAX_MANIFEST_BYTES = 1 << 22
 MANIFEST = "manifest.json"
 _NAME = re.compile(r"(\d{9,18})-([0-9a-f]{8})\.safetensors")
+_STEP = re.compile(r"[0-9]{1,18}")  # as many digits as a file's name has; int() also reads other scripts' digits
 _HEADER_KEY = "racecraft"  # the one entry of the safetensors header's metadata: a JSON text
 
 
@@ -185,11 +186,13 @@ class CheckpointStore:
         A damaged last or best one is passed over with a `CheckpointWarning` for the next best there is.
 
         Args:
-            which: ``"last"``, ``"best"`` or a step.
+            which: ``"last"``, ``"best"`` or a step, as a number or in digits.
 
         Raises:
             CheckpointError: There is none, or none that is whole.
         """
+        if isinstance(which, str) and is_step(which):
+            which = int(which)
         entries = self.entries()
         if not entries:
             raise CheckpointError(f"{self.folder} has no checkpoint.", hint="Train first, or check the path.")
@@ -331,6 +334,11 @@ class CheckpointStore:
                 unfinished = path.name.endswith(TEMPORARY)
                 if unfinished or (_NAME.fullmatch(path.name) and path.name not in listed):
                     path.unlink()
+
+
+def is_step(text: str) -> bool:
+    """Whether a text names a checkpoint by its camera steps."""
+    return _STEP.fullmatch(text) is not None
 
 
 def _rank(entry: Entry) -> tuple[float, ...]:

@@ -262,9 +262,10 @@ def _truth(text: str) -> bool:
 
 
 def _whole(text: str) -> int:
-    if not text.strip().isdigit():
+    digits = text.strip()
+    if not (digits.isascii() and digits.isdigit() and len(digits) < 10):
         raise ValueError("allowed is a whole number")
-    return int(text)
+    return int(digits)
 
 
 def _number(text: str) -> float:

@@ -100,7 +100,7 @@ def open_parent(text: str | Path) -> Parent:
     if "@" in path and not Path(path).is_dir():
         path, which = path.rsplit("@", 1)
     folder = RunFolder.open(path)
-    saved = folder.checkpoints.load(int(which) if which.isascii() and which.isdigit() else which)
+    saved = folder.checkpoints.load(which)
     return Parent(folder, saved)
 
 
