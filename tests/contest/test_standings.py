@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from racecraft.contest.standings import places, ranking_score
+from racecraft.contest.standings import places, ranking_key, ranking_score
 from racecraft.errors import ConfigError
 
 LAPS = [10.0, 9.0, 8.0, 12.0]
@@ -41,7 +41,15 @@ def test_an_unknown_ranking_gets_a_suggestion():
 
 def test_places():
     assert places([]) == []
-    assert places([9.5]) == [1]
-    assert places([12.0, 9.0, 10.0]) == [3, 1, 2]
-    assert places([9.0, 10.0, 9.0, 11.0]) == [1, 3, 1, 4]
-    assert places([math.inf, 8.0, math.inf]) == [2, 1, 2]
+    assert places([(9.5,)]) == [1]
+    assert places([(12.0,), (9.0,), (10.0,)]) == [3, 1, 2]
+    assert places([(9.0, 1.0), (10.0, 0.0), (9.0, 1.0), (9.0, 2.0)]) == [1, 4, 1, 3]
+    assert places([(math.inf,), (8.0,), (math.inf,)]) == [2, 1, 2]
+
+
+def test_keys_by_hand():
+    finished = {"lap_times": [10.0, 9.0], "completion": 1.0, "resets": 2}
+    assert ranking_key(19.0, **finished) == (0.0, 19_000.0, 9_000.0, 2.0)
+    assert ranking_key(19.0004, **finished) == ranking_key(19.0, **finished) < ranking_key(19.0006, **finished)
+    out = {"lap_times": [], "completion": 0.4567, "resets": 3}
+    assert ranking_key(math.inf, **out) == (1.0, -457.0, 3.0, 0.0) > ranking_key(1e9, **finished)

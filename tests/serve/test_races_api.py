@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 import sqlalchemy as sa
 from running_consoles import RunningConsole
 
+from racecraft.contest.classification import classify
+from racecraft.race import Lap, Recording, Trial
+from racecraft.run import CheckpointStore
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.models.garage import Garage
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.races import races as races_module
 from racecraft.serve.races.races import Races
-from racecraft.serve.races.schemas import NewRace
+from racecraft.serve.races.schemas import Enter, NewRace
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job
 from racecraft.serve.tracks.courses import Courses
+from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.track import load_track
+
+NOTHING = Recording(load_track("oval"), np.zeros((1, len(ROW_COLUMNS))), np.zeros(1), np.zeros((1, 2), np.float32))
 
 
 def refused(reply: httpx.Response, status: int) -> dict[str, Any]:
@@ -30,8 +43,9 @@ def refused(reply: httpx.Response, status: int) -> dict[str, Any]:
 class Stewards:
     """Races whose jobs are decided by the test."""
 
-    def __init__(self, folder: Path) -> None:
-        self.database = Database(f"sqlite:///{folder / 'console.db'}")
+    def __init__(self, folder: Path, url: str) -> None:
+        self.folder = folder
+        self.database = Database(url)
         self.database.migrate()
         self.queue = JobQueue(self.database)
         (folder / "tracks").mkdir()
@@ -51,21 +65,38 @@ class Stewards:
             session.flush()
             return entry.id
 
+    def model(self, name: str) -> None:
+        """A run folder with a checkpoint, as far as entering looks."""
+        CheckpointStore(self.folder / name / "checkpoints").save(64, {})
+        (self.folder / name / "run.json").write_text("{}")
+
+    def entries(self, race: int) -> list[str]:
+        with self.database.transaction() as session:
+            return list(session.scalars(sa.select(Entry.run).where(Entry.race_id == race).order_by(Entry.id)))
+
     def table(self, race: int) -> list[tuple[int | None, str, float | None, float | None]]:
         return [(row.place, row.model, row.score, row.gap) for row in self.races.get(race).standings]
 
 
 @pytest.fixture
 def stewards(tmp_path: Path) -> Iterator[Stewards]:
-    stewards = Stewards(tmp_path)
+    stewards = Stewards(tmp_path, f"sqlite:///{tmp_path / 'console.db'}")
+    yield stewards
+    stewards.database.close()
+
+
+@pytest.fixture
+def either_stewards(tmp_path: Path, database_url: str) -> Iterator[Stewards]:
+    """On either kind of database."""
+    stewards = Stewards(tmp_path, database_url)
     yield stewards
     stewards.database.close()
 
 
 def test_a_total_needs_every_lap_and_equals_share_a_place(stewards: Stewards) -> None:
     race = stewards.race(laps=3)
-    stewards.drive(race, "steady", [10.0, 10.0, 10.0])
-    stewards.drive(race, "twin", [9.0, 10.0, 11.0])
+    stewards.drive(race, "steady", [9.0, 10.0, 11.0])
+    stewards.drive(race, "twin", [10.0, 11.0, 9.0])
     stewards.drive(race, "quick", [8.0, 8.0], mean_completion=0.9)
     stewards.drive(race, "slow", [12.0, 12.0, 12.0])
     stewards.drive(race, "lost", [])
@@ -76,6 +107,62 @@ def test_a_total_needs_every_lap_and_equals_share_a_place(stewards: Stewards) ->
         (None, "quick", None, None),
         (None, "lost", None, None),
     ]
+
+
+FIELD: list[tuple[list[float], int, float]] = [
+    ([10.0, 10.0, 10.0], 0, 1.0),
+    ([9.0, 11.0, 10.0], 0, 1.0),  # the same time with a faster lap
+    ([9.0, 11.0, 10.0], 2, 1.0),  # and with resets
+    ([10.0, 10.0, 10.0004], 0, 1.0),  # the same in whole milliseconds
+    ([10.0, 10.0, 9.9996], 0, 1.0),
+    ([10.0, 10.0, 9.9994], 1, 1.0),
+    ([10.0], 1, 0.4002),
+    ([12.0], 0, 0.3998),  # as far to a tenth of a per cent, with fewer resets
+    ([], 0, 0.1),
+]
+"""Lap times, resets and completion of races of three laps."""
+
+
+def _trial(times: list[float], resets: int, completion: float) -> Trial:
+    """The same as a car's race."""
+    statuses = ["lap_complete"] * len(times) + ["off_track"] * (3 - len(times) > 0)
+    laps = tuple(
+        Lap(
+            number=number + 1,
+            status=status,
+            start_time=0.0,
+            time=[*times, 1.0][number],
+            completion=1.0,
+            resets=resets if number == 0 else 0,
+        )
+        for number, status in enumerate(statuses)
+    )
+    return Trial(index=0, laps=laps, status=statuses[-1], completion=completion, recording=NOTHING)
+
+
+@pytest.mark.parametrize("ranking", ["total", "best", "average"])
+def test_a_race_is_ranked_in_the_console_as_on_the_command_line(stewards: Stewards, ranking: str) -> None:
+    race = stewards.race(laps=3, ranking=ranking, minimum_laps=2 if ranking == "average" else 1)
+    trials = [_trial(*driven) for driven in FIELD]
+    for number, (times, resets, completion) in enumerate(FIELD):
+        stewards.drive(race, f"model-{number}", times, mean_completion=completion, resets=resets)
+    needed = {"total": 3, "best": 1, "average": 2}[ranking]
+    expected = [
+        (standing.place, f"model-{standing.car}", standing.score, standing.gap)
+        for standing in classify(trials, ranking=ranking, minimum_laps=needed)
+    ]
+    assert stewards.table(race) == expected
+    assert len({place for place, *_ in expected}) > 4
+    card = stewards.races.cards()[0]
+    assert (card.leader, card.leader_score) == expected[0][1:3]
+
+
+def test_of_a_models_entries_the_best_by_the_same_rules_counts(stewards: Stewards) -> None:
+    race = stewards.race(laps=3)
+    stewards.drive(race, "model", [10.0, 10.0, 10.0], resets=0)
+    best = stewards.drive(race, "model", [10.0, 9.0, 11.0], resets=1)
+    stewards.drive(race, "model", [10.0, 9.0, 11.0], resets=1)  # an equal one that came later
+    assert [row.entry for row in stewards.races.get(race).standings] == [best]
 
 
 def test_the_best_lap_of_the_best_entry_counts(stewards: Stewards) -> None:
@@ -119,6 +206,61 @@ def test_what_a_run_says_about_itself_opens_no_other_files(stewards: Stewards, t
     assert row.video is None
     assert not row.has_replay
     assert row.entry == entry
+
+
+# ---- entering
+
+
+def test_models_are_entered_all_or_none(stewards: Stewards) -> None:
+    race = stewards.race()
+    for name in ("ada", "bob"):
+        stewards.model(name)
+    entered = stewards.races.enter(race, Enter(models=["ada", "bob", "ada"]), user_id=1)
+    assert len(entered) == 2
+    assert stewards.entries(race) == ["ada", "bob"]
+    jobs = stewards.queue.list(kind="race")
+    assert {(job.run, job.state, job.payload["track"]) for job in jobs} == {
+        ("ada", "queued", "oval"),
+        ("bob", "queued", "oval"),
+    }
+    with pytest.raises(NotFound):
+        stewards.races.enter(race, Enter(models=["ada", "nobody"]), user_id=1)
+    stewards.races.set_deleted(race, is_deleted=True)
+    with pytest.raises(NotFound):
+        stewards.races.enter(race, Enter(models=["ada"]), user_id=1)
+    assert stewards.entries(race) == ["ada", "bob"]
+    assert len(stewards.queue.list(kind="race")) == 2
+
+
+def test_of_two_who_race_for_the_last_place_one_gets_it(
+    either_stewards: Stewards, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stewards = either_stewards
+    monkeypatch.setattr(races_module, "MAX_ENTRIES", 2)
+    race = stewards.race()
+    for name in ("ada", "bob", "cleo"):
+        stewards.model(name)
+    stewards.races.enter(race, Enter(models=["ada"]), user_id=1)
+    both_counted = threading.Barrier(2)
+
+    @sa.event.listens_for(stewards.database.engine, "after_cursor_execute")
+    def wait(*arguments: Any) -> None:
+        """Whoever has counted the entries waits a while for the other one, who must not have counted as many."""
+        if str(arguments[2]).startswith("SELECT count(entries.id)"):
+            with suppress(threading.BrokenBarrierError):
+                both_counted.wait(timeout=0.5)
+
+    def enter(name: str) -> list[int] | None:
+        try:
+            return stewards.races.enter(race, Enter(models=[name]), user_id=1)
+        except Conflict:
+            return None
+
+    with ThreadPoolExecutor(2) as pool:
+        entered = list(pool.map(enter, ["bob", "cleo"]))
+    assert entered.count(None) == 1
+    assert len(stewards.entries(race)) == 2
+    assert len(stewards.queue.list(kind="race")) == 2
 
 
 # ---- over HTTP

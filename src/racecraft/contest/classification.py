@@ -1,9 +1,7 @@
-"""The result of a race: every car's place, by exact rules. Pure functions of what the cars did.
+"""The result of a race: every car's place, by the rules of `racecraft.contest.standings`.
 
-1. A car is ranked if it completed enough laps; in a race on one road every car is, those that did not finish last.
-2. Of ranked cars the lower score wins: total time, best lap, or the best average, in whole milliseconds as AWS times.
-3. Equal scores: the faster best lap; then fewer resets; else both share the place, and the next one is left out.
-4. Cars that did not finish: who drove further, to the tenth of a per cent of the distance; then fewer resets.
+A car is ranked if it completed enough laps; in a race on one road every car is, those that did not finish last.
+Pure functions of what the cars did.
 """
 
 from __future__ import annotations
@@ -13,10 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from racecraft.contest.standings import ranking_score
+from racecraft.contest.standings import places, ranking_key, ranking_score
 from racecraft.race.results import Trial
-
-Key = tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,23 +64,20 @@ def classify(
         ConfigError: No such ranking, or fewer than one lap demanded.
     """
     scores = [ranking_score(trial.lap_times, ranking=ranking, minimum_laps=minimum_laps) for trial in trials]
-    keys = [_key(trial, score) for trial, score in zip(trials, scores, strict=True)]
+    resets = [sum(lap.resets for lap in trial.laps) for trial in trials]
+    keys = [
+        ranking_key(score, lap_times=trial.lap_times, completion=trial.completion, resets=count)
+        for trial, score, count in zip(trials, scores, resets, strict=True)
+    ]
+    found_places = places(keys)
     order = sorted(range(len(trials)), key=lambda car: (keys[car], car))
     best = min(scores, default=math.inf)
     found = []
     for car in order:
         is_ranked = math.isfinite(scores[car])
-        place = 1 + sum(key < keys[car] for key in keys) if is_ranked or ranks_all else None
+        place = found_places[car] if is_ranked or ranks_all else None
         found.append(_standing(trials[car], car, place, scores[car] if is_ranked else None, best))
     return found
-
-
-def _key(trial: Trial, score: float) -> Key:
-    """What places are decided by: less is better."""
-    resets = float(sum(lap.resets for lap in trial.laps))
-    if not math.isfinite(score):
-        return (1.0, float(-round(1000 * trial.completion)), resets, 0.0)
-    return (0.0, float(round(1000 * score)), float(round(1000 * min(trial.lap_times))), resets)
 
 
 def _standing(trial: Trial, car: int, place: int | None, score: float | None, best: float) -> Standing:

@@ -1,4 +1,10 @@
-"""Who is ahead: what a race is ranked by, and places from that. Pure functions of lap times in seconds."""
+"""Who is ahead: what a race is ranked by, and places from that; everywhere, by these exact rules. Pure functions.
+
+1. Of those that completed enough laps the lower score wins: total time, best lap, or the best average, in whole
+   milliseconds as AWS times.
+2. Equal scores: the faster best lap; then fewer resets; else both share the place, and the next one is left out.
+3. Those that did not complete enough: who drove further, to the tenth of a per cent of the distance; then fewer resets.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +14,8 @@ from typing import Final
 
 from racecraft.errors import ConfigError, did_you_mean
 
+Key = tuple[float, ...]
+"""What places are decided by: less is better, equals share a place."""
 RANKINGS: Final = ("total", "best", "average")
 """Sum of all laps; fastest lap; or mean of the fastest run of consecutive laps. Less is better."""
 
@@ -38,7 +46,21 @@ def ranking_score(lap_times: Sequence[float], *, ranking: str = "total", minimum
     return min(math.fsum(window) / minimum_laps for window in windows)
 
 
-def places(scores: Sequence[float]) -> list[int]:
-    """The place of each score, from 1: less is better, equals share a place and the next one is left out."""
-    ordered = sorted(scores)
-    return [ordered.index(score) + 1 for score in scores]
+def ranking_key(score: float, *, lap_times: Sequence[float], completion: float, resets: int) -> Key:
+    """What places are decided by, by the rules above.
+
+    Args:
+        score: As `ranking_score` gives it, s; infinite for one that has none.
+        lap_times: s of the completed laps.
+        completion: Fraction of the whole distance.
+        resets: In the whole race.
+    """
+    if not math.isfinite(score):
+        return (1.0, float(-round(1000 * completion)), float(resets), 0.0)
+    return (0.0, float(round(1000 * score)), float(round(1000 * min(lap_times))), float(resets))
+
+
+def places(keys: Sequence[Key]) -> list[int]:
+    """The place of each key, from 1: less is better, equals share a place and the next one is left out."""
+    ordered = sorted(keys)
+    return [ordered.index(key) + 1 for key in keys]

@@ -58,6 +58,11 @@ MAX_LOSSES: Final = 5
 ENDED: Final = ("done", "failed", "cancelled")
 
 
+def new_job(kind: str, run: str, payload: Mapping[str, Any]) -> Job:
+    """A job that is at the end of the queue once a session adds it."""
+    return Job(id=secrets.token_hex(8), kind=kind, run=run, payload=dict(payload))
+
+
 class JobQueue:
     """The jobs of a console's database."""
 
@@ -66,7 +71,7 @@ class JobQueue:
 
     def add(self, kind: str, run: str, payload: Mapping[str, Any]) -> Job:
         """Put a job at the end of the queue."""
-        job = Job(id=secrets.token_hex(8), kind=kind, run=run, payload=dict(payload))
+        job = new_job(kind, run, payload)
         with self._database.transaction() as session:
             session.add(job)
         return job

@@ -1,7 +1,7 @@
 """Races: made, entered, decided by jobs, ranked.
 
     race ──enter──▶ entry + job (kind race) ──▶ evaluation in the model's run folder, driven again to verify it
-      └─ standings ◀── ranking_score of each model's best entry ◀── the job's result
+      └─ standings ◀── ranking_key of each model's best entry ◀── the job's result
 
 Every entry starts alike: one car, the race's rules, objects and seed. The table says whose a race and an entry are, so
 that accounts can come later.
@@ -17,10 +17,10 @@ from typing import Any, Final
 
 import sqlalchemy as sa
 
-from racecraft.contest import places, ranking_score
+from racecraft.contest import Key, places, ranking_key, ranking_score
 from racecraft.errors import ConfigError
 from racecraft.race import RaceRules
-from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.queue import JobQueue, new_job
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.schemas import (
@@ -146,35 +146,33 @@ class Races:
             NotFound: There is no such race or model.
             Conflict: The race is not open, or a model has nothing to drive with.
         """
-        with self._database.transaction() as session:
-            race = _race(session, race_id)
-            state = _state(race)
-            count = session.scalar(sa.select(sa.func.count(Entry.id)).where(Entry.race_id == race_id)) or 0
         models = list(dict.fromkeys(request.models))
-        for name in models:
-            if self._garage.folder(name).checkpoints.last is None:
-                raise Conflict(f"Model {name!r} has no checkpoint to race with.", hint="Train it first.")
-        if state != "open":
-            raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
-        if count + len(models) > MAX_ENTRIES:
-            raise Conflict(f"A race takes {MAX_ENTRIES} entries.")
-        payload = {
-            "track": self._courses.path_or_name(race.track),
-            "rules": race.rules,
-            "objects": race.objects,
-            "vehicle": race.vehicle,
-            "seed": race.seed,
-            "checkpoint": request.checkpoint,
-        }
-        entered = []
-        for name in models:
-            job = self._queue.add(KIND, name, payload)
-            with self._database.transaction() as session:
-                entry = Entry(race_id=race_id, user_id=user_id, run=name, job_id=job.id)
-                session.add(entry)
-                session.flush()
-                entered.append(entry.id)
-        return entered
+        with self._database.transaction() as session:
+            _hold(session, race_id)
+            race = _race(session, race_id)
+            for name in models:
+                if self._garage.folder(name).checkpoints.last is None:
+                    raise Conflict(f"Model {name!r} has no checkpoint to race with.", hint="Train it first.")
+            if (state := _state(race)) != "open":
+                raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
+            count = session.scalar(sa.select(sa.func.count(Entry.id)).where(Entry.race_id == race_id)) or 0
+            if count + len(models) > MAX_ENTRIES:
+                raise Conflict(f"A race takes {MAX_ENTRIES} entries.")
+            payload = {
+                "track": self._courses.path_or_name(race.track),
+                "rules": race.rules,
+                "objects": race.objects,
+                "vehicle": race.vehicle,
+                "seed": race.seed,
+                "checkpoint": request.checkpoint,
+            }
+            jobs = [new_job(KIND, name, payload) for name in models]
+            session.add_all(jobs)
+            session.flush()  # entries name their jobs
+            entries = [Entry(race_id=race_id, user_id=user_id, run=job.run, job_id=job.id) for job in jobs]
+            session.add_all(entries)
+            session.flush()
+            return [entry.id for entry in entries]
 
     def withdraw(self, race_id: int, entry_id: int) -> None:
         """Take an entry back; if it is being driven, that ends."""
@@ -210,6 +208,16 @@ def _race(session: Any, race_id: int, *, is_deleted: bool = False) -> Race:
     if race is None or (race.deleted is not None) != is_deleted:
         raise NotFound(f"There is no race {race_id}.")
     return race
+
+
+def _hold(session: Any, race_id: int) -> None:
+    """Keep others from changing a race or entering it until the transaction ends, in either database.
+
+    What a transaction writes first it holds, SQLite the whole file and PostgreSQL the row; what it reads first it does
+    not, so two could count the entries and both add one.
+    """
+    if 0 <= race_id < 2**31:
+        session.execute(sa.update(Race).where(Race.id == race_id).values(title=Race.title))
 
 
 def _entries(session: Any, race_ids: list[int]) -> dict[int, list[Entered]]:
@@ -248,8 +256,8 @@ def _state(race: Race, moment: datetime | None = None) -> RaceState:
 
 
 def _card(race: Race, entries: list[Entered]) -> dict[str, Any]:
-    scores = [(score, job.run) for _, job, _ in entries if math.isfinite(score := _score(race, job))]
-    leader = min(scores, default=None)
+    ranked = [(entry.id, job) for entry, job, _ in entries if math.isfinite(_score(race, job))]
+    leader = min(ranked, key=lambda found: (_key(race, found[1]), found[0]), default=None)
     return {
         **{name: getattr(race, name) for name in RaceCard.model_fields if hasattr(race, name)},
         "laps": int(race.rules.get("laps", 1)),
@@ -257,8 +265,8 @@ def _card(race: Race, entries: list[Entered]) -> dict[str, Any]:
         "entries": len(entries),
         "models": len({job.run for _, job, _ in entries}),
         "running": sum(job.state in ("queued", "running") for _, job, _ in entries),
-        "leader": leader[1] if leader else None,
-        "leader_score": leader[0] if leader else None,
+        "leader": leader[1].run if leader else None,
+        "leader_score": _score(race, leader[1]) if leader else None,
     }
 
 
@@ -273,9 +281,20 @@ def _score(race: Race, job: Job) -> float:
     return ranking_score(_lap_times(job), ranking=race.ranking, minimum_laps=race.minimum_laps)
 
 
+def _key(race: Race, job: Job) -> Key:
+    """What the place of a decided entry is decided by."""
+    result: dict[str, Any] = job.result or {}
+    return ranking_key(
+        _score(race, job),
+        lap_times=_lap_times(job),
+        completion=float(result.get("mean_completion") or 0.0),
+        resets=int(result.get("resets") or 0),
+    )
+
+
 def _standings(race: Race, entries: list[Entered], *, runs: Path) -> list[Standing]:
-    """Each model's best entry: by score, then by how far it came, then by who was first."""
-    best: dict[tuple[int, str], tuple[tuple[float, float, int], Entered]] = {}
+    """Each model's best entry, in the order of their places; of equals, who was first."""
+    best: dict[tuple[int, str], tuple[tuple[Key, int], Entered]] = {}
     attempts: dict[tuple[int, str], int] = {}
     for entered in entries:
         entry, job, _ = entered
@@ -283,21 +302,22 @@ def _standings(race: Race, entries: list[Entered], *, runs: Path) -> list[Standi
             continue
         who = (entry.user_id, job.run)
         attempts[who] = attempts.get(who, 0) + 1
-        rank = (_score(race, job), -float(job.result.get("mean_completion") or 0.0), entry.id)
+        rank = (_key(race, job), entry.id)
         if who not in best or rank < best[who][0]:
             best[who] = (rank, entered)
     ordered = sorted(best.values(), key=lambda found: found[0])
-    scores = [rank[0] for rank, _ in ordered]
+    scores = [_score(race, job) for _, (_, job, _) in ordered]
+    first = min(scores, default=math.inf)
     return [
         _standing(
             entered,
             place=place,
             score=score,
-            first=scores[0],
+            first=first,
             attempts=attempts[entered[0].user_id, entered[1].run],
             runs=runs,
         )
-        for (_, entered), place, score in zip(ordered, places(scores), scores, strict=True)
+        for (_, entered), place, score in zip(ordered, places([rank[0] for rank, _ in ordered]), scores, strict=True)
     ]
 
 
