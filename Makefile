@@ -63,32 +63,40 @@ requirements: $(UV)  ## pin the newest allowed versions again
 
 $(UV): requirements/uv.txt
 	@test -n "$(PYTHON)" || { echo "Racecraft needs Python 3.11 or newer; none was found on PATH."; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements/uv.txt
+	@echo "Set-up, once, in $(VENV): about a minute on two cores, three on slow ones."
+	@echo "1 of 3: an environment of its own for $$($(PYTHON) --version) ..."
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements/uv.txt
 	@touch $(UV)
 
 $(VENV)/.train: $(UV) requirements/train.txt
-	$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/train.txt
+	@echo "2 of 3: packages from PyPI, some 100 MB ..."
+	@$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/train.txt
 	@touch $@
 
 $(VENV)/.dev: $(UV) $(VENV)/.train requirements/dev.txt
-	$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/dev.txt
+	@echo "Packages that only tests need, PyTorch among them: some 3 GB, a minute or two the first time ..."
+	@$(UV) pip install -q --python $(BIN)/python --require-hashes -r requirements/dev.txt
 	@touch $@
 
 $(VENV)/.serve: $(UV) $(VENV)/.train requirements/serve.txt
-	$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/serve.txt
+	@echo "Packages of the console's server ..."
+	@$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/serve.txt
 	@touch $@
 
 $(NODE): web/package.json web/package-lock.json
 	@command -v npm >/dev/null || { echo "The console's pages are built with Node and npm; neither was found on PATH."; exit 1; }
-	cd web && npm ci --no-audit --no-fund --loglevel=error
+	@echo "Packages of the pages, from npm: half a minute ..."
+	@cd web && npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
 
 $(PAGES): $(WEB) $(NODE)
-	cd web && npm run --silent build
+	@echo "Building the pages ..."
+	@cd web && npm run --silent build
 	@touch $@
 
 $(VENV)/.built: $(VENV)/.train $(NATIVE)
-	PATH="$(CURDIR)/$(BIN):$$PATH" flock $(VENV)/.build-lock $(UV) pip install -q --python $(BIN)/python --no-build-isolation --no-deps -e .
-	$(BIN)/python -m compileall -q src/racecraft
+	@echo "3 of 3: compiling the simulator and the learner: the longest part ..."
+	@PATH="$(CURDIR)/$(BIN):$$PATH" flock $(VENV)/.build-lock $(UV) pip install -q --python $(BIN)/python --no-build-isolation --no-deps -e .
+	@$(BIN)/python -m compileall -q src/racecraft
 	@touch $@

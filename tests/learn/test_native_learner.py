@@ -477,7 +477,8 @@ def test_the_native_backend_is_the_default(monkeypatch):
     assert isinstance(make_learner(spec, backend="torch"), TorchLearner)
     with pytest.raises(ConfigError, match="'jax'"):
         make_learner(spec, backend="jax")
-    monkeypatch.setitem(sys.modules, "racecraft.learn.torch_learner", None)
+    monkeypatch.delitem(sys.modules, "racecraft.learn.torch_learner")
+    monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(ConfigError, match="not installed"):
         make_learner(spec, backend="torch")
 

@@ -12,6 +12,7 @@ import typer
 
 from racecraft.cli.app import INTERRUPTED, app, print_json, text
 from racecraft.errors import RacecraftError
+from racecraft.extras import not_installed
 
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])  # typer hands out no name for this base
 
@@ -43,9 +44,11 @@ def main() -> None:
     except typer.Abort:
         sys.exit(INTERRUPTED)
     except Exception as error:
-        is_expected = isinstance(error, RacecraftError | OSError)
-        code, message = type(error).__name__, str(error)
-        hint = getattr(error, "hint", "") if is_expected else "This is a bug in Racecraft. --debug shows where."
+        absent = not_installed(error.name or "") if isinstance(error, ModuleNotFoundError) else None
+        told = absent or error
+        is_expected = isinstance(told, RacecraftError | OSError)
+        code, message = type(told).__name__, str(told)
+        hint = getattr(told, "hint", "") if is_expected else "This is a bug in Racecraft. --debug shows where."
         if is_debug:
             traceback.print_exc()
         if is_json:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from racecraft.cli.app import Json, app, print_json
-from racecraft.errors import ConfigError
+from racecraft.extras import needed_for
 
 
 @app.command()
@@ -33,16 +33,11 @@ def serve(
     as_json: Json = False,
 ) -> None:
     """Open the console in a browser: train, watch and race."""
-    try:
-        from racecraft.serve.quick import loading
+    from racecraft.serve.quick import loading
 
-        with loading():
-            from racecraft.serve import ServeSettings
-            from racecraft.serve import serve as run_server
-    except ModuleNotFoundError as error:
-        raise ConfigError(
-            f"The console needs {error.name}, which is not installed.", hint="Install racecraft[serve]."
-        ) from error
+    with needed_for("The console"), loading():
+        from racecraft.serve import ServeSettings
+        from racecraft.serve import serve as run_server
 
     def ready(link: str) -> None:
         if as_json:

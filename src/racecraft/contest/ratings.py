@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from racecraft.errors import ConfigError
+from racecraft.extras import needed_for
 
 MEAN: Final = 25.0
 """Of a model that has not raced."""
@@ -58,10 +59,6 @@ def win_probability(one: Rating, other: Rating) -> float:
 
 
 def _model() -> Any:
-    try:
+    with needed_for("A table of ratings"):
         from openskill.models import PlackettLuce
-    except ImportError as error:
-        raise ConfigError(
-            "Ratings need OpenSkill, which is not installed.", hint="pip install 'racecraft[multi]'"
-        ) from error
     return PlackettLuce(mu=MEAN, sigma=DEVIATION)

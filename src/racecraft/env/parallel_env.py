@@ -14,16 +14,12 @@ from racecraft.env.observation import Observation
 from racecraft.env.rendering import Renderer, check_render_mode
 from racecraft.env.task import DrivingTask, TaskSettings, seed_key
 from racecraft.errors import ConfigError, ResetNeeded
+from racecraft.extras import needed_for
 from racecraft.sim.checks import check_whole
 from racecraft.track import Track
 
-try:
+with needed_for("The environment of several learning cars"):
     from pettingzoo import ParallelEnv  # type: ignore[import-untyped]
-except ImportError as error:
-    raise ConfigError(
-        "The environment of several learning cars needs PettingZoo, which is not installed.",
-        hint="pip install 'racecraft[multi]'",
-    ) from error
 
 StepResult = tuple[
     dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]

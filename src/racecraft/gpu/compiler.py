@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.errors import ConfigError
+from racecraft.extras import needed_for
 
 ARITHMETIC: Final = ("--fmad=false", "--prec-div=true", "--prec-sqrt=true", "--ftz=false")
 LANGUAGE: Final = ("--std=c++20", "-default-device", "-w")
@@ -42,10 +43,8 @@ def compile_program(
     Raises:
         ConfigError: NVRTC is not installed, does not know the architecture, or refuses the source.
     """
-    try:
+    with needed_for("Compiling for a GPU"):
         from cuda.bindings import nvrtc
-    except ImportError as error:
-        raise ConfigError("Compiling for a GPU needs cuda-bindings, which is not installed.", hint=INSTALL) from error
     options = [*LANGUAGE, *ARITHMETIC, f"-arch={architecture}"]
     options += [f"-D{key}={value}" for key, value in (defines or {}).items()]
     try:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from racecraft.errors import ConfigError, RacecraftError
-from racecraft.gpu.compiler import INSTALL, cache_folder, compile_program
+from racecraft.extras import needed_for
+from racecraft.gpu.compiler import cache_folder, compile_program
 
 NO_GPU: Final = "Use device 'cpu'; for a GPU install NVIDIA's driver and check it with nvidia-smi."
 
@@ -108,10 +109,8 @@ class CudaDevice:
     """
 
     def __init__(self, index: int = 0) -> None:
-        try:
+        with needed_for("Device 'cuda'"):
             from cuda.bindings import driver
-        except ImportError as error:
-            raise ConfigError("Device 'cuda' needs cuda-bindings, which is not installed.", hint=INSTALL) from error
         self._driver = driver
         try:
             self._check(driver.cuInit(0))

@@ -6,6 +6,7 @@ Nothing here imports torch unless ``make_learner`` is asked for the torch backen
 from typing import Any
 
 from racecraft.errors import ConfigError
+from racecraft.extras import needed_for
 from racecraft.learn.algorithm import Algorithm
 from racecraft.learn.distill import Distill, DistillConfig
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats
@@ -30,12 +31,8 @@ def make_learner(
         ConfigError: There is no such backend, or torch is not installed.
     """
     if device != "cpu":
-        try:
+        with needed_for(f"Device {device!r}"):
             from racecraft.learn.torch_cuda_learner import CudaLearner  # takes seconds
-        except ImportError as error:
-            raise ConfigError(
-                f"Device {device!r} needs PyTorch, which is not installed.", hint="Install 'racecraft[cuda]'."
-            ) from error
         return CudaLearner(spec, seed=seed, device=device)
     if backend in ("auto", "native"):
         from racecraft.learn.native_learner import NativeLearner  # loads the native core
@@ -43,13 +40,8 @@ def make_learner(
         return NativeLearner(spec, seed=seed, num_threads=num_threads)
     if backend != "torch":
         raise ConfigError(f"backend is {backend!r}, expected 'auto', 'native' or 'torch'.")
-    try:
+    with needed_for("The torch backend"):
         from racecraft.learn.torch_learner import TorchLearner  # takes seconds
-    except ImportError as error:
-        raise ConfigError(
-            "The torch backend needs PyTorch, which is not installed.",
-            hint="Use backend 'native', or install 'racecraft[torch]'.",
-        ) from error
     return TorchLearner(spec, seed=seed, num_threads=num_threads)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from racecraft.errors import ConfigError
+from racecraft.extras import needed_for
 from racecraft.sim.vehicle import Vehicle
 
 GRAVITY: Final = 9.8
@@ -26,13 +26,8 @@ def load_casadi() -> Any:
     Raises:
         ConfigError: It is not installed.
     """
-    try:
+    with needed_for("To compute a minimum lap time"):
         import casadi
-    except ImportError:
-        raise ConfigError(
-            "To compute a minimum lap time the package casadi is needed, and it is not installed.",
-            hint="Install it with: pip install 'racecraft[limit]'",
-        ) from None
     return casadi
 
 

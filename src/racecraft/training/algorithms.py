@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from racecraft.agent import ActionSpace
 from racecraft.errors import ConfigError
+from racecraft.extras import needed_for
 from racecraft.learn import PPO, SAC, Algorithm, Distill, Environment, Learner, make_cuda_ppo
 from racecraft.learn.distill import TEACHER_PPO
 from racecraft.reward import RewardWorker, keeps_state
@@ -48,7 +49,7 @@ def make_algorithm(
     if isinstance(environment, CudaTrainingEnvironment):
         return make_cuda_ppo(settings.ppo, learner, environment, seed=seed)
     if settings.algorithm == "sac":
-        torch_sac = _import("torch_sac", "sac", extra="torch")
+        torch_sac = _import("torch_sac", "sac")
         state_size = learner.spec.state_size
         backend = torch_sac.TorchSAC(learner.spec, settings.sac, state_size=state_size, seed=seed, num_threads=threads)
         return SAC(settings.sac, backend, learner, environment, seed=seed)
@@ -57,7 +58,7 @@ def make_algorithm(
             raise ConfigError("distill trains alone on the track; opponents need --algorithm ppo.")
         return Distill(settings.distill, learner, environment, open_teacher(), seed=seed, num_threads=threads)
     if settings.algorithm.startswith("sb3:"):
-        torch_sb3 = _import("torch_sb3", settings.algorithm, extra="sb3")
+        torch_sb3 = _import("torch_sb3", settings.algorithm)
         name = settings.algorithm.removeprefix("sb3:")
         made: Algorithm = torch_sb3.SB3(name, settings.sb3, learner, environment, seed=seed, num_threads=threads)
         return made
@@ -113,15 +114,9 @@ def teacher_environment(
     return _WithoutCamera(simulation, worker, action_space, counter=EpisodeCounter(num_envs), goes_on=True)
 
 
-def _import(module: str, algorithm: str, *, extra: str) -> Any:
+def _import(module: str, algorithm: str) -> Any:
     """A backend that takes seconds to import, or may not be there."""
     import importlib
 
-    try:
+    with needed_for(f"--algorithm {algorithm}"):
         return importlib.import_module(f"racecraft.learn.{module}")
-    except ImportError as error:
-        needed = "PyTorch" if extra == "torch" else "Stable-Baselines3"
-        raise ConfigError(
-            f"--algorithm {algorithm} needs {needed}, which is not installed.",
-            hint=f"Install 'racecraft[{extra}]', or train with ppo.",
-        ) from error

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.extras import check_installed
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file, write_json
 from racecraft.run.folder import sanitize_name
@@ -16,7 +16,7 @@ from racecraft.training.plan import Plan, make_plan
 from racecraft.training.start import read_settings
 from racecraft.tuning.constants import find_constants
 from racecraft.tuning.space import Parameter, make_space
-from racecraft.tuning.study import FORMAT, GOALS, no_optuna
+from racecraft.tuning.study import FORMAT, GOALS
 
 
 def start_tuning(
@@ -98,8 +98,7 @@ def make_tuning(
     Raises:
         RacecraftError: An input is wrong.
     """
-    if find_spec("optuna") is None:  # importing it takes a second, which a server does not have
-        raise no_optuna()
+    check_installed("optuna", "racecraft tune")  # importing it takes a second, which a server does not have
     if goal not in GOALS:
         raise ConfigError(f"goal is {goal!r}, allowed: {', '.join(GOALS)}.", hint=did_you_mean(str(goal), GOALS))
     if isinstance(trial_steps, bool) or not 1 <= trial_steps <= 10**9:

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from racecraft.agent import ModelMetadata
 from racecraft.errors import ConfigError, RacecraftError, RunError
+from racecraft.extras import needed_for
 from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
@@ -328,15 +329,8 @@ def _importances(optuna: Any, study: optuna.Study) -> dict[str, float]:
     return {name: float(share) for name, share in found.items()}
 
 
-def no_optuna() -> ConfigError:
-    """What is said where Optuna is missing."""
-    return ConfigError("racecraft tune needs Optuna, which is not installed.", hint="Install 'racecraft[tune]'.")
-
-
 def _optuna() -> Any:
-    try:
+    with needed_for("racecraft tune"):
         import optuna
-    except ImportError as error:
-        raise no_optuna() from error
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     return optuna

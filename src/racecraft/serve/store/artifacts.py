@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from racecraft.errors import ConfigError, RunError
+from racecraft.extras import needed_for
 from racecraft.run import RunFolder
 
 T = TypeVar("T")
@@ -46,13 +47,9 @@ class Artifacts:
             raise ConfigError(
                 f"artifacts is {url.split('://')[0]!r}; allowed are s3://BUCKET/PREFIX and file:///FOLDER."
             )
-        try:
+        with needed_for("An object store"):
             import obstore
             from obstore import exceptions, store
-        except ModuleNotFoundError as error:
-            raise ConfigError(
-                "Object stores need obstore, which is not installed.", hint="Install racecraft[s3]."
-            ) from error
         self.url = url
         self._api, self._missing = obstore, (exceptions.NotFoundError, FileNotFoundError)
         self._broken = (exceptions.BaseError, OSError)
