@@ -29,7 +29,7 @@ def test_race_verify_and_ladder(racecraft: Run, trained: Path, tmp_path: Path) -
 
     filmed = racecraft("film", replays[0], "--ghost", replays[1], "--ghost", "best-lap", "--json").document
     assert Path(filmed["video"]).stat().st_size > 10_000
-    assert racecraft("film", replays[0], "--car", "2").err.startswith("ConfigError: Car 2")
+    assert racecraft("film", replays[0], "--car", "6").err.startswith("ConfigError: Car 6")
 
     from racecraft.replay import read_replay, write_replay
 

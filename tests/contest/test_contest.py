@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -47,27 +48,29 @@ def test_a_race_writes_results_replays_and_sim_traces(models: list[Path], tmp_pa
     assert {result["name"] for result in document["results"]} == {"m1", "m2"}
     assert document["models"]["m1"]["step"] == 64
     boxes = []
-    for name, trial in zip(("m1", "m2"), found.contest.trials, strict=True):
+    for name, trials in zip(("m1", "m2"), found.contest.trials, strict=True):
         replay = read_replay(found.folder / document["files"][f"replay of {name}"])
         assert verify(replay, num_threads=1).is_genuine
-        assert replay.names == (name,)
+        assert replay.names == tuple(f"{name}, trial {number}" for number in range(1, 6))
         rows = read_simtrace(found.folder / document["files"][f"sim-trace of {name}"])
-        assert len(rows["episode"]) == len(trial.recording)
-        boxes.append([(view.x, view.y) for view in trial.recording.objects(0)])
+        assert len(rows["episode"]) == sum(len(trial.recording) for trial in trials)
+        boxes.append([[(view.x, view.y) for view in trial.recording.objects(0)] for trial in trials])
     assert boxes[0] == boxes[1]  # everybody meets the same boxes
+    assert all(one != other for one, other in itertools.combinations(boxes[0], 2))  # in each trial others
     again = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=5)
     assert again.folder != found.folder
     assert again.contest.standings == found.contest.standings
-    other = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=6).contest.trials[0]
-    assert [(view.x, view.y) for view in other.recording.objects(0)] != boxes[0]
+    other = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=6).contest.trials[0][0]
+    assert [(view.x, view.y) for view in other.recording.objects(0)] != boxes[0][0]
 
 
 def test_a_model_ties_with_itself(models: list[Path], tmp_path: Path) -> None:
     found = race([models[0], f"{models[0]}@64", models[0]], tmp_path)
     assert found.contest.names == ("m1", "m1@64", "m1-2")
-    rows = [trial.recording.rows for trial in found.contest.trials]
-    assert np.array_equal(rows[0], rows[1])
-    assert np.array_equal(rows[0], rows[2])
+    rows = [[trial.recording.rows for trial in trials] for trials in found.contest.trials]
+    for one, other, third in zip(*rows, strict=True):
+        assert np.array_equal(one, other)
+        assert np.array_equal(one, third)
     assert [standing.place for standing in found.contest.standings] == [None] * 3  # nobody came round
     assert len({path.name for path in found.files.values()}) >= 4
 
@@ -89,6 +92,9 @@ def test_a_race_is_filmed_with_ghosts(models: list[Path], tmp_path: Path) -> Non
         ({"kind": "grid", "models": 9}, "2 to 8"),
         ({"ranking": "luck"}, "ranking"),
         ({"minimum_laps": 2}, "1 to 1"),
+        ({"num_trials": 0}, "1 to 99"),
+        ({"num_trials": 100}, "1 to 99"),
+        ({"num_trials": 2, "kind": "grid"}, "all are on one road"),
         ({"rules": "nobody's"}, "Rules"),
         ({"changes": {"max_resets": -1}}, "max_resets"),
     ],

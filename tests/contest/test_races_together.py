@@ -71,7 +71,7 @@ def test_all_cars_drive_the_same_distance_and_the_fastest_wins() -> None:
     drivers = [Autopilot(speed=1.0), Autopilot(speed=1.5), Autopilot(speed=2.0)]
     given, trials = race(drivers[::-1])  # the fastest in front: nobody meets
     assert [trial.laps[0].crash_count for trial in trials] == [0, 0, 0]
-    assert [standing.car for standing in classify(trials, ranks_all=True)] == [0, 1, 2]
+    assert [standing.car for standing in classify([[trial] for trial in trials], ranks_all=True)] == [0, 1, 2]
     for car, trial in enumerate(trials):  # a film shows the others in their colours, also if it is cut
         others = [color for number, color in enumerate(RACER_COLORS[:3]) if number != car]
         for recording in (trial.recording, trial.recording.until(2.0), trial.recording.lap(1)):
@@ -105,7 +105,7 @@ def test_time_is_up_for_everybody_at_once_and_distance_counts() -> None:
     _, trials = race([Autopilot(speed=1.0), Blind(), Autopilot(speed=0.5)], time_limit=6.0, max_resets=1000)
     assert {trial.status for trial in trials} == {"time_up"}
     assert len({len(trial.recording) for trial in trials}) == 1
-    order = [standing.car for standing in classify(trials, ranks_all=True)]
+    order = [standing.car for standing in classify([[trial] for trial in trials], ranks_all=True)]
     assert order == sorted(range(3), key=lambda car: -trials[car].completion)
 
 

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from racecraft.contest.standings import places, ranking_key, ranking_score
+from racecraft.contest.standings import median_score, places, ranking_key, ranking_score
 from racecraft.errors import ConfigError
 
 LAPS = [10.0, 9.0, 8.0, 12.0]
@@ -53,3 +53,11 @@ def test_keys_by_hand():
     assert ranking_key(19.0004, **finished) == ranking_key(19.0, **finished) < ranking_key(19.0006, **finished)
     out = {"lap_times": [], "completion": 0.4567, "resets": 3}
     assert ranking_key(math.inf, **out) == (1.0, -457.0, 3.0, 0.0) > ranking_key(1e9, **finished)
+
+
+def test_the_median_of_scores_by_hand():
+    assert median_score([7.0]) == 7.0
+    assert median_score([9.0, 1.0, 5.0]) == 5.0
+    assert median_score([4.0, 1.0, 2.0, 9.0]) == 3.0
+    assert median_score([math.inf, 5.0, math.inf, 1.0, 3.0]) == 5.0
+    assert median_score([math.inf, 5.0]) == math.inf

@@ -33,7 +33,11 @@ def race(
     rules: Rules = "drfc",
     ranking: Annotated[str, typer.Option("--ranking", help="total, best or average.")] = "total",
     minimum_laps: Annotated[
-        int | None, typer.Option("--minimum-laps", help="Laps that a model must complete to be ranked.")
+        int | None, typer.Option("--minimum-laps", help="Laps that a trial must have for a score.")
+    ] = None,
+    trials: Annotated[
+        int | None,
+        typer.Option("--trials", help="Of each model alone, from other places of the lap; 5. Their median counts."),
     ] = None,
     time_limit: Annotated[float | None, typer.Option("--time-limit", help="Seconds on the clock; 0 for none.")] = None,
     offtrack_penalty: race_options.OfftrackPenalty = None,
@@ -69,6 +73,7 @@ def race(
         rules=rules,
         ranking=ranking,
         minimum_laps=minimum_laps,
+        num_trials=trials,
         objects=_objects(kind, context.params),
         vehicle=vehicle,
         randomize=randomize,

@@ -142,21 +142,23 @@ def say_raced(outcome: RunRace) -> None:
     console, contest = Console(), outcome.contest
     conditions = contest.conditions
     laps = f"{conditions.rules.laps} lap" + "s" * (conditions.rules.laps > 1)
+    if contest.num_trials > 1:
+        laps = f"median of {contest.num_trials} trials of {laps}"
     is_crowded = conditions.objects.count > 0 or contest.shares_road
     room = max(8, console.width - (80 if is_crowded else 70))  # for names
     table = _table(title=f"{contest.kind} on {conditions.track.name}, {laps}")
     table.add_column("", justify="right", no_wrap=True)
     table.add_column("model", style="bold", overflow="ellipsis", no_wrap=True, max_width=room)
     crashes = ("crashes",) if is_crowded else ()
-    for heading in ("laps", "best lap", "total", "gap", "off track", *crashes, "resets"):
+    for heading in ("laps", "best lap", "score", "gap", "off track", *crashes, "resets"):
         table.add_column(heading, justify="right", no_wrap=True)
     for standing in contest.standings:
-        score = "–" if standing.score is None else f"{standing.total:.2f} s"
+        score = "–" if standing.score is None else f"{standing.score:.2f} s"
         gap = "–" if standing.gap is None else f"+{standing.gap:.2f}" if standing.gap else ""
         table.add_row(
             "–" if standing.place is None else str(standing.place),
             Text(contest.names[standing.car]),
-            f"{standing.laps}/{conditions.rules.laps}",
+            f"{standing.laps}/{conditions.rules.laps * contest.num_trials}",
             "–" if standing.best is None else f"{standing.best:.2f} s",
             score,
             gap,
@@ -167,7 +169,7 @@ def say_raced(outcome: RunRace) -> None:
     console.print(table)
     if contest.ranking != "total" or contest.minimum_laps < conditions.rules.laps:
         what = {"total": "total time", "best": "best lap", "average": "best average"}[contest.ranking]
-        _say(console, f"Ranked by {what}; {contest.minimum_laps} laps needed.")
+        _say(console, f"Ranked by {what}; {contest.minimum_laps} laps of a trial needed.")
     _say(console, "Race folder: ", (str(outcome.folder), "bold"))
     for what, path in outcome.files.items():
         if what.startswith(("video", "replay")):

@@ -1,11 +1,13 @@
 """`hold_race`: several models race, each alone against the clock or all on one road, and are placed.
 
-time-trial, object-avoidance, head-to-bot   a road for each, equal to the others' to the last bit
-head-to-model (2), grid (2 to 8)            one road, a staggered grid, cars that see and hit each other
+time-trial, object-avoidance, head-to-bot   a road for each, equal to the others' to the last bit; several trials, each
+                                            from another place of the lap, of which the median counts
+head-to-model (2), grid (2 to 8)            one road, a staggered grid, cars that see and hit each other; one trial
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -31,6 +33,9 @@ RACE_KINDS: Final = ALONE + TOGETHER
 MAX_ENTRIES: Final = 1000
 MAX_GRID: Final = 8
 """Cars on one road."""
+TRIALS: Final = 5
+"""Of each entry that drives alone, unless a race asks for more or fewer."""
+MAX_TRIALS: Final = 99
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,12 +48,14 @@ class Contest:
     """The same for everybody."""
     names: tuple[str, ...]
     """Of the entries."""
-    trials: tuple[Trial, ...]
-    """What each of them did."""
+    cameras: tuple[CameraSpec, ...]
+    """What each of them sees with."""
+    trials: tuple[tuple[Trial, ...], ...]
+    """What each of them did, trial by trial."""
     ranking: str
     """``total``, ``best`` or ``average``."""
     minimum_laps: int
-    """Completed laps that an entry must have to be ranked."""
+    """Completed laps that a trial must have for a score."""
 
     @property
     def shares_road(self) -> bool:
@@ -65,12 +72,30 @@ class Contest:
             ranks_all=self.shares_road,
         )
 
+    @property
+    def num_trials(self) -> int:
+        """Of each entry."""
+        return len(self.trials[0])
+
+    @property
+    def shown_trial(self) -> int:
+        """The one to film, from 0: whose score is nearest to the winner's median."""
+        winner = self.standings[0]
+        if winner.score is None:
+            return 0
+        away = [math.inf if score is None else abs(score - winner.score) for score in winner.scores]
+        return away.index(min(away))
+
     def replays(self) -> list[tuple[str, Replay]]:
         """Replays by what to call them: one for each entry, or one of all where they shared a road."""
         title = f"{self.kind} on {self.conditions.track.name}"
         if self.shares_road:
-            return [("race", self._replay(title, range(len(self.names))))]
-        return [(name, self._replay(title, [index])) for index, name in enumerate(self.names)]
+            trials = [trials[0] for trials in self.trials]
+            return [("race", _replay(title, self.conditions, self.names, trials))]
+        return [
+            (name, _replay(title, replace(self.conditions, camera=camera), _trial_names(name, len(trials)), trials))
+            for name, camera, trials in zip(self.names, self.cameras, self.trials, strict=True)
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
@@ -83,25 +108,16 @@ class Contest:
             "objects": conditions.objects.to_dict(),
             "ranking": self.ranking,
             "minimum_laps": self.minimum_laps,
+            "trials": self.num_trials,
             "results": [
                 {
                     "name": self.names[standing.car],
                     **{name: value for name, value in standing.to_dict().items() if name != "car"},
-                    "lap_seconds": list(self.trials[standing.car].lap_times),
+                    "lap_seconds": [list(trial.lap_times) for trial in self.trials[standing.car]],
                 }
                 for standing in self.standings
             ],
         }
-
-    def _replay(self, title: str, cars: Sequence[int]) -> Replay:
-        trials = tuple(self.trials[car] for car in cars)
-        return Replay(
-            title=title,
-            conditions=self.conditions,
-            names=tuple(self.names[car] for car in cars),
-            cars=trials,
-            rewards=tuple(trial.recording.rewards for trial in trials),
-        )
 
 
 def hold_race(
@@ -111,6 +127,7 @@ def hold_race(
     kind: str = "time-trial",
     ranking: str = "total",
     minimum_laps: int | None = None,
+    num_trials: int | None = None,
     num_threads: int = 0,
 ) -> Contest:
     """Race.
@@ -120,14 +137,17 @@ def hold_race(
         conditions: Track, rules, vehicle, objects, seed; everybody has the very same.
         kind: Of `RACE_KINDS`.
         ranking: ``total`` time, ``best`` lap or ``average`` of the best `minimum_laps` laps in a row.
-        minimum_laps: Completed laps that an entry must have to be ranked; by default all for ``total``, three for
+        minimum_laps: Completed laps that a trial must have for a score; by default all for ``total``, three for
             ``average``, one for ``best``.
+        num_trials: Of each entry that drives alone, 5 by default; cars on one road have one.
         num_threads: 0 takes one per core.
 
     Raises:
-        ConfigError: No such race or ranking, or the number of entries does not go with it.
+        ConfigError: No such race or ranking, or the number of entries or of trials does not go with it.
+        NonFiniteAction: An entry's network gives NaN; the message names it.
     """
     check_kind(kind, len(entries))
+    trials = check_trials(kind, num_trials)
     laps = conditions.rules.laps
     needed = {"total": laps, "average": min(3, laps)}.get(ranking, 1) if minimum_laps is None else minimum_laps
     if ranking not in RANKINGS:
@@ -135,16 +155,19 @@ def hold_race(
         raise ConfigError(f"ranking is {ranking!r}; allowed are {', '.join(RANKINGS)}.", hint=hint)
     if not 1 <= needed <= laps:
         raise ConfigError(f"minimum_laps is {needed}; allowed is 1 to {laps}, the laps of the race.")
+    driven: tuple[tuple[Trial, ...], ...]
     if kind in TOGETHER:
         conditions = replace(shared_road(conditions, len(entries)), camera=conditions.camera or CameraSpec())
-        trials = race_together([entry.policy for entry in entries], conditions, num_threads=num_threads)
+        together = race_together(entries, conditions, num_threads=num_threads)
+        driven = tuple((trial,) for trial in together)
     else:
-        trials = tuple(_alone(entry, conditions, num_threads=num_threads) for entry in entries)
+        driven = tuple(_alone(entry, conditions, num_trials=trials, num_threads=num_threads) for entry in entries)
     return Contest(
         kind=kind,
         conditions=conditions,
         names=tuple(entry.name for entry in entries),
-        trials=trials,
+        cameras=tuple(entry.sensors.camera() for entry in entries),
+        trials=driven,
         ranking=ranking,
         minimum_laps=needed,
     )
@@ -165,19 +188,47 @@ def check_kind(kind: str, num_entries: int) -> None:
         raise ConfigError(f"A {kind} race has {num_entries} models; allowed are {allowed}.")
 
 
-def _alone(entry: Entry, conditions: Conditions, *, num_threads: int) -> Trial:
+def check_trials(kind: str, num_trials: int | None) -> int:
+    """How many trials each entry of a race has.
+
+    Raises:
+        ConfigError: As many do not go with the race.
+    """
+    high = 1 if kind in TOGETHER else MAX_TRIALS
+    number = min(TRIALS, high) if num_trials is None else num_trials
+    if not 1 <= number <= high:
+        allowed = "1: all are on one road" if high == 1 else f"1 to {high}"
+        raise ConfigError(f"A {kind} race has {number} trials; allowed are {allowed}.")
+    return number
+
+
+def _alone(entry: Entry, conditions: Conditions, *, num_trials: int, num_threads: int) -> tuple[Trial, ...]:
     """One entry's race against the clock."""
     return evaluate(
-        entry.policy,
+        entry,
         conditions.track,
         rules=conditions.rules,
-        num_trials=1,
+        num_trials=num_trials,
         seed=conditions.seed,
         vehicle=conditions.vehicle,
         objects=conditions.objects,
         randomize=conditions.randomize,
         num_threads=num_threads,
-    ).trials[0]
+    ).trials
+
+
+def _replay(title: str, conditions: Conditions, names: Sequence[str], trials: Sequence[Trial]) -> Replay:
+    return Replay(
+        title=title,
+        conditions=conditions,
+        names=tuple(names),
+        cars=tuple(trials),
+        rewards=tuple(trial.recording.rewards for trial in trials),
+    )
+
+
+def _trial_names(name: str, number: int) -> list[str]:
+    return [name] if number == 1 else [f"{name}, trial {trial + 1}" for trial in range(number)]
 
 
 def race_together(drivers: Sequence[Driver], conditions: Conditions, *, num_threads: int = 0) -> tuple[Trial, ...]:

@@ -40,7 +40,7 @@ class Match:
 
     track: str
     start: int
-    """Number of the start on that track, from 0; alone, 0 is exactly on the line."""
+    """Number of the start on that track, from 0."""
     cars: Pair
     """Indices of the models."""
     places: tuple[int, int]
@@ -239,7 +239,7 @@ class _Trials:
             entry, conditions = self._entries[car], self._courses[course[0]]
             self._progress(f"{entry.name} drives {conditions.track.name}, {self._starts} starts side by side")
             self._driven[key] = evaluate(
-                entry.policy,
+                entry,
                 conditions.track,
                 rules=conditions.rules,
                 num_trials=self._starts,
@@ -253,17 +253,22 @@ class _Trials:
 
 
 def _duel(entries: Sequence[Entry], conditions: Conditions, fraction: float, swaps: bool) -> list[Trial]:
-    """What two models do on one road, from so much of a lap after the start; the second in front if it swaps them."""
-    place = (conditions.rules.start_offset + fraction) % 1.0
-    rules = replace(conditions.rules, start_offset=place if conditions.track.is_closed else 0.0)
+    """What two models do on one road, from so much of a lap after the first start; swapped, the second is in front.
+
+    The first start is where the rules say, or, where those of races start all over the lap, drawn from the seed.
+    """
+    rules = conditions.rules
+    first = rules.start_offset if rules.starts == "line" else random.Random(conditions.seed).random()
+    place = (first + fraction) % 1.0 if conditions.track.is_closed else 0.0
+    rules = replace(rules, starts="line", start_offset=place)
     given = shared_road(replace(conditions, rules=rules, camera=conditions.camera or CameraSpec()), 2)
     order = [1, 0] if swaps else [0, 1]
-    trials = race_together([entries[car].policy for car in order], given, num_threads=1)
+    trials = race_together([entries[car] for car in order], given, num_threads=1)
     return [trials[order.index(car)] for car in range(2)]
 
 
 def _compare(pair: Pair, trials: Sequence[Trial], conditions: Conditions, start: int) -> Match:
-    standings = classify(trials, minimum_laps=conditions.rules.laps, ranks_all=True)
+    standings = classify([[trial] for trial in trials], minimum_laps=conditions.rules.laps, ranks_all=True)
     places = {standing.car: standing.place or 0 for standing in standings}
     seconds = {standing.car: standing.score for standing in standings}
     return Match(

@@ -32,6 +32,7 @@ def load_ghosts(
     conditions: Conditions,
     *,
     run: Path | None = None,
+    trial: int = 0,
     recordings: Sequence[Recording] = (),
     colors: Sequence[Color] = LIVERY[1:],
 ) -> list[Ghost]:
@@ -41,6 +42,7 @@ def load_ghosts(
         sources: As above.
         conditions: Of the race that they accompany: models drive by these, a replay must be of the same road.
         run: What ``@STEP`` is a checkpoint of.
+        trial: Which is filmed, from 0, of a race whose trials start all over the lap: models drive the same one.
         recordings: What ``best-lap`` is taken from.
         colors: Of the ghosts, in order.
 
@@ -59,7 +61,7 @@ def load_ghosts(
         elif Path(source).is_file():
             found.append(_from_replay(Path(source), conditions, color))
         else:
-            found.append(_from_model(source, conditions, color, run=run))
+            found.append(_from_model(source, conditions, color, run=run, trial=trial))
     return found
 
 
@@ -87,19 +89,20 @@ def _from_replay(path: Path, conditions: Conditions, color: Color) -> Ghost:
     return ghost_of(best.recording, name=replay.title or replay.names[best.index], color=color)
 
 
-def _from_model(source: str, conditions: Conditions, color: Color, *, run: Path | None) -> Ghost:
-    entry = load_entry(_model(source, run))
+def _from_model(source: str, conditions: Conditions, color: Color, *, run: Path | None, trial: int) -> Ghost:
+    entry, rules = load_entry(_model(source, run)), conditions.rules
+    is_from_line = rules.starts == "line"
     evaluation = evaluate(
-        entry.policy,
+        entry,
         conditions.track,
-        rules=replace(conditions.rules, lateral_jitter=0.0, heading_jitter=0.0),
-        num_trials=1,
+        rules=replace(rules, lateral_jitter=0.0, heading_jitter=0.0) if is_from_line else rules,
+        num_trials=1 if is_from_line else trial + 1,
         seed=conditions.seed,
         vehicle=conditions.vehicle,
         objects=conditions.objects,
         randomize=conditions.randomize,
     )
-    return ghost_of(evaluation.trials[0].recording, name=entry.name, color=color)
+    return ghost_of(evaluation.trials[-1].recording, name=entry.name, color=color)
 
 
 def _model(source: str, run: Path | None) -> str:

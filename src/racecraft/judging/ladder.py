@@ -9,7 +9,7 @@ from typing import Any
 from racecraft.contest.ladder import Ladder, check_ladder, hold_ladder
 from racecraft.race.conditions import STANDARD_CAR, Conditions
 from racecraft.race.entry import load_entries
-from racecraft.race.rules import RaceRules, rules_by_name
+from racecraft.race.rules import RaceRules, race_rules
 from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import load_tracks
@@ -59,7 +59,7 @@ def rate_models(
     courses = [
         Conditions(
             track=track,
-            rules=rules_by_name(rules, {**given, "laps": laps}),
+            rules=race_rules(rules, {**given, "laps": laps}),
             seed=seed,
             vehicle=vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle),
             objects=objects,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from racecraft.contest.contest import Contest, check_kind, hold_race
+from racecraft.contest.contest import Contest, check_kind, check_trials, hold_race
 from racecraft.errors import RunError
 from racecraft.film.ghost import LIVERY, Ghost, Rival, ghost_of
 from racecraft.film.ghost_source import check_sources, load_ghosts
@@ -23,7 +23,7 @@ from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.conditions import STANDARD_CAR, Conditions
 from racecraft.race.entry import Entry, load_entries
 from racecraft.race.results import Evaluation
-from racecraft.race.rules import RaceRules, rules_by_name
+from racecraft.race.rules import RaceRules, race_rules
 from racecraft.replay.replay import SUFFIX, write_replay
 from racecraft.run.atomic import write_json
 from racecraft.run.folder import dated_folder, sanitize_name
@@ -62,6 +62,7 @@ def race_models(
     rules: str | RaceRules = "drfc",
     ranking: str = "total",
     minimum_laps: int | None = None,
+    num_trials: int | None = None,
     objects: Objects = NO_OBJECTS,
     vehicle: str | Vehicle = STANDARD_CAR,
     randomize: Randomization | str = "none",
@@ -81,7 +82,8 @@ def race_models(
         laps: By default the rules'.
         rules: A name of `RULE_SETS`, or rules.
         ranking: ``total``, ``best`` or ``average``.
-        minimum_laps: Laps that a model must complete to be ranked.
+        minimum_laps: Laps that a trial must have for a score.
+        num_trials: Of each model that drives alone, from as many places of the lap; by default 5.
         objects: On the track.
         vehicle: What everybody drives, whatever they were trained with.
         randomize: What differs from what the models know; the same for all.
@@ -96,11 +98,12 @@ def race_models(
         RacecraftError: A model, the track or a setting is not usable, or nothing can be written.
     """
     check_kind(kind, len(models))
+    check_trials(kind, num_trials)
     entries = load_entries(models, num_threads=num_threads)
     given = {"laps": laps, **(changes or {})}
     conditions = Conditions(
         track=track if isinstance(track, Track) else load_track(track),
-        rules=rules_by_name(rules, {name: value for name, value in given.items() if value is not None}),
+        rules=race_rules(rules, {name: value for name, value in given.items() if value is not None}),
         seed=seed,
         vehicle=vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle),
         objects=objects,
@@ -108,11 +111,17 @@ def race_models(
     )
     check_sources(ghosts, run=None)
     contest = hold_race(
-        entries, conditions, kind=kind, ranking=ranking, minimum_laps=minimum_laps, num_threads=num_threads
+        entries,
+        conditions,
+        kind=kind,
+        ranking=ranking,
+        minimum_laps=minimum_laps,
+        num_trials=num_trials,
+        num_threads=num_threads,
     )
-    recordings = [trial.recording for trial in contest.trials]
-    colors = LIVERY[len(entries) % len(LIVERY) :]
-    shown = load_ghosts(ghosts, conditions, recordings=recordings, colors=colors) if video else []
+    trial, colors = contest.shown_trial, LIVERY[len(entries) % len(LIVERY) :]
+    recordings = [trials[trial].recording for trials in contest.trials]
+    shown = load_ghosts(ghosts, conditions, trial=trial, recordings=recordings, colors=colors) if video else []
     try:
         folder = dated_folder(Path(root))[1]
         files = _write(contest, entries, folder, ghosts=shown, is_filmed=video)
@@ -124,26 +133,26 @@ def race_models(
 def _write(
     contest: Contest, entries: Sequence[Entry], folder: Path, *, ghosts: Sequence[Ghost], is_filmed: bool
 ) -> dict[str, Path]:
-    safe = _file_names(contest.names)
+    safe, shown = _file_names(contest.names), contest.shown_trial
     files = {}
     for name, replay in contest.replays():
         path = folder / f"{safe.get(name, name)}{SUFFIX}"
         files[f"replay of {name}" if name in safe else "replay"] = write_replay(replay, path)
-    for index, (entry, trial) in enumerate(zip(entries, contest.trials, strict=True)):
+    for index, (entry, trials) in enumerate(zip(entries, contest.trials, strict=True)):
         inside = folder / safe[entry.name]
         inside.mkdir()
-        alone = Evaluation(conditions=contest.conditions, trials=(trial,))
+        alone = Evaluation(conditions=contest.conditions, trials=trials)
         write_metrics(alone, inside / "metrics.json")
         write_simtrace(alone, inside, action_space=entry.policy.action_space)
         files[f"sim-trace of {entry.name}"] = inside / "0-iteration.csv"
         if is_filmed:
             files[f"video of {entry.name}"] = film(
-                trial.recording.until(FILMED),
+                trials[shown].recording.until(FILMED),
                 folder / f"{safe[entry.name]}.mp4",
                 name=entry.name,
                 laps=contest.conditions.rules.laps,
                 color=LIVERY[index % len(LIVERY)],
-                ghosts=[*_others(contest, index), *ghosts],
+                ghosts=[*_others(contest, index, shown), *ghosts],
                 rivals=_rivals(contest, index),
                 sensors=entry.policy.sensors,
             )
@@ -154,13 +163,13 @@ def _write(
     return {"results": folder / "race.json", **files}
 
 
-def _others(contest: Contest, index: int) -> list[Ghost]:
-    """Everybody else, where they drove alone."""
+def _others(contest: Contest, index: int, shown: int) -> list[Ghost]:
+    """Everybody else in the same trial, where they drove alone."""
     if contest.shares_road:
         return []
     return [
-        ghost_of(trial.recording, name=contest.names[other], color=LIVERY[other % len(LIVERY)])
-        for other, trial in enumerate(contest.trials)
+        ghost_of(trials[shown].recording, name=contest.names[other], color=LIVERY[other % len(LIVERY)])
+        for other, trials in enumerate(contest.trials)
         if other != index
     ]
 
@@ -170,8 +179,8 @@ def _rivals(contest: Contest, index: int) -> list[Rival]:
     if not contest.shares_road:
         return []
     return [
-        Rival(contest.names[other], LIVERY[other % len(LIVERY)], trial.recording)
-        for other, trial in enumerate(contest.trials)
+        Rival(contest.names[other], LIVERY[other % len(LIVERY)], trials[0].recording)
+        for other, trials in enumerate(contest.trials)
         if other != index
     ]
 

@@ -9,8 +9,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from racecraft.errors import ConfigError
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.agent.sensor_suite import SensorSuite
+from racecraft.errors import ConfigError, NonFiniteAction
 from racecraft.race.policy import NetworkPolicy, load_policy
 from racecraft.run.checkpoint import is_step
 from racecraft.run.folder import MAX_NAME, RunFolder
@@ -28,6 +33,22 @@ class Entry:
     """Camera steps of training behind its checkpoint, as the run says."""
     policy: NetworkPolicy
     """What drives."""
+
+    def __call__(self, sight: NDArray[Any]) -> NDArray[np.float32]:
+        """Commands for what its sensors read, as `racecraft.race.evaluation.Driver`.
+
+        Raises:
+            NonFiniteAction: Its network gives NaN; the message says whose.
+        """
+        try:
+            return self.policy(sight)
+        except NonFiniteAction as error:
+            raise NonFiniteAction(f"{self.name} cannot drive: {error}", hint="Leave it out of the race.") from error
+
+    @property
+    def sensors(self) -> SensorSuite:
+        """What it sees through."""
+        return self.policy.sensors
 
 
 def load_entry(model: str | Path, *, num_threads: int = 0) -> Entry:

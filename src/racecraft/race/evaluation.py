@@ -59,9 +59,10 @@ def evaluate(
 ) -> Evaluation:
     """Race a policy against the clock, several times side by side.
 
-    Trials differ by their starts only: trial 0 is exact, the others are off by the rules' jitter, drawn from
-    the seed and the trial's number. So a trial does not depend on how many others there are, and a seed
-    repeats it exactly, as far as the policy gives one car the same commands in any batch.
+    Trials differ by their starts only: from the line trial 0 is exact and the others are off by the rules' jitter;
+    from anywhere on the lap all are. Both are drawn from the seed and the trial's number. So a trial does not depend
+    on how many others there are, and a seed repeats it exactly, as far as the policy gives one car the same commands
+    in any batch.
 
     Args:
         policy: What drives: called with what its sensors read, of the front camera alone a view of all frames uint8
@@ -152,7 +153,7 @@ def trial_simulation(
         vehicle=vehicle,
         camera=camera,
         lidar=has_lidar,
-        start=Start(mode="fixed", offset=rules.start_offset),
+        start=_start(rules, is_alone=cars_per_race == 1),
         direction=rules.direction,
         randomize=randomize,
         laps=laps,
@@ -161,6 +162,15 @@ def trial_simulation(
         cars_per_race=cars_per_race,
         num_threads=num_threads,
     )
+
+
+def _start(rules: RaceRules, *, is_alone: bool) -> Start:
+    """Where the simulation itself starts cars; `line_up` moves those of trials from the line."""
+    if rules.starts == "line":
+        return Start(mode="fixed", offset=rules.start_offset)
+    if not is_alone:
+        return Start(mode="random")
+    return Start(mode="random", lateral_jitter=rules.lateral_jitter, heading_jitter=rules.heading_jitter)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

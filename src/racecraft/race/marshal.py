@@ -181,10 +181,11 @@ class Marshal:
         mask[car.index] = True
         for one in self._all:
             one.reset(mask)
-        offset = start_offset(self._simulation, car.index)
-        pose = start_pose(self._track, self._rules, seed=self._seed, trial=car.index, lap=len(car.laps), offset=offset)
-        for one in self._all if car.index > 0 else ():
-            one.set_pose(car.index, *pose)
+        if self._rules.starts == "line" and car.index > 0:
+            offset, lap = start_offset(self._simulation, car.index), len(car.laps)
+            pose = start_pose(self._track, self._rules, seed=self._seed, trial=car.index, lap=lap, offset=offset)
+            for one in self._all:
+                one.set_pose(car.index, *pose)
         car.began = clock
         car.laps_before = len(car.laps)
         car.resets_left = self._rules.max_resets
@@ -193,8 +194,9 @@ class Marshal:
     def _log_start(self, car: _Car) -> None:
         """Log the prepare step, at the pose that the car was given since."""
         row = self._simulation.judged[car.index].copy()
-        if self._simulation.cars_per_race > 1:  # it stands where the simulation put it
+        if self._rules.starts == "lap" or self._simulation.cars_per_race > 1:  # it stands where the simulation put it
             car.start = float(row[_DISTANCE] - row[_PROGRESS] * self._track.length)
+            row[_LAP] = car.laps_before
             self._log(car, row)
             return
         car.start = start_distance(self._track, self._rules)

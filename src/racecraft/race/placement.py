@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -45,12 +46,12 @@ def driven_track(track: Track, rules: RaceRules) -> Track:
 
 
 def start_distance(track: Track, rules: RaceRules) -> float:
-    """Where laps start, m along the driven track."""
+    """Where laps from the line start, m along the driven track."""
     return rules.start_offset * track.length if track.is_closed else 0.0
 
 
 def start_pose(track: Track, rules: RaceRules, *, seed: int, trial: int, lap: int = 0, offset: float = 0.0) -> Pose:
-    """Where a trial starts: on the centre line, exactly for trial 0, else off by the rules' jitter.
+    """Where a trial starts from the line: on the centre line, exactly for trial 0, else off by the rules' jitter.
 
     Args:
         track: In driving direction.
@@ -163,8 +164,11 @@ def _ahead(track: Track, places: Any, s: float) -> Any:
 def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
     """Put every car of a simulation at the start of its trial; equal seeds mean equal starts and conditions.
 
-    Cars that share a road stay where the simulation puts them: on its grid, without jitter.
+    Starts all over the lap are the simulation's own, as are those of cars that share a road: on a grid, without jitter.
     """
+    if rules.starts == "lap":
+        simulation.reset(seeds=_keys(simulation, seed))
+        return
     if simulation.randomize.is_off:
         simulation.reset()
     else:
@@ -177,6 +181,13 @@ def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
         offset = start_offset(simulation, trial)
         track = tracks[trial % len(tracks)]
         simulation.set_pose(trial, *start_pose(track, rules, seed=seed, trial=trial, offset=offset))
+
+
+def _keys(simulation: Simulation, seed: int) -> NDArray[np.uint64]:
+    """What each race of a simulation draws from, by its number alone: all 64 bits depend on all of the seed's  (N,)."""
+    size = simulation.cars_per_race
+    digests = [hashlib.sha256(f"{seed}/{race}".encode()).digest() for race in range(simulation.num_envs // size)]
+    return np.repeat(np.array([int.from_bytes(digest[:8], "little") for digest in digests], np.uint64), size)
 
 
 def start_offset(simulation: Simulation, trial: int) -> float:

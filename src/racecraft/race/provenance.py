@@ -24,7 +24,9 @@ from racecraft.sim.vehicle import Vehicle
 from racecraft.track import Track, load_track, track_names
 from racecraft.track.load import GENERATED
 
-CHOICES: Final = frozenset({"laps", "time_limit", "direction", "start_offset", "lateral_jitter", "heading_jitter"})
+CHOICES: Final = frozenset(
+    {"laps", "time_limit", "direction", "starts", "start_offset", "lateral_jitter", "heading_jitter"}
+)
 """Rules that say what is driven; the others, what mistakes cost, are what a rule set is known by."""
 PARTS: Final = ("rules", "vehicle", "track", "randomize", "among")
 MAX_NAMED: Final = 6

@@ -15,6 +15,7 @@ from racecraft.errors import ConfigError, did_you_mean
 from racecraft.sim.simulation import CONTROL_DT
 
 RACE_DIRECTIONS: Final = ("forward", "reverse")
+STARTS: Final = ("line", "lap")
 RESET_STATUSES: Final = ("crashed", "off_track", "immobilized", "reversed")
 """What puts a car back on the track, at the price of a reset and a penalty."""
 
@@ -49,14 +50,17 @@ class RaceRules:
     """Crashes into the same object after which a car is put past it instead of behind it; 0 for never."""
     time_limit: float = 0.0
     """s on the clock, penalties included, that end a trial; 0 for none, 180 in AWS's live events."""
+    starts: str = "line"
+    """``line``: all trials start at `start_offset`, trial 0 exactly, the others off by the jitter. ``lap``: every one
+    starts, off by the jitter, somewhere on the lap, drawn from the seed. An open track starts at its beginning."""
     start_offset: float = 0.0
-    """Fraction of a lap from the first waypoint to the start; an open track starts at its beginning."""
+    """Fraction of a lap from the first waypoint to the line that trials start at."""
     direction: str = "forward"
     """``forward``, or ``reverse`` to race against the route."""
     lateral_jitter: float = 0.02
-    """m: how far to either side the start may lie. A seed's trial 0 starts exactly on the centre line."""
+    """m: how far to either side the start may lie."""
     heading_jitter: float = math.radians(2.0)
-    """rad: how far to either side the start may point. A seed's trial 0 points exactly along the track."""
+    """rad: how far to either side the start may point."""
 
     def __post_init__(self) -> None:
         _check_whole("laps", self.laps, 1, 1000)
@@ -71,10 +75,10 @@ class RaceRules:
         _check_range("heading_jitter", self.heading_jitter, 0.0, math.pi, "rad")
         if not isinstance(self.is_continuous, bool):
             raise ConfigError(f"Race rule is_continuous is {self.is_continuous!r}; allowed are True and False.")
-        if self.direction not in RACE_DIRECTIONS:
-            hint = did_you_mean(str(self.direction), RACE_DIRECTIONS)
-            allowed = " and ".join(RACE_DIRECTIONS)
-            raise ConfigError(f"Race rule direction is {self.direction!r}; allowed are {allowed}.", hint=hint)
+        for name, choices in (("direction", RACE_DIRECTIONS), ("starts", STARTS)):
+            if (value := getattr(self, name)) not in choices:
+                hint, allowed = did_you_mean(str(value), choices), " and ".join(choices)
+                raise ConfigError(f"Race rule {name} is {value!r}; allowed are {allowed}.", hint=hint)
 
     def penalty(self, status: str) -> float:
         """Seconds that a car stands after a mistake.
@@ -125,6 +129,22 @@ RULE_SETS: Final[dict[str, RaceRules]] = {
 ``live``: three minutes, as in a final.
 ``first_lap``: does the car get round once, with nobody to put it back? Evaluation during training asks that.
 """
+
+RACE_STARTS: Final[dict[str, Any]] = {
+    "starts": "lap",
+    "lateral_jitter": 0.1,
+    "heading_jitter": math.radians(5.0),
+}
+"""Where entries of a race start, whatever set of rules it is held by: nobody can prepare for one place alone."""
+
+
+def race_rules(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
+    """A rule set for a race, with single rules changed: its entries start all over the lap.
+
+    Raises:
+        ConfigError: There are no such rules, or a value is outside its range.
+    """
+    return rules_by_name(rules, {**RACE_STARTS, **changes})
 
 
 def rules_by_name(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
