@@ -100,6 +100,11 @@ class TrainingError(RacecraftError, RuntimeError):
     """Training cannot go on; the last checkpoint is good."""
 
 
+def printable(text: str) -> str:
+    """Somebody else's words for a message, without what could drive a terminal."""
+    return "".join(mark if mark.isprintable() else "�" for mark in text)
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A suggestion such as ``Did you mean 'oval'?`` for a misspelt name, or an empty string."""
     close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)

@@ -129,8 +129,9 @@ def test_a_hang_in_the_middle_of_a_batch_names_its_row(track, rows):
     [
         (("import os", "os._exit(3)"), "exit status 3"),
         (("import os", "os._exit(0)"), "exit status 0"),
-        (("import os", "os.abort()"), "SIGABRT"),
-        (("import faulthandler", "faulthandler._sigsegv()"), "SIGSEGV"),
+        (("import os", "os.abort()"), "SIGSEGV"),  # it may not even send itself a signal
+        (("import ctypes", "ctypes.string_at(0)"), "SIGSEGV"),
+        (("import ctypes", "ctypes.pythonapi.syscall(101, 0, 0, 0, 0)"), "SIGSYS"),
     ],
 )
 def test_a_crash_is_told(track, rows, body, text):
@@ -181,10 +182,10 @@ def test_writing_into_the_pipes_is_no_reward(track, rows, junk):
         worker(rows)
 
 
-def test_closing_every_descriptor_is_an_error(track, rows):
+def test_no_descriptor_can_be_closed(track, rows):
     source = function("import os", "os.closerange(0, 100)", "return 1.0")
-    with running(source, track) as worker, pytest.raises(RewardError):
-        worker(rows)
+    with running(source, track) as worker:
+        assert worker(rows).sum() == worker(rows).sum() == 10.0
 
 
 @pytest.mark.parametrize(("written", "is_believed"), [("1e5", True), ("1e5 + 0.1", False), ("-1e6", False)])

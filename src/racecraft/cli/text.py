@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from racecraft.errors import printable
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -391,8 +393,7 @@ def say_calibrated(result: Calibration, output: Path) -> None:
 
 def _harmless(line: str, *, width: int = SHOWN_WIDTH) -> str:
     """A line of somebody else's text, short, and without what could drive a terminal."""
-    line = line[:width] + "…" * (len(line) > width)
-    return "".join(mark if mark.isprintable() else "�" for mark in line)
+    return printable(line[:width] + "…" * (len(line) > width))
 
 
 def _medians(found: dict[str, Any], kind: str = "") -> dict[str, dict[str, float]]:

@@ -10,10 +10,10 @@ from __future__ import annotations
 import ast
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from racecraft.errors import RewardError, did_you_mean
+from racecraft.errors import RewardError, did_you_mean, printable
 from racecraft.reward.imports import ImportRules
 from racecraft.reward.names import bound_names, undefined_names
 from racecraft.reward.params import TEMPLATE
@@ -51,6 +51,9 @@ def check_reward(source: str) -> list[Problem]:
             problems = list(_problems(source))
     except (RecursionError, MemoryError):
         problems = [Problem(1, 1, "The source is nested too deeply to be read.")]
+    problems = [
+        replace(problem, message=printable(problem.message), hint=printable(problem.hint)) for problem in problems
+    ]
     return sorted(set(problems), key=lambda problem: (problem.line, problem.column, problem.severity))
 
 

@@ -1,20 +1,28 @@
 """Starts the reward worker process: the one place that decides what it inherits.
 
 It gets a bare interpreter, an environment of its own (so no secrets and no PYTHONPATH), the root folder as
-working folder, three pipes and one piece of shared memory. A sandbox goes here, around the same command.
+working folder, four pipes and one piece of shared memory. Where bubblewrap works it stands around the same command.
 """
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
-import importlib.util
+import json
 import os
+import select
+import signal
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from racecraft.reward.worker_process import PACKAGES
+from racecraft.errors import RewardError
+from racecraft.reward.sandbox.bubblewrap import around
+from racecraft.reward.sandbox.plan import package_folder
 
 PROGRAM = Path(__file__).with_name("worker_process.py")
 
@@ -22,26 +30,112 @@ PROGRAM = Path(__file__).with_name("worker_process.py")
 INTERPRETER_OPTIONS = ("-s", "-S", "-P", "-B", "-X", "utf8")
 
 
-def start_process(shared_memory: int) -> subprocess.Popen[bytes]:
+@dataclass(frozen=True, eq=False)
+class WorkerProcess:
+    """A worker that was started."""
+
+    popen: subprocess.Popen[bytes]
+    """Requests go to its stdin, replies come from its stdout, crash reports from its stderr."""
+    interpreter: int
+    """Number of the process that runs the reward function; inside bubblewrap, which is a process too, another one."""
+    lifeline: int
+    """File descriptor; the kernel ends the worker when no process holds it any more."""
+
+    def kill(self, owner: int) -> None:
+        """Kill it and all that it may have started, and close the pipes; only in the process ``owner``, its parent."""
+        if os.getpid() != owner:  # a forked copy of the trainer: the worker is not its child
+            return
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            if self.popen.poll() is None and self.interpreter != self.popen.pid:
+                os.kill(self.interpreter, signal.SIGKILL)
+                self.ending(timeout_s=1.0)  # bubblewrap ends when what it ran has ended
+            os.killpg(self.popen.pid, signal.SIGKILL)
+        self.popen.wait()
+        for pipe in (self.popen.stdin, self.popen.stdout, self.popen.stderr):
+            if pipe is not None:
+                pipe.close()
+        with contextlib.suppress(OSError):
+            os.close(self.lifeline)
+
+    def ending(self, timeout_s: float) -> tuple[str, int] | None:
+        """How it ended: a signal's name, or an empty text and the exit status; None if it has not within the time."""
+        try:
+            status = self.popen.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return None
+        number = -status
+        if self.interpreter != self.popen.pid and status > 128:
+            number = status - 128  # how bubblewrap reports that what it ran was ended by a signal
+        if number <= 0:
+            return "", status
+        return next((known.name for known in signal.Signals if known == number), f"signal {number}"), status
+
+
+def start_process(
+    shared_memory: int, *, bubblewrap: str = "", readable: Sequence[str] = ()
+) -> tuple[WorkerProcess, int]:
     """Start the worker process.
 
     Args:
         shared_memory: File descriptor that the process inherits under the same number.
+        bubblewrap: Path of the program that stands around it, if any.
+        readable: What there is inside bubblewrap.
 
     Returns:
-        The process: requests go to its stdin, replies come from its stdout, crash reports from its stderr.
+        The process, and the number under which it finds the other end of its lifeline.
+
+    Raises:
+        RewardError: Bubblewrap did not start it.
     """
-    return subprocess.Popen(
-        [sys.executable, *INTERPRETER_OPTIONS, str(PROGRAM)],
-        bufsize=0,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        pass_fds=(shared_memory,),
-        cwd="/",
-        env=_environment(),
-        start_new_session=True,  # Ctrl-C is the trainer's affair, and one kill ends the whole group
-    )
+    interpreter = sys.executable if not bubblewrap else os.path.realpath(sys.executable)
+    command = [interpreter, *INTERPRETER_OPTIONS, str(PROGRAM)]
+    end, lifeline = os.pipe()
+    told, tells = os.pipe()
+    try:
+        if bubblewrap:
+            command = [*around(bubblewrap, [*readable, interpreter, str(PROGRAM.parent)], info=tells), *command]
+        popen = subprocess.Popen(
+            command,
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            pass_fds=(shared_memory, end, *([tells] if bubblewrap else [])),
+            cwd="/",
+            env=_environment(),
+            start_new_session=True,  # Ctrl-C is the trainer's affair, and one kill ends the whole group
+        )
+    except BaseException:
+        os.close(lifeline)
+        os.close(told)
+        raise
+    finally:
+        os.close(end)
+        os.close(tells)
+    worker = WorkerProcess(popen, popen.pid, lifeline)
+    try:
+        return (worker if not bubblewrap else replace(worker, interpreter=_told(told))), end
+    except BaseException:
+        worker.kill(os.getpid())
+        raise
+    finally:
+        os.close(told)
+
+
+def _told(descriptor: int) -> int:
+    """The process number that bubblewrap tells."""
+    text, deadline = b"", time.monotonic() + 10.0
+    while time.monotonic() < deadline and select.select([descriptor], [], [], deadline - time.monotonic())[0]:
+        part = os.read(descriptor, 4096)
+        if not part:
+            break
+        text += part
+    try:
+        return int(json.loads(text)["child-pid"])
+    except (ValueError, KeyError, TypeError):
+        raise RewardError(
+            "bubblewrap did not start the reward worker.", hint="Try it: bwrap --ro-bind / / true"
+        ) from None
 
 
 def _environment() -> dict[str, str]:
@@ -55,16 +149,10 @@ def _environment() -> dict[str, str]:
     return environment
 
 
-def package_paths(*more: str) -> list[str]:
-    """The folders that hold the packages a reward function may import, and more."""
-    paths = []
-    for name in (*PACKAGES, *more):
-        spec = importlib.util.find_spec(name)
-        if spec is not None and spec.origin is not None:
-            path = str(Path(spec.origin).parent.parent)
-            if path not in paths:
-                paths.append(path)
-    return paths
+def package_paths(packages: Sequence[str]) -> list[str]:
+    """The folders that hold packages which a reward function may import."""
+    folders = [package_folder(name) for name in packages]
+    return list(dict.fromkeys(str(folder.parent) for folder in folders if folder is not None))
 
 
 def create_shared_memory(size: int) -> int:

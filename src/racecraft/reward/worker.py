@@ -3,9 +3,10 @@
     with RewardWorker(source, tracks) as worker:
         rewards = worker(simulation.rows)  # (N, columns) -> (N,)
 
-User code never runs in the trainer. The two processes share memory and ring each other over pipes, once per
-batch; replies are numbers and text, never pickles. Whatever a reward function does, the caller gets rewards
-or one `RewardError` that names the line and the params, within a bounded time.
+User code never runs in the trainer, and is locked in where it runs (`racecraft.reward.sandbox`). The two processes
+share memory and ring each other over pipes, once per batch; replies are numbers and text, never pickles. Whatever a
+reward function does, the caller gets rewards or one `RewardError` that names the line and the params, within a bounded
+time. Nothing that comes back is believed: the process may write what it likes into its pipes and memory, at any time.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import os
 import re
 import select
 import signal
-import subprocess
 import time
 import weakref
 from collections.abc import Sequence
@@ -27,11 +27,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from racecraft.errors import ConfigError, RewardError, ShapeError
+from racecraft.errors import ConfigError, RewardError, ShapeError, printable
 from racecraft.reward import launch
 from racecraft.reward import worker_process as protocol
+from racecraft.reward.modules import needed_modules, used_words
 from racecraft.reward.numeric import NotNumeric, numeric_source
 from racecraft.reward.params import format_params, make_params
+from racecraft.reward.sandbox import Confinement, find_confinement, make_plan
 from racecraft.sim.columns import ROW_COLUMNS, row_width
 
 if TYPE_CHECKING:
@@ -44,9 +46,14 @@ LOG_BYTES = 64 * 1024  # how much of the last printed text is kept
 SHOWN_LINES = 5  # of what was printed, in an error
 SHOWN_WIDTH = 200  # characters of such a line
 MAX_BATCH = 4096  # rows per doorbell; larger arrays go over in parts
+CAUSES = {
+    "SIGKILL": "killed from outside, or by the system for lack of memory",
+    "SIGSEGV": "a crash, often of endless recursion",
+    "SIGSYS": "a system call that no reward function has any business with",
+}
 
 _TRACK_COLUMN = ROW_COLUMNS.index("track_index")
-_FRAME = re.compile(rf'File "{re.escape(protocol.FILENAME)}", line (\d+)')
+_FRAME = re.compile(rf'File "{re.escape(protocol.FILENAME)}", line (\d{{1,7}})\b')
 
 
 class RewardWorker:
@@ -70,9 +77,12 @@ class RewardWorker:
         compiled: Compile a function that only computes with numbers, which takes some seconds and then pays
             several times faster. It needs numba (``pip install racecraft[compile]``). Any other function is
             interpreted as usual, and `interpreted_because` says why.
+        foreign: The source is somebody else's: it runs completely locked in or not at all, and is not compiled, as
+            the compiler would need files while user code runs.
+        confinement: The walls around the process; by default all that this machine offers.
 
     Raises:
-        RewardError: The source cannot be loaded.
+        RewardError: The source cannot be loaded, or is foreign and cannot be locked in.
     """
 
     def __init__(
@@ -87,12 +97,19 @@ class RewardWorker:
         num_cars: int = 1,
         num_objects: int = 0,
         compiled: bool = False,
+        foreign: bool = False,
+        confinement: Confinement | None = None,
     ) -> None:
         for name, value in (("timeout_s", timeout_s), ("start_timeout_s", start_timeout_s), ("num_cars", num_cars)):
             if not value > 0:
                 raise ConfigError(f"{name} is {value}; it must be greater than 0.")
         if not memory_limit_mb >= 64:
             raise ConfigError(f"memory_limit_mb is {memory_limit_mb}; a process needs 64 at least.")
+        confinement = find_confinement() if confinement is None else confinement
+        if foreign:
+            confinement.require()
+        self.confinement = confinement
+        """The walls around the process."""
         self._source_lines = source.splitlines()
         self._waypoints = waypoints_of(tracks if isinstance(tracks, Sequence) else (tracks,))
         self._timeout_s = timeout_s
@@ -103,29 +120,41 @@ class RewardWorker:
 
         self.interpreted_because = ""
         """Why the function is interpreted though compiling was asked for."""
-        kernel = self._rewrite(source) if compiled else ""
+        if compiled and foreign:
+            self.interpreted_because = "it comes from somebody else, and the compiler reads files while it runs"
+        kernel = self._rewrite(source) if compiled and not foreign else ""
 
         width = self._width = row_width(num_objects)
         rewards_offset = MAX_BATCH * width * 8
         text_offset = rewards_offset + MAX_BATCH * 8
         log_offset = text_offset + TEXT_BYTES
         size = log_offset + protocol.SIZE.size + LOG_BYTES
+        packages = (*protocol.PACKAGES, *(("numba", "llvmlite") if kernel else ()))
+        paths = launch.package_paths(packages)
+        plan = make_plan(
+            confinement,
+            packages=packages,
+            files=(str(launch.PROGRAM.with_name("kernel.py")), *paths) if kernel else (),
+            memory_limit=memory_limit_mb * 2**20,
+        )
         descriptor = launch.create_shared_memory(size)
         try:
             memory = mmap.mmap(descriptor, size)
-            self._process = launch.start_process(descriptor)
+            self._process, lifeline = launch.start_process(
+                descriptor, bubblewrap=confinement.bubblewrap, readable=(*plan["readable"], *plan["listed"])
+            )
         finally:
             os.close(descriptor)
-        self._finalizer = weakref.finalize(self, _kill, self._process, os.getpid())
+        self._finalizer = weakref.finalize(self, self._process.kill, os.getpid())
         self._rows = np.frombuffer(memory, np.float64, MAX_BATCH * width).reshape(MAX_BATCH, -1)
         self._rewards = np.frombuffer(memory, np.float64, MAX_BATCH, rewards_offset)
         self._text = memoryview(memory)[text_offset:log_offset]
         self._log = memoryview(memory)[log_offset:]
         self._poll = select.poll()
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._requests = self._process.stdin.fileno()
-        self._replies = self._process.stdout.fileno()
+        assert self._process.popen.stdin is not None
+        assert self._process.popen.stdout is not None
+        self._requests = self._process.popen.stdin.fileno()
+        self._replies = self._process.popen.stdout.fileno()
         self._poll.register(self._replies, select.POLLIN | select.POLLHUP)
 
         setup = {
@@ -134,15 +163,18 @@ class RewardWorker:
             "waypoints": self._waypoints,
             "num_columns": width,
             "num_cars": num_cars,
-            "timeout_s": timeout_s,
+            "modules": needed_modules(source),
+            "words": used_words(source),
             "memory": descriptor,
             "memory_size": size,
-            "memory_limit": memory_limit_mb * 2**20,
+            "lifeline": lifeline,
+            "confinement": plan,
+            "inside_path": str(launch.PROGRAM.parent / "sandbox" / "inside.py"),
             "rewards_offset": rewards_offset,
             "text_offset": text_offset,
             "log_offset": log_offset,
             "params_path": make_params.__code__.co_filename,
-            "package_paths": launch.package_paths("numba", "llvmlite") if kernel else launch.package_paths(),
+            "package_paths": paths,
             "kernel": kernel,
             "kernel_path": str(launch.PROGRAM.with_name("kernel.py")),
             "trace_signal": int(signal.SIGUSR1),
@@ -163,9 +195,11 @@ class RewardWorker:
         try:
             with contextlib.suppress(BrokenPipeError), os.fdopen(os.dup(self._requests), "wb") as pipe:
                 pipe.write(protocol.SIZE.pack(len(setup)) + setup)
-            if not self._poll.poll(timeout_s * 1000):
-                raise self._stalled(None, timeout_s)
-            self._read_reply(None, 0)
+            os.set_blocking(self._requests, False)
+            for expected in (protocol.LOCKED, protocol.READY):
+                if not self._poll.poll(timeout_s * 1000):
+                    raise self._stalled(None, timeout_s)
+                self._read_reply(None, 0, expected)
         except BaseException:
             self._finalizer()
             raise
@@ -205,17 +239,18 @@ class RewardWorker:
     def _call(self, rows: Rows, first: int) -> npt.NDArray[np.float64]:
         count = len(rows)
         self._rows[:count] = rows
-        rewards = self._rewards[:count]
-        rewards.fill(np.nan)  # a finite value says that the row is done
+        shared = self._rewards[:count]
+        shared.fill(np.nan)  # a finite value says that the row is done
         try:
             with contextlib.suppress(BrokenPipeError):
-                os.write(self._requests, protocol.REQUEST.pack(count, first))
+                self._ring(count, first)
             num_done = 0
             while not self._poll.poll(self._timeout_s * 1000):
-                before, num_done = num_done, _num_done(rewards)
+                before, num_done = num_done, max(num_done, _num_done(shared))
                 if num_done == before:
                     raise self._stalled(rows, self._timeout_s, first=first)
-            self._read_reply(rows, first)
+            self._read_reply(rows, first, protocol.REWARDS)
+            rewards = shared.copy()  # the process may still write into its own
         except BaseException as error:
             self._end(str(error) if isinstance(error, RewardError) else "a batch was interrupted.")
             raise
@@ -224,48 +259,54 @@ class RewardWorker:
             raise RewardError(self._failure)
         return rewards
 
-    def _read_reply(self, rows: Rows | None, first: int) -> None:
-        """Take the reply that waits in the pipe; anything but success raises."""
+    def _ring(self, count: int, first: int) -> None:
+        try:
+            os.write(self._requests, protocol.REQUEST.pack(count, first))
+        except BlockingIOError:
+            raise RewardError("The reward worker answers without taking requests: user code is in its pipe.") from None
+
+    def _read_reply(self, rows: Rows | None, first: int, expected: int) -> None:
+        """Take the reply that waits in the pipe; anything but what is expected raises."""
         message = os.read(self._replies, protocol.REPLY.size)
         if len(message) < protocol.REPLY.size:
             raise self._crashed(rows, first)
         status, row, line, size = protocol.REPLY.unpack(message)
-        if status == (protocol.READY if rows is None else protocol.REWARDS):
-            if rows is None and size:
-                self.interpreted_because = bytes(self._text[: min(size, TEXT_BYTES)]).decode("utf-8", "replace")
+        if size > TEXT_BYTES or (rows is not None and row >= len(rows)):
+            status = 0
+        text = printable(bytes(self._text[: min(size, TEXT_BYTES)]).decode("utf-8", "replace"))
+        if status == expected:
+            if status == protocol.READY and text:
+                self.interpreted_because = text
             return
-        if status != protocol.FAILED or size > TEXT_BYTES or (rows is not None and row >= len(rows)):
+        if status != protocol.FAILED:
             raise RewardError("The reward worker sent a reply that makes no sense: user code wrote into its pipe.")
-        text = bytes(self._text[:size]).decode("utf-8", "replace")
+        if expected == protocol.LOCKED:
+            raise RewardError(f"The reward worker cannot be locked in: it {text}.", hint="See: racecraft doctor")
         raise self._error(text, line, rows, row, first=first)
 
     def _stalled(self, rows: Rows | None, timeout_s: float, *, first: int = 0) -> RewardError:
         """The error of a process that makes no progress; asks it for its stack first."""
-        self._process.send_signal(signal.SIGUSR1)
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self._process.interpreter, signal.SIGUSR1)
         line = _line_in(self._read_stderr(timeout_s=1.0))
         text = f"did not {'load' if rows is None else 'return'} within {timeout_s:g} s"
         return self._error(text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first)
 
     def _crashed(self, rows: Rows | None, first: int) -> RewardError:
         """The error of a process that ended without a reply."""
-        try:
-            status = self._process.wait(timeout=5.0)
-        except subprocess.TimeoutExpired:
+        ending = self._process.ending(timeout_s=5.0)
+        if ending is None:
             return RewardError("The reward worker closed its pipe: user code may not touch file descriptors.")
+        signal_name, status = ending
         stack = self._read_stderr(timeout_s=1.0)
         line = _line_in(stack)
-        if status < 0:
-            name = signal.Signals(-status).name
-            cause = {
-                "SIGKILL": "killed from outside, or by the system for lack of memory",
-                "SIGSEGV": "a crash, often of endless recursion",
-                "SIGXCPU": "out of processor time",
-            }
-            text = f"ended the worker process with {name}" + (f" ({cause[name]})" if name in cause else "")
+        if signal_name:
+            cause = CAUSES.get(signal_name)
+            text = f"ended the worker process with {signal_name}" + (f" ({cause})" if cause else "")
         else:
             text = f"ended the worker process with exit status {status}"
-        if rows is None and line < 0 and stack:
-            text += f": {stack.strip().splitlines()[-1]}"
+        if rows is None and line < 0 and stack.strip():
+            text += f": {printable(stack.strip().splitlines()[-1][:SHOWN_WIDTH])}"
         return self._error(text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first)
 
     def _error(self, text: str, line: int, rows: Rows | None, row: int, *, first: int) -> RewardError:
@@ -274,7 +315,7 @@ class RewardWorker:
         message += f"the {'file' if rows is None else 'reward function'} {text}"
         message += "" if message.endswith(".") else "."
         if 0 < line <= len(self._source_lines):
-            message += f"\n    {self._source_lines[line - 1].strip()}"
+            message += f"\n    {printable(self._source_lines[line - 1].strip())}"
         params: dict[str, Any] | None = None
         if rows is None:
             message += "\nIt failed while the file was loaded, before the first call."
@@ -292,8 +333,8 @@ class RewardWorker:
 
     def _read_stderr(self, timeout_s: float) -> str:
         """What the process wrote about its own crash, up to 64 KB."""
-        assert self._process.stderr is not None
-        descriptor = self._process.stderr.fileno()
+        assert self._process.popen.stderr is not None
+        descriptor = self._process.popen.stderr.fileno()
         os.set_blocking(descriptor, False)
         deadline = time.monotonic() + timeout_s
         data = b""
@@ -330,12 +371,12 @@ class RewardWorker:
         (written,) = protocol.SIZE.unpack_from(self._log)
         lines = [line for line in self._printed(written, 4 * SHOWN_LINES * SHOWN_WIDTH).splitlines() if line.strip()]
         shown = (line[:SHOWN_WIDTH] + "…" * (len(line) > SHOWN_WIDTH) for line in lines[-SHOWN_LINES:])
-        return ["".join(mark if mark.isprintable() else "�" for mark in line) for line in shown]
+        return [printable(line) for line in shown]
 
     @property
     def process_id(self) -> int:
         """Number of the worker process."""
-        return self._process.pid
+        return self._process.interpreter
 
     def close(self) -> None:
         """End the process; calling again does nothing."""
@@ -368,15 +409,3 @@ def _line_in(stack: str) -> int:
     """The innermost line of the user's file in a stack written by faulthandler, or -1."""
     match = _FRAME.search(stack)
     return int(match.group(1)) if match else -1
-
-
-def _kill(process: subprocess.Popen[bytes], owner: int) -> None:
-    """Kill the process and all that it may have started, and close its pipes."""
-    if os.getpid() != owner:  # a forked copy of the trainer: the worker is not its child
-        return
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    for pipe in (process.stdin, process.stdout, process.stderr):
-        if pipe is not None:
-            pipe.close()

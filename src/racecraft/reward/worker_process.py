@@ -1,14 +1,16 @@
 """The program inside the reward worker process: rows in, rewards out.
 
 ``launch.py`` starts it as a bare interpreter, so it imports built-in modules only, and is ready in 20 ms.
-It reads one setup message from stdin, loads the user's source, and then serves batches:
+It reads one setup message from stdin, locks itself in, loads the modules that the user's source names, takes away the
+right to open any file, loads the source, and then serves batches:
 
     stdin   REQUEST(count, first_row)       one per batch, the doorbell
     memory  rows (count, columns) in, rewards (count,) out, text of a failure, ring of the last prints
     stdout  REPLY(status, row, line, text_size)
     stderr  the stack that ``faulthandler`` writes when the process crashes or is asked where it hangs
 
-User code sees none of these three: its prints go to the ring, and file descriptors 0 to 2 lead nowhere.
+User code has no business with these three: its prints go to the ring, and file descriptors 0 to 2 lead nowhere. It is
+taken to be hostile all the same: the caller believes nothing that comes back.
 """
 
 from __future__ import annotations
@@ -18,10 +20,8 @@ import io
 import marshal
 import mmap
 import os
-import resource
 import struct
 import sys
-import time
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -33,15 +33,15 @@ if TYPE_CHECKING:
 
 REQUEST = struct.Struct("<II")  # rows in this batch, index of the first one in the caller's array
 REPLY = struct.Struct("<BIiI")  # status, row, line (-1 unknown), bytes of text
-READY, REWARDS, FAILED = 1, 2, 3  # statuses of a reply
+READY, REWARDS, FAILED, LOCKED = 1, 2, 3, 4  # statuses of a reply; LOCKED comes first, READY once all is loaded
 SIZE = struct.Struct("<Q")  # bytes of the setup message; also the count of printed bytes that heads the ring
 
 FILENAME = "reward_function.py"  # what the user's source is called in every traceback
 STEPS = 1  # column of a row that counts the episode's steps from 1, the prepare step
 REWARD_LIMIT = 1e5  # largest magnitude that AWS accepts
 
-# Events of sys.addaudithook that a reward function has no use for. Refusing them gives an error with its
-# line; it is no sandbox.
+# Events of sys.addaudithook that a reward function has no use for. The kernel refuses them; refusing them here as well
+# says it in words.
 FORBIDDEN_EVENTS = frozenset(
     (
         *("os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "os.system", "pty.spawn"),
@@ -51,8 +51,8 @@ FORBIDDEN_EVENTS = frozenset(
         *("os.chmod", "os.chown", "os.setxattr", "os.removexattr", "sqlite3.connect"),
     )
 )
-PROVING_ROWS = 512  # that a compiled function gets beside the interpreter before it is believed
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND  # flags of an open file
+PROVING_ROWS = 512  # that a compiled function gets beside the interpreter before it is believed
 PACKAGES = ("numpy", "scipy", "shapely")  # that a reward function may import where they are installed
 
 
@@ -95,19 +95,32 @@ def main() -> None:
 
     memory = memoryview(mmap.mmap(setup["memory"], setup["memory_size"]))
     os.close(setup["memory"])
-    sys.stdout = sys.stderr = PrintRing(memory[setup["log_offset"] :])
+    prints = PrintRing(memory[setup["log_offset"] :])
     faulthandler.enable(trace, all_threads=False)
     faulthandler.register(setup["trace_signal"], trace, all_threads=False)
+    end_with(setup["lifeline"])
     server = Server(setup, memory, replies)
-    limit_resources(setup["memory_limit"])
+    try:
+        needed = (0, 1, 2, requests, replies, trace, setup["lifeline"])
+        finish = load_program(setup["inside_path"])["enter"](setup["confinement"], needed)
+    except Exception as error:
+        server.fail(error, 0)
+        return
+    server.reply(LOCKED)
+    refusal = b""
     try:
         sys.path.extend(setup["package_paths"])
-        compiler = load_compiler(setup["kernel_path"]) if setup["kernel"] else None
+        load_modules(setup["modules"], frozenset(setup["words"]))
+        if setup["kernel"]:
+            refusal = server.compile(setup)
+        lock_imports(frozenset(name.partition(".")[0] for name in setup["modules"]))
+        finish()
+        del finish  # and with it the last that held ctypes
+        sys.stdout = sys.stderr = prints
         functions = load_functions(setup)
     except BaseException as error:
         server.fail(error, 0)
         return
-    refusal = server.compile(setup, compiler) if compiler is not None else b""
     server.reply(READY, size=len(refusal))
     server.serve(requests, functions)
 
@@ -116,25 +129,25 @@ class Server:
     """Answers requests over the shared memory."""
 
     def __init__(self, setup: dict[str, Any], memory: memoryview, replies: int) -> None:
-        self._make_params = load_make_params(setup["params_path"])
+        self._make_params = load_program(setup["params_path"])["make_params"]
         self._row = struct.Struct(f"{setup['num_columns']}d")
         self._rows = memory[: setup["rewards_offset"]]
         self._rewards = memory[setup["rewards_offset"] : setup["text_offset"]].cast("d")
         self._text = memory[setup["text_offset"] : setup["log_offset"]]
         self._waypoints = setup["waypoints"]
-        self._timeout_s = setup["timeout_s"]
         self._replies = replies
         self._process_id = os.getpid()
         self._write = os.write
         self._kernel: Callable[[Any, Any], None] | None = None
         self._num_proven = 0  # rows
 
-    def compile(self, setup: dict[str, Any], compiler: Callable[..., Any]) -> bytes:
+    def compile(self, setup: dict[str, Any]) -> bytes:
         """Compile the rewritten source; why that cannot be done, or nothing."""
         import numpy as np
 
         try:
-            self._kernel = compiler(setup["kernel"], self._waypoints, setup["num_columns"])
+            compile_kernel = load_program(setup["kernel_path"])["compile_kernel"]
+            self._kernel = compile_kernel(setup["kernel"], self._waypoints, setup["num_columns"])
         except Exception as error:
             refusal = describe(error)[: len(self._text)]
             self._text[: len(refusal)] = refusal
@@ -146,16 +159,12 @@ class Server:
 
     def serve(self, requests: int, functions: list[Reward]) -> None:
         """Serve batches. Row i of the caller's array goes to function i modulo their number."""
-        read, process_time, setrlimit = os.read, time.process_time, resource.setrlimit
+        read = os.read
         while True:
             message = read(requests, REQUEST.size)
             if len(message) < REQUEST.size:
                 return
             count, first = REQUEST.unpack(message)
-
-            # A dead man's switch: should the caller die while user code spins, the kernel ends this process.
-            seconds = int(process_time() + self._timeout_s * count) + 60
-            setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
             if self._kernel is None or not self._serve_compiled(count, self._kernel):
                 if not self._serve_batch(count, first, functions):
                     return
@@ -226,42 +235,79 @@ class Server:
         self.reply(FAILED, row=row, line=line, size=len(data))
 
 
-def load_make_params(path: str) -> Callable[..., dict[str, Any]]:
-    """``make_params`` of params.py, without importing the package around it."""
-    namespace: dict[str, Any] = {"__name__": "params"}
-    with open(path, encoding="utf-8") as file:
-        exec(compile(file.read(), path, "exec"), namespace)
-    make_params: Callable[..., dict[str, Any]] = namespace["make_params"]
-    return make_params
-
-
-def load_compiler(path: str) -> Callable[..., Any]:
-    """``compile_kernel`` of kernel.py, which imports numba."""
-    namespace: dict[str, Any] = {"__name__": "kernel"}
+def load_program(path: str) -> dict[str, Any]:
+    """The names of a file of Racecraft's, run without importing the package around it."""
+    namespace: dict[str, Any] = {"__name__": os.path.basename(path)}
     with open(path, encoding="utf-8") as file:
         code = compile(file.read(), path, "exec")
     exec(code, namespace)
-    compile_kernel: Callable[..., Any] = namespace["compile_kernel"]
-    return compile_kernel
+    return namespace
+
+
+def end_with(lifeline: int) -> None:
+    """Have the kernel end this process, whatever it does, once nobody holds the other end of this pipe any more."""
+    if sys.platform == "linux":
+        import fcntl
+
+        fcntl.fcntl(lifeline, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(lifeline, fcntl.F_SETFL, fcntl.fcntl(lifeline, fcntl.F_GETFL) | os.O_ASYNC)  # SIGIO, which ends it
+
+
+def load_modules(names: list[str], words: frozenset[str]) -> None:
+    """Load what the source will import, and the parts of packages that its words may mean; nothing can be, later."""
+    for name in names:
+        load_module(name)
+    if "numpy" in sys.modules:
+        load_module("numpy.random")  # to seed it
+    waiting = [name for name in (*names, *PACKAGES) if name in sys.modules and name.partition(".")[0] in PACKAGES]
+    while waiting:
+        package = waiting.pop()
+        for folder in getattr(sys.modules[package], "__path__", ()):
+            parts = {part.partition(".")[0] for part in os.listdir(folder)}
+            waiting += [name for part in parts & words if load_module(name := f"{package}.{part}")]
+
+
+def load_module(name: str) -> bool:
+    """Import a module unless it is there already; the source's own statement will say why it cannot be."""
+    try:
+        if name.endswith(".*"):  # everything, and so also what a package loads when it is asked for it
+            module = sys.modules[name[:-2]]
+            for part in module.__all__:
+                getattr(module, part, None)
+            return True
+        return name not in sys.modules and __import__(name) is not None
+    except BaseException:
+        return False
+
+
+def lock_imports(looked_for: frozenset[str]) -> None:
+    """From now on only modules that Python has built in can still be loaded."""
+    without_files = sys.meta_path[:2]  # Python's own, of modules inside the interpreter: built in, or frozen
+    sys.meta_path[:] = [*without_files, LockedFinder(looked_for)]
+    if "ctypes" not in looked_for and "numpy" not in sys.modules:  # no wall: a tool that need not lie around
+        for name in [name for name in sys.modules if name.partition(".")[0] in ("ctypes", "_ctypes")]:
+            del sys.modules[name]
+
+
+class LockedFinder:
+    """Stands in for the finder of files, as none can be opened any more."""
+
+    def __init__(self, looked_for: frozenset[str]) -> None:
+        self._looked_for = looked_for  # and not found, where they are asked for again
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        """Say why a module cannot be had."""
+        if name.partition(".")[0] not in self._looked_for:
+            raise ModuleNotFoundError(f"{name} cannot be loaded here: import it by its plain name", name=name)
 
 
 def load_functions(setup: dict[str, Any]) -> list[Reward]:
     """Run the user's source once per car that keeps its own globals; each run gives one function."""
-    source = setup["source"]
-    code = compile(source, FILENAME, "exec", dont_inherit=True)
-
-    # Seeded before the source runs, and imported only where the source can use them: numpy takes 100 ms.
-    if "random" in source:
-        import random
-
+    code = compile(setup["source"], FILENAME, "exec", dont_inherit=True)
+    if (random := sys.modules.get("random")) is not None:
         random.seed(setup["seed"])
-    if any(name in source for name in PACKAGES):
-        try:
-            import numpy.random
-
-            numpy.random.seed(setup["seed"])  # noqa: NPY002 - what users call is the global generator
-        except ImportError:  # the source says itself what it misses
-            pass
+    if (numpy_random := sys.modules.get("numpy.random")) is not None:
+        numpy_random.seed(setup["seed"])  # what users call is the global generator
     sys.addaudithook(guard)
 
     functions = []
@@ -278,27 +324,11 @@ def load_functions(setup: dict[str, Any]) -> list[Reward]:
 
 def guard(event: str, arguments: tuple[object, ...]) -> None:
     """Refuse what a reward function has no use for, at the line that tries it."""
-    if event in FORBIDDEN_EVENTS and arguments[:1] != (None,):
+    if event in FORBIDDEN_EVENTS:
         raise PermissionError(f"a reward function may not use {event}")
-    if event == "open" and isinstance(arguments[2], int) and arguments[2] & WRITING:
-        raise PermissionError("a reward function may not write files")
-
-
-def limit_resources(memory_limit: int) -> None:
-    """No file can be written, no process started, and memory ends at ``memory_limit`` bytes."""
-    for kind, limit in (
-        (resource.RLIMIT_AS, memory_limit),
-        (resource.RLIMIT_FSIZE, 0),
-        (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_NOFILE, 64),
-        (resource.RLIMIT_NPROC, 0),
-    ):
-        hard = resource.getrlimit(kind)[1]
-        value = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
-        try:
-            resource.setrlimit(kind, (value, value))
-        except (OSError, ValueError):  # some systems do not let RLIMIT_AS be lowered
-            continue
+    if event == "open" and not isinstance(arguments[0], int):
+        writes = isinstance(arguments[2], int) and arguments[2] & WRITING
+        raise PermissionError(f"a reward function may not {'write' if writes else 'read'} files")
 
 
 def to_float(reward: Any) -> float:
