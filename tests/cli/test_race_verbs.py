@@ -42,3 +42,47 @@ def test_race_verify_and_ladder(racecraft: Run, trained: Path, tmp_path: Path) -
     document = racecraft("verify", str(path), "--json").document
     assert (document["is_genuine"], document["difference"]["step"]) == (False, 5)
     assert racecraft("verify", str(tmp_path / "none.replay")).err.startswith("ReplayError")
+
+
+def test_a_race_of_a_secret_is_announced_held_and_checked(racecraft: Run, trained: Path, tmp_path: Path) -> None:
+    short = ("--track", "oval", "--time-limit", "3", "--no-video", "--laps", "1", "--trials", "3")
+    held = racecraft("race", str(trained), f"{trained}@64", *short, "--secret")
+    assert held.status == 0, held.err
+    (commitment,) = (line.split()[1] for line in held.err.splitlines() if line.startswith("Commitment"))
+    assert f"Commitment:  {commitment}" in held.out
+    (secret,) = (line.split()[1] for line in held.out.splitlines() if line.startswith("Secret:"))
+    (folder,) = (tmp_path / "races").iterdir()
+    checked = racecraft("verify", str(folder))
+    assert checked.status == 0
+    assert f"Commitment {commitment}" in checked.out
+    assert "Genuine: replays, starts and result are what the race says." in checked.out
+    document = racecraft("verify", str(folder / "race.json"), "--json").document
+    assert (document["is_genuine"], document["commitment"]) == (True, commitment)
+
+    replay = next(folder.glob("*.replay"))
+    told = racecraft("verify", str(replay), "--race", commitment)
+    assert told.status == 0
+    assert f"Of the race {commitment}: its secret gives these starts." in told.out
+    refused = racecraft("verify", str(replay), "--race", secret)
+    assert refused.status == 1
+    assert "Not of its race: its race has the commitment" in refused.out
+    again = racecraft("race", str(trained), *short, "--json").document
+    assert racecraft("verify", str(replay), "--race", str(again["folder"]), "--json").status == 1
+    assert racecraft("verify", str(again["folder"]), "--race", commitment).status == 1
+    assert racecraft("verify", str(replay), "--race", "nonsense").err.startswith("ConfigError")
+
+    both = racecraft("race", str(trained), *short, "--secret", "--seed", "4")
+    assert both.status == 2
+    assert "--secret and --seed" in both.err
+    many = racecraft("race", str(trained), str(trained), "--type", "grid", *short)
+    assert many.err.startswith("ConfigError: A grid race has 3 trials")
+
+    results = folder / "race.json"
+    results.write_text(results.read_text().replace('"place": null', '"place": 1', 1))
+    forged = racecraft("verify", str(folder))
+    assert forged.status == 1
+    assert "is not what its replay leads to" in forged.out
+    results.write_text('{"files": {"replay": "' + replay.name + '"}}')
+    old = racecraft("verify", str(folder))
+    assert old.status == 0
+    assert "Driven under the old rules" in old.out

@@ -12,7 +12,8 @@ import pytest
 
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.contest.classification import classify
-from racecraft.contest.contest import race_together, shared_road
+from racecraft.contest.contest import race_together
+from racecraft.contest.terms import shared_road
 from racecraft.errors import ConfigError
 from racecraft.race import Autopilot, Conditions, Evaluation, RaceRules, Trial
 from racecraft.race.placement import ROOM, Pose, clear_pose

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from racecraft.agent.sensor_suite import SensorSuite
-from racecraft.contest.contest import Contest, hold_race
+from racecraft.contest.contest import Contest, hold_race, race_together
+from racecraft.contest.terms import race_terms, shared_road
 from racecraft.errors import NonFiniteAction
 from racecraft.race import RULE_SETS, Autopilot, Conditions, Evaluation, RaceRules, Trial, evaluate
 from racecraft.race.entry import Entry
@@ -114,7 +115,6 @@ def test_an_open_road_is_driven_from_its_beginning() -> None:
 
 
 def test_on_one_road_the_grid_is_somewhere_on_the_lap() -> None:
-    from racecraft.contest.contest import race_together, shared_road
 
     places = []
     for seed in range(4):
@@ -152,12 +152,12 @@ def entry(name: str, policy: Any) -> Entry:
 def held(*entries: Entry, **settings: Any) -> Contest:
     rules = race_rules("drfc", {"laps": 1, "time_limit": 4.0, "max_resets": 2})
     given = Conditions(**{"track": OVAL, "rules": rules, "seed": 3, **settings})
-    return hold_race(entries, given, num_trials=3, num_threads=1)
+    return hold_race(entries, race_terms(given, num_trials=3), num_threads=1)
 
 
 def test_everybody_starts_from_the_very_same_places() -> None:
     found = held(entry("slow", Blind((0.0, 0.5))), entry("fast", Blind((0.1, 3.0))))
-    assert found.num_trials == 3
+    assert found.terms.num_trials == 3
     prepared = [[trial.recording.rows[0] for trial in trials] for trials in found.trials]
     assert np.array_equal(prepared[0], prepared[1])
     assert len({tuple(row) for row in prepared[0]}) == 3

@@ -186,6 +186,19 @@ def test_a_replay_of_another_version_says_so(clean: Path, tmp_path: Path) -> Non
     assert "Racecraft 0.0.1" in found.version_note
 
 
+def test_files_of_the_first_version_are_read_and_driven_as_they_were(clean: Path, tmp_path: Path) -> None:
+    """They know neither races nor starts all over the lap."""
+    document, body = unpack(clean.read_bytes(), name="clean")
+    document.pop("race")
+    document["rules"].pop("starts")
+    text = json.dumps(document).encode()
+    path = tmp_path / "old.replay"
+    path.write_bytes(sealed(struct.pack("<I", len(text)) + text + bytes(body), version=1))
+    found = read_replay(path)
+    assert (found.race, found.conditions.rules.starts) == (None, "line")
+    assert verify(found).is_genuine
+
+
 def test_a_wider_track_of_the_same_name_is_told(clean: Path) -> None:
     replay = read_replay(clean)
     assert verify(replay).track_note == "as in the library"
@@ -238,7 +251,7 @@ def test_a_file_that_is_too_large_is_refused_unread(tmp_path: Path, monkeypatch:
 
 def test_other_versions_and_impossible_sizes_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "bad.replay"
-    refused(path, sealed(bytes(10), version=2), "version 2")
+    refused(path, sealed(bytes(10), version=3), "version 3")
     refused(path, sealed(bytes(10), version=0), "version 0")
     refused(path, sealed(bytes(10), size=2**63), "says it holds")
     refused(path, sealed(bytes(10), size=4), "damaged")

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import Json, TrackOption, app, print_json, text
+from racecraft.cli.app import Json, TrackOption, app, is_given, print_json, text
 
 if TYPE_CHECKING:
+    from racecraft.race.announcement import Announcement
     from racecraft.sim import Objects
 
 Models = Annotated[list[str], typer.Argument(metavar="MODELS", help="Runs, RUN or RUN@CHECKPOINT.")]
@@ -53,7 +54,10 @@ def race(
     positions: race_options.Positions = "",
     vehicle: Vehicle = "v5",
     randomize: Annotated[str, typer.Option("--randomize", help="none, light, strong, aws or a JSON file.")] = "none",
-    seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts and objects.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts and objects, known to everybody.")] = 0,
+    secret: Annotated[
+        bool, typer.Option("--secret", help="Draw them from a secret instead; its commitment is told first.")
+    ] = False,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Write an MP4 of every entry.")] = True,
     ghost: race_options.Ghosts = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of all races.")] = Path("races"),
@@ -63,7 +67,14 @@ def race(
 
     Writes results, and for every entry a replay, a sim-trace and a film.
     """
+    if secret and is_given(context, "seed"):
+        context.fail("--secret and --seed are two ways to say where the race starts; give one.")
     from racecraft.judging.race import race_models
+    from racecraft.race.announcement import draw_secret
+
+    def announce(announcement: Announcement) -> None:
+        if secret and not as_json:
+            text().say_progress(f"Commitment {announcement.commitment}")
 
     outcome = race_models(
         models,
@@ -78,6 +89,8 @@ def race(
         vehicle=vehicle,
         randomize=randomize,
         seed=seed,
+        secret=draw_secret() if secret else None,
+        announce=announce,
         changes={
             "time_limit": time_limit,
             "offtrack_penalty": offtrack_penalty,
@@ -169,14 +182,29 @@ def film(
 
 @app.command()
 def verify(
-    replay: Annotated[Path, typer.Argument(help="Replay file, as evaluations and races write it.")],
+    replay: Annotated[Path, typer.Argument(help="Replay file, or a race's folder or race.json.")],
+    race: Annotated[
+        str, typer.Option("--race", help="That the replay must be of: its race.json, its folder or its commitment.")
+    ] = "",
     as_json: Json = False,
 ) -> None:
-    """Drive a replay again and compare every bit."""
+    """Drive a replay again and compare every bit.
+
+    Of a race all replays, and that its starts were drawn beforehand and its result is theirs.
+    """
+    if replay.is_dir() or replay.suffix == ".json":
+        from racecraft.judging.verification import verify_race
+
+        whole = verify_race(replay, race=race)
+        print_json(whole.to_dict()) if as_json else text().say_race_verified(whole)
+        if not whole.is_genuine:
+            raise typer.Exit(1)
+        return
+    from racecraft.judging.verification import published
     from racecraft.replay import read_replay
     from racecraft.replay import verify as drive_again
 
-    found = drive_again(read_replay(replay))
+    found = drive_again(read_replay(replay), race=published(race) if race else None)
     if as_json:
         print_json(found.to_dict())
     else:
@@ -187,7 +215,7 @@ def verify(
 
 def _objects(kind: str, options: Mapping[str, Any]) -> Objects:
     """Those of the race's type; on a road that models share there are none unless boxes or bots are asked for."""
-    from racecraft.contest.contest import TOGETHER
+    from racecraft.contest.terms import TOGETHER
 
     name = race_options.kind_of(kind)
     if name in TOGETHER:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from racecraft.judging.evaluation import RunEvaluation
     from racecraft.judging.generalization import RunGeneralization
     from racecraft.judging.race import RunRace
+    from racecraft.judging.verification import RaceVerification
     from racecraft.limits import TrackLimit
     from racecraft.replay import Verification
     from racecraft.reward import Outcome, Problem
@@ -142,13 +143,13 @@ def say_evaluated(outcome: RunEvaluation) -> None:
 def say_raced(outcome: RunRace) -> None:
     """The result of a race, the winner first, and what was written."""
     console, contest = Console(), outcome.contest
-    conditions = contest.conditions
+    conditions, terms = contest.conditions, contest.terms
     laps = f"{conditions.rules.laps} lap" + "s" * (conditions.rules.laps > 1)
-    if contest.num_trials > 1:
-        laps = f"median of {contest.num_trials} trials of {laps}"
-    is_crowded = conditions.objects.count > 0 or contest.shares_road
+    if terms.num_trials > 1:
+        laps = f"median of {terms.num_trials} trials of {laps}"
+    is_crowded = conditions.objects.count > 0 or terms.shares_road
     room = max(8, console.width - (80 if is_crowded else 70))  # for names
-    table = _table(title=f"{contest.kind} on {conditions.track.name}, {laps}")
+    table = _table(title=f"{terms.kind} on {conditions.track.name}, {laps}")
     table.add_column("", justify="right", no_wrap=True)
     table.add_column("model", style="bold", overflow="ellipsis", no_wrap=True, max_width=room)
     crashes = ("crashes",) if is_crowded else ()
@@ -160,7 +161,7 @@ def say_raced(outcome: RunRace) -> None:
         table.add_row(
             "–" if standing.place is None else str(standing.place),
             Text(contest.names[standing.car]),
-            f"{standing.laps}/{conditions.rules.laps * contest.num_trials}",
+            f"{standing.laps}/{conditions.rules.laps * terms.num_trials}",
             "–" if standing.best is None else f"{standing.best:.2f} s",
             score,
             gap,
@@ -169,9 +170,12 @@ def say_raced(outcome: RunRace) -> None:
             str(standing.resets),
         )
     console.print(table)
-    if contest.ranking != "total" or contest.minimum_laps < conditions.rules.laps:
-        what = {"total": "total time", "best": "best lap", "average": "best average"}[contest.ranking]
-        _say(console, f"Ranked by {what}; {contest.minimum_laps} laps of a trial needed.")
+    if terms.ranking != "total" or terms.minimum_laps < conditions.rules.laps:
+        what = {"total": "total time", "best": "best lap", "average": "best average"}[terms.ranking]
+        _say(console, f"Ranked by {what}; {terms.minimum_laps} laps of a trial needed.")
+    if terms.announcement.secret:
+        _say(console, "Secret:      ", terms.announcement.secret)
+        _say(console, "Commitment:  ", terms.announcement.commitment)
     _say(console, "Race folder: ", (str(outcome.folder), "bold"))
     for what, path in outcome.files.items():
         if what.startswith(("video", "replay")):
@@ -212,13 +216,41 @@ def say_verified(found: Verification) -> None:
         best = f", best {min(car.lap_times):.2f} s" if car.lap_times else ""
         laps = f"{len(car.lap_times)} laps{best}, {car.time:.2f} s in all"
         _say(console, f"  {_harmless(name)}: ", (laps, "dim"))
-    if found.difference is None:
+    if found.is_genuine:
         _say(console, ("Genuine", "bold green"), _harmless(found.provenance.verdict, width=1000), ".")
         _say(console, f"All {found.num_steps:,} steps come out the same, bit for bit.")
+        if found.race_note:
+            _say(console, found.race_note)
+    elif found.difference is None:
+        _say(console, ("Not of its race: ", "bold red"), _harmless(found.foul), ".")
     else:
         _say(console, ("Not genuine: ", "bold red"), found.difference.sentence)
         if found.version_note:
             _say(console, ("note: ", "bold"), _harmless(found.version_note))
+
+
+def say_race_verified(found: RaceVerification) -> None:
+    """Whether a race's starts, replays and result are what it says."""
+    from racecraft.judging.verification import OLD_RULES
+
+    console = Console()
+    for name, one in found.verifications.items():
+        style = "dim" if one.is_genuine else "bold red"
+        _say(console, f"  {_harmless(name)}: ", (_harmless(one.sentence, width=1000), style))
+    race = found.announcement
+    if race is None:
+        _say(console, ("note: ", "bold"), OLD_RULES)
+    else:
+        _say(console, f"Commitment {race.commitment}", (" (its seed was known)" if "seed" in race.document else "", ""))
+    if found.is_genuine:
+        _say(
+            console,
+            ("Genuine: ", "bold green"),
+            "replays, starts and result are what the race says." if race else "its replays.",
+        )
+    else:
+        reason = found.foul or "not all of its replays are genuine"
+        _say(console, ("Not genuine: ", "bold red"), _harmless(reason), ".")
 
 
 def say_limit(name: str, limit: TrackLimit) -> None:

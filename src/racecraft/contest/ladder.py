@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from racecraft.contest.classification import classify
-from racecraft.contest.contest import ALONE, race_together, shared_road
+from racecraft.contest.contest import race_together
 from racecraft.contest.ratings import Rating, rate
 from racecraft.contest.schedule import Pair, round_robin, swiss_round
+from racecraft.contest.terms import ALONE, shared_road
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry import Entry

@@ -9,16 +9,18 @@ races/<time>/race.json                  results, rules, files
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from racecraft.contest.contest import Contest, check_kind, check_trials, hold_race
+from racecraft.contest.contest import Contest, hold_race
+from racecraft.contest.terms import race_terms
 from racecraft.errors import RunError
 from racecraft.film.ghost import LIVERY, Ghost, Rival, ghost_of
 from racecraft.film.ghost_source import check_sources, load_ghosts
 from racecraft.film.video import film
+from racecraft.race.announcement import Announcement
 from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.conditions import STANDARD_CAR, Conditions
 from racecraft.race.entry import Entry, load_entries
@@ -32,6 +34,9 @@ from racecraft.sim.randomization import Randomization, load_randomization
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import Track, load_track
 
+RESULTS: Final = "race.json"
+FORMAT: Final = 2
+"""Of race.json; the first one has no such number: one trial from the line, in the car of the first model's run.json."""
 FILMED: Final = 180.0
 """s of each entry's race that are filmed."""
 
@@ -67,6 +72,8 @@ def race_models(
     vehicle: str | Vehicle = STANDARD_CAR,
     randomize: Randomization | str = "none",
     seed: int = 0,
+    secret: bytes | None = None,
+    announce: Callable[[Announcement], None] = lambda announcement: None,
     changes: dict[str, Any] | None = None,
     video: bool = True,
     ghosts: Sequence[str] = (),
@@ -87,7 +94,9 @@ def race_models(
         objects: On the track.
         vehicle: What everybody drives, whatever they were trained with.
         randomize: What differs from what the models know; the same for all.
-        seed: Of the starts and of what stands on the track.
+        seed: Of the starts and of what stands on the track, known to everybody.
+        secret: 32 bytes that both are drawn from instead.
+        announce: Is told what the race is held by, before anybody drives.
         changes: Single rules that differ, by name.
         video: Whether to film every entry.
         ghosts: More ghosts for the films, as for `load_ghosts`.
@@ -97,9 +106,6 @@ def race_models(
     Raises:
         RacecraftError: A model, the track or a setting is not usable, or nothing can be written.
     """
-    check_kind(kind, len(models))
-    check_trials(kind, num_trials)
-    entries = load_entries(models, num_threads=num_threads)
     given = {"laps": laps, **(changes or {})}
     conditions = Conditions(
         track=track if isinstance(track, Track) else load_track(track),
@@ -109,19 +115,22 @@ def race_models(
         objects=objects,
         randomize=randomize if isinstance(randomize, Randomization) else load_randomization(randomize),
     )
-    check_sources(ghosts, run=None)
-    contest = hold_race(
-        entries,
+    terms = race_terms(
         conditions,
         kind=kind,
+        num_cars=len(models),
         ranking=ranking,
         minimum_laps=minimum_laps,
         num_trials=num_trials,
-        num_threads=num_threads,
+        secret=secret,
     )
+    entries = load_entries(models, num_threads=num_threads)
+    check_sources(ghosts, run=None)
+    announce(terms.announcement)
+    contest = hold_race(entries, terms, num_threads=num_threads)
     trial, colors = contest.shown_trial, LIVERY[len(entries) % len(LIVERY) :]
     recordings = [trials[trial].recording for trials in contest.trials]
-    shown = load_ghosts(ghosts, conditions, trial=trial, recordings=recordings, colors=colors) if video else []
+    shown = load_ghosts(ghosts, terms.conditions, trial=trial, recordings=recordings, colors=colors) if video else []
     try:
         folder = dated_folder(Path(root))[1]
         files = _write(contest, entries, folder, ghosts=shown, is_filmed=video)
@@ -159,13 +168,13 @@ def _write(
     document = contest.to_dict()
     models = {entry.name: {"run": str(entry.run), "step": entry.step} for entry in entries}
     names = {name: path.relative_to(folder).as_posix() for name, path in files.items()}
-    write_json(folder / "race.json", {**document, "models": models, "files": names})
-    return {"results": folder / "race.json", **files}
+    write_json(folder / RESULTS, {"format": FORMAT, **document, "models": models, "files": names})
+    return {"results": folder / RESULTS, **files}
 
 
 def _others(contest: Contest, index: int, shown: int) -> list[Ghost]:
     """Everybody else in the same trial, where they drove alone."""
-    if contest.shares_road:
+    if contest.terms.shares_road:
         return []
     return [
         ghost_of(trials[shown].recording, name=contest.names[other], color=LIVERY[other % len(LIVERY)])
@@ -176,7 +185,7 @@ def _others(contest: Contest, index: int, shown: int) -> list[Ghost]:
 
 def _rivals(contest: Contest, index: int) -> list[Rival]:
     """Everybody else, where they drove on the same road."""
-    if not contest.shares_road:
+    if not contest.terms.shares_road:
         return []
     return [
         Rival(contest.names[other], LIVERY[other % len(LIVERY)], trials[0].recording)

@@ -27,7 +27,8 @@ from racecraft.errors import ConfigError, ReplayError
 from racecraft.json_file import parse_json_object
 
 MAGIC: Final = b"RACECRAFTREPLAY\0"
-VERSION: Final = 1
+VERSION: Final = 2
+"""Of what is written; version 1, which knows no race, is read as well."""
 MAX_FILE_BYTES: Final = 256 << 20
 MAX_BODY_BYTES: Final = 512 << 20
 MAX_HEADER_BYTES: Final = 16 << 20
@@ -95,9 +96,9 @@ def unpack(data: bytes, *, name: str) -> tuple[dict[str, Any], memoryview]:
     if len(data) < _PREFIX.size or not data.startswith(MAGIC):
         raise ReplayError(f"{name} is no replay of Racecraft: it does not begin like one.")
     _, version, size, digest = _PREFIX.unpack_from(data)
-    if version != VERSION:
+    if not 1 <= version <= VERSION:
         raise ReplayError(
-            f"{name} is a replay of version {version}; this Racecraft reads version {VERSION}.",
+            f"{name} is a replay of version {version}; this Racecraft reads up to {VERSION}.",
             hint="Update Racecraft." if version > VERSION else "",
         )
     if not 4 <= size <= MAX_BODY_BYTES:

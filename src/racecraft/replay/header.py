@@ -7,7 +7,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from racecraft.errors import RacecraftError, ReplayError
+from racecraft.errors import ConfigError, RacecraftError, ReplayError
+from racecraft.race.announcement import Announcement
 from racecraft.race.conditions import Conditions
 from racecraft.race.results import Lap
 from racecraft.race.rules import RaceRules
@@ -73,6 +74,14 @@ class TrackHeader(_Strict):
     """Of the columns: x and y of the centre line, of the inner and of the outer border."""
 
 
+class RaceHeader(_Strict):
+    """The race that it is of, as `racecraft.race.announcement.Announcement`."""
+
+    document: Settings
+    commitment: Name
+    secret: Name
+
+
 class Header(_Strict):
     """Everything but the numbers of the steps."""
 
@@ -87,6 +96,8 @@ class Header(_Strict):
     randomize: Settings
     cars_per_race: Annotated[int, Field(ge=1, le=8)]
     """Cars that share a road, in the order of the grid; `cars` has one such race after the other."""
+    race: RaceHeader | None = None
+    """None of an evaluation."""
     cars: Annotated[list[CarHeader], Field(min_length=1, max_length=MAX_CARS)]
 
 
@@ -136,6 +147,18 @@ def conditions_of(header: Header, track: Track, *, name: str) -> Conditions:
         )
     except (RacecraftError, TypeError) as error:
         raise ReplayError(f"The settings in {name} are not allowed: {error}") from error
+
+
+def race_of(header: Header, *, name: str) -> Announcement | None:
+    """The race that a replay says it is of.
+
+    Raises:
+        ReplayError: Its announcement is none, or its commitment is not that of its secret.
+    """
+    try:
+        return None if header.race is None else Announcement.from_dict(header.race.model_dump())
+    except ConfigError as error:
+        raise ReplayError(f"The race in {name} is not one: {error}") from error
 
 
 def lap_of(header: LapHeader) -> Lap:

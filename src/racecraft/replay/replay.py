@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, RacecraftError, ReplayError
 from racecraft.json_file import read_bytes
+from racecraft.race.announcement import Announcement
 from racecraft.race.conditions import Conditions
 from racecraft.race.placement import driven_track
 from racecraft.race.recording import Recording
 from racecraft.race.results import Evaluation, Trial
 from racecraft.replay.codec import MAX_FILE_BYTES, TYPES, pack, pack_column, unpack, unpack_column
-from racecraft.replay.header import CarHeader, Header, check_header, conditions_of, header_of, lap_of
+from racecraft.replay.header import CarHeader, Header, check_header, conditions_of, header_of, lap_of, race_of
 from racecraft.run.atomic import write_file
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES, row_width
 from racecraft.sim.objects import OBJECT_KINDS
@@ -56,6 +57,8 @@ class Replay:
     """Laps, results and recording of each car."""
     rewards: tuple[NDArray[np.float64], ...]
     """As stored, of each car  (T,)."""
+    race: Announcement | None = None
+    """The race that it says it is of; None of an evaluation."""
     written_by: str = field(default_factory=lambda: metadata.version("racecraft"))
     """Version of Racecraft: another one may have other rules or physics."""
 
@@ -118,6 +121,7 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
             "types": _pack(np.hstack([track.centerline, track.inner, track.outer]), columns),
         },
         **header_of(replay.conditions),
+        "race": None if replay.race is None else replay.race.to_dict(),
         "cars": [],
     }
     for name, car, rewards in zip(replay.names, replay.cars, replay.rewards, strict=True):
@@ -183,6 +187,7 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
         names=tuple(_printable(car.name) for car in header.cars),
         cars=tuple(cars),
         rewards=tuple(rewards),
+        race=race_of(header, name=name),
         written_by=_printable(header.racecraft),
     )
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import RacecraftError, ReplayError
+from racecraft.race.announcement import Announcement
 from racecraft.race.evaluation import race_simulation
 from racecraft.race.marshal import Marshal
 from racecraft.race.provenance import Provenance, provenance, track_note, vehicle_note
@@ -65,11 +66,13 @@ class Verification:
     replay: Replay
     difference: Difference | None
     """None if every bit is the same."""
+    foul: str = ""
+    """What it has otherwise than the race it is to be of, in words; empty where that is its race, or there is none."""
 
     @property
     def is_genuine(self) -> bool:
-        """Whether the replay is what its actions lead to."""
-        return self.difference is None
+        """Whether the replay is what its actions lead to, and of its race, where it has one."""
+        return self.difference is None and not self.foul
 
     @property
     def num_steps(self) -> int:
@@ -104,11 +107,24 @@ class Verification:
         """The verdict: genuine or not, by whose rules, and what of them is not everybody's."""
         if self.difference is not None:
             return f"Not genuine: {self.difference.sentence}"
+        if self.foul:
+            return f"Not of its race: {self.foul}."
         return f"Genuine{self.provenance.verdict}."
+
+    @property
+    def race_note(self) -> str:
+        """Which race it is of, and what that proves; empty where it is of none."""
+        race = self.replay.race
+        if race is None:
+            return ""
+        starts = "its seed was known" if "seed" in race.document else "its secret gives these starts"
+        if race.is_secret:
+            starts = "it is not over, so nobody can check the starts"
+        return f"Of the race {race.commitment}: {starts}."
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
-        found = self.difference
+        found, race = self.difference, self.replay.race
         return {
             "is_genuine": self.is_genuine,
             "verdict": self.sentence,
@@ -120,18 +136,30 @@ class Verification:
             "vehicle": self.vehicle_note,
             "driven": self.provenance.to_dict(),
             "written_by": self.replay.written_by,
+            "race": None if race is None else race.commitment,
+            "foul": self.foul,
             "difference": None
             if found is None
             else {field.name: getattr(found, field.name) for field in fields(found)} | {"sentence": found.sentence},
         }
 
 
-def verify(replay: Replay, *, num_threads: int = 0) -> Verification:
+def verify(replay: Replay, *, race: Announcement | str | None = None, num_threads: int = 0) -> Verification:
     """Drive a replay again.
+
+    Args:
+        replay: Of anybody.
+        race: That it must be of, as it was published: its announcement, or its commitment alone; by default the one
+            that it says it is of.
+        num_threads: 0 takes one per core.
 
     Raises:
         ReplayError: Its track or its settings cannot be driven at all.
     """
+    return replace(_driven_again(replay, num_threads=num_threads), foul=_foul(replay, race))
+
+
+def _driven_again(replay: Replay, *, num_threads: int) -> Verification:
     conditions, num_cars = replay.conditions, len(replay.cars)
     if conditions.camera is not None:
         small = replace(conditions.camera, width=SMALLEST_CAMERA, height=SMALLEST_CAMERA)
@@ -160,6 +188,17 @@ def verify(replay: Replay, *, num_threads: int = 0) -> Verification:
         if found is not None:
             return Verification(replay=replay, difference=found)
     return Verification(replay=replay, difference=None)
+
+
+def _foul(replay: Replay, race: Announcement | str | None) -> str:
+    """What a replay has otherwise than the race that it must be of, or that it says it is of."""
+    if isinstance(race, str):
+        if replay.race is None:
+            return f"it names no race, and must be of {race}"
+        if replay.race.commitment != race:
+            return f"its race has the commitment {replay.race.commitment}, not {race}"
+    announced = race if isinstance(race, Announcement) else replay.race
+    return "" if announced is None else announced.mismatch(replay.conditions, num_cars=len(replay.cars))
 
 
 def _first_difference(stored: Trial, driven: Any, *, car: int, begin: int) -> Difference | None:

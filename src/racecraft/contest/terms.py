@@ -1,0 +1,141 @@
+"""What a race is held by: settled and checked before anybody enters, the same for all, and announced.
+
+settings -> *race_terms* -> RaceTerms -> announcement (published), conditions (driven under)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+from racecraft.contest.standings import RANKINGS
+from racecraft.errors import ConfigError, did_you_mean
+from racecraft.race.announcement import Announcement
+from racecraft.race.conditions import Conditions
+from racecraft.sim.camera import CameraSpec
+
+ALONE: Final = ("time-trial", "object-avoidance", "head-to-bot")
+TOGETHER: Final = ("head-to-model", "grid")
+RACE_KINDS: Final = ALONE + TOGETHER
+"""What `racecraft race` can hold."""
+MAX_ENTRIES: Final = 1000
+MAX_GRID: Final = 8
+"""Cars on one road."""
+TRIALS: Final = 5
+"""Of each entry that drives alone, unless a race asks for more or fewer."""
+MAX_TRIALS: Final = 99
+
+
+@dataclass(frozen=True, kw_only=True)
+class RaceTerms:
+    """Everything that decides a race but who enters it; from `race_terms`."""
+
+    kind: str
+    """Of `RACE_KINDS`."""
+    conditions: Conditions
+    """The same for everybody, the seed included."""
+    ranking: str
+    """``total``, ``best`` or ``average``."""
+    minimum_laps: int
+    """Completed laps that a trial must have for a score."""
+    num_trials: int
+    """Of each entry."""
+    announcement: Announcement
+    """What is published of it; with its secret, which is kept until the race is over."""
+
+    @property
+    def shares_road(self) -> bool:
+        """Whether all cars are on one road."""
+        return self.kind in TOGETHER
+
+
+def race_terms(
+    conditions: Conditions,
+    *,
+    kind: str = "time-trial",
+    num_cars: int = 1,
+    ranking: str = "total",
+    minimum_laps: int | None = None,
+    num_trials: int | None = None,
+    secret: bytes | None = None,
+) -> RaceTerms:
+    """Settle what a race is held by.
+
+    Args:
+        conditions: Track, rules, vehicle, objects; their seed counts where there is no secret.
+        kind: Of `RACE_KINDS`.
+        num_cars: Entries; where each drives alone their number means nothing.
+        ranking: ``total`` time, ``best`` lap or ``average`` of the best `minimum_laps` laps in a row.
+        minimum_laps: Completed laps that a trial must have for a score; by default all for ``total``, three for
+            ``average``, one for ``best``.
+        num_trials: Of each entry that drives alone, 5 by default; cars on one road have one.
+        secret: 32 bytes that the seed is drawn from, or None for one that everybody may know.
+
+    Raises:
+        ConfigError: No such race or ranking, or the number of entries, laps or trials does not go with it.
+    """
+    check_kind(kind, num_cars)
+    trials, laps = check_trials(kind, num_trials), conditions.rules.laps
+    needed = {"total": laps, "average": min(3, laps)}.get(ranking, 1) if minimum_laps is None else minimum_laps
+    if ranking not in RANKINGS:
+        hint = did_you_mean(ranking, RANKINGS)
+        raise ConfigError(f"ranking is {ranking!r}; allowed are {', '.join(RANKINGS)}.", hint=hint)
+    if not 1 <= needed <= laps:
+        raise ConfigError(f"minimum_laps is {needed}; allowed is 1 to {laps}, the laps of the race.")
+    if kind in TOGETHER:
+        conditions = replace(shared_road(conditions, num_cars), camera=conditions.camera or CameraSpec())
+    announcement = Announcement.of(
+        conditions, kind=kind, ranking=ranking, minimum_laps=needed, num_trials=trials, secret=secret
+    )
+    return RaceTerms(
+        kind=kind,
+        conditions=replace(conditions, seed=announcement.seed or 0),
+        ranking=ranking,
+        minimum_laps=needed,
+        num_trials=trials,
+        announcement=announcement,
+    )
+
+
+def check_kind(kind: str, num_entries: int) -> None:
+    """Refuse a race that there is not, or with too few or too many cars.
+
+    Raises:
+        ConfigError: Says what is allowed.
+    """
+    if kind not in RACE_KINDS:
+        hint = did_you_mean(kind, RACE_KINDS)
+        raise ConfigError(f"Race type is {kind!r}; allowed are {', '.join(RACE_KINDS)}.", hint=hint)
+    low, high = {"head-to-model": (2, 2), "grid": (2, MAX_GRID)}.get(kind, (1, MAX_ENTRIES))
+    if not low <= num_entries <= high:
+        allowed = str(low) if low == high else f"{low} to {high}"
+        raise ConfigError(f"A {kind} race has {num_entries} models; allowed are {allowed}.")
+
+
+def check_trials(kind: str, num_trials: int | None) -> int:
+    """How many trials each entry of a race has.
+
+    Raises:
+        ConfigError: As many do not go with the race.
+    """
+    high = 1 if kind in TOGETHER else MAX_TRIALS
+    number = min(TRIALS, high) if num_trials is None else num_trials
+    if not 1 <= number <= high:
+        allowed = "1: all are on one road" if high == 1 else f"1 to {high}"
+        raise ConfigError(f"A {kind} race has {number} trials; allowed are {allowed}.")
+    return number
+
+
+def shared_road(conditions: Conditions, num_cars: int) -> Conditions:
+    """The same on one road, where laps flow: nobody could stop for a standing start among the others.
+
+    Raises:
+        ConfigError: The road is no circuit and the race has several laps.
+    """
+    if conditions.rules.laps > 1 and not conditions.track.is_closed:
+        raise ConfigError(
+            f"Cars on one road race one lap on {conditions.track.name}, which is no circuit; laps is "
+            f"{conditions.rules.laps}."
+        )
+    rules = replace(conditions.rules, is_continuous=True)
+    return replace(conditions, rules=rules, cars_per_race=num_cars)
