@@ -12,7 +12,7 @@ PAGES := src/racecraft/serve/pages/index.html
 NODE := web/node_modules/.package-lock.json
 WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/* web/src/*/*/*)
 
-.PHONY: help train console test test-fast lint format bench setup build stub clean requirements
+.PHONY: help train console test test-fast mutants lint format bench setup build stub clean requirements
 
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | awk -F'\t' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -28,6 +28,9 @@ test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every 
 
 test-fast: $(VENV)/.built $(VENV)/.dev  ## the tests that take seconds
 	$(BIN)/python -m pytest -m "not slow"
+
+mutants: $(VENV)/.built $(VENV)/.dev  ## plant small faults, one at a time, and count which ones the tests notice (hours; goes on where it stopped)
+	$(BIN)/python tests/mutants/plant_python.py --jobs 2
 
 lint: $(VENV)/.built $(VENV)/.dev $(NODE)  ## ruff, mypy --strict, clang-format, prettier and eslint, changing nothing
 	$(BIN)/ruff check .

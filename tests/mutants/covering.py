@@ -1,0 +1,78 @@
+"""Which modules get faults, how many, and the tests of behaviour that are to notice: cheap ones first, no goldens.
+
+Chosen are the modules where a small slip gives a wrong number and no error: rules, placing, learning, judging, what
+runs and replays say. A few tests of many cover each, so that a fault costs seconds.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+Tests = tuple[str, ...]
+
+LEARN: Final[Tests] = ("tests/learn/test_ppo.py", "-k", "not learns and not e_greedy")
+SERVE: Final[Tests] = ("tests/serve/test_races_api.py", "-k", "not HTTP and stewards or ranked or enter")
+
+COVERING: Final[dict[str, tuple[int, Tests]]] = {
+    # a race: rules, placing, judging
+    "race/marshal.py": (8, ("tests/race/test_evaluation.py", "tests/race/test_object_races.py")),
+    "race/placement.py": (8, ("tests/race/test_object_races.py", "tests/race/test_evaluation.py")),
+    "race/evaluation.py": (6, ("tests/race/test_evaluation.py",)),
+    "race/results.py": (6, ("tests/race/test_evaluation.py",)),
+    "race/statistics.py": (4, ("tests/race/test_statistics.py",)),
+    "race/rules.py": (4, ("tests/race/test_rules.py", "tests/race/test_evaluation.py")),
+    "race/recording.py": (4, ("tests/race/test_evaluation.py", "tests/race/test_object_races.py")),
+    "race/default_reward.py": (2, ("tests/race/test_evaluation.py",)),
+    "race/entry.py": (2, ("tests/film/test_ghosts.py", "tests/race/test_entry.py")),
+    "race/yardstick.py": (5, ("tests/race/test_yardstick.py",)),
+    # contests
+    "contest/classification.py": (4, ("tests/contest/test_classification.py",)),
+    "contest/standings.py": (5, ("tests/contest/test_standings.py", "tests/contest/test_classification.py")),
+    "contest/schedule.py": (5, ("tests/contest/test_schedule.py",)),
+    "contest/ladder.py": (8, ("tests/contest/test_ladder.py", "tests/contest/test_contest.py", "-k", "ladder")),
+    "contest/ratings.py": (3, ("tests/contest/test_schedule.py",)),
+    "contest/contest.py": (4, ("tests/contest/test_contest.py",)),
+    # replays, and logs of the original
+    "replay/codec.py": (5, ("tests/replay/test_race_replay.py",)),
+    "replay/replay.py": (5, ("tests/replay/test_race_replay.py",)),
+    "replay/verification.py": (5, ("tests/replay/test_race_replay.py",)),
+    "fidelity/differences.py": (3, ("tests/fidelity/test_fidelity.py", "tests/fidelity/test_replay.py")),
+    "fidelity/rules.py": (4, ("tests/fidelity/test_replay.py", "tests/fidelity/test_fidelity.py")),
+    "fidelity/logs.py": (4, ("tests/fidelity/test_replay.py", "tests/fidelity/test_fidelity.py")),
+    # learning
+    "learn/rollout.py": (5, ("tests/learn/test_rollout.py", "tests/learn/test_ppo.py", "-k", "not learns")),
+    "learn/ppo.py": (12, LEARN),
+    "learn/average.py": (3, ("tests/learn/test_average.py",)),
+    "learn/distill.py": (8, ("tests/learn/test_distill.py",)),
+    "learn/sac.py": (6, ("tests/learn/test_sac.py",)),
+    "learn/replay_buffer.py": (3, ("tests/learn/test_sac.py",)),
+    "learn/distributions.py": (4, ("tests/learn/test_distributions.py",)),
+    # trainings and runs
+    "training/evaluator.py": (5, ("tests/training/test_evaluator.py", "tests/training/test_many_tracks.py")),
+    "training/environment.py": (4, ("tests/training/test_job.py",)),
+    "training/stop.py": (3, ("tests/training/test_stop.py", "tests/training/test_job.py")),
+    "training/progress.py": (3, ("tests/training/test_stop.py", "tests/training/test_job.py")),
+    "training/job.py": (6, ("tests/training/test_job.py", "tests/training/test_resume.py")),
+    "run/episodes.py": (4, ("tests/run/test_episodes.py",)),
+    "run/checkpoint.py": (6, ("tests/run/test_checkpoint.py", "-k", "not kill")),
+    "run/simtrace.py": (5, ("tests/run/test_simtrace.py",)),
+    "run/metrics.py": (4, ("tests/run/test_run_metrics.py",)),
+    "run/history.py": (3, ("tests/run/test_history.py",)),
+    # rewards, actions and sensors
+    "reward/params.py": (5, ("tests/reward/test_params.py", "tests/reward/test_object_params.py")),
+    "reward/dry_run.py": (4, ("tests/reward/test_dry_run.py",)),
+    "reward/worker.py": (4, ("tests/reward/test_worker.py", "tests/reward/test_worker_faults.py")),
+    "agent/action_space.py": (5, ("tests/agent/test_action_space.py",)),
+    "agent/lidar.py": (3, ("tests/agent/test_observe_lidar.py", "tests/agent/test_sensors.py")),
+    "agent/hyperparameters.py": (3, ("tests/agent/test_hyperparameters.py",)),
+    "limits/road.py": (4, ("tests/limits/test_limits.py",)),
+    "limits/limit.py": (3, ("tests/limits/test_limits.py",)),
+    # what comes from outside, what is shown
+    "importing/archive_guard.py": (5, ("tests/importing/test_archive.py",)),
+    "importing/tar_reader.py": (4, ("tests/importing/test_archive.py",)),
+    "analysis/laps.py": (4, ("tests/analysis/test_laps.py",)),
+    "analysis/corners.py": (4, ("tests/analysis/test_laps.py",)),
+    "serve/races/races.py": (6, SERVE),
+    "serve/jobs/queue.py": (5, ("tests/serve/test_jobs.py", "-k", "not killed and not kill and not server")),
+    "serve/door/guard.py": (4, ("tests/serve/test_door.py",)),
+}

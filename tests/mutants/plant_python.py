@@ -1,0 +1,223 @@
+"""Plant small faults in our Python, one at a time, and see whether the tests notice: `make mutants` runs it.
+
+    copy of the tree ─ a fault is written into it ─ a forked child imports it and runs the covering tests ─ taken out
+
+    .venv/bin/python tests/mutants/plant_python.py --jobs 2 [--only race/] [--again]
+
+Every outcome is a line of `build/mutants/python.jsonl`; a run goes on where the last one stopped. It plants a fault
+anew when its module has changed, and one that nobody noticed when its tests have. What others wrote is imported once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import traceback
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from covering import COVERING, Tests
+from planting import Fault, sample
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "build" / "mutants"
+SEED = "2026"
+CPU_SECONDS, WALL_SECONDS = 100, 900  # of one fault; who needs longer does not end, and that is noticed
+PRELOADED = ("numpy", "pydantic", "scipy.ndimage", "scipy.interpolate", "PIL.Image", "rich", "typer")
+PRELOADED += ("gymnasium", "sqlalchemy.orm", "shapely", "safetensors.numpy", "yaml", "openskill.models", "fastapi")
+PRELOADED += ("torch", "av", "httpx")
+Outcome = dict[str, Any]
+
+
+class FirstFailure:
+    """A pytest plugin that remembers the first test that failed."""
+
+    name = ""
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        if report.failed and not self.name:
+            self.name = report.nodeid
+
+    def pytest_collectreport(self, report: Any) -> None:
+        if report.failed and not self.name:
+            self.name = f"{report.nodeid} (cannot be loaded)"
+
+
+def copy_tree(folder: Path) -> None:
+    """What is tracked or new, without the pages; and the native core beside our Python, as a wheel has it."""
+    shutil.rmtree(folder, ignore_errors=True)
+    listed = ["git", "ls-files", "-co", "--exclude-standard", "-z", "--", ".", ":!web"]
+    for name in subprocess.run(listed, cwd=ROOT, capture_output=True, check=True, text=True).stdout.split("\0"):
+        if name and (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, folder / name)
+    from racecraft import _native
+
+    shutil.copy2(_native.__file__, folder / "src" / "racecraft")
+    if (ROOT.parent / "shared").is_dir():
+        with suppress(FileExistsError):
+            (folder.parent / "shared").symlink_to(ROOT.parent / "shared")
+
+
+def run_tests(tree: Path, tests: Tests, *, keeps_bytecode: bool = False) -> tuple[str, float]:
+    """Run tests of a tree in a child; the test that noticed, empty if none did, and the CPU seconds it took."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setsid()
+            os.close(reading)
+            os.chdir(tree)
+            for number in (1, 2):
+                os.dup2(os.open(tree / "output.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+            resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
+            sys.dont_write_bytecode = not keeps_bytecode
+            failure = FirstFailure()
+            options = ["-x", "-p", "no:cacheprovider", "-m", "not slow", "--basetemp", f"{tree}-tmp"]
+            options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is preloaded
+            code = pytest.main([*options, *tests], plugins=[failure])
+            os.write(writing, (failure.name or (f"pytest ended with {code}" if code else "")).encode() or b"\0")
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(0)
+    os.close(writing)
+    deadline = time.monotonic() + WALL_SECONDS
+    while os.waitpid(child, os.WNOHANG)[0] == 0:
+        if time.monotonic() > deadline:
+            os.killpg(child, signal.SIGKILL)
+        time.sleep(0.05)
+    with suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)  # what the tests have started and a fault did not end
+    noticed = os.read(reading, 10_000).decode()
+    os.close(reading)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return (noticed or "no end").strip("\0"), seconds
+
+
+@dataclass(frozen=True)
+class Step:
+    """A fault to plant."""
+
+    module: str
+    tests: Tests
+    fault: Fault
+    key: str
+    """Changes with the module."""
+    covered_by: str
+    """Changes with the tests."""
+
+
+def planned(only: str) -> list[Step]:
+    """Every fault to plant."""
+    found = []
+    for module, (number, tests) in COVERING.items():
+        if module.startswith(only):
+            source = (ROOT / "src" / "racecraft" / module).read_text(encoding="utf-8")
+            texts = [(ROOT / test).read_text(encoding="utf-8") for test in tests if test.endswith(".py")]
+            for index, fault in enumerate(sample(source, number, seed=f"{SEED} {module}")):
+                found.append(Step(module, tests, fault, _digest(SEED, source, index), _digest(tests, texts)))
+    return found
+
+
+def _digest(*parts: object) -> str:
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:12]
+
+
+def work(tree: Path, plan: list[Step], log: Path) -> None:
+    """Plant what is planned, one fault after the other."""
+    copy_tree(tree)
+    sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
+    for name in [name for name in sys.modules if name.partition(".")[0] == "racecraft"]:
+        del sys.modules[name]
+    sys.path.insert(0, str(tree / "src"))
+    clean: set[Tests] = set()
+    for step in plan:
+        module, tests, fault = step.module, step.tests, step.fault
+        if tests not in clean:
+            noticed, seconds = run_tests(tree, tests, keeps_bytecode=True)
+            print(f"{module}: its tests take {seconds:.1f} s of CPU", flush=True)
+            if noticed:
+                raise SystemExit(f"Without any fault {noticed} fails; see {tree / 'output.txt'}.")
+            clean.add(tests)
+        path = tree / "src" / "racecraft" / module
+        source, stamp = path.read_text(encoding="utf-8"), path.stat()
+        path.write_text(fault.plant(source), encoding="utf-8")
+        noticed, seconds = run_tests(tree, tests)
+        path.write_text(source, encoding="utf-8")
+        os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+        told = {"module": module, "line": fault.line, "before": fault.before, "after": fault.after, "noticed": noticed}
+        with log.open("a", encoding="utf-8") as file:
+            marks = {"key": step.key, "covered_by": step.covered_by, "seconds": round(seconds, 1)}
+            file.write(json.dumps({**told, **marks}) + "\n")
+        print("noticed " if noticed else "SURVIVED", _line(told), flush=True)
+
+
+def _outcome(step: Step, log: Path) -> Outcome | None:
+    """What came of a fault, if it was planted before and that still holds."""
+    found = None
+    for line in log.read_text(encoding="utf-8").splitlines() if log.exists() else []:
+        outcome = json.loads(line)
+        if outcome["key"] == step.key and (outcome["noticed"] or outcome["covered_by"] == step.covered_by):
+            found = outcome
+    return found
+
+
+def _line(outcome: Outcome) -> str:
+    before, after = (" ".join(outcome[name].split())[:60] for name in ("before", "after"))
+    return f"{outcome['module']}:{outcome['line']}  {before}  ->  {after}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--jobs", type=int, default=1, help="trees that faults are planted in side by side")
+    parser.add_argument("--only", default="", help="modules whose names begin so")
+    parser.add_argument("--again", action="store_true", help="forget earlier outcomes")
+    given = parser.parse_args()
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    log = FOLDER / "python.jsonl"
+    if given.again:
+        log.unlink(missing_ok=True)
+    plan = planned(given.only)
+    todo = [step for step in plan if _outcome(step, log) is None]
+    print(f"{len(plan)} faults in Python, {len(plan) - len(todo)} of them planted before")
+    for name in PRELOADED if todo else ():
+        with suppress(ImportError):
+            importlib.import_module(name)
+    children = []
+    for job in range(given.jobs if todo else 0):
+        if (child := os.fork()) == 0:
+            work(FOLDER / f"tree-{job}", todo[job :: given.jobs], log)
+            os._exit(0)
+        children.append(child)
+    failed = [child for child in children if os.waitpid(child, 0)[1] != 0]
+
+    outcomes = [outcome for step in plan if (outcome := _outcome(step, log)) is not None]
+    survivors = [outcome for outcome in outcomes if not outcome["noticed"]]
+    for name, count in Counter(outcome["module"] for outcome in survivors).most_common():
+        print(f"\n{name}: {count} survived")
+        print("\n".join(f"  {_line(outcome)}" for outcome in survivors if outcome["module"] == name))
+    share = 1 - len(survivors) / max(len(outcomes), 1)
+    print(f"\nPython: {len(outcomes)} faults planted, {len(outcomes) - len(survivors)} noticed, {share:.1%}")
+    sys.exit(bool(failed))
+
+
+if __name__ == "__main__":
+    main()
