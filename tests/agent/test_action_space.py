@@ -48,12 +48,12 @@ def test_grid_is_the_console_generator():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"max_steering": 31}, "max_steering is 31, allowed: 1 to 30"),
+        ({"max_steering": 31}, "max_steering is 31; allowed is 1 to 30"),
         ({"max_steering": math.nan}, "max_steering is nan"),
-        ({"steering_granularity": 4}, "steering_granularity is 4, allowed: 3, 5 or 7"),
-        ({"max_speed": 4.1}, "max_speed is 4.1, allowed: 0.1 to 4"),
-        ({"speed_granularity": 0}, "speed_granularity is 0, allowed: 1, 2 or 3"),
-        ({"max_speed": 0.2, "speed_granularity": 3}, "speed is 0.0666667, allowed: 0.1 to 4"),
+        ({"steering_granularity": 4}, "steering_granularity is 4; allowed is 3, 5 or 7"),
+        ({"max_speed": 4.1}, "max_speed is 4.1; allowed is 0.1 to 4"),
+        ({"speed_granularity": 0}, "speed_granularity is 0; allowed is 1, 2 or 3"),
+        ({"max_speed": 0.2, "speed_granularity": 3}, "speed is 0.0666667; allowed is 0.1 to 4"),
     ],
 )
 def test_grid_refuses_what_the_console_refuses(change, words):
@@ -122,12 +122,12 @@ def test_continuous_refuses_nan_and_shapes():
 @pytest.mark.parametrize(
     ("low", "high", "words"),
     [
-        ((-31, 1), (30, 2), "steering_angle.low is -31, allowed: -30 to 0"),
+        ((-31, 1), (30, 2), "steering_angle.low is -31; allowed is -30 to 0"),
         ((5, 1), (30, 2), "steering_angle.low is 5"),
         ((-5, 1), (-1, 2), "steering_angle.high is -1"),
         ((-5, 0.05), (5, 2), "speed.low is 0.05"),
-        ((-5, 2), (5, 1), "speed.low is 2, allowed: below its high of 1"),
-        ((0, 1), (0, 2), "steering_angle.low is 0, allowed: below"),
+        ((-5, 2), (5, 1), "speed.low is 2.0; allowed is below its high of 1"),
+        ((0, 1), (0, 2), "steering_angle.low is 0.0; allowed is below"),
     ],
 )
 def test_continuous_refuses_bad_limits(low, high, words):
@@ -139,6 +139,6 @@ def test_continuous_refuses_bad_limits(low, high, words):
 def test_presets_exist_and_a_misspelt_one_is_guessed():
     assert all(action_space(name).size >= 2 for name in PRESETS)
     assert action_space("fast").table[:, 1].max() == 4.0
-    with pytest.raises(ConfigError, match="'fats' does not exist") as error:
+    with pytest.raises(ConfigError, match="action space is 'fats'; allowed are default") as error:
         action_space("fats")
     assert error.value.hint == "Did you mean 'fast'?"

@@ -83,7 +83,7 @@ def test_wrong_field_names_itself_its_value_and_the_range(field, value, allowed)
     ):
         with pytest.raises(ConfigError) as error:
             make()
-        assert f"{field} is {value!r}, allowed: {allowed}" in str(error.value)
+        assert f"{field} is {value!r}; allowed is {allowed}" in str(error.value)
 
 
 def test_every_field_has_a_range_in_words():
@@ -96,7 +96,7 @@ def test_every_field_has_a_range_in_words():
 def test_sac_trains_after_every_episode():
     Hyperparameters(num_episodes_between_training=1).check_algorithm("sac")
     Hyperparameters().check_algorithm("clipped_ppo")
-    with pytest.raises(ConfigError, match="num_episodes_between_training is 20, allowed: 1 with 'sac'"):
+    with pytest.raises(ConfigError, match="num_episodes_between_training is 20; allowed is 1 with 'sac'"):
         Hyperparameters().check_algorithm("sac")
 
 

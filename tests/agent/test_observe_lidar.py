@@ -56,7 +56,7 @@ def test_a_free_world_is_all_zeros():
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(ConfigError, match="'SECTOR_LIDR' does not exist"):
+    with pytest.raises(ConfigError, match="LIDAR sensor is 'SECTOR_LIDR'; allowed are LIDAR"):
         observe_lidar("SECTOR_LIDR", RAYS)
     with pytest.raises(ShapeError, match=r"expected \(N, 64\)"):
         observe_lidar("LIDAR", RAYS[:, :8])

@@ -95,7 +95,7 @@ def test_a_race_is_filmed_with_ghosts(models: list[Path], tmp_path: Path) -> Non
         ({"num_trials": 0}, "1 to 99"),
         ({"num_trials": 100}, "1 to 99"),
         ({"num_trials": 2, "kind": "grid"}, "all are on one road"),
-        ({"rules": "nobody's"}, "Rules"),
+        ({"rules": "nobody's"}, "rules is"),
         ({"changes": {"max_resets": -1}}, "max_resets"),
     ],
 )

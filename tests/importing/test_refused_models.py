@@ -49,7 +49,7 @@ BAD_MODELS: dict[str, tuple[dict[str, str], str]] = {
     "two models": ({f"{n}/{name}": text for n in "ab" for name, text in models.MODEL.items()}, "2 models: 'a', 'b'"),
     "setting": (
         {**models.DRFC, "run.env": "DR_TRAIN_REVERSE_DIRECTION=perhaps"},
-        "DR_TRAIN_REVERSE_DIRECTION is 'perhaps', allowed: true or false",
+        "DR_TRAIN_REVERSE_DIRECTION is 'perhaps'; allowed is true or false",
     ),
     "penalty": ({**models.DRFC, "run.env": "DR_EVAL_OFF_TRACK_PENALTY=-1"}, "DR_EVAL_OFF_TRACK_PENALTY is '-1'"),
     "env world": ({**models.DRFC, "run.env": "DR_WORLD_NAME=reinvent_base"}, "'reinvent_base'"),

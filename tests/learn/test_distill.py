@@ -188,8 +188,8 @@ def test_a_student_that_refines_resumes_to_the_bit() -> None:
         ({"learning_rate": -1.0}, "learning_rate is -1.0"),
         ({"buffer_size": 100}, "at least num_envs x num_steps = 512"),
         ({"minibatch_size": 1.5}, "minibatch_size is 1.5"),
-        ({"rate_steps": -1}, "rate_steps is -1, expected a whole number, 0 or more"),
-        ({"student_steps": 0.5}, "student_steps is 0.5, expected a whole number, 0 or more"),
+        ({"rate_steps": -1}, "rate_steps is -1; allowed is a whole number from 0"),
+        ({"student_steps": 0.5}, "student_steps is 0.5; allowed is a whole number from 0"),
     ],
 )
 def test_settings_that_cannot_work_are_refused(settings: dict[str, Any], match: str) -> None:

@@ -467,7 +467,7 @@ def test_it_may_be_asked_from_several_threads():
 def test_networks_that_do_not_fit_are_refused():
     with pytest.raises(ConfigError, match="too small"):
         NativeLearner(NetworkSpec(num_actions=2, frame_shape=(32, 32)))
-    with pytest.raises(ConfigError, match="does not exist"):
+    with pytest.raises(ConfigError, match="allowed are RACECRAFT_SMALL"):
         NativeLearner(NetworkSpec(name="RESNET", num_actions=2))
 
 

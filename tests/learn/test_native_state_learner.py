@@ -146,5 +146,5 @@ def test_what_does_not_fit_is_refused() -> None:
 
 def test_a_teacher_is_no_network_to_choose() -> None:
     assert networks.TEACHER not in networks.network_names()
-    with pytest.raises(ConfigError, match="does not exist"):
+    with pytest.raises(ConfigError, match="allowed are RACECRAFT_SMALL"):
         networks.architecture(networks.TEACHER)

@@ -35,7 +35,7 @@ def test_privileged_critic_replaces_only_the_critic(name):
 
 
 def test_misspelt_network_gets_a_suggestion():
-    with pytest.raises(ConfigError, match="does not exist") as caught:
+    with pytest.raises(ConfigError, match="allowed are RACECRAFT_SMALL") as caught:
         networks.architecture("RACECRAFT_SMAL")
     assert "RACECRAFT_SMALL" in caught.value.hint
 

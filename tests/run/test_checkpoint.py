@@ -117,12 +117,12 @@ def test_last_is_what_was_saved_last_whatever_its_step(store):
 @pytest.mark.parametrize(
     ("which", "words"),
     [
-        ("worst", "allowed: 'last', 'best' or a step"),
-        ("²", "allowed: 'last', 'best' or a step"),
-        ("٣", "allowed: 'last', 'best' or a step"),
-        ("1" * 5000, "allowed: 'last', 'best' or a step"),
-        (300, "no checkpoint of step 300, allowed: 100, 200"),
-        ("0", "no checkpoint of step 0, allowed: 100, 200"),
+        ("worst", "allowed is 'last', 'best' or a step"),
+        ("²", "allowed is 'last', 'best' or a step"),
+        ("٣", "allowed is 'last', 'best' or a step"),
+        ("1" * 5000, "allowed is 'last', 'best' or a step"),
+        (300, "no checkpoint of step 300; allowed are 100, 200"),
+        ("0", "no checkpoint of step 0; allowed are 100, 200"),
     ],
 )
 def test_wrong_choice_is_told(store, which, words):
@@ -145,7 +145,7 @@ def test_no_checkpoint_yet(store):
         ({"arrays": {"x": np.array([object()])}}, "array 'x' has type object"),
         ({"arrays": {}, "metadata": {"x": object()}}, "must be JSON"),
         ({"arrays": {}, "metadata": {"x": float("nan")}}, "must be JSON"),
-        ({"arrays": {}, "score": (float("nan"),)}, "allowed: finite numbers"),
+        ({"arrays": {}, "score": (float("nan"),)}, "allowed are finite numbers"),
     ],
 )
 def test_what_cannot_be_saved_is_refused_and_leaves_the_old(store, arguments, words):

@@ -311,7 +311,7 @@ def test_reader_takes_every_era(path, columns, rows, tmp_path):
         (",".join(WRITTEN) + "\n" + ",".join(["x"] * 18), "is not a sim-trace"),
         (
             ",".join(WRITTEN) + "\n" + ",".join(["1"] * 9 + ["yes"] + ["1"] * 8),
-            "done is 'yes', allowed: True or False",
+            "done is 'yes'; allowed is True or False",
         ),
         (",".join(WRITTEN) + "\n" + ",".join(["1.5"] + ["1"] * 17), "episode is not a whole number"),
         (",".join(WRITTEN) + "\n" + ",".join(["1", "1", "inf"] + ["1"] * 15), "X is not a finite number"),

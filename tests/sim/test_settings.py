@@ -82,8 +82,9 @@ def test_starts_and_cameras(kind, name, bad):
 
 
 def test_a_misspelt_start_is_recognised():
-    with pytest.raises(ConfigError, match="Did you mean 'random'"):
+    with pytest.raises(ConfigError, match="Start mode is 'randon'; allowed are fixed, advance, random") as error:
         Start(mode="randon")
+    assert error.value.hint == "Did you mean 'random'?"
 
 
 def test_the_ends_of_every_range_work():

@@ -137,7 +137,7 @@ def test_what_does_not_train_now_is_an_error_and_no_search(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("settings", "match"),
     [
-        ({"goal": "fame"}, "goal is 'fame', allowed: laps, lap_time"),
+        ({"goal": "fame"}, "goal is 'fame'; allowed are laps, lap_time"),
         ({"trial_steps": 0}, "trial_steps is 0"),
         ({"search": ["nonsense"]}, "neither a constant"),
     ],

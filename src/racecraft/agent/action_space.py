@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from racecraft.errors import ConfigError, NonFiniteAction, ShapeError, did_you_mean
+from racecraft.checks import check_choice, require
+from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
 
 if TYPE_CHECKING:
     import gymnasium
@@ -42,7 +43,7 @@ class DiscreteActionSpace:
             raise ShapeError(f"table has shape {self.table.shape}, expected (actions, 2): steering_angle, speed.")
         if not MIN_ACTIONS <= len(self.table) <= MAX_ACTIONS:
             count = len(self.table)
-            raise ConfigError(f"action_space has {count} actions, allowed: {MIN_ACTIONS} to {MAX_ACTIONS}.")
+            raise ConfigError(f"action_space has {count} actions; allowed is {MIN_ACTIONS} to {MAX_ACTIONS}.")
         for index, (steering, speed) in enumerate(self.to_degrees()):
             _check(
                 f"action_space[{index}].steering_angle",
@@ -69,10 +70,9 @@ class DiscreteActionSpace:
         """
         _check("max_steering", max_steering, 1.0, MAX_STEERING, "degrees")
         _check("max_speed", max_speed, MIN_SPEED, MAX_SPEED, "m/s")
-        if steering_granularity not in STEERING_GRANULARITIES:
-            raise ConfigError(f"steering_granularity is {steering_granularity!r}, allowed: 3, 5 or 7.")
-        if speed_granularity not in SPEED_GRANULARITIES:
-            raise ConfigError(f"speed_granularity is {speed_granularity!r}, allowed: 1, 2 or 3.")
+        is_usual = steering_granularity in STEERING_GRANULARITIES
+        require("steering_granularity", steering_granularity, is_usual, "3, 5 or 7")
+        require("speed_granularity", speed_granularity, speed_granularity in SPEED_GRANULARITIES, "1, 2 or 3")
         angles = np.linspace(-max_steering, max_steering, steering_granularity)
         speeds = [max_speed * (i + 1) / speed_granularity for i in range(speed_granularity)]
         return cls([(math.radians(angle), speed) for angle in angles for speed in speeds])
@@ -104,7 +104,7 @@ class DiscreteActionSpace:
             )
         if indices.size and (indices.min() < 0 or indices.max() >= self.size):
             wrong = indices[(indices < 0) | (indices >= self.size)][0]
-            raise ConfigError(f"action {wrong} does not exist, allowed: 0 to {self.size - 1}.")
+            raise ConfigError(f"action {wrong} does not exist; allowed is 0 to {self.size - 1}.")
         commands: NDArray[np.float32] = self._commands[indices]
         return commands
 
@@ -169,10 +169,8 @@ class ContinuousActionSpace:
             ("steering_angle", left, right),
             ("speed", self.low[1], self.high[1]),
         ):
-            if not low_value < high_value:
-                raise ConfigError(
-                    f"action_space.{name}.low is {low_value:g}, allowed: below its high of {high_value:g}."
-                )
+            is_below = low_value < high_value
+            require(f"action_space.{name}.low", float(low_value), is_below, f"below its high of {high_value:g}")
 
     @classmethod
     def from_aws(cls, limits: Mapping[str, Mapping[str, Any]]) -> ContinuousActionSpace:
@@ -251,11 +249,7 @@ def action_space(name: str) -> ActionSpace:
     Raises:
         ConfigError: No preset has this name.
     """
-    if name not in PRESETS:
-        raise ConfigError(
-            f"action space {name!r} does not exist, allowed: {', '.join(PRESETS)}.",
-            hint=did_you_mean(name, PRESETS),
-        )
+    check_choice("action space", name, PRESETS)
     return PRESETS[name]()
 
 
@@ -265,14 +259,14 @@ def _frozen(values: ArrayLike, *, name: str) -> NDArray[np.float64]:
     except (TypeError, ValueError) as error:
         raise ShapeError(f"{name} is not an array of numbers: {error}.") from error
     if not np.isfinite(array).all():
-        raise ConfigError(f"{name} holds NaN or infinity, allowed: finite steering angles and speeds.")
+        raise ConfigError(f"{name} holds NaN or infinity; allowed are finite steering angles and speeds.")
     array.setflags(write=False)
     return array
 
 
 def _check(name: str, value: float, low: float, high: float, unit: str) -> None:
     if not low <= value <= high:
-        raise ConfigError(f"{name} is {value:g}, allowed: {low:g} to {high:g} {unit}.")
+        raise ConfigError(f"{name} is {value:g}; allowed is {low:g} to {high:g} {unit}.")
 
 
 def _degrees(radians: float) -> float:

@@ -92,14 +92,14 @@ def _sentence(model: type[BaseModel], fault: Any) -> str:
     where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
     allowed = _description(model, location)
     if fault["type"] == "missing":
-        return f"{where} is missing{f', allowed: {allowed}' if allowed else ''}"
+        return f"{where} is missing{f'; allowed is {allowed}' if allowed else ''}"
     value = show(fault["input"])
     suggestion = ""
     if fault["type"] == "literal_error":
         choices = re.findall("'([^']+)'", fault["ctx"]["expected"])
         allowed = allowed or ", ".join(choices)
         suggestion = did_you_mean(fault["input"], choices) if isinstance(fault["input"], str) else ""
-    return f"{where} is {value}, allowed: {allowed or fault['msg']}" + (f" ({suggestion})" if suggestion else "")
+    return f"{where} is {value}; allowed is {allowed or fault['msg']}" + (f" ({suggestion})" if suggestion else "")
 
 
 def _description(model: type[BaseModel], location: tuple[str | int, ...]) -> str:

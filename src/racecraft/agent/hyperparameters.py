@@ -118,7 +118,7 @@ class Hyperparameters:
         """
         if algorithm == "sac" and self.num_episodes_between_training != 1:
             episodes = self.num_episodes_between_training
-            raise ConfigError(f"num_episodes_between_training is {episodes}, allowed: 1 with 'sac'.")
+            raise ConfigError(f"num_episodes_between_training is {episodes}; allowed is 1 with 'sac'.")
 
     def to_ppo(self) -> dict[str, float | int | str]:
         """The same settings under the names of our PPO.

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensors import LIDAR_RAYS, LIDARS, LidarConfig
-from racecraft.errors import ConfigError, ShapeError, did_you_mean
+from racecraft.checks import check_choice
+from racecraft.errors import ShapeError
 
 NEAREST: Final = 0.15  # m
 FARTHEST: Final = 1.0  # m, of the sensor LIDAR; what is farther away is told as this
@@ -36,10 +37,7 @@ def observe_lidar(name: str, rays: NDArray[np.float32], *, config: LidarConfig |
         ConfigError: There is no such sensor.
         ShapeError: The rays are not (N, 64).
     """
-    if name not in LIDARS:
-        raise ConfigError(
-            f"LIDAR sensor {name!r} does not exist; allowed are {', '.join(LIDARS)}.", hint=did_you_mean(name, LIDARS)
-        )
+    check_choice("LIDAR sensor", name, LIDARS)
     if rays.ndim != 2 or rays.shape[1] != LIDAR_RAYS:
         raise ShapeError(f"rays have shape {rays.shape}, expected (N, {LIDAR_RAYS}): one row per car, in metres.")
     if name == "LIDAR":

@@ -24,6 +24,7 @@ from racecraft.agent.action_space import (
 from racecraft.agent.aws_file import AwsModel, Number, Whole, unknown_fields, validate
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.agent.sensors import LIDAR_RAYS, LidarConfig, check_sensors
+from racecraft.checks import check_choice
 from racecraft.errors import ConfigError
 from racecraft.json_file import read_json_object, write_json_object
 
@@ -139,8 +140,7 @@ class ModelMetadata:
             ("training_algorithm", self.training_algorithm, ("clipped_ppo", "sac")),
             ("version", self.version, VERSIONS),
         ):
-            if value not in allowed:
-                raise ConfigError(f"{name} is {value!r}, allowed: {', '.join(allowed)}.")
+            check_choice(name, value, allowed)
         if self.training_algorithm == "sac" and self.action_space.kind != "continuous":
             raise ConfigError("training_algorithm 'sac' needs action_space_type 'continuous', but it is 'discrete'.")
 
@@ -223,7 +223,7 @@ def _action_notes(actions: list[_Action], version: str, *, name: str) -> list[st
             where = f"action_space[{place}].steering_angle is {action.steering_angle:g}"
             if version not in ("1", "2"):
                 limits = f"{-MAX_STEERING:g} to {MAX_STEERING:g} degrees"
-                raise ConfigError(f"{where}, allowed: {limits} (up to {MAX_FILE_STEERING:g} only in version 1 or 2).")
+                raise ConfigError(f"{where}; allowed is {limits} (up to {MAX_FILE_STEERING:g} only in version 1 or 2).")
             notes.append(f"{name}: {where}, driven as {MAX_STEERING:g}: the wheels turn no further.")
         if action.index not in (None, place):
             notes.append(f"{name}: action_space[{place}].index is {action.index}; its place in the list counts.")

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.checks import check_choice
+from racecraft.errors import ConfigError
 
 if TYPE_CHECKING:
     from racecraft.sim.camera import CameraSpec
@@ -41,17 +42,15 @@ def check_sensors(names: Sequence[str]) -> tuple[str, ...]:
         ConfigError: Says which rule is broken by which name.
     """
     for name in names:
-        if name not in SENSOR_NAMES:
-            raise ConfigError(
-                f"sensor {name!r} does not exist, allowed: {', '.join(SENSOR_NAMES)}.",
-                hint=did_you_mean(name, SENSOR_NAMES),
-            )
+        check_choice("sensor", name, SENSOR_NAMES)
     cameras = [name for name in names if name in CAMERAS]
     lidars = [name for name in names if name in LIDARS]
     if len(cameras) != 1:
-        raise ConfigError(f"sensor has {len(cameras)} cameras {cameras}, allowed: exactly one of {', '.join(CAMERAS)}.")
+        raise ConfigError(
+            f"sensor has {len(cameras)} cameras {cameras}; allowed is exactly one of {', '.join(CAMERAS)}."
+        )
     if len(lidars) > 1:
-        raise ConfigError(f"sensor has {len(lidars)} LIDARs {lidars}, allowed: at most one of {', '.join(LIDARS)}.")
+        raise ConfigError(f"sensor has {len(lidars)} LIDARs {lidars}; allowed is at most one of {', '.join(LIDARS)}.")
     return tuple(names)
 
 
@@ -85,6 +84,5 @@ def observation_shape(name: str, *, lidar: LidarConfig | None = None) -> tuple[i
         "SECTOR_LIDAR": (8,),
         "DISCRETIZED_SECTOR_LIDAR": (lidar.num_sectors * lidar.num_values_per_sector,),
     }
-    if name not in SENSOR_NAMES:
-        raise ConfigError(f"sensor {name!r} does not exist.", hint=did_you_mean(name, SENSOR_NAMES))
+    check_choice("sensor", name, SENSOR_NAMES)
     return shapes.get(name, (FRAME_HEIGHT, FRAME_WIDTH, 1))

@@ -19,6 +19,7 @@ from racecraft.agent import action_space
 from racecraft.bench.learning import measure_learning
 from racecraft.bench.machine import copy_bandwidth, describe_machine, matrix_flops
 from racecraft.bench.rivals import measure_rivals
+from racecraft.checks import check_number, check_whole
 from racecraft.errors import ConfigError, RacecraftError, did_you_mean
 from racecraft.learn import NetworkSpec, PPOConfig, forward_operations
 from racecraft.reward import RewardWorker, load_preset
@@ -57,10 +58,8 @@ def run_benchmarks(*, only: list[str], seconds: float = 3.0, seeds: int = 5, say
                 f"Benchmark {name!r} does not exist; there are {', '.join(BENCHMARKS)}.",
                 hint=did_you_mean(name, BENCHMARKS),
             )
-    if not 0.1 <= seconds <= 600.0:
-        raise ConfigError(f"seconds is {seconds!r}; allowed is 0.1 to 600.")
-    if not 1 <= seeds <= 100:
-        raise ConfigError(f"seeds is {seeds!r}; allowed is 1 to 100.")
+    check_number("seconds", seconds, 0.1, 600.0)
+    check_whole("seeds", seeds, 1, 100)
     results: dict[str, Any] = {"machine": describe_machine()}
     for name, measure in BENCHMARKS.items():
         if name in only or (not only and name not in ON_REQUEST):

@@ -84,14 +84,13 @@ def limit_track(
     as_json: Json = False,
 ) -> None:
     """Find a car's minimum lap time on a track, and the medals."""
-    from racecraft.errors import ConfigError
+    from racecraft.checks import check_choice
     from racecraft.film.limit_picture import draw_limit
     from racecraft.limits import compute_limit, track_limit
     from racecraft.sim import load_vehicle
     from racecraft.track import load_track
 
-    if direction not in ("forward", "reverse"):
-        raise ConfigError(f"direction is {direction!r}; allowed are forward and reverse.")
+    check_choice("direction", direction, ("forward", "reverse"))
     car, track = load_vehicle(vehicle), load_track(name)
     track = track.reversed() if direction == "reverse" else track
     limit = track_limit(track, car) if output is None else compute_limit(track, car)

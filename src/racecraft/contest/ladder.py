@@ -14,12 +14,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from racecraft.checks import check_choice, check_whole
 from racecraft.contest.classification import classify
 from racecraft.contest.contest import race_together
 from racecraft.contest.ratings import Rating, rate
 from racecraft.contest.schedule import Pair, round_robin, swiss_round
 from racecraft.contest.terms import ALONE, shared_road
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.errors import ConfigError
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry import Entry
 from racecraft.race.evaluation import evaluate
@@ -293,14 +294,8 @@ def check_ladder(num_entries: int, *, kind: str, schedule: str, starts: int, rou
     """
     if not 2 <= num_entries <= MAX_ENTRIES:
         raise ConfigError(f"A ladder has {num_entries} models; allowed are 2 to {MAX_ENTRIES}.")
-    if kind not in LADDER_KINDS:
-        hint = did_you_mean(kind, LADDER_KINDS)
-        raise ConfigError(f"A ladder's races are {kind!r}; allowed are {', '.join(LADDER_KINDS)}.", hint=hint)
-    if schedule not in SCHEDULES:
-        hint = did_you_mean(schedule, SCHEDULES)
-        raise ConfigError(f"schedule is {schedule!r}; allowed are {', '.join(SCHEDULES)}.", hint=hint)
-    if not 1 <= starts <= MAX_STARTS:
-        raise ConfigError(f"A ladder has {starts} starts on each track; allowed are 1 to {MAX_STARTS}.")
-    if not 0 <= rounds <= MAX_STARTS:
-        raise ConfigError(f"A ladder has {rounds} rounds; allowed are 0 to {MAX_STARTS}.")
+    check_choice("Race type of a ladder", kind, LADDER_KINDS)
+    check_choice("schedule", schedule, SCHEDULES)
+    check_whole("starts", starts, 1, MAX_STARTS)
+    check_whole("rounds", rounds, 0, MAX_STARTS)
     rate([Rating(), Rating()], [1, 2])  # find out whether it is installed before any race

@@ -13,7 +13,7 @@ import statistics
 from collections.abc import Sequence
 from typing import Final
 
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.checks import check_choice, check_whole
 
 Key = tuple[float, ...]
 """What places are decided by: less is better, equals share a place."""
@@ -32,11 +32,8 @@ def ranking_score(lap_times: Sequence[float], *, ranking: str = "total", minimum
     Raises:
         ConfigError: No such ranking, or fewer than one lap demanded.
     """
-    if ranking not in RANKINGS:
-        allowed = ", ".join(RANKINGS)
-        raise ConfigError(f"ranking is {ranking!r}; allowed are {allowed}.", hint=did_you_mean(ranking, RANKINGS))
-    if minimum_laps < 1:
-        raise ConfigError(f"minimum_laps is {minimum_laps!r}; allowed is 1 or more.")
+    check_choice("ranking", ranking, RANKINGS)
+    check_whole("minimum_laps", minimum_laps, 1)
     if len(lap_times) < minimum_laps:
         return math.inf
     if ranking == "best":

@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
+from racecraft.checks import check_choice, require
 from racecraft.contest.standings import RANKINGS
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.errors import ConfigError
 from racecraft.race.announcement import Announcement
 from racecraft.race.conditions import Conditions
 from racecraft.sim.camera import CameraSpec
@@ -77,11 +78,8 @@ def race_terms(
     check_kind(kind, num_cars)
     trials, laps = check_trials(kind, num_trials), conditions.rules.laps
     needed = {"total": laps, "average": min(3, laps)}.get(ranking, 1) if minimum_laps is None else minimum_laps
-    if ranking not in RANKINGS:
-        hint = did_you_mean(ranking, RANKINGS)
-        raise ConfigError(f"ranking is {ranking!r}; allowed are {', '.join(RANKINGS)}.", hint=hint)
-    if not 1 <= needed <= laps:
-        raise ConfigError(f"minimum_laps is {needed}; allowed is 1 to {laps}, the laps of the race.")
+    check_choice("ranking", ranking, RANKINGS)
+    require("minimum_laps", needed, 1 <= needed <= laps, f"1 to {laps}, the laps of the race")
     if kind in TOGETHER:
         conditions = replace(shared_road(conditions, num_cars), camera=conditions.camera or CameraSpec())
     announcement = Announcement.of(
@@ -103,9 +101,7 @@ def check_kind(kind: str, num_entries: int) -> None:
     Raises:
         ConfigError: Says what is allowed.
     """
-    if kind not in RACE_KINDS:
-        hint = did_you_mean(kind, RACE_KINDS)
-        raise ConfigError(f"Race type is {kind!r}; allowed are {', '.join(RACE_KINDS)}.", hint=hint)
+    check_choice("Race type", kind, RACE_KINDS)
     low, high = {"head-to-model": (2, 2), "grid": (2, MAX_GRID)}.get(kind, (1, MAX_ENTRIES))
     if not low <= num_entries <= high:
         allowed = str(low) if low == high else f"{low} to {high}"

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.checks import check_choice
 from racecraft.sim.simulation import Simulation
 
 ObservationKind = Literal["camera", "state", "both"]
@@ -50,8 +50,7 @@ def check_kind(kind: str) -> None:
     Raises:
         ConfigError: It is none of `KINDS`.
     """
-    if kind not in KINDS:
-        raise ConfigError(f"observation is {kind!r}, allowed: {', '.join(KINDS)}.", hint=did_you_mean(str(kind), KINDS))
+    check_choice("observation", kind, KINDS)
 
 
 class Observer:

@@ -9,13 +9,13 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_whole
 from racecraft.env.info import single_info
 from racecraft.env.observation import Observation
 from racecraft.env.rendering import Renderer, check_render_mode
 from racecraft.env.task import DrivingTask, TaskSettings, seed_key
 from racecraft.errors import ConfigError, ResetNeeded
 from racecraft.extras import needed_for
-from racecraft.sim.checks import check_whole
 from racecraft.track import Track
 
 with needed_for("The environment of several learning cars"):

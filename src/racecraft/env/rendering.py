@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import ConfigError
+from racecraft.checks import require
 from racecraft.sim import Simulation
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.views import RACER_COLORS, CarView, ScanView, Scene, View, views_of_objects
@@ -22,8 +22,7 @@ def check_render_mode(mode: str | None) -> None:
     Raises:
         ConfigError: It is neither None nor ``rgb_array``.
     """
-    if mode not in (None, "rgb_array"):
-        raise ConfigError(f"render_mode is {mode!r}, allowed: None or 'rgb_array'.")
+    require("render_mode", mode, mode in (None, "rgb_array"), "None or 'rgb_array'")
 
 
 class Renderer:

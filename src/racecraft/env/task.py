@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from racecraft.agent import ActionSpace, LidarConfig, ModelMetadata, camera_of
 from racecraft.agent import action_space as preset_action_space
 from racecraft.agent.sensors import LIDARS
+from racecraft.checks import check_type, check_whole
 from racecraft.env.info import LapClock
 from racecraft.env.observation import ObservationKind, Observer, check_kind
 from racecraft.env.rewards import RewardFunction, open_reward
 from racecraft.env.sensor_observation import SensorObserver
-from racecraft.errors import ConfigError
 from racecraft.sim import CameraSpec, Objects, Simulation, Start, Vehicle
-from racecraft.sim.checks import check_type
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.track import Track, load_track
 
@@ -84,10 +83,7 @@ class DrivingTask:
         check_kind(observation)
         objects = NO_OBJECTS if objects is None else objects
         check_type("objects", objects, Objects, "use racecraft.sim.Objects(...)")
-        if isinstance(max_episode_steps, bool) or not isinstance(max_episode_steps, int | np.integer):
-            raise ConfigError(f"max_episode_steps is {max_episode_steps!r}, expected a whole number.")
-        if not 1 <= max_episode_steps < 2**31 - 1:
-            raise ConfigError(f"max_episode_steps is {max_episode_steps}, allowed: 1 to {2**31 - 2}.")
+        check_whole("max_episode_steps", max_episode_steps, 1, 2**31 - 2)
         tracks = [track] if isinstance(track, str | Path | Track) else list(track)
         self.action_space = _action_space(action_space)
         self.simulation = Simulation(
@@ -158,8 +154,7 @@ def seed_key(seed: Any) -> int:
     Raises:
         ConfigError: It is not a whole number from 0 to 2**64 - 1.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < 2**64:
-        raise ConfigError(f"seed is {seed!r}, expected a whole number from 0 to 2**64 - 1.")
+    check_whole("seed", seed, 0, 2**64 - 1)
     return int(seed)
 
 

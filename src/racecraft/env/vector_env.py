@@ -208,7 +208,7 @@ def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
         return AutoresetMode(mode)
     except ValueError:
         allowed = ", ".join(repr(known.value) for known in AutoresetMode)
-        raise ConfigError(f"autoreset_mode is {mode!r}, allowed: {allowed} or an AutoresetMode.") from None
+        raise ConfigError(f"autoreset_mode is {mode!r}; allowed is {allowed} or an AutoresetMode.") from None
 
 
 def _within(

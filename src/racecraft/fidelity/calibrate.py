@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import ConfigError, RunError
+from racecraft.checks import check_number
+from racecraft.errors import RunError
 from racecraft.fidelity.dynamics import REPORTED_STEPS, Windows, reported_errors, windows_of
 from racecraft.fidelity.logs import Faults, Log, read_logs
 from racecraft.fidelity.rules import require_length
@@ -94,8 +95,7 @@ def calibrate(
         RunError: The logs cannot be read, or hold too little driving.
         ConfigError: A setting is out of range.
     """
-    if not 0.05 <= held_out <= 0.9:
-        raise ConfigError(f"held_out is {held_out!r}; allowed is a share from 0.05 to 0.9.")
+    check_number("held_out", held_out, 0.05, 0.9)
     start = load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
     road = load_track(track) if isinstance(track, str) else track
     windows = _load([logs] if isinstance(logs, str | Path) else list(logs), road)

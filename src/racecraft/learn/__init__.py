@@ -5,7 +5,7 @@ Nothing here imports torch unless ``make_learner`` is asked for the torch backen
 
 from typing import Any
 
-from racecraft.errors import ConfigError
+from racecraft.checks import check_choice
 from racecraft.extras import needed_for
 from racecraft.learn.algorithm import Algorithm
 from racecraft.learn.distill import Distill, DistillConfig
@@ -34,12 +34,11 @@ def make_learner(
         with needed_for(f"Device {device!r}"):
             from racecraft.learn.torch_cuda_learner import CudaLearner  # takes seconds
         return CudaLearner(spec, seed=seed, device=device)
-    if backend in ("auto", "native"):
+    check_choice("backend", backend, ("auto", "native", "torch"))
+    if backend != "torch":
         from racecraft.learn.native_learner import NativeLearner  # loads the native core
 
         return NativeLearner(spec, seed=seed, num_threads=num_threads)
-    if backend != "torch":
-        raise ConfigError(f"backend is {backend!r}, expected 'auto', 'native' or 'torch'.")
     with needed_for("The torch backend"):
         from racecraft.learn.torch_learner import TorchLearner  # takes seconds
     return TorchLearner(spec, seed=seed, num_threads=num_threads)

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import CheckpointError, ConfigError, TrainingError
+from racecraft.checks import check_number, check_whole, require
+from racecraft.errors import CheckpointError, TrainingError
 from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below, holding
@@ -83,21 +84,13 @@ class DistillConfig:
             "updates_per_iteration",
             "buffer_size",
         ):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 10**9:
-                raise ConfigError(f"{name} is {value!r}, expected a whole number, 1 or more.")
+            check_whole(name, getattr(self, name), 1, is_plain=True)
         for name in ("student_steps", "rate_steps"):
-            steps = getattr(self, name)
-            if isinstance(steps, bool) or not isinstance(steps, int) or not 0 <= steps <= 10**9:
-                raise ConfigError(f"{name} is {steps!r}, expected a whole number, 0 or more.")
-        rate = self.learning_rate
-        if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0 <= rate <= 1:
-            raise ConfigError(f"learning_rate is {rate!r}, expected a number from 0 to 1.")
-        if self.buffer_size < self.num_envs * self.num_steps:
-            raise ConfigError(
-                f"buffer_size is {self.buffer_size}, expected at least num_envs x num_steps = "
-                f"{self.num_envs * self.num_steps}."
-            )
+            check_whole(name, getattr(self, name), 0, is_plain=True)
+        check_number("learning_rate", self.learning_rate, 0.0, 1.0, is_plain=True)
+        samples = self.num_envs * self.num_steps
+        is_enough = self.buffer_size >= samples
+        require("buffer_size", self.buffer_size, is_enough, f"at least num_envs x num_steps = {samples}")
 
 
 def sure_answers(outputs: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -154,8 +147,8 @@ class Distill:
         seed: int = 0,
         num_threads: int = 0,
     ) -> None:
-        if config.num_envs != environment.num_envs:
-            raise ConfigError(f"num_envs is {config.num_envs}, expected the environment's {environment.num_envs}.")
+        is_driven = config.num_envs == environment.num_envs
+        require("num_envs", config.num_envs, is_driven, f"the environment's {environment.num_envs}")
         self.config, self.learner, self.environment, self.seed = config, learner, environment, seed
         self.state_size = environment.observe()[1].shape[1]
         teacher_spec = replace(learner.spec, state_size=self.state_size)

@@ -20,7 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import ConfigError, ShapeError, did_you_mean
+from racecraft.checks import check_choice
+from racecraft.errors import ConfigError, ShapeError
 from racecraft.learn.learner import NetworkSpec, Weights
 from racecraft.learn.native_distributions import normals
 
@@ -102,12 +103,8 @@ def architecture(name: str, *, lenses: int = 1) -> Architecture:
     """
     if lenses == 2 and name in STEREO:
         return STEREO[name]
-    try:
-        return ARCHITECTURES[name]
-    except KeyError:
-        known = ", ".join(ARCHITECTURES)
-        hint = did_you_mean(name, ARCHITECTURES)
-        raise ConfigError(f"Network {name!r} does not exist, expected one of {known}.", hint=hint) from None
+    check_choice("network", name, ARCHITECTURES)
+    return ARCHITECTURES[name]
 
 
 def sky_rows(spec: NetworkSpec) -> int:

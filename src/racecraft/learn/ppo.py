@@ -10,7 +10,6 @@ from; a `Learner` holds the network.
 from __future__ import annotations
 
 import dataclasses
-import sys
 import time
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -19,14 +18,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import CheckpointError, ConfigError, TrainingError
+from racecraft.checks import check_choice, check_number, check_whole, require
+from racecraft.errors import CheckpointError, TrainingError
 from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights, holding
 from racecraft.learn.rollout import Rollout
 
 _VALUE_BATCH = 4096  # observations whose values are computed at once
-_MAX_COUNT = 10**9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,18 +88,14 @@ class PPOConfig:
             ("epsilon_steps", 0),
             ("rate_steps", 0),
         ):
-            value = getattr(self, name)
-            is_whole = isinstance(value, int) and not isinstance(value, bool)
-            _require(self, name, is_whole and least <= value <= _MAX_COUNT, f"a whole number, {least} or more")
-        for name in ("gamma", "gae_lambda", "epsilon_start", "epsilon_end", "average_share"):
-            _require(self, name, _is_number(getattr(self, name), 0.0, 1.0), "a number from 0 to 1")
+            check_whole(name, getattr(self, name), least, is_plain=True)
+        for name in ("gamma", "gae_lambda", "clip_coef", "epsilon_start", "epsilon_end", "average_share"):
+            check_number(name, getattr(self, name), 0.0, 1.0, is_plain=True)
         for name in ("learning_rate", "ent_coef", "vf_coef", "max_grad_norm"):
-            _require(self, name, _is_number(getattr(self, name), 0.0), "a finite number, 0 or more")
-        is_open = _is_number(self.clip_coef, 0.0, 1.0) and 0 < self.clip_coef < 1
-        _require(self, "clip_coef", is_open, "between 0 and 1")
-        _require(self, "value_loss", self.value_loss in ("mse", "huber"), "'mse' or 'huber'")
-        is_known = self.exploration in ("categorical", "e-greedy")
-        _require(self, "exploration", is_known, "'categorical' or 'e-greedy'")
+            check_number(name, getattr(self, name), 0.0, is_plain=True)
+        require("clip_coef", self.clip_coef, 0.0 < self.clip_coef < 1.0, "a number above 0 and below 1")
+        check_choice("value_loss", self.value_loss, ("mse", "huber"))
+        check_choice("exploration", self.exploration, ("categorical", "e-greedy"))
 
     @property
     def objective(self) -> Objective:
@@ -176,16 +171,16 @@ class PPO:
     def __init__(self, config: PPOConfig, learner: Learner, environment: Environment, *, seed: int = 0) -> None:
         spec = learner.spec
         is_driven = config.num_envs == environment.num_envs
-        _require(config, "num_envs", is_driven, f"the environment's {environment.num_envs}")
-        if config.exploration == "e-greedy":
-            _require(config, "exploration", spec.is_discrete, "'categorical' for continuous actions")
+        require("num_envs", config.num_envs, is_driven, f"the environment's {environment.num_envs}")
+        is_possible = spec.is_discrete or config.exploration != "e-greedy"
+        require("exploration", config.exploration, is_possible, "'categorical' for continuous actions")
         if config.episodes_per_iteration:
             capacity = -(-config.max_steps_per_iteration // min(config.num_envs, config.episodes_per_iteration))
         else:
             capacity = config.num_steps
             samples = config.num_steps * config.num_envs
             is_filled = config.minibatch_size <= samples
-            _require(config, "minibatch_size", is_filled, f"at most num_steps x num_envs = {samples}")
+            require("minibatch_size", config.minibatch_size, is_filled, f"at most num_steps x num_envs = {samples}")
         self.config = config
         self.learner = learner
         self.environment, self.seed = environment, seed
@@ -455,12 +450,3 @@ class PPO:
         self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
         self._episode_returns, self._episode_lengths = returns.copy(), lengths.copy()
         self.return_scale = scale.copy()
-
-
-def _is_number(value: object, low: float, high: float = sys.float_info.max) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high
-
-
-def _require(config: PPOConfig, name: str, is_met: bool, allowed: str) -> None:
-    if not is_met:
-        raise ConfigError(f"{name} is {getattr(config, name)!r}, expected {allowed}.")

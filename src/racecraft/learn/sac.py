@@ -18,12 +18,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_flag, check_number, check_whole, require
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights, below
 from racecraft.learn.ppo import Environment, IterationStats
 from racecraft.learn.replay_buffer import ReplayBuffer, Transitions
-
-_MAX_COUNT = 10**9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,17 +59,15 @@ class SACConfig:
     def __post_init__(self) -> None:
         """Refuse what cannot work, naming the field."""
         for name in ("num_envs", "num_steps", "minibatch_size", "buffer_size", "policy_frequency", "learning_starts"):
-            value = getattr(self, name)
-            is_whole = isinstance(value, int) and not isinstance(value, bool)
-            _require(self, name, is_whole and 1 <= value <= _MAX_COUNT, "a whole number, 1 or more")
-        for name in ("gamma", "tau", "alpha"):
-            _require(self, name, _is_number(getattr(self, name), 1.0), "a number from 0 to 1")
-        _require(self, "learning_rate", _is_number(self.learning_rate, 1.0), "a number from 0 to 1")
-        is_rate = _is_number(self.updates_per_step, 64.0) and self.updates_per_step > 0
-        _require(self, "updates_per_step", is_rate, "a number above 0, up to 64")
+            check_whole(name, getattr(self, name), 1, is_plain=True)
+        for name in ("learning_rate", "gamma", "tau", "alpha"):
+            check_number(name, getattr(self, name), 0.0, 1.0, is_plain=True)
+        check_number("updates_per_step", self.updates_per_step, 0.0, 64.0, is_plain=True)
+        require("updates_per_step", self.updates_per_step, self.updates_per_step > 0, "a number above 0")
         for name in ("learns_alpha", "normalize_rewards"):
-            _require(self, name, isinstance(getattr(self, name), bool), "true or false")
-        _require(self, "buffer_size", self.buffer_size >= 2 * self.num_envs, "at least two steps of every car")
+            check_flag(name, getattr(self, name))
+        is_enough = self.buffer_size >= 2 * self.num_envs
+        require("buffer_size", self.buffer_size, is_enough, "at least two steps of every car")
 
 
 class Backend(Protocol):
@@ -116,9 +113,8 @@ class SAC:
         self, config: SACConfig, backend: Backend, learner: Learner, environment: Environment, *, seed: int = 0
     ) -> None:
         spec = learner.spec
-        _require(
-            config, "num_envs", config.num_envs == environment.num_envs, f"the environment's {environment.num_envs}"
-        )
+        is_driven = config.num_envs == environment.num_envs
+        require("num_envs", config.num_envs, is_driven, f"the environment's {environment.num_envs}")
         if spec.is_discrete or not spec.is_squashed:
             raise ConfigError("SAC needs continuous actions.", hint="Give --actions continuous.")
         self.config, self.backend, self.learner, self.environment = config, backend, learner, environment
@@ -303,12 +299,3 @@ def _mean(stats: list[UpdateStats]) -> UpdateStats:
     seen = {name: np.array([getattr(update, name) for update in stats]) for name in names}
     known = {name: values[np.isfinite(values)] for name, values in seen.items()}
     return UpdateStats(**{name: float(v.mean()) if len(v) else float("nan") for name, v in known.items()})
-
-
-def _is_number(value: object, high: float) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 <= value <= high
-
-
-def _require(config: SACConfig, name: str, is_met: bool, allowed: str) -> None:
-    if not is_met:
-        raise ConfigError(f"{name} is {getattr(config, name)!r}, expected {allowed}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from racecraft.errors import ConfigError
+from racecraft.checks import check_number, check_whole
 
 SB3_ALGORITHMS: Final = ("ppo", "a2c", "dqn", "sac", "td3")
 DISCRETE_ONLY: Final = ("dqn",)
@@ -42,10 +42,6 @@ class SB3Config:
             ("buffer_size", 1),
             ("learning_starts", 1),
         ):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= 10**9:
-                raise ConfigError(f"{name} is {value!r}, expected a whole number, {least} or more.")
+            check_whole(name, getattr(self, name), least, is_plain=True)
         for name, high in (("learning_rate", 1.0), ("gamma", 1.0), ("updates_per_step", 64.0)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= high:
-                raise ConfigError(f"{name} is {value!r}, expected a number from 0 to {high:g}.")
+            check_number(name, getattr(self, name), 0.0, high, is_plain=True)

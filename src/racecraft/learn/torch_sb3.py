@@ -22,6 +22,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor, nn
 
+from racecraft.checks import require
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import networks, torch_networks
 from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights, below
@@ -68,8 +69,8 @@ class SB3:
         wanted = "discrete" if name in DISCRETE_ONLY else "continuous" if name in CONTINUOUS_ONLY else ""
         if wanted and spec.is_discrete != (wanted == "discrete"):
             raise ConfigError(f"sb3:{name} needs {wanted} actions.")
-        if config.num_envs != environment.num_envs:
-            raise ConfigError(f"num_envs is {config.num_envs}, expected the environment's {environment.num_envs}.")
+        is_driven = config.num_envs == environment.num_envs
+        require("num_envs", config.num_envs, is_driven, f"the environment's {environment.num_envs}")
         if num_threads:
             torch.set_num_threads(num_threads)
         self.name, self.config, self.learner = name, config, learner

@@ -14,7 +14,7 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import ConfigError
+from racecraft.checks import check_number
 from racecraft.sim.columns import CURVATURE_AHEAD, STATE_COLUMNS
 
 PATH_SPACING: Final = 0.05
@@ -55,8 +55,7 @@ class Autopilot:
             "lookahead_time": (0.0, 0.5),
         }
         for name, (low, high) in limits.items():
-            if not low <= getattr(self, name) <= high:
-                raise ConfigError(f"Autopilot setting {name} is {getattr(self, name)!r}; allowed is {low} to {high}.")
+            check_number(f"Autopilot setting {name}", getattr(self, name), low, high)
 
     def __call__(self, state: NDArray[np.float32]) -> NDArray[np.float32]:
         """Commands for `Simulation.step`: steering_angle [rad], speed [m/s], (N, 2)."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
+from racecraft.checks import check_choice, check_whole
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.race.conditions import Conditions
 from racecraft.race.default_reward import centerline_rewards
@@ -140,8 +141,7 @@ def trial_simulation(
 
     On several tracks, for `completion` only, trial i drives track i modulo their number.
     """
-    if isinstance(num_trials, bool) or not isinstance(num_trials, int) or not 1 <= num_trials <= 1000:
-        raise ConfigError(f"num_trials is {num_trials!r}; allowed is a whole number from 1 to 1000.")
+    check_whole("num_trials", num_trials, 1, 1000, is_plain=True)
     if isinstance(tracks, Track):
         tracks = (tracks,)
     is_closed = all(track.is_closed for track in tracks)
@@ -273,8 +273,7 @@ def _sight(simulation: Simulation, sees: str, sensors: SensorSuite) -> NDArray[A
 
 
 def _needed(camera: CameraSpec | None, sees: str) -> CameraSpec | None:
-    if sees not in SIGHTS:
-        raise ConfigError(f"sees is {sees!r}; allowed are 'frames' and 'state'.")
+    check_choice("sees", sees, SIGHTS)
     if sees == "state":
         return None
     if camera is None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
+from racecraft.checks import check_choice, check_whole
 from racecraft.errors import ConfigError
 from racecraft.race.evaluation import MAX_STEPS, Driver, drive_lap
 from racecraft.race.placement import start_pose
@@ -154,9 +155,9 @@ def generalize(
     Raises:
         ConfigError: No track, a direction that does not exist, or a setting outside its range.
     """
+    check_whole("num_trials", num_trials, 1, MAX_TRIALS, is_plain=True)
     for direction in directions:
-        if direction not in DIRECTIONS:
-            raise ConfigError(f"direction is {direction!r}; allowed are {' and '.join(DIRECTIONS)}.")
+        check_choice("direction", direction, DIRECTIONS)
     if not tracks or not directions:
         raise ConfigError("There is no track or no direction to drive.")
     by_length = sorted(range(len(tracks)), key=lambda index: tracks[index].length)  # cars of a group end together
@@ -166,7 +167,7 @@ def generalize(
         roads = [tracks[index] for index in group]
         simulation = Simulation(
             roads,
-            num_envs=_checked(num_trials) * len(roads),
+            num_envs=num_trials * len(roads),
             vehicle=vehicle,
             direction="alternate",
             randomize=randomize,
@@ -191,12 +192,6 @@ def generalize(
     return Generalization(
         results=tuple(results[index, direction] for index in range(len(tracks)) for direction in directions)
     )
-
-
-def _checked(num_trials: int) -> int:
-    if isinstance(num_trials, bool) or not isinstance(num_trials, int) or not 1 <= num_trials <= MAX_TRIALS:
-        raise ConfigError(f"num_trials is {num_trials!r}; allowed on each track is a whole number to {MAX_TRIALS}.")
-    return num_trials
 
 
 def _line_up(simulation: Simulation, direction: str, *, seed: int) -> None:

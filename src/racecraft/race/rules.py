@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Final
 
+from racecraft.checks import check_choice, check_flag, check_number, check_whole
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.sim.simulation import CONTROL_DT
 
@@ -18,16 +19,6 @@ RACE_DIRECTIONS: Final = ("forward", "reverse")
 STARTS: Final = ("line", "lap")
 RESET_STATUSES: Final = ("crashed", "off_track", "immobilized", "reversed")
 """What puts a car back on the track, at the price of a reset and a penalty."""
-
-
-def _check_whole(name: str, value: object, low: int, high: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise ConfigError(f"Race rule {name} is {value!r}; allowed is a whole number from {low} to {high}.")
-
-
-def _check_range(name: str, value: object, low: float, high: float, unit: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise ConfigError(f"Race rule {name} is {value!r}; allowed is {low:g} to {high:g} {unit}.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,22 +54,22 @@ class RaceRules:
     """rad: how far to either side the start may point."""
 
     def __post_init__(self) -> None:
-        _check_whole("laps", self.laps, 1, 1000)
-        _check_whole("max_resets", self.max_resets, 0, 1_000_000)
-        _check_whole("mercy_after", self.mercy_after, 0, 1_000_000)
-        _check_range("offtrack_penalty", self.offtrack_penalty, 0.0, 600.0, "s")
-        _check_range("collision_penalty", self.collision_penalty, 0.0, 600.0, "s")
-        _check_range("immobilized_penalty", self.immobilized_penalty, 0.0, 600.0, "s")
-        _check_range("time_limit", self.time_limit, 0.0, 86_400.0, "s")
-        _check_range("start_offset", self.start_offset, 0.0, 0.999999, "of a lap")
-        _check_range("lateral_jitter", self.lateral_jitter, 0.0, 1.0, "m")
-        _check_range("heading_jitter", self.heading_jitter, 0.0, math.pi, "rad")
-        if not isinstance(self.is_continuous, bool):
-            raise ConfigError(f"Race rule is_continuous is {self.is_continuous!r}; allowed are True and False.")
-        for name, choices in (("direction", RACE_DIRECTIONS), ("starts", STARTS)):
-            if (value := getattr(self, name)) not in choices:
-                hint, allowed = did_you_mean(str(value), choices), " and ".join(choices)
-                raise ConfigError(f"Race rule {name} is {value!r}; allowed are {allowed}.", hint=hint)
+        for name, least, most in (("laps", 1, 1000), ("max_resets", 0, 1_000_000), ("mercy_after", 0, 1_000_000)):
+            check_whole(f"Race rule {name}", getattr(self, name), least, most, is_plain=True)
+        limits = {
+            "offtrack_penalty": 600.0,
+            "collision_penalty": 600.0,
+            "immobilized_penalty": 600.0,
+            "time_limit": 86_400.0,
+            "start_offset": 0.999999,
+            "lateral_jitter": 1.0,
+            "heading_jitter": math.pi,
+        }
+        for name, high in limits.items():
+            check_number(f"Race rule {name}", getattr(self, name), 0.0, high, is_plain=True)
+        check_flag("Race rule is_continuous", self.is_continuous)
+        check_choice("Race rule direction", self.direction, RACE_DIRECTIONS)
+        check_choice("Race rule starts", self.starts, STARTS)
 
     def penalty(self, status: str) -> float:
         """Seconds that a car stands after a mistake.
@@ -154,10 +145,6 @@ def rules_by_name(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
         ConfigError: There are no such rules, or a value is outside its range.
     """
     if isinstance(rules, str):
-        if rules not in RULE_SETS:
-            raise ConfigError(
-                f"Rules {rules!r} do not exist; allowed are {', '.join(RULE_SETS)}.",
-                hint=did_you_mean(rules, RULE_SETS),
-            )
+        check_choice("rules", rules, RULE_SETS)
         rules = RULE_SETS[rules]
     return replace(rules, **changes)

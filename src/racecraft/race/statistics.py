@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from racecraft.errors import ConfigError
+from racecraft.checks import require
 
 
 class Interval(NamedTuple):
@@ -32,8 +32,7 @@ def wilson_interval(successes: int, trials: int, *, confidence: float = 0.95) ->
     Raises:
         ConfigError: More successes than trials, a negative number, or a confidence outside 0 to 1.
     """
-    if not 0 <= successes <= trials:
-        raise ConfigError(f"successes is {successes!r}; allowed is 0 to the number of trials, {trials}.")
+    require("successes", successes, 0 <= successes <= trials, f"0 to the number of trials, {trials}")
     z = NormalDist().inv_cdf(0.5 + _checked(confidence) / 2)
     if trials == 0:
         return Interval(0.0, 1.0)
@@ -95,6 +94,5 @@ def _student_within(freedom: int, angle: float) -> float:
 
 
 def _checked(confidence: float) -> float:
-    if not 0.0 < confidence < 1.0:
-        raise ConfigError(f"confidence is {confidence!r}; allowed is between 0 and 1, usually 0.95.")
+    require("confidence", confidence, 0.0 < confidence < 1.0, "between 0 and 1, usually 0.95")
     return confidence

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from racecraft.checks import require
 from racecraft.errors import ConfigError, RewardError, ShapeError, printable
 from racecraft.reward import launch
 from racecraft.reward import worker_process as protocol
@@ -101,10 +102,8 @@ class RewardWorker:
         confinement: Confinement | None = None,
     ) -> None:
         for name, value in (("timeout_s", timeout_s), ("start_timeout_s", start_timeout_s), ("num_cars", num_cars)):
-            if not value > 0:
-                raise ConfigError(f"{name} is {value}; it must be greater than 0.")
-        if not memory_limit_mb >= 64:
-            raise ConfigError(f"memory_limit_mb is {memory_limit_mb}; a process needs 64 at least.")
+            require(name, value, value > 0, "a number above 0")
+        require("memory_limit_mb", memory_limit_mb, memory_limit_mb >= 64, "64 or more, which a process needs")
         confinement = find_confinement() if confinement is None else confinement
         if foreign:
             confinement.require()

@@ -140,11 +140,11 @@ class CheckpointStore:
         """
         step, time_stamp = int(step), time.time()
         if step < 0:
-            raise CheckpointError(f"step is {step}, allowed: 0 or more.")
+            raise CheckpointError(f"step is {step}; allowed is 0 or more.")
         shown = {name: float(v) if math.isfinite(v) else None for name, v in (metrics or {}).items()}
         ranked = None if score is None else tuple(map(float, score))
         if ranked is not None and not all(map(math.isfinite, ranked)):
-            raise CheckpointError(f"score is {ranked}, allowed: finite numbers.")
+            raise CheckpointError(f"score is {ranked}; allowed are finite numbers.")
         header = {
             "step": step,
             "time_stamp": time_stamp,
@@ -203,12 +203,12 @@ class CheckpointStore:
             candidates = [entries[place] for _, place in reversed(ranked)]
         elif isinstance(which, str):
             hint = did_you_mean(which, ("last", "best"))
-            raise CheckpointError(f"checkpoint is {which!r}, allowed: 'last', 'best' or a step.", hint=hint)
+            raise CheckpointError(f"checkpoint is {which!r}; allowed is 'last', 'best' or a step.", hint=hint)
         else:
             candidates = [entry for entry in reversed(entries) if entry.step == which][:1]
         if not candidates:
             steps = ", ".join(str(entry.step) for entry in entries)
-            raise CheckpointError(f"{self.folder} has no checkpoint of step {which}, allowed: {steps}.")
+            raise CheckpointError(f"{self.folder} has no checkpoint of step {which}; allowed are {steps}.")
         damage = []
         for entry in candidates:
             try:
@@ -375,7 +375,7 @@ def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> li
     plain = {name: np.asarray(values) for name, values in arrays.items()}
     for name, array in plain.items():
         if not is_storable(array):
-            raise CheckpointError(f"array {name!r} has type {array.dtype}, allowed: booleans, integers, floats.")
+            raise CheckpointError(f"array {name!r} has type {array.dtype}; allowed are booleans, integers, floats.")
     try:
         text = json.dumps(header, allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:

@@ -401,7 +401,7 @@ def _parse(name: str, texts: tuple[str, ...]) -> NDArray[Any]:
         return np.array(texts, dtype=np.str_)
     if name in ("done", "all_wheels_on_track"):
         if wrong := set(texts) - {"True", "False", "0", "1"}:
-            raise ValueError(f"{name} is {min(wrong)[:40]!r}, allowed: True or False")
+            raise ValueError(f"{name} is {min(wrong)[:40]!r}; allowed is True or False")
         return np.array([text in ("True", "1") for text in texts], dtype=np.bool_)
     if name == "action" and any(text.startswith("[") for text in texts):
         return np.array([text.strip("[]").replace(",", " ").split() for text in texts], dtype=np.float64).reshape(-1, 2)

@@ -7,6 +7,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Final
 
+from racecraft.checks import check_whole, require
 from racecraft.errors import ConfigError
 
 STATE_FOLDER: Final = ".racecraft"
@@ -38,11 +39,9 @@ class ServeSettings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "runs", self.runs.absolute())
-        if not 0 <= self.port <= 65535:
-            raise ConfigError(f"port is {self.port}; allowed is 0 to 65535, where 0 takes a free one.")
+        require("port", self.port, 0 <= self.port <= 65535, "0 to 65535, where 0 takes a free one")
         for name in ("training_slots", "other_slots"):
-            if not 1 <= getattr(self, name) <= 64:
-                raise ConfigError(f"{name} is {getattr(self, name)}; allowed is 1 to 64.")
+            check_whole(name, getattr(self, name), 1, 64)
         if self.artifacts and not self.artifacts.startswith(("s3://", "file:///")):
             raise ConfigError(
                 f"artifacts is {self.artifacts.split('://')[0]!r}; allowed are s3://BUCKET/PREFIX and file:///FOLDER."

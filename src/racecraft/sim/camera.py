@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
-from racecraft.errors import ConfigError
-from racecraft.sim.checks import check_number, check_whole
+from racecraft.checks import check_choice, check_number, check_whole
+
+PALETTES: Final = ("2018", "2020")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,5 +47,4 @@ class CameraSpec:
         }
         for name, (low, high) in limits.items():
             check_number(f"Camera setting {name}", getattr(self, name), low, high)
-        if self.palette not in ("2018", "2020"):
-            raise ConfigError(f"Camera palette is {self.palette!r}; allowed are '2018' and '2020'.")
+        check_choice("Camera palette", self.palette, PALETTES)

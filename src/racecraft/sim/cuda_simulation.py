@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft import _native
+from racecraft.checks import check_whole
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.gpu import Device, open_device
-from racecraft.sim.checks import check_whole
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.simulation import VEHICLE_FIELDS, Simulation
 from racecraft.track.track import Track

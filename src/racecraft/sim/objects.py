@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Final
 
 from racecraft import _native
+from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, require
 from racecraft.errors import ConfigError, did_you_mean
-from racecraft.sim.checks import check_number, check_type, check_whole
 
 MAX_OBJECTS: Final = 32
 """On one track, obstacles and bot cars together."""
@@ -30,21 +30,18 @@ Positions = tuple[tuple[float, int], ...]
 def _check_group(name: str, count: Any, placement: Any, positions: Any, min_distance: Any) -> Positions:
     """The positions in their stored form."""
     check_whole(f"{name} count", count, 1, MAX_OBJECTS)
-    if placement not in PLACEMENTS:
-        hint = did_you_mean(str(placement), PLACEMENTS)
-        raise ConfigError(f"{name} placement is {placement!r}; allowed are {', '.join(PLACEMENTS)}.", hint=hint)
+    check_choice(f"{name} placement", placement, PLACEMENTS)
     check_number(f"{name} min_distance", min_distance, 0.0, 1000.0)
-    if isinstance(positions, str) or not isinstance(positions, Sequence):
-        raise ConfigError(f"{name} positions are {positions!r}; allowed is a list of (fraction of a lap, lane).")
+    is_list = isinstance(positions, Sequence) and not isinstance(positions, str)
+    require(f"{name} positions", positions, is_list, "a list of (fraction of a lap, lane)")
     stored = []
     for position in positions:
-        if isinstance(position, str) or not isinstance(position, Sequence) or len(position) != 2:
-            raise ConfigError(f"{name} position is {position!r}; allowed is a pair (fraction of a lap, lane).")
+        is_pair = isinstance(position, Sequence) and not isinstance(position, str) and len(position) == 2
+        require(f"{name} position", position, is_pair, "a pair (fraction of a lap, lane)")
         fraction, lane = position
         check_number(f"{name} position", fraction, 0.0, 1.0)
         check_number(f"{name} lane", lane, -1, 1)
-        if lane not in (1, -1):
-            raise ConfigError(f"{name} lane is {lane!r}; allowed are 1 (inner) and -1 (outer).")
+        require(f"{name} lane", lane, lane in (1, -1), "1 (inner) or -1 (outer)")
         stored.append((float(fraction), int(lane)))
     if placement == "fixed" and len(stored) < count:
         raise ConfigError(
@@ -75,9 +72,7 @@ class Obstacles:
     def __post_init__(self) -> None:
         stored = _check_group("Obstacles", self.count, self.placement, self.positions, self.min_distance)
         object.__setattr__(self, "positions", stored)
-        if self.kind not in OBSTACLE_KINDS:
-            hint = did_you_mean(str(self.kind), OBSTACLE_KINDS)
-            raise ConfigError(f"Obstacles kind is {self.kind!r}; allowed are {', '.join(OBSTACLE_KINDS)}.", hint=hint)
+        check_choice("Obstacles kind", self.kind, OBSTACLE_KINDS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +102,7 @@ class Bots:
         stored = _check_group("Bots", self.count, self.placement, self.positions, self.min_distance)
         object.__setattr__(self, "positions", stored)
         check_number("Bots speed", self.speed, 0.0, 10.0)
-        check_type("Bots changes_lane", self.changes_lane, bool, "allowed are True and False")
+        check_flag("Bots changes_lane", self.changes_lane)
         check_number("Bots shortest_stay", self.shortest_stay, 0.1, 3600.0)
         check_number("Bots longest_stay", self.longest_stay, self.shortest_stay, 3600.0)
         check_number("Bots change_distance", self.change_distance, 0.1, 100.0)
@@ -179,9 +174,7 @@ def objects_for_race(race_type: str, *, settings: Mapping[str, Any] | None = Non
         ConfigError: No such race type, or a setting is not allowed.
     """
     name = str(race_type).lower().replace("_", "-")
-    if name not in RACE_TYPES:
-        hint = did_you_mean(name, RACE_TYPES)
-        raise ConfigError(f"Race type is {race_type!r}; allowed are {', '.join(RACE_TYPES)}.", hint=hint)
+    check_choice("Race type", name, RACE_TYPES)
     given = dict(settings or {})
     if name == "time-trial":
         if given:

@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
+from racecraft.checks import check_choice, check_number, check_type, require
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.sim.camera import CameraSpec
-from racecraft.sim.checks import check_number, check_type
 from racecraft.sim.parameter_file import read_parameters
 from racecraft.sim.vehicle import Vehicle
 
@@ -68,8 +68,8 @@ class Randomization:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, list | tuple) or len(value) != 2:
-                raise ConfigError(f"Randomization {field.name} is {value!r}; allowed are two numbers, least and most.")
+            is_pair = isinstance(value, list | tuple) and len(value) == 2
+            require(f"Randomization {field.name}", value, is_pair, "two numbers, least and most")
             low, high = value
             for number in (low, high):
                 check_number(f"Randomization {field.name}", number, *LIMITS[field.name])
@@ -212,11 +212,7 @@ def load_randomization(name_or_path: str | Path) -> Randomization:
         return PRESETS[name]
     data = read_parameters(name, kind="Randomization", presets=PRESETS)
     preset = data.pop("preset", "none")
-    if preset not in list(PRESETS):
-        raise ConfigError(
-            f"Randomization file {name!r} names the preset {preset!r}; allowed are {', '.join(PRESETS)}.",
-            hint=did_you_mean(str(preset), PRESETS),
-        )
+    check_choice(f"The preset of randomization file {name!r}", preset, PRESETS)
     for key in data:
         if key not in LIMITS:
             raise ConfigError(f"Randomization file {name!r} has an unknown quantity {key!r}.", hint=_hint(key))

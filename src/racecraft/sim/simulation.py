@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from racecraft import _native
-from racecraft.errors import ConfigError, NonFiniteAction, ShapeError, did_you_mean
+from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, require
+from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
 from racecraft.sim.camera import CameraSpec
-from racecraft.sim.checks import check_number, check_type, check_whole
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS, Objects, native_objects
 from racecraft.sim.randomization import Randomization, load_randomization
@@ -61,9 +61,7 @@ class Start:
     """Draw for every race who starts where in its grid, instead of car 0 in front."""
 
     def __post_init__(self) -> None:
-        if self.mode not in START_MODES:
-            hint = did_you_mean(str(self.mode), START_MODES)
-            raise ConfigError(f"Start mode is {self.mode!r}; allowed are {', '.join(START_MODES)}. {hint}".strip())
+        check_choice("Start mode", self.mode, START_MODES)
         limits = {
             "offset": (-1.0, 1.0),
             "advance": (-1.0, 1.0),
@@ -72,8 +70,8 @@ class Start:
         }
         for name, (low, high) in limits.items():
             check_number(f"Start setting {name}", getattr(self, name), low, high)
-        check_type("Start setting spread", self.spread, bool, "allowed are True and False")
-        check_type("Start setting shuffle", self.shuffle, bool, "allowed are True and False")
+        check_flag("Start setting spread", self.spread)
+        check_flag("Start setting shuffle", self.shuffle)
 
 
 class Simulation:
@@ -168,12 +166,10 @@ class Simulation:
         if camera is not None:
             check_type("camera", camera, CameraSpec, "use racecraft.CameraSpec(...), or None")
         check_type("vehicle", vehicle, (Vehicle, str, Path), "use a preset's name, a file or racecraft.Vehicle(...)")
-        check_type("lidar", lidar, bool, "allowed are True and False")
+        check_flag("lidar", lidar)
         check_type("objects", objects, Objects, "use racecraft.sim.Objects(...)")
-        if direction not in DIRECTIONS:
-            raise ConfigError(f"direction is {direction!r}; allowed are {', '.join(DIRECTIONS)}.")
-        if track_order not in TRACK_ORDERS:
-            raise ConfigError(f"track_order is {track_order!r}; allowed are {', '.join(TRACK_ORDERS)}.")
+        check_choice("direction", direction, DIRECTIONS)
+        check_choice("track_order", track_order, TRACK_ORDERS)
         check_type(
             "randomize", randomize, (Randomization, str, Path), "use a preset's name, a file or Randomization(...)"
         )
@@ -185,8 +181,7 @@ class Simulation:
         check_whole("num_threads", num_threads, 0, 1024)
         check_number("time_limit", time_limit, 0.0, 1e9)
         check_whole("cars_per_race", cars_per_race, 1, _native.MAX_CARS_PER_RACE)
-        if num_envs % cars_per_race:
-            raise ConfigError(f"num_envs is {num_envs}; allowed are multiples of cars_per_race, {cars_per_race}.")
+        require("num_envs", num_envs, num_envs % cars_per_race == 0, f"a multiple of cars_per_race, {cars_per_race}")
 
         self.num_envs = num_envs
         self.seed = seed
@@ -266,7 +261,7 @@ class Simulation:
         """
         if not self.num_objects or name not in (*OBJECT_HEADER, *OBJECT_COLUMNS):
             allowed = ", ".join((*OBJECT_HEADER, *OBJECT_COLUMNS)) if self.num_objects else "none without objects"
-            raise ConfigError(f"There is no object column {name!r}; allowed: {allowed}.")
+            raise ConfigError(f"There is no object column {name!r}; allowed are {allowed}.")
         begin = len(ROW_COLUMNS)
         if name in OBJECT_HEADER:
             return self.judged[:, begin + OBJECT_HEADER.index(name)]

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Final
 
+from racecraft.checks import check_number
 from racecraft.errors import ConfigError, did_you_mean
-from racecraft.sim.checks import check_number
 from racecraft.sim.parameter_file import read_parameters
 
 

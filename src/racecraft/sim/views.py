@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from racecraft import _native
-from racecraft.errors import ConfigError
-from racecraft.sim.camera import CameraSpec
+from racecraft.checks import check_choice
+from racecraft.sim.camera import PALETTES, CameraSpec
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER
 from racecraft.sim.objects import OBJECT_KINDS
 from racecraft.sim.simulation import ground_map, native_camera
@@ -133,8 +133,7 @@ class Scene:
     """
 
     def __init__(self, track: Track, *, palette: str = "2018") -> None:
-        if palette not in ("2018", "2020"):
-            raise ConfigError(f"Palette is {palette!r}; allowed are '2018' and '2020'.")
+        check_choice("Palette", palette, PALETTES)
         self.palette = palette
         self._track = track
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import SensorSuite
+from racecraft.checks import check_number, check_whole
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import Algorithm, make_learner
 from racecraft.learn.learner import Weights
@@ -65,11 +66,9 @@ class Opponents:
             ("pool_size", self.pool_size, 2, MAX_POOL),
             ("snapshot_every", self.snapshot_every, 1, 10**9),
         ):
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-                raise ConfigError(f"{name} of opponents is {value!r}; allowed is a whole number from {low} to {high}.")
+            check_whole(f"{name} of opponents", value, low, high, is_plain=True)
         for name, share in (("current_share", self.current_share), ("beside_share", self.beside_share)):
-            if isinstance(share, bool) or not isinstance(share, int | float) or not 0.0 <= share <= 1.0:
-                raise ConfigError(f"{name} of opponents is {share!r}; allowed is a number from 0 to 1.")
+            check_number(f"{name} of opponents", share, 0.0, 1.0, is_plain=True)
 
     @property
     def is_self(self) -> bool:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata
+from racecraft.checks import check_choice, check_type, check_whole
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.learn import DistillConfig, NetworkSpec, PPOConfig, SACConfig, network_names
 from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3_ALGORITHMS, SB3Config
@@ -128,9 +129,7 @@ class TrainSettings:
             ("critic", self.critic, CRITICS),
             ("direction", self.direction, DIRECTIONS),
         ):
-            if choice not in allowed:
-                hint = did_you_mean(str(choice), allowed)
-                raise ConfigError(f"{name} is {choice!r}; allowed are {', '.join(allowed)}.", hint=hint)
+            check_choice(name, choice, allowed)
         for name, value, low, high in (
             ("num_envs", self.num_envs, 1, MAX_ENVS if self.device == "cpu" else MAX_CUDA_ENVS),
             ("seed", self.seed, 0, 2**32 - 1),
@@ -138,11 +137,9 @@ class TrainSettings:
             ("evaluation_trials", self.evaluation_trials, 1, 100),
             ("num_threads", self.num_threads, 0, 1024),
         ):
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-                raise ConfigError(f"{name} is {value!r}; allowed is a whole number from {low} to {high}.")
+            check_whole(name, value, low, high, is_plain=True)
         self.randomize.check(self.vehicle, CameraSpec())
-        if not isinstance(self.objects, Objects):
-            raise ConfigError(f"objects is {self.objects!r}; use racecraft.sim.Objects(...).")
+        check_type("objects", self.objects, Objects, "use racecraft.sim.Objects(...)")
         kind, _, number = self.device.partition(":") if isinstance(self.device, str) else ("", "", "")
         if self.device != "cpu" and (kind != "cuda" or (":" in self.device and not number.isdecimal())):
             raise ConfigError(f"device is {self.device!r}; allowed are 'cpu', 'cuda', and 'cuda:1' for the second GPU.")
@@ -159,8 +156,7 @@ class TrainSettings:
                 f"critic is 'lap', which is for algorithm 'ppo' on device 'cpu'; it is {self.algorithm!r} on "
                 f"{self.device!r}. Allowed there are 'privileged' and 'camera'."
             )
-        if not isinstance(self.until, Until):
-            raise ConfigError(f"until is {self.until!r}; allowed is a text such as '5 laps'.")
+        check_type("until", self.until, Until, "allowed is a text such as '5 laps'")
         if self.until.laps > self.evaluation_trials:
             object.__setattr__(self, "evaluation_trials", self.until.laps)
 
@@ -322,7 +318,7 @@ def make_settings(
     if algorithm == "distill" and metadata.action_space.kind == "continuous":
         settings = {"distill": FAST_DISTILL, **({} if is_far else {"start": FAST_START}), **settings}
     if num_envs and kind != "ppo":
-        _check_num_envs(num_envs, MAX_ENVS)
+        check_whole("num_envs", num_envs, 1, MAX_ENVS, is_plain=True)
         begin: dict[str, Any] = {"sac": SACConfig(), "distill": DistillConfig(), "sb3": SB3Config()}
         settings[kind] = replace(settings.get(kind, begin[kind]), num_envs=num_envs)
     if hyperparameters is not None:
@@ -351,25 +347,16 @@ def make_settings(
 
 def _with_num_envs(ppo: PPOConfig, num_envs: int, *, most: int) -> PPOConfig:
     """The same PPO with other cars: rollouts of about as many samples."""
-    _check_num_envs(num_envs, most)
+    check_whole("num_envs", num_envs, 1, most, is_plain=True)
     num_steps = max(1, round(ppo.num_envs * ppo.num_steps / num_envs))
     minibatch_size = min(ppo.minibatch_size, num_envs * num_steps)
     return replace(ppo, num_envs=num_envs, num_steps=num_steps, minibatch_size=minibatch_size)
 
 
-def _check_num_envs(num_envs: int, most: int) -> None:
-    if not 1 <= num_envs <= most:
-        raise ConfigError(f"num_envs is {num_envs!r}; allowed is a whole number from 1 to {most}.")
-
-
 def _check_actions(algorithm: str, metadata: ModelMetadata) -> None:
     """Refuse an algorithm that cannot choose among these actions."""
     kind, name = metadata.action_space.kind, algorithm.removeprefix("sb3:")
-    if algorithm not in ALGORITHMS:
-        raise ConfigError(
-            f"algorithm is {algorithm!r}; allowed are {', '.join(ALGORITHMS)}.",
-            hint=did_you_mean(str(algorithm), ALGORITHMS),
-        )
+    check_choice("algorithm", algorithm, ALGORITHMS)
     if kind == "discrete" and name in CONTINUOUS_ONLY:
         raise ConfigError(
             f"{algorithm} needs a continuous action space; this one is discrete.", hint="Give --actions continuous."

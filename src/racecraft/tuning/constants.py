@@ -12,6 +12,7 @@ import ast
 import math
 from collections.abc import Mapping
 
+from racecraft.checks import require
 from racecraft.errors import ConfigError, RewardError, did_you_mean
 
 
@@ -43,8 +44,7 @@ def rewrite_constants(source: str, values: Mapping[str, float | int]) -> str:
                 f"The reward function has no constant {name!r} at its top level that is set once, to a number.",
                 hint=did_you_mean(name, literals),
             )
-        if not math.isfinite(value):
-            raise ConfigError(f"{name} is {value!r}, allowed: a finite number.")
+        require(name, value, math.isfinite(value), "a finite number")
     # from the last to the first, so that places further up stay right
     for name, node in sorted(literals.items(), key=lambda item: (item[1].lineno, item[1].col_offset), reverse=True):
         if name in values:

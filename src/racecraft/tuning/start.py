@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.checks import check_choice, check_whole
+from racecraft.errors import ConfigError, RunError
 from racecraft.extras import check_installed
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file, write_json
@@ -99,10 +100,8 @@ def make_tuning(
         RacecraftError: An input is wrong.
     """
     check_installed("optuna", "racecraft tune")  # importing it takes a second, which a server does not have
-    if goal not in GOALS:
-        raise ConfigError(f"goal is {goal!r}, allowed: {', '.join(GOALS)}.", hint=did_you_mean(str(goal), GOALS))
-    if isinstance(trial_steps, bool) or not 1 <= trial_steps <= 10**9:
-        raise ConfigError(f"trial_steps is {trial_steps!r}, allowed: a whole number from 1 to 10^9.")
+    check_choice("goal", goal, GOALS)
+    check_whole("trial_steps", trial_steps, 1, is_plain=True)
     space = space_of(plan, search)
     folder = Path(root) / (_checked(name) if name is not None else f"tuning-{time.strftime('%Y%m%d-%H%M%S')}")
     try:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from racecraft.agent import ModelMetadata
+from racecraft.checks import check_whole, require
 from racecraft.errors import ConfigError, RacecraftError, RunError
 from racecraft.extras import needed_for
 from racecraft.json_file import read_json_object
@@ -97,10 +98,8 @@ class Tuning:
             RunError: The tuning is in use, or its storage is damaged.
             RacecraftError: The very first trial, which is what the user has now, cannot be trained.
         """
-        if not 0 < minutes <= 30 * 24 * 60:
-            raise ConfigError(f"minutes is {minutes!r}, allowed: above 0, up to 43,200.")
-        if not 0 <= max_trials <= 100_000:
-            raise ConfigError(f"trials is {max_trials!r}, allowed: 0 to 100,000.")
+        require("minutes", minutes, 0 < minutes <= 30 * 24 * 60, "a number above 0, up to 43,200")
+        check_whole("trials", max_trials, 0, 100_000)
         deadline = time.monotonic() + 60.0 * minutes
         with exclusive_lock(self.folder / ".lock"):
             study = self._study()

@@ -1,0 +1,62 @@
+"""What settings may be: whatever is not allowed is refused by name, value and what is, in one wording."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterable
+from typing import Any, Final
+
+import numpy as np
+
+from racecraft.errors import ConfigError, did_you_mean
+
+MAX_COUNT: Final = 10**9
+"""Of steps, samples, ...: who asks for more has made a mistake."""
+
+
+def require(name: str, value: Any, is_met: bool, allowed: str) -> None:
+    """Refuse a value that does not meet what the words `allowed` say."""
+    if not is_met:
+        raise ConfigError(f"{name} is {value!r}; allowed is {allowed}.")
+
+
+def check_whole(name: str, value: Any, low: int, high: int = MAX_COUNT, *, is_plain: bool = False) -> None:
+    """Refuse what is not a whole number from low to high.
+
+    Args:
+        name: What messages call it.
+        value: Any object.
+        low: The least.
+        high: The most.
+        is_plain: Whether NumPy's numbers are refused, too: JSON, in which settings are kept, does not know them.
+    """
+    is_whole = isinstance(value, int if is_plain else int | np.integer) and not isinstance(value, bool)
+    require(name, value, is_whole and low <= value <= high, f"a whole number from {low} to {high}")
+
+
+def check_number(name: str, value: Any, low: float, high: float = math.inf, *, is_plain: bool = False) -> None:
+    """Refuse what is not a finite number from low to high; the arguments are those of `check_whole`."""
+    kinds = int | float if is_plain else int | float | np.integer | np.floating
+    is_number = isinstance(value, kinds) and not isinstance(value, bool)
+    is_within = is_number and low <= value <= min(high, sys.float_info.max)
+    require(name, value, is_within, f"a number from {low:g}" + (f" to {high:g}" if high < math.inf else ""))
+
+
+def check_flag(name: str, value: Any) -> None:
+    """Refuse what is neither True nor False."""
+    check_type(name, value, bool, "allowed are True and False")
+
+
+def check_choice(name: str, value: Any, allowed: Iterable[str]) -> None:
+    """Refuse what is none of these names, with a hint at what was perhaps meant."""
+    known = tuple(allowed)
+    if not isinstance(value, str) or value not in known:
+        hint = did_you_mean(str(value), known)
+        raise ConfigError(f"{name} is {value!r}; allowed are {', '.join(known)}.", hint=hint)
+
+
+def check_type(name: str, value: Any, allowed: type | tuple[type, ...], advice: str) -> None:
+    """Refuse a value of another type, saying what to give instead."""
+    if not isinstance(value, allowed):
+        raise ConfigError(f"{name} is {value!r}; {advice}.")

@@ -1,0 +1,79 @@
+"""One wording for every setting that is refused: name, value, what is allowed, what was perhaps meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, require
+from racecraft.errors import ConfigError
+
+COLOURS = ("red", "green")
+
+
+@pytest.mark.parametrize("value", [2, 5, np.int64(3), np.uint8(5)])
+def test_whole_numbers_from_low_to_high_pass(value: object) -> None:
+    check_whole("cars", value, 2, 5)
+
+
+@pytest.mark.parametrize("value", [1, 6, 3.0, True, "3", None, math.nan, np.float64(3), 10**400])
+def test_other_than_whole_numbers_are_refused(value: object) -> None:
+    with pytest.raises(ConfigError) as error:
+        check_whole("cars", value, 2, 5)
+    assert str(error.value) == f"cars is {value!r}; allowed is a whole number from 2 to 5."
+
+
+@pytest.mark.parametrize("value", [0, 0.5, 1, np.float32(0.25), np.int64(1)])
+def test_numbers_from_low_to_high_pass(value: object) -> None:
+    check_number("share", value, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("value", [-1e-9, 1.0000001, False, "0.5", None, math.nan, math.inf, 10**400])
+def test_other_than_numbers_are_refused(value: object) -> None:
+    with pytest.raises(ConfigError) as error:
+        check_number("share", value, 0.0, 1.0)
+    assert str(error.value) == f"share is {value!r}; allowed is a number from 0 to 1."
+
+
+@pytest.mark.parametrize("value", [-0.5, math.nan, math.inf, 10**400])
+def test_a_number_without_a_highest_is_finite(value: object) -> None:
+    check_number("rate", 1e300, 0.0)
+    with pytest.raises(ConfigError, match=r"; allowed is a number from 0\.$"):
+        check_number("rate", value, 0.0)
+
+
+@pytest.mark.parametrize(("check", "value"), [(check_whole, np.int64(1)), (check_number, np.float32(1.0))])
+def test_numbers_of_numpy_are_refused_where_json_is_written(check: Callable[..., None], value: object) -> None:
+    check("share", value, 0, 1)
+    with pytest.raises(ConfigError, match="share is"):
+        check("share", value, 0, 1, is_plain=True)
+    check("share", 1, 0, 1, is_plain=True)
+
+
+def test_a_misspelt_choice_is_guessed() -> None:
+    check_choice("colour", "green", COLOURS)
+    with pytest.raises(ConfigError) as error:
+        check_choice("colour", "grren", COLOURS)
+    assert str(error.value) == "colour is 'grren'; allowed are red, green."
+    assert error.value.hint == "Did you mean 'green'?"
+    for value in (None, 3, ["red"], np.array(["red", "green"])):
+        with pytest.raises(ConfigError, match="allowed are red, green"):
+            check_choice("colour", value, COLOURS)
+
+
+def test_flags_and_types_are_refused_with_what_to_give() -> None:
+    check_flag("spread", False)
+    with pytest.raises(ConfigError, match="spread is 1; allowed are True and False"):
+        check_flag("spread", 1)
+    with pytest.raises(ConfigError, match="road is 'oval'; give a number"):
+        check_type("road", "oval", (int, float), "give a number")
+
+
+def test_anything_else_says_itself_what_is_allowed() -> None:
+    require("laps", 3, True, "more than 2")
+    with pytest.raises(ConfigError) as error:
+        require("laps", 2, False, "more than 2")
+    assert str(error.value) == "laps is 2; allowed is more than 2."
