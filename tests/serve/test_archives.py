@@ -216,3 +216,14 @@ def test_archives_hold_no_links(console: RunningConsole) -> None:
     assert "metrics/passwd" not in files
     assert not any(path.startswith("model/etc") for path in files)
     error(console.client.get("/api/models/nothing/archive"), 404)
+
+
+def test_somebody_elses_reward_stays_somebody_elses(console: RunningConsole) -> None:
+    """In a clone, and in a model that is made with the very same text; edited, it is the owner's."""
+    name = upload(console, "theirs.tar.gz", tar_of(AWS_MODEL)).json()["model"]["name"]
+    clone = console.client.post(f"/api/models/{name}/clone", json={}).json()["name"]
+    same, edited = console.create(reward=REWARD), console.create(reward=REWARD + "# seen\n")
+    marks = [RunFolder.open(console.runs / run).read_info().foreign for run in (name, clone, same, edited)]
+    assert marks == [True, True, True, False]
+    verdict = console.client.post("/api/rewards/check", json={"source": REWARD, "track": "oval"}).json()
+    assert verdict["ok"]

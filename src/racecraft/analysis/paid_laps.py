@@ -31,7 +31,7 @@ class PaidLap:
     """(R,)"""
 
 
-def pay_laps(source: str, track: Track, trace: Path, *, timeout_s: float = 0.5) -> list[PaidLap]:
+def pay_laps(source: str, track: Track, trace: Path, *, timeout_s: float = 0.5, foreign: bool = False) -> list[PaidLap]:
     """Ask a reward function what it pays for the laps of a sim-trace, the last few of them, in the order driven.
 
     Objects on the track are left out: a trace does not say where they were.
@@ -41,6 +41,7 @@ def pay_laps(source: str, track: Track, trace: Path, *, timeout_s: float = 0.5) 
         track: That of the trace.
         trace: An evaluation's or a training's sim-trace.
         timeout_s: How long one call may take, s.
+        foreign: The source is somebody else's; see `RewardWorker`.
 
     Raises:
         RewardError: The function fails.
@@ -48,7 +49,7 @@ def pay_laps(source: str, track: Track, trace: Path, *, timeout_s: float = 0.5) 
     """
     rules = TrackRules(track)
     found: list[PaidLap] = []
-    with RewardWorker(source, track, timeout_s=timeout_s) as worker:
+    with RewardWorker(source, track, timeout_s=timeout_s, foreign=foreign) as worker:
         for log in read_logs([trace], Faults()):
             judged = rules.judge(log)
             starts = log.starts.tolist()

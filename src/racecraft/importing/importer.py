@@ -1,7 +1,8 @@
 """`import_run`: from a folder, archive or file of the original to a run folder that can be trained.
 
 Nothing foreign is run: the reward function is parsed and checked as text, and tried where it will be trained, in the
-worker process. The new run folder appears whole or not at all.
+worker process; the run is marked, so that this never happens outside of its walls. The new run folder appears whole or
+not at all.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from racecraft.importing.source import Source, SourceFile, open_source
 from racecraft.json_file import parse_json_object
 from racecraft.race.rules import RaceRules
 from racecraft.reward import check_reward, load_reward, validate_reward
+from racecraft.reward.sandbox import find_confinement
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.run.training_params import TrainingParams
@@ -139,7 +141,7 @@ def import_run(
             (folder.path / ORIGINAL).mkdir(exist_ok=True)
             write_json(folder.path / ORIGINAL / "import.json", {**report.to_dict(), "source": source.title})
             params = replace(params, world_name=tracks[0].name)
-            write_run(folder, settings, tracks, text, metadata, hyperparameters, params)
+            write_run(folder, settings, tracks, text, metadata, hyperparameters, params, foreign=not reward)
         except BaseException as error:
             shutil.rmtree(folder.path, ignore_errors=True)
             if isinstance(error, OSError):
@@ -197,6 +199,12 @@ def _read_reward(model: _Model, reward: str | Path) -> str:
     else:
         text = model.source.text(name)
         model.used[model.shown(name)] = REWARD
+        walls = find_confinement()
+        if not walls.is_complete:
+            model.notes.append(
+                f"This system cannot lock in somebody else's reward function (no {walls.missing}), so it does not run "
+                "it: read it, and if you trust it, give it as your own with --reward FILE."
+            )
     validate_reward(text)
     model.notes += [f"warning: {problem}" for problem in check_reward(text)[:3]]
     return text

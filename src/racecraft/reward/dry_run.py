@@ -55,7 +55,9 @@ class Outcome:
     """What the function printed, up to 64 KB."""
 
 
-def dry_run(source: str, track: Track, *, timeout_s: float = 1.0, seed: int = 0) -> list[Outcome]:
+def dry_run(
+    source: str, track: Track, *, timeout_s: float = 1.0, seed: int = 0, foreign: bool = False
+) -> list[Outcome]:
     """Call a reward function once in every situation.
 
     Args:
@@ -63,9 +65,10 @@ def dry_run(source: str, track: Track, *, timeout_s: float = 1.0, seed: int = 0)
         track: The track that the situations lie on.
         timeout_s: How long one call may take, s.
         seed: Seeds ``random`` and ``numpy.random``.
+        foreign: The source is somebody else's; see `RewardWorker`.
 
     Raises:
-        RewardError: The source cannot be loaded at all.
+        RewardError: The source cannot be loaded at all, or is foreign and cannot be locked in.
     """
     waypoints = waypoints_of([track])
     outcomes: list[Outcome] = []
@@ -73,7 +76,7 @@ def dry_run(source: str, track: Track, *, timeout_s: float = 1.0, seed: int = 0)
     try:
         for situation in situations(track):
             if worker is None:
-                worker = RewardWorker(source, track, seed=seed, timeout_s=timeout_s)
+                worker = RewardWorker(source, track, seed=seed, timeout_s=timeout_s, foreign=foreign)
             reward, error = None, None
             try:
                 reward = float(worker(situation.row[None])[0])

@@ -35,22 +35,23 @@ class Painting:
     """NaN where the function failed  (P, O)."""
 
 
-def paint_reward(source: str, track: Track, *, timeout_s: float = 0.5) -> Painting:
+def paint_reward(source: str, track: Track, *, timeout_s: float = 0.5, foreign: bool = False) -> Painting:
     """Ask a reward function what it pays everywhere on a track.
 
     Args:
         source: Text of a ``reward_function.py`` that has been checked.
         track: Where.
         timeout_s: How long one call may take, s; after a failure the rest stays NaN.
+        foreign: The source is somebody else's; see `RewardWorker`.
 
     Raises:
-        RewardError: The source cannot be loaded at all.
+        RewardError: The source cannot be loaded at all, or is foreign and cannot be locked in.
     """
     places = np.linspace(0.0, track.length, PLACES, endpoint=not track.is_closed)
     offsets = np.array(OFFSETS)
     shape = (len(places), len(offsets))
     points, rewards = np.empty((*shape, 2)), np.full(shape, np.nan)
-    with RewardWorker(source, track, timeout_s=timeout_s) as worker:
+    with RewardWorker(source, track, timeout_s=timeout_s, foreign=foreign) as worker:
         for column, offset in enumerate(offsets):
             half = 0.5 * track.width_at(places)
             rows = np.stack([_row(track, place, offset * width) for place, width in zip(places, half, strict=True)])

@@ -107,6 +107,8 @@ class RewardWorker:
         confinement = find_confinement() if confinement is None else confinement
         if foreign:
             confinement.require()
+        self.foreign = foreign
+        """Whether the source is somebody else's."""
         self.confinement = confinement
         """The walls around the process."""
         self._source_lines = source.splitlines()

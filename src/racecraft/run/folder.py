@@ -61,6 +61,8 @@ class RunInfo:
     """Versions of what may change the result, and the machine."""
     parent: dict[str, Any] | None = None
     """The run, step and file of the checkpoint it began from, if it did."""
+    foreign: bool = False
+    """Whether the reward function is somebody else's: it was imported, or comes from a run that was."""
 
 
 @dataclass(frozen=True)
@@ -229,7 +231,13 @@ class RunFolder:
             if document.pop("format") != FORMAT:
                 raise RunError(f"{path} was written by another version of Racecraft.", hint="Update Racecraft.")
             info = RunInfo(**document)
-            for name, kind in (("seed", int), ("track", str), ("track_digest", str), ("settings", dict)):
+            for name, kind in (
+                ("seed", int),
+                ("track", str),
+                ("track_digest", str),
+                ("settings", dict),
+                ("foreign", bool),
+            ):
                 if not isinstance(getattr(info, name), kind):
                     raise TypeError(f"{name} in run.json is {getattr(info, name)!r}.")
             return info

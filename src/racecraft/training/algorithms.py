@@ -79,6 +79,8 @@ def teacher_environment(
     tracks: Sequence[Track],
     action_space: ActionSpace,
     stack: ExitStack,
+    *,
+    foreign: bool = False,
 ) -> TrainingEnvironment:
     """Cars for a teacher: the run's tracks, car and reward function, no camera, no logs.
 
@@ -88,6 +90,7 @@ def teacher_environment(
         tracks: Its tracks.
         action_space: Its actions.
         stack: Closes the reward's process.
+        foreign: The reward function is somebody else's.
     """
     num_envs = TEACHER_PPO.num_envs
     simulation = Simulation(
@@ -109,6 +112,7 @@ def teacher_environment(
             seed=settings.seed,
             num_cars=num_envs if keeps_state(source) else 1,
             num_objects=settings.objects.count,
+            foreign=foreign,
         )
     )
     return _WithoutCamera(simulation, worker, action_space, counter=EpisodeCounter(num_envs), goes_on=True)

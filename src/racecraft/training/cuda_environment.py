@@ -31,7 +31,8 @@ class CudaTrainingEnvironment:
     """A batch of cars with rewards on a device; an implementation of `DeviceEnvironment` of ``learn.torch_cuda_ppo``.
 
     A reward function that is purely numeric runs there as well, once it gave the interpreter's rewards on recorded
-    steps. Any other is asked on the CPU, which costs a copy of all rows and a call per car and step.
+    steps. Any other is asked on the CPU, which costs a copy of all rows and a call per car and step; so is somebody
+    else's, as nothing could end a loop on the GPU.
 
     Args:
         simulation: The cars.
@@ -65,6 +66,8 @@ class CudaTrainingEnvironment:
         self._width = simulation.judged.shape[1]
         self._kernel: CudaReward | None = None
         try:
+            if worker.foreign:
+                raise NotNumeric("it comes from somebody else")
             if simulation.objects.count:
                 raise NotNumeric("there are objects on the track")
             kernel = CudaReward(source, simulation.tracks, device=device, width=self._width, include=SOURCES)

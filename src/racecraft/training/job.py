@@ -140,7 +140,7 @@ class Training:
         require_trainable(settings, metadata)
         saved = self._last_checkpoint()
         resumed = saved.metadata if saved is not None else {}
-        source = folder.read_reward_function()
+        source, is_foreign = folder.read_reward_function(), folder.read_info().foreign
 
         # The learner's backend takes longest to import, so it starts first, beside everything else.
         with ThreadPoolExecutor(1) as pool:
@@ -151,7 +151,7 @@ class Training:
             tracks = self._load_tracks()
             simulation = open_simulation(settings, tracks, metadata.suite)
             if not self.is_checked:
-                require_valid_reward(source, tracks[0])
+                require_valid_reward(source, tracks[0], foreign=is_foreign)
             learner = future.result()
             if saved is None and folder.read_info().parent is not None:
                 begin_from(learner, folder.parent_checkpoint.load())
@@ -161,7 +161,12 @@ class Training:
             copies = settings.num_envs if keeps_state(source) else 1
             worker = stack.enter_context(
                 RewardWorker(
-                    source, list(tracks), seed=settings.seed, num_cars=copies, num_objects=settings.num_objects
+                    source,
+                    list(tracks),
+                    seed=settings.seed,
+                    num_cars=copies,
+                    num_objects=settings.num_objects,
+                    foreign=is_foreign,
                 )
             )
             kept = saved.step if saved is not None else 0
@@ -222,7 +227,7 @@ class Training:
                 )
 
             def open_teacher() -> TrainingEnvironment:
-                return teacher_environment(settings, source, tracks, metadata.action_space, stack)
+                return teacher_environment(settings, source, tracks, metadata.action_space, stack, foreign=is_foreign)
 
             session = _Session(
                 environment=environment,

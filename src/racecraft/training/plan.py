@@ -32,6 +32,8 @@ class Plan:
     metadata: ModelMetadata
     hyperparameters: Hyperparameters | None
     parent: Parent | None
+    foreign: bool = False
+    """Whether the reward function is somebody else's."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -52,6 +54,7 @@ class Plan:
             root=root,
             name=name,
             parent=self.parent,
+            foreign=self.foreign,
         )
 
 
@@ -82,7 +85,10 @@ def make_plan(
     opponents = settings.get("opponents", None if before is None else before.opponents)
     defaults = defaults_for(objects, opponents)
     limit = Until.parse(until or defaults.until) if isinstance(until, str) else until
-    source = load_reward(reward or defaults.reward) if reward or theirs is None else theirs.read_reward_function()
+    if reward or theirs is None:
+        source, is_foreign = load_reward(reward or defaults.reward), False
+    else:
+        source, is_foreign = theirs.read_reward_function(), theirs.read_info().foreign
     if model_metadata is not None:
         metadata = ModelMetadata.load(model_metadata)
     elif theirs is None or actions is not None:
@@ -126,6 +132,7 @@ def make_plan(
         metadata=metadata,
         hyperparameters=parameters,
         parent=parent,
+        foreign=is_foreign,
     )
 
 

@@ -27,6 +27,7 @@ def start_run(
     root: str | Path = "runs",
     name: str | None = None,
     parent: Parent | None = None,
+    foreign: bool = False,
 ) -> RunFolder:
     """Make a run folder that `Training` can train.
 
@@ -38,6 +39,7 @@ def start_run(
         root: Where runs lie.
         name: Name of the run; by default a new one.
         parent: The checkpoint whose weights it begins with; by default it begins with random ones.
+        foreign: The reward function is somebody else's: it runs locked in, or not at all.
 
     Raises:
         RewardError: The reward function has a mistake that can be seen before training.
@@ -52,7 +54,7 @@ def start_run(
         parent.check(settings.network_spec(metadata), metadata)
     tracks = load_tracks(settings.track)
     track = tracks[0]
-    require_valid_reward(reward, track)
+    require_valid_reward(reward, track, foreign=foreign)
     prefix = track.name if len(tracks) == 1 else f"{len(tracks)}-tracks"
     folder = RunFolder.create(root, name=name, prefix=prefix)
     params = TrainingParams(
@@ -64,7 +66,7 @@ def start_run(
         start_position_offset=settings.start.offset % 1.0,
         min_eval_trials=settings.evaluation_trials,
     )
-    write_run(folder, settings, tracks, reward, metadata, hyperparameters, params, parent=parent)
+    write_run(folder, settings, tracks, reward, metadata, hyperparameters, params, parent=parent, foreign=foreign)
     return folder
 
 
@@ -78,6 +80,7 @@ def write_run(
     params: TrainingParams,
     *,
     parent: Parent | None = None,
+    foreign: bool = False,
 ) -> None:
     """Write everything that a run starts from; ``run.json``, which makes the folder a run, comes last."""
     folder.write_inputs(
@@ -96,7 +99,14 @@ def write_run(
         weights = {f"{WEIGHTS}{name}": array for name, array in parent.weights.items()}
         folder.parent_checkpoint.save(saved.step, weights, metadata={"network": saved.metadata["network"], **record})
     folder.write_info(
-        RunInfo(seed=settings.seed, track=settings.track, track_digest=digest, settings=document, parent=record)
+        RunInfo(
+            seed=settings.seed,
+            track=settings.track,
+            track_digest=digest,
+            settings=document,
+            parent=record,
+            foreign=foreign,
+        )
     )
 
 
@@ -160,13 +170,14 @@ def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:
         )
 
 
-def require_valid_reward(source: str, track: Track) -> None:
+def require_valid_reward(source: str, track: Track, *, foreign: bool = False) -> None:
     """Refuse a reward function that cannot be right, before anything is trained with it.
 
     Raises:
-        RewardError: The static check finds a mistake, or a call fails in one of the situations of a track.
+        RewardError: The static check finds a mistake, a call fails in one of the situations of a track, or the source
+            is foreign and cannot be locked in.
     """
     validate_reward(source)
-    for outcome in dry_run(source, track):
+    for outcome in dry_run(source, track, foreign=foreign):
         if outcome.error is not None:
             raise outcome.error

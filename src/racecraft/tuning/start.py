@@ -63,6 +63,7 @@ def plan_of(run: RunFolder) -> Plan:
         metadata=run.read_model_metadata(),
         hyperparameters=None,  # they are among the settings, and trials have others
         parent=None,
+        foreign=run.read_info().foreign,
     )
 
 
@@ -117,6 +118,7 @@ def make_tuning(
                 "space": [parameter.to_dict() for parameter in space],
                 "settings": plan.settings.to_dict(),
                 "parent": None if plan.parent is None else plan.parent.address,
+                "foreign": plan.foreign,
             },
         )
     except FileExistsError as error:

@@ -71,7 +71,7 @@ class Tuning:
             settings = TrainSettings.from_dict(dict(document["settings"]))
             reward = (self.folder / "reward_function.py").read_text(encoding="utf-8")
             metadata = ModelMetadata.load(self.folder / "model_metadata.json")
-            parent = document.get("parent")
+            parent, foreign = document.get("parent"), bool(document.get("foreign", False))
         except (ConfigError, KeyError, TypeError, ValueError, OSError) as error:
             raise RunError(f"{self.folder} cannot be opened: {error}") from error
         self.plan = Plan(
@@ -80,6 +80,7 @@ class Tuning:
             metadata=metadata,
             hyperparameters=None,  # they are in the settings, where trials change them
             parent=None if parent is None else open_parent(str(parent)),
+            foreign=foreign,
         )
         self._on_trial = on_trial
         self._optuna = _optuna()

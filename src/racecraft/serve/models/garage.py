@@ -8,7 +8,7 @@ import re
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -59,6 +59,14 @@ class Garage:
         if _NAME.fullmatch(name) and (self._runs / name / "run.json").is_file():
             return RunFolder(self._runs / name)
         raise NotFound(f"There is no model {name[:80]!r}.")
+
+    def is_foreign(self, reward: str) -> bool:
+        """Whether this text is, to the letter, the reward function of a model that came from somebody else."""
+        for folder in list_runs(self._runs):
+            with suppress(RacecraftError):
+                if folder.read_info().foreign and folder.read_reward_function() == reward:
+                    return True
+        return False
 
     def cards(self) -> list[ModelCard]:
         """All models, newest first."""

@@ -85,6 +85,7 @@ def create_model(request: NewModel, context: InContext) -> ModelCard:
         hyperparameters=parameters,
         root=context.garage.runs,
         name=request.name,
+        foreign=context.garage.is_foreign(source),
     )
     if request.train:
         _train(context, folder, until=None)
@@ -158,6 +159,7 @@ def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard
         hyperparameters=folder.read_hyperparameters(),
         root=context.garage.runs,
         name=request.name or context.garage.name_beside(name),
+        foreign=folder.read_info().foreign,
     )
     context.mirror.copy(copy.name)
     return context.garage.card(copy.name)
@@ -170,7 +172,8 @@ def train_model(name: str, request: TrainOn, context: InContext) -> JobInfo:
     if request.until is not None:
         Until.parse(request.until)
     if request.reward is not None:
-        require_valid_reward(request.reward, load_track(folder.read_info().track))
+        info = folder.read_info()
+        require_valid_reward(request.reward, load_track(info.track), foreign=info.foreign)
         write_file(folder.reward_function, request.reward.encode())
     return _train(context, folder, until=request.until)
 

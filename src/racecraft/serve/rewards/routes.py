@@ -91,7 +91,8 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
     if any(problem.severity == "error" for problem in problems):
         return RewardVerdict(ok=False, problems=found, situations=[], painting=None)
     track = context.courses.load(request.track)
-    outcomes = dry_run(request.source, track)
+    foreign = context.garage.is_foreign(request.source)
+    outcomes = dry_run(request.source, track, foreign=foreign)
     for outcome in outcomes:
         if outcome.error is not None and outcome.error.line:
             found.append(
@@ -116,18 +117,18 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
     ]
     if any(outcome.error is not None for outcome in outcomes):
         return RewardVerdict(ok=False, problems=found, situations=situations, painting=None)
-    painted = paint_reward(request.source, track)
+    painted = paint_reward(request.source, track, foreign=foreign)
     painting = RewardPainting(
         places=painted.places.round(3).tolist(),
         offsets=painted.offsets.tolist(),
         points=painted.points.round(3).tolist(),
         rewards=[[value if math.isfinite(value) else None for value in row] for row in painted.rewards.tolist()],
     )
-    laps = _laps(context, request) if request.run is not None else []
+    laps = _laps(context, request, foreign=foreign) if request.run is not None else []
     return RewardVerdict(ok=True, problems=found, situations=situations, painting=painting, laps=laps)
 
 
-def _laps(context: Context, request: RewardCheck) -> list[RewardLap]:
+def _laps(context: Context, request: RewardCheck, *, foreign: bool) -> list[RewardLap]:
     """The last laps of the model that was asked for, where it was evaluated on the track."""
     folder = context.garage.folder(str(request.run))
     track = context.courses.load(request.track)
@@ -142,6 +143,6 @@ def _laps(context: Context, request: RewardCheck) -> list[RewardLap]:
                         points=lap.points.round(3).tolist(),
                         rewards=[value if math.isfinite(value) else None for value in lap.rewards.tolist()],
                     )
-                    for lap in pay_laps(request.source, track, trace)
+                    for lap in pay_laps(request.source, track, trace, foreign=foreign)
                 ]
     return []
