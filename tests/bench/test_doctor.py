@@ -5,6 +5,7 @@ import json
 import pytest
 
 from racecraft.bench import doctor
+from racecraft.reward.sandbox import Confinement
 
 
 def test_this_machine_is_healthy() -> None:
@@ -12,6 +13,19 @@ def test_this_machine_is_healthy() -> None:
     assert [finding.name for finding in findings] == [name for name, _, _ in doctor.CHECKS]
     assert not [finding for finding in findings if not finding.ok]
     json.dumps([finding.to_dict() for finding in findings])
+
+
+def test_a_kernel_without_walls_is_a_warning_and_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("racecraft.reward.sandbox.find_confinement", lambda: Confinement(syscalls="x86_64"))
+    (found,) = [finding for finding in doctor.examine() if finding.name == "reward sandbox"]
+    assert (found.ok, found.warns) == (True, True)
+    assert "no Landlock" in found.text
+    assert "Somebody else's are refused" in found.hint
+    walls = Confinement(landlock=7, syscalls="x86_64")
+    monkeypatch.setattr("racecraft.reward.sandbox.find_confinement", lambda: walls)
+    (found,) = [finding for finding in doctor.examine() if finding.name == "reward sandbox"]
+    assert (found.ok, found.warns, found.hint) == (True, False, "")
+    assert "locked in: Landlock 7, filtered system calls, hard limits; bubblewrap could" in found.text
 
 
 def test_what_is_broken_is_reported_with_a_hint_and_the_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:

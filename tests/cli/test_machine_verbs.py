@@ -16,6 +16,19 @@ def test_the_doctor(racecraft: Run) -> None:
     assert racecraft("doctor", "--json").document["ok"]
 
 
+def test_the_doctor_warns_and_is_content(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    from racecraft.bench import doctor
+
+    def lacking() -> str:
+        raise doctor.Lacking("no walls", hint="Read what you run.")
+
+    monkeypatch.setattr(doctor, "CHECKS", [("reward sandbox", lacking, "")])
+    outcome = racecraft("doctor")
+    assert outcome.status == 0
+    assert outcome.out.split() == ["warn", "reward", "sandbox", "no", "walls", "Read", "what", "you", "run."]
+    assert racecraft("doctor", "--json").document["checks"][0]["warns"]
+
+
 def test_the_doctor_finds_what_is_broken(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     from racecraft.bench import doctor
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from running_consoles import RunningConsole
 
+from racecraft.reward.sandbox import find_confinement
 from racecraft.serve.machine import machine
 from racecraft.serve.settings import ServeSettings
 
@@ -17,7 +18,7 @@ def test_folders_storage_devices_and_the_sandbox(console: RunningConsole) -> Non
     assert found["runs"] == str(console.runs)
     assert found["tracks"].startswith(found["runs"])
     assert found["database"] in ("SQLite", "PostgreSQL")
-    assert found["sandbox"] == "process"
+    assert found["sandbox"] == ("kernel" if find_confinement().is_complete else "process")
     assert 0 <= found["used_bytes"] < found["total_bytes"]
     assert 0 < found["free_bytes"] <= found["total_bytes"]
     assert found["cores"] >= 1

@@ -24,10 +24,20 @@ class Finding:
     """What was found."""
     hint: str = ""
     """What to do about it."""
+    warns: bool = False
+    """It works, with less than there could be."""
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
         return asdict(self)
+
+
+class Lacking(Exception):
+    """What works, and what it lacks; a hint says what that means."""
+
+    def __init__(self, text: str, *, hint: str) -> None:
+        super().__init__(text)
+        self.hint = hint
 
 
 def examine() -> list[Finding]:
@@ -38,6 +48,8 @@ def examine() -> list[Finding]:
 def _try(name: str, check: Callable[[], str], hint: str) -> Finding:
     try:
         return Finding(name=name, ok=True, text=check())
+    except Lacking as lack:
+        return Finding(name=name, ok=True, text=str(lack), hint=lack.hint, warns=True)
     except Exception as error:  # whatever is broken here is what the user wants to know
         return Finding(name=name, ok=False, text=f"{type(error).__name__}: {error}", hint=hint)
 
@@ -78,6 +90,19 @@ def _reward() -> str:
     return f"worker process started, {len(outcomes)} rewards paid"
 
 
+def _sandbox() -> str:
+    from racecraft.reward.sandbox import find_confinement
+
+    walls = find_confinement()
+    if walls.is_complete:
+        return f"reward code is locked in: {walls}" + ("" if walls.bubblewrap else "; bubblewrap could stand around it")
+    raise Lacking(
+        f"reward code has {walls}; the system has no {walls.missing}",
+        hint="Your own reward functions run all the same: run only what you have read. Somebody else's are refused. "
+        "Linux 5.13 or newer with Landlock can lock them in.",
+    )
+
+
 def _learner() -> str:
     from racecraft.learn import NetworkSpec, make_learner
 
@@ -103,6 +128,7 @@ CHECKS: list[tuple[str, Callable[[], str], str]] = [
     ("native core", _core, "Build it again: make clean setup."),
     ("simulator", _simulator, "Build it again: make clean setup."),
     ("reward worker", _reward, "Racecraft must be allowed to start processes."),
+    ("reward sandbox", _sandbox, "Look at the error: it is a bug in Racecraft."),
     ("learner", _learner, "Compile the native core again: make build."),
     ("video", _video, "Install PyAV with H.264: pip install av."),
     ("folder", _disk, "Change into a folder that you may write to."),

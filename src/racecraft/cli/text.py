@@ -357,7 +357,8 @@ def say_examined(findings: list[Finding]) -> None:
         text = Text(finding.text)
         if finding.hint:
             text.append(f"\n{finding.hint}", style="yellow")
-        mark = Text("ok", "green") if finding.ok else Text("bad", "bold red")
+        good = Text("warn", "bold yellow") if finding.warns else Text("ok", "green")
+        mark = good if finding.ok else Text("bad", "bold red")
         table.add_row(mark, Text(finding.name, "bold"), text)
     console.print(table)
 

@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 from typing import Final, Literal
 
+from racecraft.reward.sandbox import find_confinement
 from racecraft.serve.schemas import Message
 from racecraft.serve.settings import ServeSettings
 from racecraft.sim import instruction_set
@@ -15,9 +16,9 @@ from racecraft.sim import instruction_set
 MAX_FILES: Final = 50_000  # that are looked at to say how large a folder is
 NVIDIA: Final = Path("/proc/driver/nvidia/gpus")
 
-Sandbox = Literal["process"]
-"""``process``: reward code runs in a process of its own with a bare environment, limits on memory, time, files and
-processes, and an interpreter that refuses networks, programs and writing. It is no wall against malice."""
+Sandbox = Literal["kernel", "process"]
+"""``kernel``: reward code is locked in by Landlock, a filter of system calls and hard limits, somebody else's, too.
+``process``: the system lacks one of them: one's own runs in a process with limits, somebody else's not at all."""
 
 
 class Console(Message):
@@ -67,7 +68,7 @@ def describe_machine(settings: ServeSettings) -> Machine:
         is_used_complete=is_complete,
         free_bytes=disk.free,
         total_bytes=disk.total,
-        sandbox="process",
+        sandbox="kernel" if find_confinement().is_complete else "process",
         processor=_processor(),
         cores=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
         instruction_set=instruction_set(),

@@ -26,9 +26,12 @@ export const settings: Record<keyof typeof english, string> = {
   settings_slots_value: "{trainings} Training, {others} andere",
   settings_sandbox: "Belohnungscode",
   settings_sandbox_level: "Geltende Stufe",
+  settings_sandbox_kernel: "Vom Kernel eingeschlossen",
+  settings_sandbox_kernel_lead:
+    "Belohnungsfunktionen laufen in einem Prozess, der nur rechnen kann: Er kann keine Datei öffnen oder auch nur sehen, kein Netz erreichen, kein Programm starten und keinem anderen Prozess ein Signal senden. Diese Mauer hält der Kernel von Linux, auch gegen böse Absicht; importierte Modelle lassen sich also trainieren, ohne sie vorher zu lesen.",
   settings_sandbox_process: "Eigener Prozess",
   settings_sandbox_process_lead:
-    "Belohnungsfunktionen laufen in einem getrennten, kargen Python mit Grenzen für Speicher und Zeit. Netz, Programme und Schreiben in Dateien werden dort verweigert. Das hält Fehler und achtlosen Code auf; eine Mauer gegen böse Absicht ist es nicht. Lass also nur Code laufen, den du gelesen hast oder dessen Verfasser du traust.",
+    "Diesem System fehlt, was Belohnungscode einschließt (Landlock oder seccomp von Linux). Deine eigenen Belohnungsfunktionen laufen in einem getrennten, kargen Python mit Grenzen für Speicher und Zeit; das hält Fehler und achtlosen Code auf, eine Mauer gegen böse Absicht ist es nicht. Die Funktionen importierter Modelle laufen hier deshalb nicht.",
   settings_keys: "Tasten",
   settings_keys_drive: "Lenken, fahren, bremsen",
   settings_keys_draw: "Einen Punkt bewegen; mit Umschalt weiter",

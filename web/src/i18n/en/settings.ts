@@ -24,9 +24,12 @@ export const settings = {
   settings_slots_value: "{trainings} training, {others} other",
   settings_sandbox: "Reward code",
   settings_sandbox_level: "Level in force",
+  settings_sandbox_kernel: "Locked in by the kernel",
+  settings_sandbox_kernel_lead:
+    "Reward functions run in a process that can do nothing but compute: it cannot open or even see a file, reach a network, start a program or signal another process. The kernel of Linux holds this wall, against somebody who means harm too, so imported models may be trained without reading them first.",
   settings_sandbox_process: "Process of its own",
   settings_sandbox_process_lead:
-    "Reward functions run in a separate, bare Python with limits on memory and time. Networks, programs and writing to files are refused there. This stops mistakes and careless code; it is no wall against somebody who means harm, so run only code that you have read or whose author you trust.",
+    "This system lacks what locks reward code in (Landlock or seccomp of Linux). Your own reward functions run in a separate, bare Python with limits on memory and time, which stops mistakes and careless code; it is no wall against somebody who means harm. The functions of imported models are therefore not run here.",
   settings_keys: "Keys",
   settings_keys_drive: "Steer, go, brake",
   settings_keys_draw: "Move a point; with Shift further",
