@@ -149,7 +149,7 @@ def test_a_race_is_ranked_in_the_console_as_on_the_command_line(stewards: Stewar
     needed = {"total": 3, "best": 1, "average": 2}[ranking]
     expected = [
         (standing.place, f"model-{standing.car}", standing.score, standing.gap)
-        for standing in classify(trials, ranking=ranking, minimum_laps=needed)
+        for standing in classify([[trial] for trial in trials], ranking=ranking, minimum_laps=needed)
     ]
     assert stewards.table(race) == expected
     assert len({place for place, *_ in expected}) > 4
