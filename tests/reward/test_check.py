@@ -48,11 +48,11 @@ ERRORS = [
     (body("def inner():", "    return 1", "inner()"), 1, 1, "never returns"),
     (body("yield 1.0"), 2, 5, "yield"),
     (body("return 'fast'"), 2, 5, "type str"),
-    (body("import os", RETURN), 2, 5, "'import os'"),
-    ("import os\n" + body(RETURN), 1, 1, "'import os'"),
+    (body("import ctypes", RETURN), 2, 5, "'import ctypes'"),
+    ("import socket\n" + body(RETURN), 1, 1, "'import socket'"),
     ("import math, subprocess as s\n" + body(RETURN), 1, 1, "'import subprocess'"),
-    ("import os.path\n" + body(RETURN), 1, 1, "'import os.path'"),
-    ("from os import path\n" + body(RETURN), 1, 1, "'import os'"),
+    ("import urllib.request\n" + body(RETURN), 1, 1, "'import urllib.request'"),
+    ("from multiprocessing import Pool\n" + body(RETURN), 1, 1, "'import multiprocessing'"),
     ("from . import mine\n" + body(RETURN), 1, 1, "relative"),
     ("import nunpy as np\n" + body(RETURN), 1, 1, "Did you mean 'numpy'?"),
     ("import torch\n" + body(RETURN), 1, 1, "Allowed are math"),
@@ -89,12 +89,11 @@ ERRORS = [
     (body("return [y for x in range(3)][0]"), 2, 13, "'y' is not defined"),
     ("x = undefined_thing\n" + body(RETURN), 1, 5, "'undefined_thing' is not defined"),
     ("def outer():\n    reward_function = 1\nx = outer()", 1, 1, "top level"),
-    ("import logging\n" + body(RETURN), 1, 1, "'import logging'"),
     ("import requests\n" + body(RETURN), 1, 1, "'import requests'"),
-    ("import pickle\n" + body(RETURN), 1, 1, "'import pickle'"),
-    ("import io\n" + body(RETURN), 1, 1, "'import io'"),
-    ("from pathlib import Path\n" + body(RETURN), 1, 1, "'import pathlib'"),
-    ("import sys\n" + body("print('x', file=sys.stderr)", RETURN), 1, 1, "'import sys'"),
+    ("from tempfile import TemporaryFile\n" + body(RETURN), 1, 1, "'import tempfile'"),
+    ("import racecraft\n" + body(RETURN), 1, 1, "'import racecraft'"),
+    ("import test.support\n" + body(RETURN), 1, 1, "'import test.support'"),
+    ("from os import _exit\n" + body(RETURN), 1, 1, "'os._exit'"),
     ("from numpy import save as payload\n" + body(RETURN), 1, 1, "'numpy.save'"),
     ("import numpy as load\nx = load.loadtxt('x')\n" + body(RETURN), 2, 5, "'numpy.loadtxt'"),
     ("import numpy as np\nx = np.memmap('x')\n" + body(RETURN), 2, 5, "'numpy.memmap'"),
@@ -129,6 +128,11 @@ WARNINGS = [
     (body("try:", "    return params['speeed']", "except KeyError:", "    return 1.0"), 3, "no key 'speeed'"),
     (body("import time", "return time.time()"), 3, "clock on the wall"),
     ("import numpy as np\nrng = np.random.default_rng()\n" + body(RETURN), 2, "without a seed"),
+    (body("import logging", "logging.info('x')", RETURN), 2, "'import logging' is refused by AWS; here it is allowed."),
+    ("import io\n" + body(RETURN), 1, "'import io' is refused by AWS"),
+    ("from pathlib import PurePath\n" + body(RETURN), 1, "'import pathlib' is refused by AWS"),
+    ("import os.path\n" + body("return os.path.sep == '/'"), 1, "'import os.path' is refused by AWS"),
+    ("import sys\n" + body("print('x', file=sys.stderr)", RETURN), 1, "'import sys' is refused by AWS"),
     (body("return 1.0 if params['x'] is 1 else 2.0"), 2, '"is" with'),
     (body(r"x = '\d'", RETURN), 2, "invalid escape sequence"),
 ]
@@ -141,6 +145,22 @@ def test_warnings_pass_validation(source, line, text):
     assert problems[0].line == line
     assert text in str(problems[0])
     validate_reward(source)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "logging.basicConfig(filename='reward.log')",
+        "logging.FileHandler('reward.log')",
+        "logging.handlers.RotatingFileHandler('reward.log')",
+    ],
+)
+def test_a_log_file_is_a_warning_that_says_where_its_lines_are(call):
+    problems = check_reward(f"import logging, logging.handlers\n{call}\n" + body(RETURN))
+    assert {problem.severity for problem in problems} == {"warning"}
+    assert [problem.line for problem in problems] == [1, 1, 2]
+    assert "No log file is written. Its lines are kept with what the function prints." in str(problems[2])
+    assert "log file" not in str(check_reward("import logging\nlogging.basicConfig(level=10)\n" + body(RETURN)))
 
 
 FINE = [
@@ -238,7 +258,7 @@ def test_presets_are_clean(name):
 
 def test_all_errors_are_counted():
     with pytest.raises(RewardError, match=r"\(2 more\)"):
-        validate_reward("import os\nimport sys\n" + body("return params['speeed']"))
+        validate_reward("import socket\nimport ssl\n" + body("return params['speeed']"))
 
 
 @settings(max_examples=100, deadline=None)

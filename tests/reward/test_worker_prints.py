@@ -59,3 +59,32 @@ def test_an_error_of_a_silent_function_does_not_speak_of_prints(track, rows):
     with running(function("return None"), track) as worker, pytest.raises(RewardError) as caught:
         worker(rows)
     assert "printed" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "opening",
+    [
+        "logging.basicConfig(filename='reward.log', level=logging.INFO)",
+        "logging.basicConfig(filename='/tmp/racecraft-test-reward.log', level=10, filemode='w', force=True)",
+        "logging.getLogger().addHandler(logging.FileHandler('reward.log')); logging.getLogger().setLevel(20)",
+        "logging.getLogger().addHandler(RotatingFileHandler('a/b.log', maxBytes=9)); logging.getLogger().setLevel(20)",
+        "logging.getLogger().addHandler(TimedRotatingFileHandler('b.log')); logging.getLogger().setLevel(20)",
+        "logging.getLogger().addHandler(logging.FileHandler('c.log', delay=True)); logging.getLogger().setLevel(20)",
+    ],
+)
+def test_a_log_file_is_told_of_once_and_its_lines_are_kept(track, rows, opening):
+    top = f"import logging\nfrom logging.handlers import *\n{opening}\n"
+    with running(function("logging.info('at %s', params['x'])", "return 1.0", top=top), track) as worker:
+        assert worker(rows[:2]).tolist() == [1.0, 1.0]
+        log = worker.read_log()
+    assert log.count("[racecraft: no log file is written; its lines are kept here]\n") == 1
+    assert "at 0.0\n" in log
+    assert "at 1.0\n" in log
+    assert "Traceback" not in log
+
+
+def test_logging_without_a_file_is_printed(track, rows):
+    source = function("logging.warning('careful')", "return 1.0", top="import logging\n")
+    with running(source, track) as worker:
+        worker(rows[:1])
+        assert worker.read_log() == "WARNING:root:careful\n"

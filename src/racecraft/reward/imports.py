@@ -1,9 +1,14 @@
-"""What a reward function may import and call: AWS's rules, applied to a name's meaning, not its spelling."""
+"""What a reward function may import and call: AWS's rules, applied to a name's meaning, not its spelling.
+
+They are habits, no wall: that is the worker's (`racecraft.reward.sandbox`). So what the standard library offers and the
+wall permits is allowed, with a warning where AWS refuses it.
+"""
 
 from __future__ import annotations
 
 import ast
 import importlib.util
+import sys
 from collections.abc import Iterator
 from typing import Final, Literal
 
@@ -41,6 +46,25 @@ PLAIN_MODULES: Final = (  # of the standard library: they compute and reach no f
         "statistics",
     ),
     *("contextlib", "pprint", "string", "textwrap", "time", "traceback", "types", "typing", "warnings"),
+)
+USELESS_MODULES: Final = frozenset(  # of the standard library: all that they are for is refused in the worker
+    (
+        *("aifc", "asynchat", "asyncio", "asyncore", "cgi", "cgitb", "ftplib", "http", "imaplib", "mailbox", "nntplib"),
+        *("poplib", "select", "selectors", "smtpd", "smtplib", "socket", "socketserver", "ssl", "telnetlib", "urllib"),
+        *("webbrowser", "wsgiref", "xmlrpc"),
+        *("concurrent", "fcntl", "getpass", "grp", "multiprocessing", "nt", "pipes", "posix", "pty", "pwd", "resource"),
+        *("signal", "spwd", "subprocess", "syslog", "termios", "tty"),
+        *("dbm", "filecmp", "fileinput", "glob", "shelve", "shutil", "sqlite3", "tarfile", "tempfile", "zipfile"),
+        *("antigravity", "curses", "idlelib", "readline", "rlcompleter", "tkinter", "turtle", "turtledemo"),
+        *("atexit", "bdb", "code", "codeop", "compileall", "ctypes", "distutils", "ensurepip", "faulthandler", "gc"),
+        *("imp", "importlib", "lib2to3", "mmap", "modulefinder", "pdb", "pkgutil", "py_compile", "runpy", "site"),
+        *("venv", "zipapp", "zipimport"),
+    )
+)
+LOG_FILES: Final = (
+    "logging.FileHandler",
+    "logging.handlers.RotatingFileHandler",
+    "logging.handlers.TimedRotatingFileHandler",
 )
 FORBIDDEN_MODULES: Final = (  # parts of allowed packages that read or write files, or load foreign code
     *(
@@ -143,6 +167,8 @@ class ImportRules:
             hint = "Simulated time is params['sim_time'], or params['steps'] / 15."
             message = f"'{meaning}' is the clock on the wall, and the simulator is hundreds of times faster."
             yield node, message, hint, "warning"
+        elif meaning in LOG_FILES or (meaning == "logging.basicConfig" and "filename" in _keywords(node)):
+            yield node, "No log file is written.", "Its lines are kept with what the function prints.", "warning"
         elif meaning in ("numpy.random.default_rng", "random.Random") and not node.args + node.keywords:
             yield (
                 node,
@@ -172,7 +198,7 @@ def _check_import_from(node: ast.ImportFrom) -> Iterator[Finding]:
         return
     problems = list(_check_module(node, node.module))
     yield from problems
-    if problems:
+    if any(severity == "error" for *_, severity in problems):
         return
     for alias in node.names:
         meaning = f"{node.module}.{alias.name}"
@@ -184,11 +210,22 @@ def _check_import_from(node: ast.ImportFrom) -> Iterator[Finding]:
 
 def _check_module(node: ast.stmt, module: str) -> Iterator[Finding]:
     top = module.split(".")[0]
-    if top not in AWS_MODULES + PLAIN_MODULES:
+    if top in AWS_MODULES + PLAIN_MODULES:
+        pass
+    elif top in sys.stdlib_module_names and top not in USELESS_MODULES:
+        hint = "Leave it out if the function is to run there, too."
+        yield node, f"'import {module}' is refused by AWS; here it is allowed.", hint, "warning"
+    else:
         hint = did_you_mean(top, AWS_MODULES)
-        allowed = f"Allowed are {', '.join(AWS_MODULES)}, and plain modules such as itertools."
-        yield node, f"'import {module}' is not allowed in a reward function.", hint or allowed, "error"
-    elif any(f"{module}.".startswith(f"{forbidden}.") for forbidden in FORBIDDEN_MODULES):
+        allowed = f"Allowed are {', '.join(AWS_MODULES)}, and of the standard library what needs no files, networks or"
+        yield (
+            node,
+            f"'import {module}' is not allowed in a reward function.",
+            hint or f"{allowed} processes.",
+            "error",
+        )
+        return
+    if any(f"{module}.".startswith(f"{forbidden}.") for forbidden in FORBIDDEN_MODULES):
         yield node, f"'import {module}' is not allowed: it reads or writes files.", "", "error"
 
 
@@ -198,6 +235,10 @@ def _check_installed(node: ast.stmt, module: str, *, is_guarded: bool) -> Iterat
     if top in PACKAGES and importlib.util.find_spec(top) is None:
         message = f"'import {module}' is allowed, but {top} is not installed here."
         yield node, message, f"Install it: pip install {top}", "warning" if is_guarded else "error"
+
+
+def _keywords(node: ast.Call) -> set[str | None]:
+    return {keyword.arg for keyword in node.keywords}
 
 
 def _is_file_function(meaning: str) -> bool:

@@ -60,6 +60,25 @@ class BadRewardError(Exception):
     """What the function returned is not a reward."""
 
 
+class LogFile(io.TextIOBase):
+    """What is opened in place of a log file: its lines go where prints go."""
+
+    def __init__(self, prints: PrintRing) -> None:
+        self._prints = prints
+
+    def writable(self) -> bool:
+        """Yes."""
+        return True
+
+    def write(self, text: str) -> int:
+        """Print it."""
+        return self._prints.write(text)
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Stay where it is, as a file that never grows."""
+        return 0
+
+
 class PrintRing(io.TextIOBase):
     """A text stream into shared memory that keeps the last bytes and never blocks, grows or fails."""
 
@@ -117,6 +136,7 @@ def main() -> None:
         finish()
         del finish  # and with it the last that held ctypes
         sys.stdout = sys.stderr = prints
+        replace_log_files(prints)
         functions = load_functions(setup)
     except BaseException as error:
         server.fail(error, 0)
@@ -287,6 +307,22 @@ def lock_imports(looked_for: frozenset[str]) -> None:
     if "ctypes" not in looked_for and "numpy" not in sys.modules:  # no wall: a tool that need not lie around
         for name in [name for name in sys.modules if name.partition(".")[0] in ("ctypes", "_ctypes")]:
             del sys.modules[name]
+
+
+def replace_log_files(prints: PrintRing) -> None:
+    """Let functions that write a log go on without its file."""
+    os.getcwd = lambda: "/"  # what it is, and can no longer be asked
+    if (logging := sys.modules.get("logging")) is None:
+        return
+    told: list[bool] = []
+
+    def open_log(handler: Any) -> LogFile:
+        if not told:
+            told.append(True)
+            prints.write("[racecraft: no log file is written; its lines are kept here]\n")
+        return LogFile(prints)
+
+    logging.FileHandler._open = open_log
 
 
 class LockedFinder:
