@@ -114,11 +114,11 @@ void bind_learner(nb::module_& m) {
             [](Learner* self, int height, int width, int top, int pool, int block,
                const std::vector<std::tuple<int, int, int>>& convs, const std::vector<int>& dense,
                int num_actions, bool is_discrete, int state_size, const std::vector<int>& critic_units,
-               int lenses, int lidar_size, const std::vector<int>& lidar_units, int camera_dense,
+               int lenses, int lidar_size, const std::vector<int>& lidar_units,
                const std::vector<int>& policy_units, int num_threads) {
-                NetworkSpec spec{height,      width,       pool,         block,        {},  dense,
-                                 num_actions, is_discrete, state_size,   critic_units, top, lenses,
-                                 lidar_size,  lidar_units, camera_dense, policy_units};
+                NetworkSpec spec{height, width,       pool,        block,       {},
+                                 dense,  num_actions, is_discrete, state_size,  critic_units,
+                                 top,    lenses,      lidar_size,  lidar_units, policy_units};
                 for (const auto& [filters, kernel, stride] : convs) {
                     spec.convs.push_back({filters, kernel, stride});
                 }
@@ -126,7 +126,7 @@ void bind_learner(nb::module_& m) {
             },
             nb::kw_only(), "height"_a, "width"_a, "top"_a, "pool"_a, "block"_a, "convs"_a, "dense"_a,
             "num_actions"_a, "is_discrete"_a, "state_size"_a, "critic_units"_a, "lenses"_a, "lidar_size"_a,
-            "lidar_units"_a, "camera_dense"_a, "policy_units"_a, "num_threads"_a)
+            "lidar_units"_a, "policy_units"_a, "num_threads"_a)
         .def(
             "encode",
             [](Learner& self, In<uint8_t, 2> sight) {

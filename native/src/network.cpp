@@ -122,8 +122,6 @@ Network::Network(const NetworkSpec& description) : spec(description) {
     require(spec.lenses == 1 || spec.lenses == 2, "A camera has one lens or two.");
     require(spec.lidar_size >= 0 && (spec.lidar_size == 0 || !spec.lidar_units.empty()),
             "A LIDAR of 0 or more values needs a branch of at least one dense layer.");
-    require(spec.camera_dense >= 0 && spec.camera_dense <= static_cast<int>(spec.dense.size()),
-            "The camera's branch cannot have more dense layers than there are.");
     if (spec.is_blind()) {
         add_state_tower(policy, spec.policy_units, spec.num_actions);
     } else {
@@ -171,19 +169,14 @@ void Network::add_camera_tower(Tower& tower, int num_outputs) {
         fold = 1;
     }
     require(!spec.convs.empty(), "The network needs at least one convolution.");
-    const size_t camera_dense = static_cast<size_t>(spec.camera_dense);
-    int joined = 0;
+    int joined = add_lidar_branch(tower);
     const auto add = [&](int units, Activation activation) {
         add_dense_layer(tower, Source::layer, activation, units, height, width, channels, joined);
         height = width = 1;
         channels = units;
         joined = 0;
     };
-    for (size_t i = 0; i < spec.dense.size(); ++i) {
-        if (i == camera_dense) joined = add_lidar_branch(tower);
-        add(spec.dense[i], Activation::relu);
-    }
-    if (spec.dense.size() == camera_dense) joined = add_lidar_branch(tower);
+    for (const int units : spec.dense) add(units, Activation::relu);
     add(num_outputs, Activation::identity);
 }
 

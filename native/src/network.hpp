@@ -53,7 +53,6 @@ struct NetworkSpec {
     int lenses = 1;                 // images of one camera, 2 for a stereo pair
     int lidar_size = 0;             // values of the LIDAR sensor, a byte each; 0 without one
     std::vector<int> lidar_units;   // of the LIDAR's branch
-    int camera_dense = 0;           // how many of the dense layers belong to the camera's branch
     std::vector<int> policy_units;  // of a policy that sees the state; then there is no image and no LIDAR
 
     bool is_blind() const { return !policy_units.empty(); }  // sees the state only

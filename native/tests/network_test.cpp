@@ -202,12 +202,14 @@ std::vector<NetworkSpec> odd_networks() {
         {9, 11, 1, 1, {{3, 3, 2}, {33, 2, 1}, {4, 2, 2}}, {9, 5}, 1, false, 1, {}},
         {7, 7, 1, 1, {{18, 7, 3}}, {34}, 19, true, 0, {}},  // a kernel as large as the image
         {6, 13, 1, 1, {{2, 3, 3}, {1, 1, 2}}, {1}, 2, true, 35, {33}},
-        {26, 16, 2, 4, {{6, 4, 4}}, {5}, 3, true, 2, {4}, 10},  // its upper rows are not seen
-        {12, 16, 1, 4, {{5, 8, 4}}, {7, 6}, 3, true, 5, {6}, 0, 2, 9, {5, 3}, 1},  // two lenses and a LIDAR
-        {9, 11, 1, 1, {{3, 3, 2}, {4, 2, 1}}, {}, 2, false, 0, {}, 0, 2, 4, {18}, 0},  // the head joins them
-        {8, 8, 2, 1, {{3, 3, 1}}, {35}, 2, true, 0, {}, 0, 1, 33, {2}, 1},
-        {0, 0, 1, 1, {}, {}, 3, true, 17, {33, 5}, 0, 1, 0, {}, 0, {34, 7}},  // teachers, which see the state
-        {0, 0, 1, 1, {}, {}, 2, false, 5, {16}, 0, 1, 0, {}, 0, {64, 64, 3}},
+        {20, 24, 1, 4, {{3, 8, 4}, {17, 1, 1}, {5, 1, 1}}, {6}, 3, true, 0, {}, 0, 1, 4, {3}},  // kernels of
+                                                                                                // one pixel
+        {26, 16, 2, 4, {{6, 4, 4}}, {5}, 3, true, 2, {4}, 10},                  // its upper rows are not seen
+        {12, 16, 1, 4, {{5, 8, 4}}, {7, 6}, 3, true, 5, {6}, 0, 2, 9, {5, 3}},  // two lenses and a LIDAR
+        {9, 11, 1, 1, {{3, 3, 2}, {4, 2, 1}}, {}, 2, false, 0, {}, 0, 2, 4, {18}},  // the head joins them
+        {8, 8, 2, 1, {{3, 3, 1}}, {35}, 2, true, 0, {}, 0, 1, 33, {2}},
+        {0, 0, 1, 1, {}, {}, 3, true, 17, {33, 5}, 0, 1, 0, {}, {34, 7}},  // teachers, which see the state
+        {0, 0, 1, 1, {}, {}, 2, false, 5, {16}, 0, 1, 0, {}, {64, 64, 3}},
     };
 }
 
@@ -402,7 +404,6 @@ TEST(impossible_networks_are_refused) {
         [](NetworkSpec& s) { s.lidar_size = -1; },
         [](NetworkSpec& s) { s.lidar_size = 4; },  // without a branch
         [](NetworkSpec& s) { s.lidar_units = {0}; },
-        [](NetworkSpec& s) { s.camera_dense = 2; },
     };
     Learner accepted(good, 1);
     for (const auto& fault : faults) {

@@ -43,7 +43,7 @@ def parts_of(spec: NetworkSpec, sight) -> tuple[np.ndarray, np.ndarray]:
 
 def reference_tower(spec: NetworkSpec, weights, sight, tower: str) -> np.ndarray:
     """The tower that sees the sensors, in float64."""
-    arch = networks.architecture(spec.name, lenses=spec.lenses)
+    arch = networks.architecture_of(spec)
     height, width = networks.pooled_shape(spec)
     frames, lidar = parts_of(spec, sight)
     frames = frames[:, :, networks.sky_rows(spec) :]
@@ -60,14 +60,12 @@ def reference_tower(spec: NetworkSpec, weights, sight, tower: str) -> np.ndarray
         x = np.einsum("nchwij,fcij->nfhw", windows, weight, optimize=True) + bias[:, None, None]
         x = x.clip(0)
     x = x.transpose(0, 2, 3, 1).reshape(len(x), -1)
-    for i in range(1, arch.camera_dense + 1):
-        x = dense(f"{tower}.dense{i}", x)
     if spec.lidar_size:
         y = lidar / 255
         for i in range(1, len(arch.lidar) + 1):
             y = dense(f"{tower}.lidar{i}", y)
         x = np.concatenate([x, y], axis=1)
-    for i in range(arch.camera_dense + 1, len(arch.dense) + 1):
+    for i in range(1, len(arch.dense) + 1):
         x = dense(f"{tower}.dense{i}", x)
     return x @ weights[f"{tower}.head.weight"].T + weights[f"{tower}.head.bias"]
 
@@ -78,7 +76,7 @@ def reference_gradient(spec: NetworkSpec, weights, sight, minibatch: Minibatch, 
     from torch.nn import functional
 
     p = {name: torch.from_numpy(array).double().requires_grad_() for name, array in weights.items()}
-    arch = networks.architecture(spec.name, lenses=spec.lenses)
+    arch = networks.architecture_of(spec)
     frames, lidar = parts_of(spec, sight)
 
     def dense(layer: str, x: torch.Tensor) -> torch.Tensor:
@@ -91,14 +89,12 @@ def reference_gradient(spec: NetworkSpec, weights, sight, minibatch: Minibatch, 
         for i, conv in enumerate(arch.convs, 1):
             x = functional.conv2d(x, p[f"{tower}.conv{i}.weight"], p[f"{tower}.conv{i}.bias"], conv.stride).relu()
         x = x.permute(0, 2, 3, 1).reshape(len(x), -1)
-        for i in range(1, arch.camera_dense + 1):
-            x = dense(f"{tower}.dense{i}", x)
         if spec.lidar_size:
             y = torch.from_numpy(lidar).double() / 255
             for i in range(1, len(arch.lidar) + 1):
                 y = dense(f"{tower}.lidar{i}", y)
             x = torch.cat([x, y], 1)
-        for i in range(arch.camera_dense + 1, len(arch.dense) + 1):
+        for i in range(1, len(arch.dense) + 1):
             x = dense(f"{tower}.dense{i}", x)
         return functional.linear(x, p[f"{tower}.head.weight"], p[f"{tower}.head.bias"])
 

@@ -20,6 +20,32 @@ def test_shallow_has_aws_size_per_tower():
     assert parameter_count(spec, tower="critic") == body + 512 + 1
 
 
+@pytest.mark.parametrize(
+    ("name", "sizes"),
+    [
+        ("DEEP_CONVOLUTIONAL_NETWORK", [(64, 64, 1, 1), (512, 56_000)]),
+        ("DEEP_CONVOLUTIONAL_NETWORK_DEEP", [(512, 64, 1, 1), (512, 512, 1, 1), (256, 9_216), (128, 256)]),
+    ],
+)
+def test_inner_dense_layers_of_the_deep_networks_act_at_every_position(name, sizes):
+    """TensorFlow's dense layers act on the last axis; AWS's trainer flattens behind these (Coach's InputEmbedder)."""
+    shapes = weight_shapes(NetworkSpec(name=name, num_actions=10))
+    inner = [shape for key, shape in shapes.items() if key.startswith("policy.") and key.endswith("weight")][4:-1]
+    assert inner == sizes
+
+
+def test_a_policy_of_sac_has_one_more_layer_as_aws_has():
+    plain, squashed = (
+        weight_shapes(NetworkSpec(name=SHALLOW, num_actions=2, is_discrete=False, is_squashed=is_squashed))
+        for is_squashed in (False, True)
+    )
+    assert squashed["policy.dense2.weight"] == (256, 512)
+    assert squashed["policy.head.weight"] == (2, 256)
+    assert plain["policy.head.weight"] == (2, 512)
+    small = weight_shapes(NetworkSpec(num_actions=2, is_discrete=False, is_squashed=True))
+    assert small["policy.head.weight"] == (2, 128)
+
+
 def test_default_network_is_small():
     spec = NetworkSpec(num_actions=10, state_size=20)
     assert network_names()[0] == spec.name

@@ -11,7 +11,7 @@ head. Kernels are (rows, columns, inputs, outputs) and (inputs, outputs).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,10 @@ from racecraft.agent.sensors import CAMERAS
 from racecraft.errors import SourceError
 from racecraft.learn import NetworkSpec
 from racecraft.learn.learner import Weights
-from racecraft.learn.networks import architecture, flat_size, weight_shapes
+from racecraft.learn.networks import architecture_of, flat_size, weight_shapes
 
-MIDDLEWARE = "middleware_fc_embedder"
+MIDDLEWARE: Final = "middleware_fc_embedder"
+CRITIC_HEAD: Final = "v_values_head_0/output"
 
 
 class Tensors(Protocol):
@@ -89,32 +90,62 @@ def policy_weights(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite) ->
     return weights
 
 
+def has_critic(tensors: Tensors) -> bool:
+    """Whether the file holds the value of a state, too, as checkpoints of PPO do."""
+    return bool(find_tower(tensors, CRITIC_HEAD))
+
+
+def critic_weights(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite) -> Weights:
+    """The weights of the critic that sees the sensors: every ``critic.*`` of `weight_shapes`.
+
+    Raises:
+        SourceError: As `policy_weights`.
+    """
+    scope = find_tower(tensors, CRITIC_HEAD)
+    return _tower(tensors, spec, sensors, scope=scope, head=CRITIC_HEAD, tower="critic")
+
+
 def _tower(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite, *, scope: str, head: str, tower: str) -> Weights:
     """The layers of one tower by our names."""
-    arch = architecture(spec.name, lenses=spec.lenses)
+    arch = architecture_of(spec)
     shapes = {name: shape for name, shape in weight_shapes(spec).items() if name.startswith(f"{tower}.")}
     camera = next(name for name in sensors.names if name in CAMERAS)
     layers: dict[str, str] = {}  # our layer -> AWS's
-    for i in range(len(arch.convs)):
-        layers[f"{tower}.conv{i + 1}"] = f"{camera}/Conv2d_{2 * i}"
-    for i in range(arch.camera_dense):
-        layers[f"{tower}.dense{i + 1}"] = f"{camera}/Dense_{2 * (len(arch.convs) + i)}"
+    for i, conv in enumerate(arch.convs):
+        layers[f"{tower}.conv{i + 1}"] = f"{camera}/{'Dense' if conv.kernel == 1 else 'Conv2d'}_{2 * i}"
     for i in range(len(arch.lidar) if spec.lidar_size else 0):
         layers[f"{tower}.lidar{i + 1}"] = f"{sensors.lidar_name}/Dense_{2 * i}"
-    for i in range(len(arch.dense) - arch.camera_dense):
-        layers[f"{tower}.dense{arch.camera_dense + i + 1}"] = f"{MIDDLEWARE}/Dense_{2 * i}"
+    for i in range(len(arch.dense)):
+        layers[f"{tower}.dense{i + 1}"] = f"{MIDDLEWARE}/Dense_{2 * i}"
+    if spec.is_squashed and tower == "policy":
+        units = shapes[f"{tower}.dense{len(arch.dense)}.weight"][::-1]
+        layers[f"{tower}.dense{len(arch.dense)}"] = _unnamed(tensors, scope, head.split("/")[0], units)
     layers[f"{tower}.head"] = head
     weights: Weights = {}
     for ours, theirs in layers.items():
         shape = shapes[f"{ours}.weight"]
-        kernel = _checked(tensors, f"{scope}/{theirs}/kernel", (*shape[2:], *shape[1::-1]))
+        is_dense = len(shape) == 2 or "/Dense_" in theirs
+        kernel = _checked(
+            tensors, f"{scope}/{theirs}/kernel", shape[1::-1] if is_dense else (*shape[2:], *shape[1::-1])
+        )
+        turned = kernel.transpose((1, 0) if is_dense else (3, 2, 0, 1))
+        weight = weights[f"{ours}.weight"] = np.empty(shape, np.float32)
         if theirs == f"{MIDDLEWARE}/Dense_0" and spec.lidar_size and sensors.lidar_name < camera:
-            features = arch.dense[arch.camera_dense - 1] if arch.camera_dense else flat_size(spec)
-            kernel = np.roll(kernel, features, axis=0)  # the LIDAR's inputs come first there, last here
-        order = (3, 2, 0, 1) if kernel.ndim == 4 else (1, 0)
-        weights[f"{ours}.weight"] = np.ascontiguousarray(kernel.transpose(order))
+            size = flat_size(spec)  # the camera's inputs come last there, first here
+            weight[:, :size], weight[:, size:] = turned[:, -size:], turned[:, :-size]
+        else:
+            weight[:] = turned.reshape(shape)
         weights[f"{ours}.bias"] = _checked(tensors, f"{scope}/{theirs}/bias", shape[:1]).copy()
     return weights
+
+
+def _unnamed(tensors: Tensors, scope: str, part: str, shape: tuple[int, ...]) -> str:
+    """A dense layer without a name of its own: TensorFlow calls it ``dense_N``, so its kernel's shape has to tell."""
+    for name, given in tensors.shapes.items():
+        layer = name.removeprefix(f"{scope}/").removesuffix("/kernel")
+        if given == shape and layer.startswith(f"{part}/dense"):
+            return layer
+    return f"{part}/dense"
 
 
 def _checked(tensors: Tensors, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:

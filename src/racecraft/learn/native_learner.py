@@ -49,7 +49,7 @@ class NativeLearner:
             self.load_weights(networks.initial_weights(spec, seed=seed, orthonormalize=_native.orthonormalize))
 
     def _make(self, spec: NetworkSpec, num_threads: int) -> _native.Learner:
-        arch = networks.architecture(spec.name, lenses=spec.lenses)
+        arch = networks.architecture_of(spec)
         height, width = spec.frame_shape
         return _native.Learner(
             height=height,
@@ -66,7 +66,6 @@ class NativeLearner:
             lenses=spec.lenses,
             lidar_size=spec.lidar_size,
             lidar_units=list(arch.lidar),
-            camera_dense=arch.camera_dense,
             policy_units=[],
             num_threads=num_threads,
         )

@@ -54,7 +54,6 @@ class NativeStateLearner(NativeLearner):
             lenses=1,
             lidar_size=0,
             lidar_units=[],
-            camera_dense=0,
             policy_units=list(networks.TEACHER_UNITS),
             num_threads=num_threads,
         )

@@ -4,8 +4,8 @@ Every network is two separate towers, as AWS's are: a policy that sees what the 
 either the privileged state (a small perceptron, training only) or the same through a tower of its own. A LIDAR has
 dense layers of its own, and what comes of them is laid behind what comes of the camera.
 
-    image -> convolutions [-> dense layers] -> (camera, LIDAR) -> dense layers -> head
-    LIDAR -> dense layers -----------------------^
+    image -> convolutions -> (camera, LIDAR) -> dense layers -> head
+    LIDAR -> dense layers ------^
 
 Weights are named ``policy.conv1.weight`` (filters, channels, kernel, kernel), ``policy.dense1.weight`` (out, in),
 ``policy.lidar1.weight``, ``policy.head.weight``; the last convolution is flattened in the order row, column, channel.
@@ -15,7 +15,7 @@ A backend needs nothing but this file.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +51,6 @@ class Architecture:
     """Share of the image's rows, from the top, that the tower does not see."""
     log_std: float = 0.0
     """Log standard deviation that a Gaussian policy begins with; 0 as AWS's."""
-    camera_dense: int = 0
-    """How many of the dense layers come before the LIDAR's values are laid beside the camera's."""
     lidar: tuple[int, ...] = (256, 256)
     """Units of the LIDAR's own dense layers, where there is one."""
 
@@ -63,18 +61,23 @@ ARCHITECTURES: dict[str, Architecture] = {
     ),
     "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW": Architecture((Conv(32, 8, 4), Conv(64, 4, 2), Conv(64, 3, 1)), (512,)),
     "DEEP_CONVOLUTIONAL_NETWORK": Architecture(
-        (Conv(32, 5, 2), Conv(32, 3, 1), Conv(64, 3, 2), Conv(64, 3, 1)), (64, 512), camera_dense=1
+        (Conv(32, 5, 2), Conv(32, 3, 1), Conv(64, 3, 2), Conv(64, 3, 1), Conv(64, 1, 1)), (512,)
     ),
     "DEEP_CONVOLUTIONAL_NETWORK_DEEP": Architecture(
-        (Conv(32, 8, 4), Conv(32, 4, 2), Conv(64, 4, 2), Conv(64, 3, 1)), (512, 512, 256, 128), camera_dense=2
+        (Conv(32, 8, 4), Conv(32, 4, 2), Conv(64, 4, 2), Conv(64, 3, 1), Conv(512, 1, 1), Conv(512, 1, 1)), (256, 128)
     ),
 }
+"""By name. What AWS's console calls the dense layers of 64, and of 512 and 512, units of the last two stands before the
+flattening in its trainer, so it acts at every position of the image by itself: a convolution whose kernel is one pixel.
+"""
 _STEREO_CONVS = (Conv(32, 3, 1), Conv(64, 3, 2), Conv(64, 3, 1), Conv(128, 3, 2), Conv(128, 3, 1))
 STEREO: dict[str, Architecture] = {
     "DEEP_CONVOLUTIONAL_NETWORK": Architecture(_STEREO_CONVS, (512,)),
     "DEEP_CONVOLUTIONAL_NETWORK_DEEP": Architecture(_STEREO_CONVS, (256, 128)),
 }
 """What AWS builds under these names for a stereo camera; the others are the same for both."""
+SAC_HEAD = 256
+"""Units of one more dense layer that AWS's policies have before the head when SAC trains them."""
 CRITIC_UNITS = (64, 64)
 """Dense layers (tanh) of the critic that sees the privileged state."""
 TEACHER = "TEACHER"
@@ -107,18 +110,25 @@ def architecture(name: str, *, lenses: int = 1) -> Architecture:
     return ARCHITECTURES[name]
 
 
+def architecture_of(spec: NetworkSpec) -> Architecture:
+    """The layers of a network's towers."""
+    arch = architecture(spec.name, lenses=spec.lenses)
+    is_aws = spec.name.startswith("DEEP_CONVOLUTIONAL_NETWORK")
+    return replace(arch, dense=(*arch.dense, SAC_HEAD)) if spec.is_squashed and is_aws else arch
+
+
 def sky_rows(spec: NetworkSpec) -> int:
     """Rows at the top of a camera image that the network does not see.
 
     The default camera looks 15 degrees down and has its horizon in row 29 of 120. What is above it tells nothing of
     the road but differs from track to track, and a third of the network's arithmetic would go there.
     """
-    return int(_architecture(spec).sky * spec.frame_shape[0])
+    return int(architecture_of(spec).sky * spec.frame_shape[0])
 
 
 def pooled_shape(spec: NetworkSpec) -> tuple[int, int]:
     """Height and width of what the first convolution sees, pixels."""
-    pool = _architecture(spec).pool
+    pool = architecture_of(spec).pool
     return (spec.frame_shape[0] - sky_rows(spec)) // pool, spec.frame_shape[1] // pool
 
 
@@ -128,7 +138,7 @@ def block_size(spec: NetworkSpec) -> int:
     A convolution whose stride divides its kernel and the image equals one of stride 1 over squares of
     `stride` pixels, `stride`² channels each. On a CPU that is twice as fast as one channel of grey.
     """
-    first = _architecture(spec).convs[0]
+    first = architecture_of(spec).convs[0]
     height, width = pooled_shape(spec)
     divides = first.kernel % first.stride == 0 and height % first.stride == 0 and width % first.stride == 0
     return first.stride if divides else 1
@@ -194,7 +204,7 @@ def encode(spec: NetworkSpec, sight: NDArray[np.uint8]) -> NDArray[np.uint8]:
     flat = sight.reshape(count, size + spec.lidar_size)
     frames = flat[:, :size].reshape(count * spec.lenses, height, width)
     pixels = np.ascontiguousarray(frames[:, sky_rows(spec) :])
-    if _architecture(spec).pool == 2:
+    if architecture_of(spec).pool == 2:
         pairs = pixels.view(np.uint16)  # two neighbours in one word: sums of whole rows at SIMD speed
         sums = (pairs & 255) + (pairs >> 8)
         pixels = ((sums[:, 0::2] + sums[:, 1::2] + 2) >> 2).astype(np.uint8)
@@ -210,7 +220,7 @@ def encode(spec: NetworkSpec, sight: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def flat_size(spec: NetworkSpec) -> int:
     """Numbers that the camera's convolutions end in."""
-    arch = _architecture(spec)
+    arch = architecture_of(spec)
     height, width = pooled_shape(spec)
     for conv in arch.convs:
         height = (height - conv.kernel) // conv.stride + 1
@@ -225,8 +235,8 @@ def weight_shapes(spec: NetworkSpec) -> dict[str, tuple[int, ...]]:
     is_blind = spec.name == TEACHER
     shapes: dict[str, tuple[int, ...]] = {}
 
-    def dense(layer: str, inputs: int, units: tuple[int, ...], *, first: int = 1) -> int:
-        for i, size in enumerate(units, first):
+    def dense(layer: str, inputs: int, units: tuple[int, ...]) -> int:
+        for i, size in enumerate(units, 1):
             shapes[f"{layer}{i}.weight"], shapes[f"{layer}{i}.bias"] = (size, inputs), (size,)
             inputs = size
         return inputs
@@ -235,16 +245,15 @@ def weight_shapes(spec: NetworkSpec) -> dict[str, tuple[int, ...]]:
         shapes[f"{tower}.head.weight"], shapes[f"{tower}.head.bias"] = (outputs, inputs), (outputs,)
 
     def sensors(tower: str, outputs: int) -> None:
-        arch, channels = _architecture(spec), spec.lenses
+        arch, channels = architecture_of(spec), spec.lenses
         for i, conv in enumerate(arch.convs, 1):
             shapes[f"{tower}.conv{i}.weight"] = (conv.filters, channels, conv.kernel, conv.kernel)
             shapes[f"{tower}.conv{i}.bias"] = (conv.filters,)
             channels = conv.filters
-        before, after = arch.dense[: arch.camera_dense], arch.dense[arch.camera_dense :]
-        inputs = dense(f"{tower}.dense", flat_size(spec), before)
+        inputs = flat_size(spec)
         if spec.lidar_size:
             inputs += dense(f"{tower}.lidar", spec.lidar_size, arch.lidar)
-        head(tower, dense(f"{tower}.dense", inputs, after, first=arch.camera_dense + 1), outputs)
+        head(tower, dense(f"{tower}.dense", inputs, arch.dense), outputs)
 
     def states(tower: str, units: tuple[int, ...], outputs: int) -> None:
         head(tower, dense(f"{tower}.dense", spec.state_size, units), outputs)
@@ -284,7 +293,7 @@ def initial_weights(
         if not name.endswith(".weight"):
             begin = 0.0
             if name == "policy.log_std":
-                begin = TEACHER_LOG_STD if spec.name == TEACHER else _architecture(spec).log_std
+                begin = TEACHER_LOG_STD if spec.name == TEACHER else architecture_of(spec).log_std
             weights[name] = np.full(shape, begin, np.float32)
             continue
         gain = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}.get(name, 2.0**0.5)
@@ -303,7 +312,7 @@ def parameter_count(spec: NetworkSpec, *, tower: str = "") -> int:
 
 def forward_operations(spec: NetworkSpec) -> int:
     """Floating-point operations of one forward pass for one car, both towers; biases and activations not counted."""
-    arch = _architecture(spec)
+    arch = architecture_of(spec)
     total = 0
     for name, shape in weight_shapes(spec).items():
         if not name.endswith(".weight"):
@@ -316,7 +325,3 @@ def forward_operations(spec: NetworkSpec) -> int:
             places = height * width
         total += 2 * places * int(np.prod(shape))
     return total
-
-
-def _architecture(spec: NetworkSpec) -> Architecture:
-    return architecture(spec.name, lenses=spec.lenses)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.learn.learner import NetworkSpec, Weights
-from racecraft.learn.networks import Conv, architecture, pooled_shape, sky_rows
+from racecraft.learn.networks import Conv, architecture_of, pooled_shape, sky_rows
 
 Floats = NDArray[np.float32]
 
@@ -56,7 +56,7 @@ def grad_cam(spec: NetworkSpec, weights: Weights, frame: NDArray[np.uint8], *, t
         raise ConfigError("Grad-CAM explains networks that see one camera alone; this one has other sensors, too.")
     if frame.shape != spec.frame_shape:
         raise ShapeError(f"frame has shape {frame.shape}, expected {spec.frame_shape}.")
-    arch = architecture(spec.name)
+    arch = architecture_of(spec)
     x = _pooled(spec, frame)[None] / np.float32(255.0)
     maps = []
     for index, conv in enumerate(arch.convs, 1):
@@ -95,7 +95,7 @@ def grad_cam(spec: NetworkSpec, weights: Weights, frame: NDArray[np.uint8], *, t
 def _pooled(spec: NetworkSpec, frame: NDArray[np.uint8]) -> Floats:
     """The image as the first convolution sees it, rounded as training rounds it."""
     pixels = frame[sky_rows(spec) :].astype(np.uint16)
-    if architecture(spec.name).pool == 2:
+    if architecture_of(spec).pool == 2:
         height, width = pooled_shape(spec)
         pixels = (pixels.reshape(height, 2, width, 2).sum(axis=(1, 3)) + 2) >> 2
     return pixels.astype(np.float32)
@@ -129,7 +129,7 @@ def _on_the_frame(spec: NetworkSpec, picture: Floats, convs: tuple[Conv, ...]) -
     for conv in convs:
         first += 0.5 * (conv.kernel - 1) * stride
         stride *= conv.stride
-    pool, sky = architecture(spec.name).pool, sky_rows(spec)
+    pool, sky = architecture_of(spec).pool, sky_rows(spec)
     height, width = spec.frame_shape
     rows = ((np.arange(sky, height) - sky + 0.5) / pool - 0.5 - first) / stride
     columns = ((np.arange(width) + 0.5) / pool - 0.5 - first) / stride

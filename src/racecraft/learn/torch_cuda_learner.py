@@ -73,7 +73,7 @@ class CudaLearner:
     def encode_frames(self, frames: Tensor) -> Tensor:
         """What ``networks.encode`` makes of frames uint8 (N, H, W): (N, *observation_shape)."""
         pixels = frames[:, networks.sky_rows(self.spec) :]
-        if networks.architecture(self.spec.name).pool == 2:
+        if networks.architecture_of(self.spec).pool == 2:
             wide = pixels.to(torch.int16)
             rows = wide[:, 0::2] + wide[:, 1::2]
             pixels = ((rows[:, :, 0::2] + rows[:, :, 1::2] + 2) >> 2).to(torch.uint8)

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from racecraft.learn.learner import NetworkSpec
-from racecraft.learn.networks import CRITIC_UNITS, architecture, block_size, image_shape
+from racecraft.learn.networks import CRITIC_UNITS, architecture_of, block_size, image_shape
 
 Parameters = dict[str, Tensor]
 
@@ -51,7 +51,7 @@ def sensor_features(
     parameters: Parameters, observations: Tensor, *, spec: NetworkSpec, tower: str, dtype: torch.dtype
 ) -> Tensor:
     """What the head of a tower sees  (B, units of the last dense layer)."""
-    arch, block = architecture(spec.name, lenses=spec.lenses), block_size(spec)
+    arch, block = architecture_of(spec), block_size(spec)
     rows, columns, channels = image_shape(spec)
     size = rows * columns * channels
     flat = observations.flatten(1)
@@ -62,10 +62,8 @@ def sensor_features(
         if i == 1 and block > 1:
             weight, stride = _fold(weight, block), 1
         x = _ConvRelu.apply(x, weight, parameters[f"{tower}.conv{i}.bias"], stride)
-    x = x.permute(0, 2, 3, 1).flatten(1)
+    x = _beside_lidar(parameters, x.permute(0, 2, 3, 1).flatten(1), flat[:, size:], arch.lidar, tower=tower)
     for i in range(1, len(arch.dense) + 1):
-        if i == arch.camera_dense + 1:
-            x = _beside_lidar(parameters, x, flat[:, size:], arch.lidar, tower=tower)
         x = _linear(parameters, x, f"{tower}.dense{i}").relu_()
     return x
 

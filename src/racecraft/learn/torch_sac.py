@@ -50,8 +50,8 @@ class TorchSAC:
             torch.set_num_threads(num_threads)
         self.spec, self.config, self.state_size = spec, config, state_size
         size = spec.num_actions
-        self._tower = replace(spec, num_actions=2 * size, is_discrete=True, is_squashed=False, state_size=1)
-        self._camera = replace(self._tower, num_actions=_FEATURES)
+        self._tower = replace(spec, num_actions=2 * size, is_discrete=True, state_size=1)
+        self._camera = replace(self._tower, num_actions=_FEATURES, is_squashed=False)
         actor = networks.initial_weights(self._tower, seed=seed)
         actor["policy.head.bias"][size:] = BEGINNERS_LOG_STD
         generator = torch.Generator().manual_seed(seed)
