@@ -7,9 +7,14 @@ import io
 import json
 import tarfile
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
+from aws_models import AwsModel
+
 from racecraft.run.simtrace import COLUMNS
+
+Files = dict[str, str | bytes]
 
 REWARD = "def reward_function(params):\n    return float(params['progress'])\n"
 ACTIONS = [{"steering_angle": angle, "speed": 1.0, "index": place} for place, angle in enumerate((-30.0, 0.0, 30.0))]
@@ -67,15 +72,16 @@ HISTORY = {
     "logs/training/training-20240611-robomaker.log": "starting\nSIM_TRACE_LOG:" + simtrace().splitlines()[1] + "\n",
 }
 
-WEIGHTS = {
-    "model/.coach_checkpoint": "x",
-    "model/8_Step-100.ckpt.data-00000-of-00001": "weights",
-    "model/8_Step-100.ckpt.index": "x",
-    "model/model_8.pb": "graph",
-    "model/deepracer_checkpoints.json": "{}",
+GRAPH = AwsModel(num_actions=len(ACTIONS)).small_graph()
+WEIGHTS: Files = {
+    "model/.coach_checkpoint": "8_Step-100.ckpt",
+    "model/8_Step-100.ckpt.meta": "a graph that is not read",
+    "model/model_7.pb": "graph",
+    "model/model_8.pb": GRAPH,
+    "model/deepracer_checkpoints.json": json.dumps({"best_checkpoint": {"name": "8_Step-100.ckpt"}}),
 }
 
-DRFC = {
+DRFC: Files = {
     "run.env": "DR_WORLD_NAME=oval\nDR_LOCAL_S3_MODEL_PREFIX=my-model\n",
     "system.env": "DR_WORKERS=1\nDR_DOCKER_STYLE=swarm\n",
     "custom_files/reward_function.py": REWARD,
@@ -84,32 +90,36 @@ DRFC = {
     "defaults/reward_function.py": "this is no Python",
     "data/minio/bucket/my-model/metrics/TrainingMetrics.json": metrics(),
     "data/minio/bucket/my-model/training-simtrace/0-iteration.csv": simtrace(),
-    "data/minio/bucket/my-model/model/model_1.pb": "graph",
+    "data/minio/bucket/my-model/model/model_1.pb": GRAPH,
     "data/minio/bucket/other/reward_function.py": REWARD,
     "data/minio/bucket/other/training-simtrace/0-iteration.csv": "no sim-trace",
 }
 
 
-def as_folder(files: dict[str, str], folder: Path) -> Path:
+def _bytes(content: str | bytes) -> bytes:
+    return content.encode() if isinstance(content, str) else content
+
+
+def as_folder(files: Mapping[str, str | bytes], folder: Path) -> Path:
     for name, text in files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        path.write_bytes(_bytes(text))
     return folder
 
 
-def as_tar(files: dict[str, str], path: Path, *, prefix: str = "") -> Path:
+def as_tar(files: Mapping[str, str | bytes], path: Path, *, prefix: str = "") -> Path:
     with tarfile.open(path, "w:gz" if path.suffix == ".gz" else "w") as archive:
         for name, text in files.items():
-            data = text.encode()
+            data = _bytes(text)
             info = tarfile.TarInfo(prefix + name)
             info.size = len(data)
             archive.addfile(info, io.BytesIO(data))
     return path
 
 
-def as_zip(files: dict[str, str], path: Path, *, prefix: str = "") -> Path:
+def as_zip(files: Mapping[str, str | bytes], path: Path, *, prefix: str = "") -> Path:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in files.items():
-            archive.writestr(prefix + name, text)
+            archive.writestr(prefix + name, _bytes(text))
     return path

@@ -54,6 +54,10 @@ def attribute(name: str, value: bytes) -> bytes:
     return bytes_field(5, bytes_field(1, name) + bytes_field(2, value))
 
 
+VERSIONS = bytes_field(4, number(1, 134))
+"""What a graph ends in."""
+
+
 class GraphWriter:
     """A GraphDef, node by node."""
 
@@ -75,7 +79,7 @@ class GraphWriter:
         return self.node(name, "Placeholder", shape=bytes_field(7, shape_message(shape)), dtype=number(6, FLOAT))
 
     def bytes(self) -> bytes:
-        return b"".join(bytes_field(1, node) for node in self.nodes) + bytes_field(4, number(1, 134))
+        return b"".join(bytes_field(1, node) for node in self.nodes) + VERSIONS
 
 
 # ---- parse

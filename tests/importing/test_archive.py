@@ -8,8 +8,10 @@ import struct
 import tarfile
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -306,6 +308,14 @@ def test_a_bomb(pack: Callable[[dict[str, bytes]], bytes], tmp_path: Path) -> No
     path = tmp_path / "x.tar.gz"
     with pytest.raises(ArchiveError, match="only a bomb does"):
         list(read_archive(path))  # also when nobody reads the member
+
+
+def test_a_bomb_that_grows_less_is_one_when_it_is_large(tmp_path: Path) -> None:
+    data = gzip.compress(make_tar({str(i): np.random.default_rng(i).bytes(200) + bytes(9_800) for i in range(100)}))
+    limits = Limits(ratio_grace=1000, large_bytes=900_000)
+    with pytest.raises(ArchiveError, match="more than 20 times its size, as only a bomb does"):
+        read(data, tmp_path, limits=limits)
+    read(data, tmp_path, limits=replace(limits, large_bytes=2_000_000))
 
 
 def test_a_header_that_claims_more_than_there_is(tmp_path: Path) -> None:

@@ -36,8 +36,8 @@ def test_it_says_what_it_did_and_how_to_go_on(
         "DR_WORKERS  cars drive side by side",
         "DR_WORLD_NAM  unknown, has no effect. Did you mean 'DR_WORLD_NAME'?",
         "2 metrics, sim-traces and logs",
-        "TensorFlow's weights",
-        "begins with fresh ones",
+        "model/model_1.pb  weights of the policy",
+        "its critic begins anew",
         "racecraft train --resume runs/mine",
     ):
         assert words in out, words

@@ -36,6 +36,7 @@ def test_a_virtual_model_gives_the_same_run_from_a_folder_and_from_archives(tmp_
     for name, text in models.HISTORY.items():
         assert first[f"original/{name}"] == text.encode()
     assert not any(name.endswith((".pb", ".mp4")) or "ckpt" in name for name in first)
+    assert found[0].used["model/model_8.pb"] == "weights of the policy"
     assert any("TensorFlow" in why for why in found[0].unused.values())
     assert "JOB_TYPE" in found[0].unused
 
@@ -58,7 +59,9 @@ def test_a_drfc_folder(tmp_path: Path) -> None:
     assert found.run.name.startswith("my-model-")
     assert found.kind == "deepracer-for-cloud folder, folder drfc"
     assert sorted(found.kept) == ["metrics/TrainingMetrics.json", "training-simtrace/0-iteration.csv"]
-    assert (found.unknown, found.notes, found.track) == ({}, [], "oval")
+    assert (found.unknown, found.track) == ({}, "oval")
+    assert found.used["model/model_1.pb"] == "weights of the policy"
+    assert [note[:26] for note in found.notes] == ["The model's critic is not "]
     assert {"DR_WORKERS", "DR_DOCKER_STYLE"} <= found.unused.keys()
     report = json.loads((found.run / "original" / "import.json").read_text())
     assert report["used"] == found.used
@@ -83,9 +86,8 @@ def test_a_reward_function_alone_and_with_files_beside_it(tmp_path: Path) -> Non
     assert (settings.track, settings.direction, settings.network) == ("oval", "reverse", "RACECRAFT_SMALL")
 
 
-def test_a_cars_archive_needs_a_reward(tmp_path: Path) -> None:
-    car = {"model_metadata.json": models.METADATA, "agent/model.pb": "graph"}
-    archive = models.as_tar(car, tmp_path / "model.tar.gz")
+def test_a_model_without_weights_needs_a_reward(tmp_path: Path) -> None:
+    archive = models.as_tar({"model_metadata.json": models.METADATA}, tmp_path / "model.tar.gz")
     with pytest.raises(SourceError, match=r"has no reward_function\.py") as caught:
         import_run(archive)
     assert "--reward" in caught.value.hint

@@ -21,15 +21,23 @@ def import_(
     reward: Annotated[
         str, typer.Option("--reward", "-r", help="Preset or file; by default the files' own reward function.")
     ] = "",
-    network: Annotated[str, typer.Option("--network", help="RACECRAFT_SMALL is much faster than AWS's.")] = "",
+    network: Annotated[
+        str, typer.Option("--network", help="RACECRAFT_SMALL is much faster than AWS's, and begins with fresh weights.")
+    ] = "",
+    checkpoint: Annotated[
+        str,
+        typer.Option(
+            "--checkpoint", "-c", help="Whose weights: best, last, an iteration, a file's name, or none for fresh ones."
+        ),
+    ] = "best",
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the run.")] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
     as_json: Json = False,
 ) -> None:
-    """Make a run from files of the original; it runs none of them."""
+    """Make a run from files of the original, with the weights that AWS trained; it runs none of them."""
     from racecraft.importing import import_run
 
-    result = import_run(path, root=runs, name=name, track=track, reward=reward, network=network)
+    result = import_run(path, root=runs, name=name, track=track, reward=reward, network=network, checkpoint=checkpoint)
     if as_json:
         print_json(result.to_dict())
     else:

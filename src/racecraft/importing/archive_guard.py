@@ -30,6 +30,10 @@ class Limits:
     """Unpacked to packed size; beyond it the archive is a bomb."""
     ratio_grace: int = 1 << 22
     """Unpacked bytes before the ratio counts: padding shrinks to nothing."""
+    large_ratio: int = 20
+    """The same ratio of what is large: weights hardly shrink, logs to an eighth."""
+    large_bytes: int = 1 << 28
+    """Unpacked bytes that are large."""
 
 
 class Member(Protocol):
@@ -85,8 +89,10 @@ class Guard:
 
     def check_ratio(self, unpacked: int, packed: int) -> None:
         """Refuse what grows more than a model does."""
-        if unpacked > self.limits.ratio_grace and unpacked > self.limits.ratio * packed:
-            self.refuse(f"grows to more than {self.limits.ratio} times its size, as only a bomb does")
+        limits = self.limits
+        ratio = limits.large_ratio if unpacked > limits.large_bytes else limits.ratio
+        if unpacked > limits.ratio_grace and unpacked > ratio * packed:
+            self.refuse(f"grows to more than {ratio} times its size, as only a bomb does")
 
     def refuse(self, what: str) -> NoReturn:
         """Raise; ``what`` continues the archive's name to a sentence."""

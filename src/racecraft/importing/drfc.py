@@ -52,6 +52,8 @@ FILES: Final = {
 
 MODEL_PREFIX: Final = "DR_LOCAL_S3_MODEL_PREFIX"
 PRETRAINED: Final = "DR_LOCAL_S3_PRETRAINED"
+PRETRAINED_PREFIX: Final = "DR_LOCAL_S3_PRETRAINED_PREFIX"
+PRETRAINED_CHECKPOINT: Final = "DR_LOCAL_S3_PRETRAINED_CHECKPOINT"
 
 ALIASES: Final = {
     "DR_CHANGE_START_POSITION": "DR_TRAIN_CHANGE_START_POSITION",
@@ -137,8 +139,10 @@ class DrfcSettings:
     """Other settings that have a meaning, and what each becomes."""
     prefix: str
     """Name of the model; empty where it is not given."""
-    is_pretrained: bool
-    """It was to go on from another model's weights."""
+    pretrained: str
+    """Name of the model whose weights it was to go on from; empty where there is none."""
+    pretrained_checkpoint: str
+    """Which of them: ``best`` or ``last``."""
     without_effect: dict[str, str]
     """Known settings that mean nothing here, and why."""
     unknown: dict[str, str]
@@ -174,9 +178,9 @@ def read_drfc(env: EnvFile, *, name: str) -> DrfcSettings:
         del without_effect[key]
     if MODEL_PREFIX in values:
         used[f"{MODEL_PREFIX}={values[MODEL_PREFIX]}"] = "name of the run, and of the folder of its history"
-    is_pretrained = values.get(PRETRAINED, "").lower() == "true"
+    pretrained = values.get(PRETRAINED_PREFIX, "") if values.get(PRETRAINED, "").lower() == "true" else ""
     if PRETRAINED in values:
-        why = "weights of the original are not read" if is_pretrained else "training begins with fresh weights"
+        why = "counts until the model has weights of its own" if pretrained else "there is no other model to go on from"
         without_effect[f"{PRETRAINED}={values[PRETRAINED]}"] = why
     return DrfcSettings(
         params=params,
@@ -186,7 +190,8 @@ def read_drfc(env: EnvFile, *, name: str) -> DrfcSettings:
         files=files,
         used=used,
         prefix=values.get(MODEL_PREFIX, ""),
-        is_pretrained=is_pretrained,
+        pretrained=pretrained,
+        pretrained_checkpoint="best" if values.get(PRETRAINED_CHECKPOINT) == "best" else "last",
         without_effect=without_effect,
         unknown=unknown,
         notes=tuple(notes),

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean
@@ -25,15 +27,21 @@ from racecraft.importing.layout import (
     METADATA,
     PLACES,
     REWARD,
+    RUN,
     RUN_ENV,
     SYSTEM_ENV,
     TRAINING_PARAMS,
     find_root,
+    role,
 )
+from racecraft.importing.model_files import BEST, ModelFiles, choose_model, find_models
 from racecraft.importing.own import read_own
+from racecraft.importing.policy_weights import has_critic
 from racecraft.importing.report import ImportedRun, unused_files
 from racecraft.importing.source import Source, SourceFile, open_source
+from racecraft.importing.weights import open_model, read_weights, save_weights
 from racecraft.json_file import parse_json_object
+from racecraft.learn.learner import Weights
 from racecraft.race.rules import RaceRules
 from racecraft.reward import check_reward, load_reward, validate_reward
 from racecraft.reward.sandbox import find_confinement
@@ -41,6 +49,7 @@ from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.run.training_params import TrainingParams
 from racecraft.track import Track, load_track, track_names
+from racecraft.training.defaults import TIME_TRIAL
 from racecraft.training.settings import DEFAULT_TRACK, make_settings
 from racecraft.training.start import require_trainable, write_run
 
@@ -64,6 +73,8 @@ class _Model:
     unused: dict[str, str] = field(default_factory=dict)
     unknown: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    weights: ModelFiles | None = None
+    """Whose weights the run begins with."""
 
     def find(self, name: str) -> str:
         """Path of a settings file, or an empty string."""
@@ -86,6 +97,7 @@ def import_run(
     track: str = "",
     reward: str | Path = "",
     network: str = "",
+    checkpoint: str = BEST,
 ) -> ImportedRun:
     """Make a run from files of the original.
 
@@ -95,14 +107,18 @@ def import_run(
         name: Name of the run; by default made from the model's.
         track: Name or file of a track, instead of the world that the files name.
         reward: Preset or file, instead of the reward function among the files.
-        network: Instead of the network that the files name.
+        network: Instead of the network that the files name; then it begins with fresh weights.
+        checkpoint: Which weights it begins with, where there are several: ``best``, ``last``, an iteration or a file's
+            name; ``none`` for fresh ones.
 
     Raises:
         RacecraftError: Nothing is understood, something is wrong in the files, or hostile. No run was made.
     """
-    with open_source(path) as source:
+    with ExitStack() as stack:
+        source = stack.enter_context(open_source(path))
         model = _Model(source, "" if source.reward else find_root(source.files, source=source.title))
         params, given = _read_params(model)
+        model.weights = _find_weights(model, checkpoint, network)
         text = _read_reward(model, reward)
         metadata = _read_metadata(model)
         own = None if track or reward or network else read_own(source, model.root)
@@ -118,13 +134,27 @@ def import_run(
         job = job_settings(params, given)
         model.used.update(job.used)
         model.unused.update(job.unused)
+        tensors = None
+        if own is None and model.weights is not None:
+            with _or_fresh_weights():
+                tensors = stack.enter_context(open_model(source, model.weights))
         if own is not None:
             settings = own.settings
         else:
             settings = make_settings(
-                metadata=metadata, hyperparameters=hyperparameters, network=network, track=label, **job.values
+                metadata=metadata,
+                hyperparameters=hyperparameters,
+                network=network,
+                track=label,
+                critic="camera" if tensors is not None and has_critic(tensors) else "",
+                **job.values,
             )
         require_trainable(settings, metadata)
+        spec = settings.network_spec(metadata)
+        weights: Weights = {}
+        if tensors is not None:
+            with _or_fresh_weights():
+                weights = read_weights(tensors, spec, metadata.suite, model.notes)
         if network:
             model.used[f"--network {network}"] = "network"
         rules = _race_rules(model, settings.direction)
@@ -135,6 +165,8 @@ def import_run(
             history = keep_history(_history_files(model), _history_root(model), place)
             if own is not None:
                 model.used.update(own.restore(folder, model.notes))
+            if model.weights is not None and weights:
+                save_weights(folder, weights, spec, _origin(model, model.weights, has_critic=not spec.state_size))
             report = _report(model, folder, tracks[0], history)
             if rules is not None:
                 write_json(folder.race_rules, rules.to_dict())
@@ -171,8 +203,6 @@ def _read_params(model: _Model) -> tuple[TrainingParams, dict[str, str]]:
         model.unused.update(drfc.without_effect)
         model.unknown.update(drfc.unknown)
         model.notes += drfc.notes
-        if drfc.is_pretrained:
-            model.notes.append("The model was to go on from another one's weights; this run begins with fresh ones.")
         return drfc.params, drfc.given
     place = model.find(TRAINING_PARAMS)
     if not place:
@@ -184,6 +214,41 @@ def _read_params(model: _Model) -> tuple[TrainingParams, dict[str, str]]:
     return params, given
 
 
+def _find_weights(model: _Model, checkpoint: str, network: str) -> ModelFiles | None:
+    """The trained weights among the files, if they are wanted and can be understood."""
+    if network or not model.find(METADATA) or model.root + RUN in model.source.files:
+        return None
+    names = [file.name for file in _history_files(model) if role(file.name) == "weights"]
+    drfc = model.drfc
+    if drfc is not None and drfc.pretrained and not find_models(names):
+        other = f"{model.root}{BUCKET}/{drfc.pretrained}/"
+        names = [name for name in model.source.files if name.startswith(other) and role(name) == "weights"]
+        checkpoint = drfc.pretrained_checkpoint if checkpoint == BEST else checkpoint
+        begins = f"the {checkpoint} ones" if find_models(names) else "fresh ones, since they are not among the files"
+        model.notes.append(f"The model was to go on from the weights of {drfc.pretrained!a}; it begins with {begins}.")
+    return choose_model(model.source, names, checkpoint, model.notes)
+
+
+@contextmanager
+def _or_fresh_weights() -> Iterator[None]:
+    """Within, an error of the weights says how to do without them."""
+    try:
+        yield
+    except SourceError as error:
+        hint = f"{error.hint} With --checkpoint none the run begins with fresh weights.".strip()
+        raise SourceError(str(error), hint=hint) from error
+
+
+def _origin(model: _Model, weights: ModelFiles, *, has_critic: bool) -> dict[str, Any]:
+    """Where weights come from, for the checkpoint; and for the user."""
+    shown = " and ".join(path.removeprefix(_history_root(model)) for path in weights.paths)
+    model.used[shown] = "weights of the policy and the critic" if has_critic else "weights of the policy"
+    if not has_critic:
+        model.notes.append("The model's critic is not in the files: should it be trained, its critic begins anew.")
+    origin = {"file": weights.name, "iteration": weights.iteration, "steps": weights.steps}
+    return {name: value for name, value in origin.items() if value != -1}
+
+
 def _read_reward(model: _Model, reward: str | Path) -> str:
     name = model.source.reward or model.find(REWARD)
     if reward:
@@ -191,6 +256,9 @@ def _read_reward(model: _Model, reward: str | Path) -> str:
         model.used[f"--reward {reward}"] = REWARD
         if name:
             model.unused[model.shown(name)] = "--reward was given"
+    elif not name and model.weights is not None:
+        text = load_reward(TIME_TRIAL.reward)
+        model.notes.append(f"There is no {REWARD}: should it be trained, then with the preset {TIME_TRIAL.reward!r}.")
     elif not name:
         raise SourceError(
             f"{model.source.title} has no {REWARD}, without which nothing can be trained.",
@@ -302,7 +370,9 @@ def _history_files(model: _Model) -> list[SourceFile]:
 
 
 def _report(model: _Model, folder: RunFolder, track: Track, history: History) -> ImportedRun:
-    model.unused.update(unused_files(_history_files(model), _history_root(model)))
+    read = () if model.weights is None else model.weights.paths
+    left = [file for file in _history_files(model) if file.name not in read]
+    model.unused.update(unused_files(left, _history_root(model)))
     model.unused.update({name: f"left out: {why}" for name, why in history.refused.items()})
     if model.source.num_links:
         model.unused[f"{model.source.num_links} links"] = "links are not followed"

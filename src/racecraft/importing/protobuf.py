@@ -53,16 +53,16 @@ class Wire:
             self._left -= 1
             if self._left < 0:
                 self.refuse("has more fields than a model has")
-            key, place = self._varint(message, place)
+            key, place = self.varint(message, place)
             number, wire_type = key >> 3, key & 7
             if number == 0:
                 self.refuse("is damaged: a field has the number 0")
             if wire_type == _VARINT:
-                value, place = self._varint(message, place)
+                value, place = self.varint(message, place)
                 yield Field(number, value, _EMPTY)
                 continue
             if wire_type == _BYTES:
-                size, place = self._varint(message, place)
+                size, place = self.varint(message, place)
             elif wire_type in (_FIXED32, _FIXED64):
                 size = 4 if wire_type == _FIXED32 else 8
             else:
@@ -89,7 +89,7 @@ class Wire:
         """Raise; ``what`` continues the file's name to a sentence."""
         raise SourceError(f"{self.name} {what}.")
 
-    def _varint(self, data: memoryview, place: int) -> tuple[int, int]:
+    def varint(self, data: memoryview, place: int) -> tuple[int, int]:
         """A number, 64 bits at most, and where what follows begins."""
         value = 0
         for i, byte in enumerate(data[place : place + _MAX_VARINT]):

@@ -11,7 +11,7 @@ from racecraft.importing.layout import Role, role
 from racecraft.importing.source import SourceFile
 
 _WHY: dict[Role, str] = {
-    "weights": "TensorFlow's weights: Racecraft reads none of its files, so training begins with fresh weights",
+    "weights": "other weights of the model, and what TensorFlow needs beside them",
     "video": "videos and pictures are not needed",
     "code": "code besides the reward function is neither run nor kept",
     "archive": "archives inside are not opened; import one by itself",

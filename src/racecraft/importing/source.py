@@ -22,7 +22,7 @@ from racecraft.json_file import read_text
 
 MAX_FILES: Final = 100_000
 MAX_DEPTH: Final = 20
-MAX_KEPT_BYTES: Final = 1 << 30  # of an archive's members that are put into the temporary folder
+MAX_KEPT_BYTES: Final = 1 << 31  # of an archive's members that are put into the temporary folder
 MAX_BYTES: Final[dict[Role, int]] = {
     "settings": 1 << 20,
     "code": 1 << 20,
@@ -30,6 +30,7 @@ MAX_BYTES: Final[dict[Role, int]] = {
     "trace": 1 << 28,
     "log": 1 << 28,
     "own": 1 << 28,
+    "weights": 1 << 29,
 }
 """Largest file of a role that is read; the other roles are not read at all."""
 _SKIPPED: Final = (".git", ".venv", "venv", "node_modules", "__pycache__", "__MACOSX")
@@ -93,7 +94,7 @@ def open_source(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> Iterato
         raise SourceError(f"There is no file or folder {str(path)[:200]!r} to import.")
     elif path.suffix == ".py":
         yield _single(path)
-    elif path.name in PLACES or path.suffix in (".json", ".yaml", ".env", ".csv", ".log"):
+    elif path.name in PLACES or path.suffix in (".json", ".yaml", ".env", ".csv", ".log", ".pb", ".index"):
         raise SourceError(
             f"{path.name} alone is no model.", hint=f"Import the folder it lies in: racecraft import {path.parent}"
         )
@@ -147,10 +148,12 @@ def _archive(path: Path, folder: Path, limits: Limits) -> Source:
         base = member.name.rpartition("/")[2]
         if base.startswith("._") or member.name.startswith("__MACOSX/"):
             continue  # what macOS puts beside every file
-        if member.size <= MAX_BYTES.get(role(member.name), -1) and is_plain(base):
+        if member.size <= MAX_BYTES.get(role(member.name), -1) and is_plain(base.removeprefix(".")):
             total += member.size
             if total > MAX_KEPT_BYTES:
-                raise SourceError(f"{path.name} holds more than {MAX_KEPT_BYTES:,} bytes of logs and settings.")
+                raise SourceError(
+                    f"{path.name} holds more than {MAX_KEPT_BYTES:,} bytes of logs, weights and settings."
+                )
             kept = folder / str(number) / base
             kept.parent.mkdir()
             with kept.open("xb") as file:

@@ -48,7 +48,7 @@ from racecraft.training.environment import TrainingEnvironment, open_simulation
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
 from racecraft.training.opponents import OpponentPool
-from racecraft.training.parent import begin_from
+from racecraft.training.parent import begin_from, is_weights_only
 from racecraft.training.progress import EvaluationReport, IterationReport, Reporter, SilentReporter, TrainResult
 from racecraft.training.start import aws_hyperparameters, read_settings, require_trainable, require_valid_reward
 from racecraft.training.stop import Until
@@ -138,7 +138,7 @@ class Training:
         settings, folder = self.settings, self.folder
         metadata = folder.read_model_metadata()
         require_trainable(settings, metadata)
-        saved = self._last_checkpoint()
+        saved, begun = self._beginning()
         resumed = saved.metadata if saved is not None else {}
         source, is_foreign = folder.read_reward_function(), folder.read_info().foreign
 
@@ -153,8 +153,8 @@ class Training:
             if not self.is_checked:
                 require_valid_reward(source, tracks[0], foreign=is_foreign)
             learner = future.result()
-            if saved is None and folder.read_info().parent is not None:
-                begin_from(learner, folder.parent_checkpoint.load())
+            if begun is not None:
+                begin_from(learner, begun)
 
         with ExitStack() as stack:
             # A function that remembers something gets a memory for each car: on AWS one process drove one car.
@@ -390,6 +390,15 @@ class Training:
         for text in dict.fromkeys(str(warning.message) for warning in caught):
             self.reporter.note(text)
         return saved
+
+    def _beginning(self) -> tuple[Checkpoint | None, Checkpoint | None]:
+        """The checkpoint to resume from, or else the weights to begin with: imported ones, or a parent's."""
+        saved = self._last_checkpoint()
+        if saved is not None and is_weights_only(saved):
+            return None, saved
+        if saved is None and self.folder.read_info().parent is not None:
+            return None, self.folder.parent_checkpoint.load()
+        return saved, None
 
     def _load_state(self, session: _Session, saved: Checkpoint) -> None:
         arrays, metadata = saved.arrays, saved.metadata

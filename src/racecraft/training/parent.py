@@ -127,6 +127,11 @@ def fitting(weights: Mapping[str, NDArray[Any]], spec: NetworkSpec) -> Arrays:
     return {name: given[name] for name in shapes if name in same}
 
 
+def is_weights_only(saved: Checkpoint) -> bool:
+    """Whether a checkpoint has no training of ours behind it: `racecraft import` made it of a model's weights."""
+    return "origin" in saved.metadata
+
+
 def begin_from(learner: Learner, saved: Checkpoint) -> None:
     """Give a learner with fresh weights those of a parent that fit it.
 

@@ -1,0 +1,152 @@
+"""Models that the original trained become runs that drive, and go on learning, like any other."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import models
+import numpy as np
+import pytest
+from aws_models import DEEP, AwsModel
+from runs_made import nothing_was_made
+
+from racecraft import evaluate, resume, train
+from racecraft.errors import SourceError
+from racecraft.importing import import_run
+from racecraft.race import load_driver
+from racecraft.run import RunFolder
+from racecraft.training.start import read_settings
+
+SHARED = Path(__file__).parents[3] / "shared"
+AWS_MODEL = SHARED / "aws_model"
+ROUTES = ("reinvent_base", "reinvent_2018", "reInvent2019_wide", "oval")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not AWS_MODEL.is_dir(), reason="the models are not in the repository")
+def test_what_aws_trained_drives_twenty_of_twenty_laps_at_first_sight() -> None:
+    found = import_run(AWS_MODEL, track="reinvent_2018", name="aws")
+    assert found.used["model_48.pb"] == "weights of the policy"
+    laps = {}
+    for route in ROUTES:
+        shared = SHARED / "tracks" / f"{route}.npy"
+        raced = evaluate(found.run, track=str(shared if shared.exists() else route), laps=1, num_trials=5, video=False)
+        laps[route] = sum(trial.num_offtrack == 0 and len(trial.laps) == 1 for trial in raced.evaluation.trials)
+    assert laps == dict.fromkeys(ROUTES, 5)
+
+
+def small(actions: int = 3, **changes: str) -> models.Files:
+    return {"model_metadata.json": json.dumps(AwsModel(num_actions=actions).metadata()), **changes}
+
+
+def imported(path: Path, **options: str) -> tuple[str, list[str]]:
+    """The file whose weights were taken, and the notes."""
+    found = import_run(path, name=f"n{len(list(Path('runs').glob('*')))}", track="oval", **options)
+    store = RunFolder.open(found.run).checkpoints
+    return (store.load().metadata["origin"]["file"] if store.entries() else "", found.notes)
+
+
+def test_best_last_a_named_one_or_none(tmp_path: Path) -> None:
+    index = {"best_checkpoint": {"name": "7_Step-70.ckpt"}, "last_checkpoint": {"name": "9_Step-90.ckpt"}}
+    files = {
+        **small(),
+        "model/deepracer_checkpoints.json": json.dumps(index),
+        **{f"model/model_{i}.pb": models.GRAPH for i in (7, 8, 9)},
+    }
+    folder = models.as_folder(files, tmp_path / "m")
+    assert imported(folder)[0] == "model_7.pb"
+    assert imported(folder, checkpoint="last")[0] == "model_9.pb"
+    for name in ("8", "model_8.pb", "model/model_8.pb", "8_Step-80.ckpt"):
+        assert imported(folder, checkpoint=name)[0] == "model_8.pb"
+    assert imported(folder, checkpoint="none", reward="centerline")[0] == ""
+    with pytest.raises(SourceError, match=r"has no checkpoint '6'; it has model_7\.pb, model_8\.pb, model_9\.pb"):
+        imported(folder, checkpoint="6")
+    (folder / "model/deepracer_checkpoints.json").unlink()
+    (folder / "model/.coach_checkpoint").write_text("8_Step-80.ckpt\n")
+    assert imported(folder, checkpoint="last")[0] == "model_8.pb"
+    name, notes = imported(folder)
+    assert name == "model_9.pb"
+    assert any("model_9.pb was taken of 3 states" in note for note in notes)
+
+
+@pytest.mark.parametrize("damage", ["{", "[]", '{"best_checkpoint": 7}', '{"best_checkpoint": {"name": "../../etc"}}'])
+def test_an_index_that_says_nothing_is_no_hindrance(damage: str, tmp_path: Path) -> None:
+    files = {**small(), "model/deepracer_checkpoints.json": damage, "model/model_7.pb": models.GRAPH}
+    assert imported(models.as_folder(files, tmp_path / "m"))[0] == "model_7.pb"
+
+
+def test_a_car_s_archive_and_every_place_of_a_graph(tmp_path: Path) -> None:
+    for place in ("agent/model.pb", "model.pb", "model/model_3.pb", "output/frozen.pb"):
+        files = {**small(), place: models.GRAPH, "worker_0.multi_agent_graph_0.json": "{}"}
+        for source in (
+            models.as_tar(files, tmp_path / f"{len(place)}.tar.gz"),
+            models.as_zip(files, tmp_path / f"{len(place)}.zip", prefix="wrapped/"),
+        ):
+            assert imported(source)[0] == place.rpartition("/")[2]
+    two = models.as_folder({**small(), "a.pb": models.GRAPH, "b.pb": models.GRAPH}, tmp_path / "two")
+    with pytest.raises(SourceError, match=r"holds 2 graphs: a\.pb, b\.pb") as caught:
+        imported(two)
+    assert "--checkpoint FILE" in caught.value.hint
+    assert imported(two, checkpoint="b.pb")[0] == "b.pb"
+
+
+def test_the_weights_of_the_pretrained_model_until_there_are_own_ones(tmp_path: Path) -> None:
+    env = "DR_WORLD_NAME=oval\nDR_LOCAL_S3_MODEL_PREFIX=my-model\nDR_LOCAL_S3_PRETRAINED=True\n"
+    env += "DR_LOCAL_S3_PRETRAINED_PREFIX=older\n"
+    files = {**models.DRFC, "run.env": env, "data/minio/bucket/older/model/model_4.pb": models.GRAPH}
+    assert imported(models.as_folder(files, tmp_path / "a"))[0] == "model_1.pb"
+    del files["data/minio/bucket/my-model/model/model_1.pb"]
+    name, notes = imported(models.as_folder(files, tmp_path / "b"))
+    assert name == "model_4.pb"
+    assert any("the weights of 'older'; it begins with the last ones" in note for note in notes)
+    del files["data/minio/bucket/older/model/model_4.pb"]
+    name, notes = imported(models.as_folder(files, tmp_path / "c"))
+    assert name == ""
+    assert any("it begins with fresh ones" in note for note in notes)
+
+
+def test_a_checkpoint_goes_on_learning_where_it_stopped(tmp_path: Path) -> None:
+    model = AwsModel(DEEP, kind="continuous")
+    model.write(tmp_path / "m", graph="model/model_8.pb", checkpoint="model/8_Step-100.ckpt")
+    settings = {"lr": 1e-8, "num_episodes_between_training": 1, "num_epochs": 3, "batch_size": 64}
+    (tmp_path / "m" / "hyperparameters.json").write_text(json.dumps(settings))
+    found = import_run(tmp_path / "m", name="mine", track="oval", reward="centerline")
+    assert "weights of the policy and the critic" in found.used.values()
+    folder = RunFolder.open(found.run)
+    assert read_settings(folder).critic == "camera"
+    begin = folder.checkpoints.load()
+    assert begin.metadata["origin"] == {"file": "8_Step-100.ckpt", "iteration": 8, "steps": 100}
+    assert begin.arrays["weights/policy.log_std"].tolist() == [-0.5, 0.25]
+    assert resume(found.run, until="1 steps").steps > 0
+    after = folder.checkpoints.load()
+    assert after.step > 0
+    learned = [name for name in begin.arrays if not np.array_equal(after.arrays[name], begin.arrays[name])]
+    assert learned  # it did learn
+    for name, array in begin.arrays.items():
+        assert np.abs(after.arrays[name] - array).max() < 1e-4, name
+    assert resume(found.run, until="1 steps").steps >= after.step  # and resumes as any run does
+
+
+def test_another_run_begins_from_it(tmp_path: Path) -> None:
+    model = AwsModel(DEEP)
+    model.write(tmp_path / "m", graph="agent/model.pb")
+    found = import_run(tmp_path / "m", name="aws", track="oval")
+    theirs = RunFolder.open(found.run).checkpoints.load()
+    child = train("oval", reward="centerline", parent=str(found.run), until="1 steps", name="child", num_envs=2)
+    ours = RunFolder.open(child.run).parent_checkpoint.load()
+    for name, array in theirs.arrays.items():
+        assert np.array_equal(ours.arrays[name], array)
+    assert load_driver(found.run).learner.spec.name == DEEP
+
+
+def test_settings_of_its_own_make_no_use_of_weights(tmp_path: Path) -> None:
+    folder = models.as_folder({**small(), "reward_function.py": models.REWARD, "model.pb": b"nonsense"}, tmp_path / "m")
+    with pytest.raises(SourceError, match=r"model\.pb is damaged") as caught:
+        imported(folder)
+    assert "--checkpoint none" in caught.value.hint
+    assert nothing_was_made()
+    assert imported(folder, checkpoint="none")[0] == ""
+    assert imported(folder, network="RACECRAFT_SMALL")[0] == ""
+    with pytest.raises(SourceError, match="alone is no model"):
+        import_run(folder / "model.pb")
