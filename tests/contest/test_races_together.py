@@ -118,6 +118,9 @@ def test_two_that_are_put_back_at_once_do_not_stand_in_each_other() -> None:
     s, offset = OVAL.project(np.array([found.x, found.y]))
     assert float(s) < 3.0
     assert abs(float(offset)) == pytest.approx(0.25 * OVAL.widths[0], abs=0.02)
+    ahead = OVAL.point_at(3.3)[None]  # in the way by less than a step of the search
+    found = clear_pose(OVAL, Pose(*OVAL.point_at(3.0), 0.0), ahead)
+    assert float(OVAL.project(np.array([found.x, found.y]))[0]) == pytest.approx(2.75, abs=0.02)
     here = Pose(x, y, 0.3)
     assert clear_pose(OVAL, here, np.zeros((0, 2))) == here
     everywhere = OVAL.point_at(np.arange(0.0, OVAL.length, 0.1))

@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
-from racecraft.race import Autopilot, RaceRules, completion, evaluate, trial_simulation
+from racecraft.race import Autopilot, RaceRules, Recording, completion, evaluate, trial_simulation
+from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.placement import line_up, reset_pose, start_pose
 from racecraft.sim import ROW_COLUMNS, STATE_COLUMNS, Vehicle
+from racecraft.sim.columns import STATUS_NAMES
 from racecraft.track import Track, load_track
 
 OVAL, RING, STRAIGHT = load_track("oval"), load_track("reinvent_2018"), load_track("straight")
@@ -318,6 +320,63 @@ def test_on_several_tracks_every_trial_starts_off_its_own():
         for trial in range(6):
             pose = start_pose(driven[trial % 3], rules, seed=4, trial=trial)
             assert simulation.vehicles[:3, trial] == pytest.approx(pose, abs=1e-5), (direction, trial)
+
+
+def test_laps_flow_on_where_every_track_is_a_circuit():
+    laps = {
+        tracks: trial_simulation(tracks, rules=RaceRules(laps=3), camera=None).laps
+        for tracks in ((OVAL, RING), (OVAL, STRAIGHT), (STRAIGHT,))
+    }
+    assert list(laps.values()) == [3, 1, 1]
+
+
+@pytest.mark.parametrize("starts", ["line", "lap"])
+def test_every_start_is_logged_in_its_lap_and_progress_goes_on_after_a_mistake(starts):
+    (trial,) = drive(
+        Constant(0.0, 1.0), laps=2, is_continuous=False, max_resets=1000, offtrack_penalty=1.0, starts=starts, seed=3
+    ).trials
+    recording = trial.recording
+    statuses, progress, place = (
+        recording.statuses,
+        recording.column("progress"),
+        recording.column("projection_distance"),
+    )
+    begun = [step for step, status in enumerate(statuses) if status == "prepare"]
+    assert recording.column("lap")[begun].tolist() == [0, 1]
+    mistakes = [step for step, status in enumerate(statuses) if status == "off_track"]
+    assert len(mistakes) > 4
+    for step in mistakes:
+        assert statuses[step + 1] == "pause"
+        moved = (place[step + 1] - place[step - 1] + OVAL.length / 2) % OVAL.length - OVAL.length / 2
+        assert progress[step + 1] - progress[step - 1] == pytest.approx(moved / OVAL.length, abs=1e-4)
+
+
+def test_the_default_reward_by_hand():
+    """AWS's: full up to and at a tenth of the width from the centre line, on either side, and less in steps."""
+    offsets = np.array([0.0, 0.2, -0.2, 0.21, 0.5, -0.51, 1.0, 1.01])
+    rows = np.zeros((len(offsets), len(ROW_COLUMNS)))
+    rows[:, ROW_COLUMNS.index("offset")], rows[:, ROW_COLUMNS.index("track_width")] = offsets, 2.0
+    assert centerline_rewards(rows).tolist() == [1.0, 1.0, 1.0, 0.5, 0.5, 0.1, 0.1, 1e-3]
+
+
+def test_distances_times_and_rewards_of_a_recording_by_hand():
+    statuses = ("prepare", "in_progress", "pause", "lap_complete", "in_progress")
+    rows = np.zeros((5, len(ROW_COLUMNS)))
+    values = {
+        "status": [STATUS_NAMES.index(status) for status in statuses],
+        "lap": [0, 0, 0, 1, 1],
+        "progress": [-0.1, 0.5, 1.2, 1.0, 0.25],
+        "track_width": [1.0] * 5,
+    }
+    for name, column in values.items():
+        rows[:, ROW_COLUMNS.index(name)] = column
+    clock = np.arange(5) * DT
+    recording = Recording(OVAL, rows, clock, np.zeros((5, 2), np.float32))
+    assert recording.distances.tolist() == [0.0, 0.5, 1.0, 1.0, 1.25]
+    # the last step begun: half a step of slack, as clocks count steps
+    asked = np.array([-1.0, 0.0, 0.4 * DT, 0.6 * DT, DT, 3.4 * DT, 99.0])
+    assert recording.steps_at(asked).tolist() == [0, 0, 0, 1, 1, 3, 4]
+    assert recording.rewards.tolist() == [0.0, 1.0, 0.0, 1.0, 1.0]  # none while it stands
 
 
 def test_completion_stops_a_slow_car():

@@ -49,6 +49,7 @@ LENGTH = RING.length
         (5.0, 0.1, [(8.0, 0.2)], {}, 5.0, 1),  # far from everything: as without objects
         (5.0, 0.1, [(5.9, 0.2)], {}, 4.9, -1),  # an object ahead: 1 m behind it, in the other lane
         (5.0, -0.1, [(5.9, -0.2)], {}, 4.9, 1),
+        (5.0, 0.1, [(9.0, -0.2), (5.9, 0.2)], {}, 4.9, -1),  # the nearest one counts
         (5.0, 0.1, [(4.5, 0.2)], {}, 3.5, -1),  # and the same where it is just behind
         (5.0, 0.1, [(6.2, -0.2)], {"crashed": 0}, 5.2, 1),  # what it ran into counts, however far
         (5.0, 0.1, [(5.3, -0.2)], {"crashed": 0, "mercy": True}, 6.3, 1),  # mercy: past it
