@@ -44,6 +44,9 @@ def test_swiss_rounds_repeat_no_pair_while_there_are_others(number: int) -> None
 def test_swiss_neighbours_in_the_table_meet() -> None:
     pairs = swiss_round([3.0, 1.0, 3.0, 1.0], met=[])
     assert {frozenset(pair) for pair in pairs} == {frozenset((0, 2)), frozenset((1, 3))}
+    assert {frozenset(pair) for pair in swiss_round([1.0, 3.0, 2.0], met=[])} == {frozenset((1, 2))}  # the last rests
+    assert {frozenset(pair) for pair in swiss_round([1.0, 3.0, 2.0], met=[], rested=[0])} == {frozenset((1, 0))}
+    assert {frozenset(pair) for pair in swiss_round([1.0, 3.0, 2.0], met=[], rested=[0, 1, 2])} == {frozenset((1, 2))}
     again = swiss_round([2.0, 1.0], met=[(0, 1)])  # nobody else is there
     assert {frozenset(pair) for pair in again} == {frozenset((0, 1))}
     assert again == [(1, 0)]  # the other one starts in front

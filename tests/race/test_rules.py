@@ -4,7 +4,7 @@ import json
 import pytest
 
 from racecraft.errors import ConfigError
-from racecraft.race.rules import RULE_SETS, RaceRules
+from racecraft.race.rules import RULE_SETS, RaceRules, rules_by_name
 
 
 def test_defaults_are_those_of_deepracer_for_cloud():
@@ -62,6 +62,16 @@ def test_a_wrong_rule_names_itself_and_its_value(field, value):
         RaceRules(**{field: value})
     assert repr(value) in str(error.value)
     assert "allowed" in str(error.value)
+
+
+def test_rules_by_name_with_single_ones_changed():
+    assert rules_by_name("worker", {}) == RULE_SETS["worker"]
+    assert rules_by_name("worker", {"laps": 2}) == dataclasses.replace(RULE_SETS["worker"], laps=2)
+    own = RaceRules(laps=7)
+    assert rules_by_name(own, {"max_resets": 1}) == RaceRules(laps=7, max_resets=1)
+    with pytest.raises(ConfigError, match="Rules 'wrker' do not exist") as caught:
+        rules_by_name("wrker", {})
+    assert "worker" in caught.value.hint
 
 
 def test_rules_are_frozen_and_plain():

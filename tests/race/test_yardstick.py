@@ -10,6 +10,7 @@ import pytest
 from racecraft.errors import ConfigError
 from racecraft.race import RULE_SETS, Autopilot, evaluate, official_races, placings
 from racecraft.race.yardstick import PERCENTILES, TIMINGS, Placing, _table
+from racecraft.sim import Vehicle
 from racecraft.track import Track, load_track
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -69,6 +70,8 @@ def test_an_evaluation_is_placed_by_what_the_race_was_ranked_by() -> None:
     assert by_timing["TOTAL_TIME"].time == pytest.approx(evaluation.total_time / 2)
     assert "faster than about" in by_timing["TOTAL_TIME"].sentence
     assert by_timing["TOTAL_TIME"].to_dict()["month"] == "2021-11"
+    own = replace(evaluation.conditions, vehicle=Vehicle(mass=1.7))  # a car that nobody had
+    assert placings(replace(evaluation, conditions=own)) == []
     unfinished = replace(rules, max_resets=0, time_limit=10.0)
     cut = evaluate(Autopilot(speed=1.0), track, rules=unfinished, num_trials=1, sees="state", num_threads=1)
     assert placings(cut) == []
