@@ -69,7 +69,7 @@ def test_rules_by_name_with_single_ones_changed():
     assert rules_by_name("worker", {"laps": 2}) == dataclasses.replace(RULE_SETS["worker"], laps=2)
     own = RaceRules(laps=7)
     assert rules_by_name(own, {"max_resets": 1}) == RaceRules(laps=7, max_resets=1)
-    with pytest.raises(ConfigError, match="Rules 'wrker' do not exist") as caught:
+    with pytest.raises(ConfigError, match="'wrker'") as caught:
         rules_by_name("wrker", {})
     assert "worker" in caught.value.hint
 
