@@ -52,42 +52,14 @@ void DevicePlan::point(size_t object, const T* const* slot, const void* base, si
 }
 
 DevicePlan::DevicePlan(const Engine& engine, size_t num_envs)
-    : palette_(engine.palettes_.front()), seed_(engine.config_.seed) {
-    const EngineConfig& config = engine.config_;
-    if (config.cars_per_race != 1)
-        throw std::invalid_argument("A GPU drives cars that race alone; cars_per_race must be 1.");
-    const ObjectField& field = engine.objects_;
+    : batch_(engine.batch_), palette_(engine.palettes_.front()), seed_(engine.seed_) {
     Batch& b = batch_;
+    if (b.cars_per_race != 1)
+        throw std::invalid_argument("A GPU drives cars that race alone; cars_per_race must be 1.");
     b.num_envs = static_cast<int32_t>(num_envs);
-    b.num_tracks = static_cast<int32_t>(engine.num_tracks());
-    b.num_objects = field.count();
-    b.num_lenses = static_cast<int32_t>(engine.num_lenses());
-    b.row_width = static_cast<int32_t>(engine.row_width());
-    b.state_width = static_cast<int32_t>(engine.state_width());
-    b.has_lidar = config.has_lidar;
-    b.is_randomized = engine.randomization_ != nullptr;
-    b.has_latency = b.is_randomized && engine.randomization_->has_latency();
-    b.has_cameras = !engine.cameras_.empty();
-    b.draws_tracks = config.draws_tracks;
-    b.substeps = config.substeps;
-    b.direction = config.direction;
-    b.limits = config.limits;
-    b.start = config.start;
-    b.rule = config.objects;
-    b.lens_forward = field.lens_forward_;
-    b.lens_left = field.lens_left_;
-    b.half_tangent = field.half_tangent_;
-    b.vehicle = engine.vehicle_;
-    if (b.is_randomized) b.randomization = *engine.randomization_;
-    b.colours = engine.colours_;
-    if (engine.camera_ != nullptr) {
-        const CameraSpec& spec = engine.camera_->spec();
-        b.num_pixels = spec.width * spec.height;
-        b.camera_bytes = camera_table_bytes(spec.height);
-    }
+    if (engine.camera_ != nullptr) b.camera_bytes = camera_table_bytes(engine.camera_->spec().height);
 
-    std::vector<TrackGeometry> tracks;
-    for (const TrackStore& store : engine.tracks_) tracks.push_back(store.geometry());
+    const std::vector<TrackGeometry>& tracks = engine.geometries_;
     tracks_ = put(tracks.data(), tracks.size());
     for (size_t i = 0; i < tracks.size(); ++i) {
         const TrackGeometry& g = tracks[i];

@@ -33,7 +33,7 @@ class DevicePlan {
     template <typename T>
     void point(size_t object, const T* const* slot, const void* base, size_t target);
 
-    Batch batch_{};
+    Batch batch_;
     GreyPalette palette_;
     uint64_t seed_;
     std::vector<uint8_t> world_;       // with offsets into itself in place of addresses

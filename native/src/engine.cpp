@@ -8,142 +8,192 @@
 #include "exposure_kernel.hpp"
 #include "lidar_kernel.hpp"
 #include "object_painter_kernel.hpp"
+#include "object_rule.hpp"
 #include "vehicle_kernel.hpp"
 
 namespace racecraft {
+
+// A part of the cars at a time by the kernels of the instruction set in force, frames at once.
+struct Engine::DriveHere {
+    Engine& engine;
+
+    void move(int32_t begin, int32_t end, const Commands& commands) {
+        const size_t n = engine.num_envs();
+        float* fields = engine.vehicles_.data();
+        const VehicleArrays arrays{fields,
+                                   fields + n,
+                                   fields + 2 * n,
+                                   fields + 3 * n,
+                                   fields + 4 * n,
+                                   fields + 5 * n,
+                                   fields + 6 * n,
+                                   commands.steering,
+                                   commands.speed,
+                                   commands.is_moving,
+                                   engine.parameters_.data(),
+                                   n,
+                                   engine.delay_.empty() ? nullptr : engine.delay_.data(),
+                                   engine.earlier_.empty() ? nullptr : engine.earlier_.data()};
+        for (int32_t env = begin; env < end; env += kLanes) {
+            const int count = std::min(end - env, kLanes);
+            RC_DISPATCH(advance_vehicles, arrays, static_cast<size_t>(env), count, engine.batch_.substeps);
+        }
+    }
+
+    void aim(int32_t env) {
+        const size_t car = static_cast<size_t>(env);
+        const Conditions& conditions = engine.conditions_[car];
+        if (!engine.cameras_.empty()) {
+            engine.cameras_[car].rebuild(camera_under(conditions, engine.camera_->spec()));
+        }
+        if (!engine.right_cameras_.empty()) {
+            engine.right_cameras_[car].rebuild(camera_under(conditions, engine.right_camera_->spec()));
+        }
+    }
+
+    void see(int32_t env) {
+        if (!engine.lidar_.empty()) {
+            const Room& room = track_of(engine.batch_, env).room;
+            float* rays = &engine.lidar_[static_cast<size_t>(env) * kLidarRays];
+            RC_DISPATCH(scan_lidar, room, lidar_pose_of(engine.batch_, env), around(engine.batch_, env),
+                        rays);
+        }
+        if (engine.camera_ != nullptr) engine.draw(env);
+    }
+};
 
 Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
                std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
                const CameraSpec* camera, const GreyPalette& palette, const Randomization* randomization,
                const RgbPalette& colours)
-    : config_(config),
+    : seed_(config.seed),
       tracks_(std::move(tracks)),
       grounds_(std::move(grounds)),
-      objects_(config.objects, config.num_envs, config.cars_per_race, camera),
-      pool_(config.num_threads),
-      colours_(colours),
-      vehicle_(vehicle) {
-    const size_t n = config_.num_envs;
-    vehicles_.resize(kNumVehicleFields * n);
-    parameters_.resize(kNumVehicleParameters * n);
-    steering_command_.resize(n);
-    speed_command_.resize(n);
-    is_moving_.resize(n);
-    state_.resize(state_width() * n);
-    rows_.resize(row_width() * n);
-    if (config_.has_lidar) lidar_.resize(kLidarRays * n);
-    episodes_.resize(n);
-    track_choice_.resize(n);
-    seeds_.assign(n, config_.seed);
-    streams_.resize(n);
-    palettes_.assign(n, palette);
-    if (config_.cars_per_race > 1) races_.assign(n / config_.cars_per_race, -1);
-    flags_ = std::make_unique<bool[]>(2 * n);
-
-    float values[kNumVehicleParameters];
-    std::memcpy(values, &vehicle, sizeof(values));
-    for (size_t env = 0; env < n; ++env) {
-        for (int k = 0; k < kNumVehicleParameters; ++k) parameters_[k * n + env] = values[k];
-        track_choice_[env] = static_cast<int32_t>(env / config_.cars_per_race % num_tracks());
-        streams_[env] = static_cast<uint32_t>(env);
-        episodes_[env].episode = -1;
-    }
+      pool_(config.num_threads) {
+    check_objects(config.objects, config.num_envs, config.cars_per_race);
+    for (const TrackStore& track : tracks_) geometries_.push_back(track.geometry());
     if (camera != nullptr) {
         CameraSpec spec = *camera;
-        spec.left = camera->left + 0.5f * config_.baseline;
+        spec.left = camera->left + 0.5f * config.baseline;
         camera_ = std::make_unique<CameraModel>(spec);
-        spec.left = camera->left - 0.5f * config_.baseline;
-        if (config_.baseline != 0.0f) right_camera_ = std::make_unique<CameraModel>(spec);
-        frames_.resize(num_lenses() * n * static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height));
+        spec.left = camera->left - 0.5f * config.baseline;
+        if (config.baseline != 0.0f) right_camera_ = std::make_unique<CameraModel>(spec);
     }
-    if (randomization != nullptr) {
-        randomization_ = std::make_unique<Randomization>(*randomization);
-        conditions_.resize(n);
-        if (randomization->has_latency()) {
-            delay_.resize(n);
-            earlier_.resize(4 * n);
-        }
-        const bool has_cameras = camera != nullptr && randomization->has_cameras();
-        for (size_t env = 0; has_cameras && env < n; ++env) cameras_.emplace_back(*camera);
-        for (size_t env = 0; has_cameras && right_camera_ != nullptr && env < n; ++env) {
-            right_cameras_.emplace_back(*camera);
-        }
-    }
+    set_up_batch(config, vehicle, camera != nullptr ? *camera : CameraSpec{}, randomization, colours);
+    allocate(palette);
     reset(nullptr);
 }
 
-void Engine::store_vehicle(size_t env, const VehicleState& state) {
-    float values[kNumVehicleFields];
-    std::memcpy(values, &state, sizeof(state));
-    for (size_t k = 0; k < kNumVehicleFields; ++k) vehicles_[k * num_envs() + env] = values[k];
+// The settings; those of sight are of a car with the default camera's eyes where it has none.
+void Engine::set_up_batch(const EngineConfig& config, const VehicleParameters& vehicle,
+                          const CameraSpec& eyes, const Randomization* randomization,
+                          const RgbPalette& colours) {
+    Batch& b = batch_;
+    b.num_envs = static_cast<int32_t>(config.num_envs);
+    b.cars_per_race = static_cast<int32_t>(config.cars_per_race);
+    b.num_tracks = static_cast<int32_t>(num_tracks());
+    b.num_objects = num_objects(config.objects) + b.cars_per_race - 1;
+    b.num_lenses = camera_ == nullptr ? 0 : right_camera_ == nullptr ? 1 : 2;
+    b.num_pixels = camera_ == nullptr ? 0 : eyes.width * eyes.height;
+    b.row_width = kNumRowColumns + object_row_width(b.num_objects);
+    b.state_width = kNumStateColumns + (b.num_objects > 0 ? kNumObjectState : 0);
+    b.has_lidar = config.has_lidar;
+    b.is_randomized = randomization != nullptr;
+    b.has_latency = randomization != nullptr && randomization->has_latency();
+    b.has_cameras = randomization != nullptr && randomization->has_cameras() && camera_ != nullptr;
+    b.draws_tracks = config.draws_tracks;
+    b.substeps = config.substeps;
+    b.direction = config.direction;
+    b.limits = config.limits;
+    b.start = config.start;
+    b.rule = config.objects;
+    b.lens_forward = eyes.forward;
+    b.lens_left = eyes.left;
+    float sine, cosine;
+    sincos_of(0.5f * eyes.hfov, sine, cosine);
+    b.half_tangent = sine / cosine;
+    b.vehicle = vehicle;
+    if (randomization != nullptr) b.randomization = *randomization;
+    b.colours = colours;
+    b.tracks = geometries_.data();
 }
 
-void Engine::publish(size_t env) {
-    if (!objects_.has_racers()) return;
-    const ObjectKind kind = is_over(env)                      ? ObjectKind::gone_racer
-                            : episodes_[env].frozen_steps > 0 ? ObjectKind::frozen_racer
-                                                              : ObjectKind::racer;
-    objects_.publish(env, track_of(env), vehicle(env), kind);
-}
-
-void Engine::show_others(size_t env) {
-    if (!objects_.has_racers()) return;
-    publish(env);
-    const size_t first = env / config_.cars_per_race * config_.cars_per_race;
-    for (size_t other = first; other < first + config_.cars_per_race; ++other) {
-        if (other != env && !is_over(other)) look(other);
+// The cars, before their first episode.
+void Engine::allocate(const GreyPalette& palette) {
+    Batch& b = batch_;
+    const size_t n = num_envs();
+    const size_t cars = static_cast<size_t>(b.cars_per_race);
+    const auto place = [](auto& values, size_t count, const auto& value) {
+        values.assign(count, value);
+        return values.data();
+    };
+    b.vehicles = place(vehicles_, n * kNumVehicleFields, 0.0f);
+    b.parameters = place(parameters_, n * kNumVehicleParameters, 0.0f);
+    b.state = place(state_, n * state_width(), 0.0f);
+    b.rows = place(rows_, n * row_width(), 0.0);
+    b.lidar = place(lidar_, n * kLidarRays * (b.has_lidar != 0), 0.0f);
+    b.frames = place(frames_, n * static_cast<size_t>(b.num_lenses * b.num_pixels), uint8_t{0});
+    b.episodes = place(episodes_, n, Episode{});
+    const size_t world = static_cast<size_t>(first_racer(b)) + (has_racers(b) ? cars : 0);
+    b.objects = place(objects_, n / cars * world, ObjectState{});
+    b.track_choice = place(track_choice_, n, 0);
+    b.races = place(races_, has_racers(b) ? n / cars : 0, -1);
+    b.seeds = place(seeds_, n, seed_);
+    b.streams = place(streams_, n, 0u);
+    b.palettes = place(palettes_, n, palette);
+    b.conditions = place(conditions_, b.is_randomized ? n : 0, Conditions{});
+    b.delay = place(delay_, b.has_latency ? n : 0, 0);
+    b.earlier = place(earlier_, b.has_latency ? 4 * n : 0, 0.0f);
+    flags_ = std::make_unique<bool[]>(2 * n);
+    b.terminated = reinterpret_cast<uint8_t*>(flags_.get());
+    b.truncated = b.terminated + n;
+    for (std::vector<float>* commands : {&steering_command_, &speed_command_, &is_moving_})
+        commands->resize(n);
+    for (size_t env = 0; env < n; ++env) {
+        store_parameters(b, static_cast<int32_t>(env), b.vehicle);
+        episodes_[env].episode = -1;
+        track_choice_[env] = static_cast<int32_t>(env / cars % num_tracks());
+        streams_[env] = static_cast<uint32_t>(env);
+        if (b.has_cameras) cameras_.emplace_back(camera_->spec());
+        if (b.has_cameras && right_camera_ != nullptr) right_cameras_.emplace_back(camera_->spec());
     }
 }
 
-void Engine::move_bots(size_t first) {
-    Footprint cars[kMaxCarsPerRace];
-    int32_t num_cars = 0;
-    for (size_t env = first; env < first + config_.cars_per_race; ++env) {
-        const bool is_gone = objects_.has_racers() && is_over(env);
-        if (is_gone || episodes_[env].frozen_steps > 0) continue;
-        const VehicleState car = vehicle(env);
-        float sine, cosine;
-        sincos_of(car.heading, sine, cosine);
-        cars[num_cars++] = car_footprint(car.x, car.y, sine, cosine);
+void Engine::show_others(int32_t env) {
+    if (!has_racers(batch_)) return;
+    publish(batch_, env);
+    const int32_t first = env - env % batch_.cars_per_race;
+    for (int32_t other = first; other < first + batch_.cars_per_race; ++other) {
+        if (other != env && !is_over(batch_, other)) see_from(other);
     }
-    objects_.advance(first / config_.cars_per_race, track_of(first), draws_of_race(first), cars, num_cars);
 }
 
-void Engine::look(size_t env) {
-    const VehicleState state = vehicle(env);
-    float* seen = &state_[env * state_width()];
-    observe(track_of(env), state, episodes_[env], seen);
-    objects_.observe(env, track_of(env), episodes_[env], seen + kNumStateColumns);
-    if (config_.has_lidar) {
-        const Episode& episode = episodes_[env];
-        const LidarPose pose{state.x,
-                             state.y,
-                             episode.sine,
-                             episode.cosine,
-                             seeds_[env],
-                             streams_[env],
-                             static_cast<uint32_t>(episode.episode),
-                             static_cast<uint32_t>(episode.steps)};
-        RC_DISPATCH(scan_lidar, track_of(env).room, pose, objects_.around(env), &lidar_[env * kLidarRays]);
-    }
-    if (camera_ == nullptr) return;
-    const size_t pixels = frames_.size() / (num_envs() * num_lenses());
-    uint8_t* frame = &frames_[env * num_lenses() * pixels];
-    render(cameras_.empty() ? *camera_ : cameras_[env], env, state, frame);
+void Engine::see_from(int32_t env) {
+    DriveHere here{*this};
+    look(batch_, env, here);
+}
+
+void Engine::draw(int32_t env) {
+    const size_t car = static_cast<size_t>(env);
+    const size_t pixels = static_cast<size_t>(batch_.num_pixels);
+    uint8_t* frame = &frames_[car * num_lenses() * pixels];
+    const VehicleState state = load_vehicle(batch_, env);
+    render(cameras_.empty() ? *camera_ : cameras_[car], env, state, frame);
     if (right_camera_ != nullptr) {
-        render(right_cameras_.empty() ? *right_camera_ : right_cameras_[env], env, state, frame + pixels);
+        render(right_cameras_.empty() ? *right_camera_ : right_cameras_[car], env, state, frame + pixels);
     }
 }
 
-void Engine::render(const CameraModel& camera, size_t env, const VehicleState& state, uint8_t* frame) {
-    const GroundMap& ground = *grounds_[static_cast<size_t>(episodes_[env].track) % num_tracks()];
-    render_grey(camera, ground, palettes_[env], state.x, state.y, state.heading, frame);
-    if (objects_.count() > 0) {
+void Engine::render(const CameraModel& camera, int32_t env, const VehicleState& state, uint8_t* frame) {
+    const size_t car = static_cast<size_t>(env);
+    const GroundMap& ground = *grounds_[static_cast<size_t>(episodes_[car].track) % num_tracks()];
+    render_grey(camera, ground, palettes_[car], state.x, state.y, state.heading, frame);
+    if (batch_.num_objects > 0) {
         const LensPose lens = place_lens(camera.view(), ground.view(), state.x, state.y, state.heading);
-        RC_DISPATCH(draw_objects, camera.spec(), lens, objects_.around(env), frame);
+        RC_DISPATCH(draw_objects, camera.spec(), lens, around(batch_, env), frame);
     }
-    if (randomization_ != nullptr) {
-        const Conditions& light = conditions_[env];
+    if (!conditions_.empty()) {
+        const Conditions& light = conditions_[car];
         RC_DISPATCH(expose, frame, camera.spec().width, camera.spec().height, light.gradient_across,
                     light.gradient_down, light.blur);
     }
@@ -151,130 +201,72 @@ void Engine::render(const CameraModel& camera, size_t env, const VehicleState& s
 
 // Cars to a portion of work: whole races.
 size_t Engine::chunk_size(size_t most) const {
+    const size_t cars = static_cast<size_t>(batch_.cars_per_race);
     const size_t parts = 4 * static_cast<size_t>(pool_.num_threads());
-    const size_t cars = std::clamp((num_envs() + parts - 1) / parts, size_t{1}, most);
-    return (cars + config_.cars_per_race - 1) / config_.cars_per_race * config_.cars_per_race;
+    const size_t portion = std::clamp((num_envs() + parts - 1) / parts, size_t{1}, most);
+    return (portion + cars - 1) / cars * cars;
+}
+
+template <typename Work>
+void Engine::for_chunks(size_t most, Work&& work) {
+    const size_t chunk = chunk_size(most);
+    pool_.for_each((num_envs() + chunk - 1) / chunk, [&](size_t part) {
+        DriveHere here{*this};
+        work(static_cast<int32_t>(part * chunk),
+             static_cast<int32_t>(std::min((part + 1) * chunk, num_envs())), here);
+    });
 }
 
 void Engine::reset(const bool* mask, const uint64_t* seeds) {
     const std::lock_guard lock(mutex_);
-    const size_t chunk = chunk_size(kLanes);
-    pool_.for_each((num_envs() + chunk - 1) / chunk, [&](size_t part) {
-        const size_t end = std::min((part + 1) * chunk, num_envs());
-        for (size_t env = part * chunk; env < end && seeds != nullptr; ++env) {
-            if (mask != nullptr && !mask[env]) continue;
-            seeds_[env] = seeds[env];
-            streams_[env] = static_cast<uint32_t>(env % config_.cars_per_race);
-            episodes_[env].episode = -1;
-            if (!races_.empty()) races_[env / config_.cars_per_race] = -1;
+    for_chunks(kLanes, [&](int32_t begin, int32_t end, DriveHere& here) {
+        for (int32_t first = begin; first < end; first += batch_.cars_per_race) {
+            uint32_t who = 0;
+            for (int32_t k = 0; k < batch_.cars_per_race; ++k) {
+                const int32_t env = first + k;
+                if (mask != nullptr && !mask[env]) continue;
+                who |= 1u << k;
+                if (seeds != nullptr) reseed(batch_, env, seeds[env]);
+            }
+            begin_race(batch_, first, who, here);
         }
-        for (size_t env = part * chunk; env < end; env += config_.cars_per_race) begin_race(env, mask);
     });
-}
-
-void Engine::step_chunk(size_t begin, size_t end, const float* actions) {
-    const size_t n = num_envs();
-    bool any_moving = false;
-    for (size_t env = begin; env < end; ++env) {
-        is_moving_[env] = 0.0f;
-        if (terminated()[env] || truncated()[env]) continue;
-        const float steering = clamp(actions[2 * env], -kMaxSteering, kMaxSteering);
-        const float speed = actions[2 * env + 1];
-        steering_command_[env] = steering;
-        speed_command_[env] = speed == 0.0f ? 0.0f : clamp(speed, kMinSpeedCommand, kMaxSpeedCommand);
-        double* row = &rows_[env * row_width()];
-        const VehicleState car = vehicle(env);
-        const int32_t crashed = objects_.find_crash(env, track_of(env), episodes_[env], car);
-        const Verdict verdict = judge(track_of(env), config_.limits, car, steering, speed_command_[env],
-                                      is_reversed(env), crashed >= 0, episodes_[env], row);
-        const bool has_crashed = row[kRow_is_crashed] != 0.0;
-        objects_.write_row(env, episodes_[env], car, has_crashed ? crashed : -1, row + kNumRowColumns);
-        terminated()[env] = verdict.terminated;
-        truncated()[env] = verdict.truncated;
-        is_moving_[env] = verdict.moves ? 1.0f : 0.0f;
-        any_moving |= verdict.moves;
-    }
-    if (!any_moving && !objects_.has_bots() && !objects_.has_racers()) return;
-
-    float* fields = vehicles_.data();
-    const VehicleArrays arrays{fields,
-                               fields + n,
-                               fields + 2 * n,
-                               fields + 3 * n,
-                               fields + 4 * n,
-                               fields + 5 * n,
-                               fields + 6 * n,
-                               steering_command_.data(),
-                               speed_command_.data(),
-                               is_moving_.data(),
-                               parameters_.data(),
-                               n,
-                               delay_.empty() ? nullptr : delay_.data(),
-                               earlier_.empty() ? nullptr : earlier_.data()};
-    for (size_t env = begin; env < end; env += kLanes) {
-        const int count = static_cast<int>(std::min(end - env, size_t{kLanes}));
-        RC_DISPATCH(advance_vehicles, arrays, env, count, config_.substeps);
-    }
-    for (size_t env = begin; env < end; ++env) {
-        if (is_moving_[env] != 0.0f && !earlier_.empty()) {
-            earlier_[2 * n + env] = earlier_[env];
-            earlier_[3 * n + env] = earlier_[n + env];
-            earlier_[env] = steering_command_[env];
-            earlier_[n + env] = speed_command_[env];
-        }
-        publish(env);
-    }
-    // Others drive on around a car that stands as a penalty, so its view changes, too.
-    const bool is_lively = objects_.has_bots() || objects_.has_racers();
-    for (size_t first = begin; first < end; first += config_.cars_per_race) {
-        bool is_any = false;
-        for (size_t env = first; env < first + config_.cars_per_race; ++env) {
-            is_any |= is_moving_[env] != 0.0f || !is_over(env);
-        }
-        if (is_any && objects_.has_bots()) move_bots(first);
-        for (size_t env = first; env < first + config_.cars_per_race; ++env) {
-            if (is_moving_[env] != 0.0f || (is_lively && !is_over(env))) look(env);
-        }
-    }
 }
 
 void Engine::step(const float* actions) {
     const std::lock_guard lock(mutex_);
+    const Commands commands{steering_command_.data(), speed_command_.data(), is_moving_.data(), 0};
     // With a camera a car costs microseconds, without one nanoseconds: hand out work in matching portions.
-    const size_t chunk = chunk_size(camera_ != nullptr ? kLanes : 64 * kLanes);
-    pool_.for_each((num_envs() + chunk - 1) / chunk, [&](size_t part) {
-        step_chunk(part * chunk, std::min((part + 1) * chunk, num_envs()), actions);
+    for_chunks(camera_ != nullptr ? kLanes : 64 * kLanes, [&](int32_t begin, int32_t end, DriveHere& here) {
+        step_races(batch_, begin, end, actions, commands, here);
     });
 }
 
-void Engine::set_pose(size_t env, float x, float y, float heading, float speed) {
+void Engine::set_pose(size_t car, float x, float y, float heading, float speed) {
     const std::lock_guard lock(mutex_);
+    const int32_t env = static_cast<int32_t>(car);
     VehicleState state{};
     state.x = x;
     state.y = y;
     state.heading = wrap_angle(heading);
     state.speed = speed;
-    store_vehicle(env, state);
-    forget_commands(env);
-    Episode& episode = episodes_[env];
+    store_vehicle(batch_, env, state);
+    forget_commands(batch_, env);
+    Episode& episode = episodes_[car];
     episode.falling_steps = 0;
     episode.still_steps = 0;
-    terminated()[env] = false;
-    truncated()[env] = false;
-    look(env);
+    terminated()[car] = false;
+    truncated()[car] = false;
+    see_from(env);
     episode.last_x = episode.reference_x;
     episode.last_y = episode.reference_y;
     show_others(env);
 }
 
-void Engine::forget_commands(size_t env) {
-    for (size_t k = 0; k < 4 && !earlier_.empty(); ++k) earlier_[k * num_envs() + env] = 0.0f;
-}
-
-void Engine::freeze(size_t env, int steps) {
+void Engine::freeze(size_t car, int steps) {
     const std::lock_guard lock(mutex_);
-    episodes_[env].frozen_steps = steps;
-    show_others(env);
+    episodes_[car].frozen_steps = steps;
+    show_others(static_cast<int32_t>(car));
 }
 
 template <typename Visitor>
@@ -289,7 +281,7 @@ void Engine::visit_saved(Visitor&& visit) {
     visit(seeds_.data(), seeds_.size() * sizeof(uint64_t));
     visit(streams_.data(), streams_.size() * sizeof(uint32_t));
     visit(palettes_.data(), palettes_.size() * sizeof(GreyPalette));
-    visit(objects_.states().data(), objects_.states().size() * sizeof(ObjectState));
+    visit(objects_.data(), objects_.size() * sizeof(ObjectState));
     visit(earlier_.data(), earlier_.size() * sizeof(float));
     visit(flags_.get(), 2 * num_envs() * sizeof(bool));
 }
@@ -333,15 +325,13 @@ void Engine::load(const uint8_t* bytes, size_t size) {
         restore(before.data());
         throw std::invalid_argument(std::string("Saved simulation state ") + fault);
     }
-    for (size_t env = 0; env < num_envs(); ++env) {
-        if (randomization_ != nullptr) draw_episode(env);
-        look(env);
-    }
+    DriveHere here{*this};
+    for (int32_t env = 0; env < batch_.num_envs; ++env) restore_car(batch_, env, here);
 }
 
 void Engine::restore(const uint8_t* bytes) {
     visit_saved([&](void* data, size_t part) {
-        if (part > 0) std::memcpy(data, bytes, part);  // without objects there is no address to copy to
+        if (part > 0) std::memcpy(data, bytes, part);  // what a batch lacks has no address to copy to
         bytes += part;
     });
 }
@@ -353,10 +343,10 @@ const char* Engine::find_fault() const {
     const auto is_count = [](int32_t value) { return value >= 0 && value < 1'000'000'000; };
     for (size_t env = 0; env < num_envs(); ++env) {
         const Episode& episode = episodes_[env];
-        const bool has_tracks = episode.track >= 0 && static_cast<size_t>(episode.track) < tracks_.size() &&
-                                track_choice_[env] >= 0 &&
-                                static_cast<size_t>(track_choice_[env]) < num_tracks() &&
-                                episode.track == episodes_[env - env % config_.cars_per_race].track;
+        const bool has_tracks =
+            episode.track >= 0 && static_cast<size_t>(episode.track) < tracks_.size() &&
+            track_choice_[env] >= 0 && static_cast<size_t>(track_choice_[env]) < num_tracks() &&
+            episode.track == episodes_[env - env % static_cast<size_t>(batch_.cars_per_race)].track;
         if (!has_tracks) return "names a track that this simulation lacks.";
         const int status = static_cast<int>(episode.status);
         if (status < 0 || status > static_cast<int>(Status::park))
@@ -375,7 +365,7 @@ const char* Engine::find_fault() const {
     if (!std::all_of(vehicles_.begin(), vehicles_.end(), is_number)) return "holds a car that is nowhere.";
     if (!std::all_of(earlier_.begin(), earlier_.end(), is_number)) return "holds a command that cannot be.";
     if (!std::all_of(parameters_.begin(), parameters_.end(), is_number)) return "holds a car that cannot be.";
-    if (const char* fault = objects_.find_fault()) return fault;
+    if (const char* fault = racecraft::find_fault(objects_)) return fault;
     const uint8_t* flags = reinterpret_cast<const uint8_t*>(flags_.get());
     if (!std::all_of(flags, flags + 2 * num_envs(), [](uint8_t flag) { return flag <= 1; })) {
         return "is damaged.";

@@ -1,19 +1,12 @@
-// Steps a batch of cars: judge, move, observe, render. One call, no allocation, any number of threads, same
-// bits.
-//
-// Consecutive cars make a race: they share a track, obstacles and bots, and see and hit each other. A step
-// does each of these things for every car of a race before the next, so the order of the cars means nothing.
+// Steps a batch of cars on the CPU: the races of racecraft/race.hpp, in one call, without an allocation, by
+// any number of threads, to the same bits.
 #pragma once
 
 #include <memory>
 #include <vector>
 
 #include "camera_model.hpp"
-#include "object_field.hpp"
-#include "racecraft/random.hpp"
-#include "racecraft/randomization.hpp"
-#include "racecraft/rules.hpp"
-#include "racecraft/start.hpp"
+#include "racecraft/race.hpp"
 #include "thread_pool.hpp"
 #include "track_store.hpp"
 
@@ -58,15 +51,15 @@ class Engine {
     // Keeps one car standing for so many steps from now on, as a penalty; nobody can run into it.
     void freeze(size_t env, int steps);
 
-    size_t num_envs() const { return config_.num_envs; }
+    size_t num_envs() const { return static_cast<size_t>(batch_.num_envs); }
     size_t num_tracks() const { return tracks_.size() / 2; }
     int num_threads() const { return pool_.num_threads(); }
     size_t num_bytes() const;  // of the batch's own buffers, frames included
     const CameraModel* camera() const { return camera_.get(); }
-    size_t num_lenses() const { return camera_ == nullptr ? 0 : right_camera_ == nullptr ? 1 : 2; }
+    size_t num_lenses() const { return static_cast<size_t>(batch_.num_lenses); }
     // Columns of a row and of a state: more than kNumRowColumns and kNumStateColumns where there are objects.
-    size_t row_width() const { return kNumRowColumns + static_cast<size_t>(objects_.row_width()); }
-    size_t state_width() const { return kNumStateColumns + static_cast<size_t>(objects_.state_width()); }
+    size_t row_width() const { return static_cast<size_t>(batch_.row_width); }
+    size_t state_width() const { return static_cast<size_t>(batch_.state_width); }
     double* rows() { return rows_.data(); }                  // (N, row_width())
     float* state() { return state_.data(); }                 // (N, state_width())
     float* lidar() { return lidar_.data(); }                 // (N, kLidarRays), or nothing
@@ -90,31 +83,18 @@ class Engine {
   private:
     friend class DevicePlan;  // reads the settings
 
-    static constexpr size_t kNumVehicleFields = sizeof(VehicleState) / sizeof(float);
+    struct DriveHere;  // the engine's way of a race
 
-    const TrackGeometry& track_of(size_t env) const { return tracks_[episodes_[env].track].geometry(); }
-    bool is_reversed(size_t env) const { return static_cast<size_t>(episodes_[env].track) >= num_tracks(); }
-    VehicleState vehicle(size_t env) const {
-        const float* at = &vehicles_[env];
-        const size_t n = num_envs();
-        return {at[0], at[n], at[2 * n], at[3 * n], at[4 * n], at[5 * n], at[6 * n]};
-    }
-    void store_vehicle(size_t env, const VehicleState& state);
-    bool is_over(size_t env) const { return flags_[env] || flags_[num_envs() + env]; }
-    Draws draws_of_race(size_t env) const;  // of the race that a car is in
-    VehicleState start_pose(size_t env, int32_t slot, bool is_new_race);
-    void begin_race(size_t first, const bool* mask);
-    void begin_episode(size_t env, int32_t slot, bool is_new_race, int32_t track);
-    void write_prepare_row(size_t env);
-    void draw_episode(size_t env);  // conditions and camera of an episode
-    void publish(size_t env);       // a car to the others of its race
-    void show_others(size_t env);   // the others of its race what has changed about a car between two steps
-    void move_bots(size_t first);
-    void forget_commands(size_t env);
-    void render(const CameraModel& camera, size_t env, const VehicleState& state, uint8_t* frame);
-    void look(size_t env);  // observes and renders the current pose
-    void step_chunk(size_t begin, size_t end, const float* actions);
+    void set_up_batch(const EngineConfig& config, const VehicleParameters& vehicle, const CameraSpec& eyes,
+                      const Randomization* randomization, const RgbPalette& colours);
+    void allocate(const GreyPalette& palette);
+    void see_from(int32_t env);     // the current pose
+    void show_others(int32_t env);  // the others of its race what has changed about a car between two steps
+    void draw(int32_t env);
+    void render(const CameraModel& camera, int32_t env, const VehicleState& state, uint8_t* frame);
     size_t chunk_size(size_t most) const;
+    template <typename Work>
+    void for_chunks(size_t most, Work&& work);  // work(begin, end, here) by all threads
 
     template <typename Visitor>
     void visit_saved(Visitor&& visit);
@@ -122,19 +102,21 @@ class Engine {
     void restore(const uint8_t* bytes);
     const char* find_fault() const;  // null if the state is one that this engine can go on from
 
-    EngineConfig config_;
+    uint64_t seed_;
     mutable std::mutex mutex_;  // held by every public call that reads or writes cars
     std::vector<TrackStore> tracks_;
+    std::vector<TrackGeometry> geometries_;  // of the tracks, side by side
     std::vector<std::shared_ptr<const GroundMap>> grounds_;
     std::unique_ptr<CameraModel> camera_, right_camera_;  // the one, or the left one, and the right one
-    ObjectField objects_;
     ThreadPool pool_;
+    Batch batch_{};  // the settings, and where the arrays below lie
 
     std::vector<float> vehicles_, parameters_, steering_command_, speed_command_, is_moving_, state_;
     std::vector<double> rows_;
     std::vector<float> lidar_;
     std::vector<uint8_t> frames_;
     std::vector<Episode> episodes_;
+    std::vector<ObjectState> objects_;  // the worlds of all races, one after the other
     std::vector<int32_t> track_choice_;
     std::vector<int32_t> races_;     // (N / cars_per_race,) number of each race, empty where cars race alone
     std::vector<uint64_t> seeds_;    // (N,) with its stream, the key of each car's random numbers
@@ -142,9 +124,6 @@ class Engine {
     std::vector<GreyPalette> palettes_;
 
     // Randomisation; all of it empty where there is none.
-    std::unique_ptr<Randomization> randomization_;
-    RgbPalette colours_;
-    VehicleParameters vehicle_;                         // before randomisation
     std::vector<Conditions> conditions_;                // (N,)
     std::vector<CameraModel> cameras_, right_cameras_;  // (N,), empty unless cameras differ, or lenses
     std::vector<int32_t> delay_;                        // (N,) substeps, empty unless commands act late

@@ -69,10 +69,10 @@ void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int 
             const VehicleState state{
                 lanes.x[i],        lanes.y[i],       lanes.heading[i], lanes.speed[i], lanes.lateral_speed[i],
                 lanes.yaw_rate[i], lanes.steering[i]};
-            const bool acts = substep >= delay[i];
-            const bool acts_before = substep >= delay[i] - substeps;
-            const float steering = acts ? steering_command[i] : (acts_before ? earlier[0][i] : earlier[2][i]);
-            const float speed = acts ? speed_command[i] : (acts_before ? earlier[1][i] : earlier[3][i]);
+            const float steering = acting_command(substep, substeps, delay[i], steering_command[i],
+                                                  earlier[0][i], earlier[2][i]);
+            const float speed =
+                acting_command(substep, substeps, delay[i], speed_command[i], earlier[1][i], earlier[3][i]);
             const VehicleState next = vehicle_substep(c, state, steering, speed, sim_dt);
             lanes.x[i] = next.x;
             lanes.y[i] = next.y;

@@ -22,8 +22,7 @@ struct VehicleArrays {
     const float* is_moving;         // 1 to advance the car, 0 to leave it as it stands
     const float* parameters;        // (kNumVehicleParameters, stride)
     size_t stride;                  // num_envs
-    // Commands that act late; all null where none does. A car's command acts from substep `delay` on, before
-    // it the one of the step before, and another step earlier the one before that.
+    // Commands that act late, see acting_command(); all null where none does.
     const int32_t* delay = nullptr;  // substeps, 0 to twice as many as a step has
     const float* earlier = nullptr;  // steering and speed command of the last step and of the one before
                                      // it, (4, stride)

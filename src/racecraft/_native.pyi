@@ -244,7 +244,7 @@ class DevicePlan:
 
     def batch(self, world: int, addresses: Sequence[int]) -> Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C')]: ...
 
-BATCH_BYTES: int = 1416
+BATCH_BYTES: int = 1424
 
 CAR_THREADS: int = 128
 

@@ -116,6 +116,15 @@ def test_the_same_bits_for_any_batch_threads_and_instruction_set():
         _native.set_isa(best)
 
 
+@pytest.mark.parametrize("steps", [0, 1, 5])
+def test_a_loaded_simulation_scans_what_the_saved_one_did(steps):
+    saved, other = (Simulation(OVAL, num_envs=3, camera=None, lidar=True, seed=seed) for seed in (1, 2))
+    for _ in range(steps):
+        saved.step(np.tile(np.float32([0.1, 1.0]), (3, 1)))
+    other.load(saved.save())
+    np.testing.assert_array_equal(other.lidar, saved.lidar)
+
+
 def test_without_a_lidar_there_are_no_rays():
     assert Simulation(OVAL, num_envs=3, camera=None).lidar.shape == (3, 0)
 

@@ -1,8 +1,8 @@
-// A batch of cars as plain memory: what a GPU's kernels (native/gpu) read and write. The same struct on both
-// sides.
+// A batch of cars as plain memory: what the engine (native/src/engine.hpp) and a GPU's kernels (native/gpu)
+// read and write, by the same functions (cars.hpp, race.hpp).
 //
-//   world   tracks, grounds, cameras: one block of memory that never changes (native/src/device_plan.cpp)
-//   cars    arrays of num_envs elements, in the layout of the engine (native/src/engine.hpp)
+//   world   tracks, grounds, cameras: memory that never changes
+//   cars    arrays of num_envs elements
 #pragma once
 
 #include "racecraft/camera_tables.hpp"
@@ -43,8 +43,8 @@ constexpr int32_t kRowThreads = 128;    // threads that draw objects, one row ea
 constexpr int32_t kNumVehicleFields = sizeof(VehicleState) / sizeof(float);
 
 struct Batch {
-    // Sizes; of a camera, those of one frame.
-    int32_t num_envs, num_tracks, num_objects, num_lenses, num_pixels;
+    // Sizes; of a camera, those of one frame. num_objects is what a car has around it.
+    int32_t num_envs, cars_per_race, num_tracks, num_objects, num_lenses, num_pixels;
     int32_t row_width, state_width, camera_bytes;
     int32_t has_lidar, is_randomized, has_latency, has_cameras, draws_tracks;
 
@@ -61,12 +61,13 @@ struct Batch {
 
     // The world.
     const TrackGeometry* tracks;  // (2 num_tracks,), the reversed twins after the others
-    const GroundView* grounds;    // (num_tracks,), none without a camera
-    const CameraView* lenses;     // (num_lenses,)
+    const GroundView* grounds;    // (num_tracks,), none without a camera; GPU only
+    const CameraView* lenses;     // (num_lenses,), GPU only
 
 #define RC_FIELD(name, type, size) type* name;
     RC_CAR_ARRAYS(RC_FIELD)
 #undef RC_FIELD
+    int32_t* races;  // (N / cars_per_race,) number of each race, null where cars race alone; CPU only
 };
 
 // Bytes of the tables of one camera, in the order of car_tables().

@@ -209,6 +209,15 @@ RC_HD VehicleState vehicle_advance(const VehicleState& state, const VehicleRates
     return next;
 }
 
+// The command that acts in a substep: this step's from substep `delay` on, before it the one of the step
+// before, and another step earlier the one before that.
+RC_HD float acting_command(int32_t substep, int32_t substeps, int32_t delay, float now, float before,
+                           float earlier) {
+    const bool acts = substep >= delay;
+    const bool acts_before = substep >= delay - substeps;
+    return acts ? now : (acts_before ? before : earlier);
+}
+
 // One physics substep of sim_dt seconds.
 RC_HD VehicleState vehicle_substep(const VehicleConstants& c, const VehicleState& state,
                                    float steering_command, float speed_command, float sim_dt) {
