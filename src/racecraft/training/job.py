@@ -394,11 +394,9 @@ class Training:
     def _beginning(self) -> tuple[Checkpoint | None, Checkpoint | None]:
         """The checkpoint to resume from, or else the weights to begin with: imported ones, or a parent's."""
         saved = self._last_checkpoint()
-        if saved is not None and is_weights_only(saved):
-            return None, saved
         if saved is None and self.folder.read_info().parent is not None:
             return None, self.folder.parent_checkpoint.load()
-        return saved, None
+        return (None, saved) if saved is not None and is_weights_only(saved) else (saved, None)
 
     def _load_state(self, session: _Session, saved: Checkpoint) -> None:
         arrays, metadata = saved.arrays, saved.metadata
