@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sysconfig
 from importlib import metadata
 from pathlib import Path
@@ -51,11 +52,8 @@ def link_main_packages(folder: Path) -> None:
             top = file.parts[0]
             if top not in ("..", "bin", "__pycache__") and not (folder / top).exists():
                 (folder / top).symlink_to(site / top)
-    source, built = Path(racecraft.__file__).parent, site / "racecraft"
-    (folder / "racecraft").mkdir()
-    for place in (source, built):
-        for entry in place.iterdir() if place.is_dir() else ():
-            if entry.name != "__pycache__" and not (folder / "racecraft" / entry.name).exists():
-                (folder / "racecraft" / entry.name).symlink_to(entry)
+    for place in (Path(racecraft.__file__).parent, site / "racecraft"):  # sources, and what was built
+        unwanted = shutil.ignore_patterns("__pycache__", "pages")
+        shutil.copytree(place, folder / "racecraft", ignore=unwanted, dirs_exist_ok=True)
     about = next(site.glob("racecraft-*.dist-info"))
     (folder / about.name).symlink_to(about)

@@ -51,11 +51,12 @@ COMMANDS: dict[str, list[str]] = {
         "evaluate R/b --tracks oval",
     ],
     "race": [
-        "race R/b R/b@last -t oval --type time-trial -l 1 --rules drfc --ranking best --minimum-laps 1 --time-limit 4"
-        " --offtrack-penalty 1 --collision-penalty 1 --max-resets 1 --direction forward --vehicle v5"
-        " --randomize none -s 1 --video --ghost best-lap -o X --json",
+        "race R/b R/b@last -t oval --type time-trial --trials 1 -l 1 --rules drfc --ranking best"
+        " --minimum-laps 1 --time-limit 4 --offtrack-penalty 1 --collision-penalty 1 --max-resets 1 --direction forward"
+        " --vehicle v5 --randomize none -s 1 --video --ghost best-lap -o X --json",
         f"race R/b R/b@last -t oval --type object-avoidance -l 1 --time-limit 4 {BOXES} --no-video -o X",
         f"race R/b -t oval --type head-to-bot -l 1 --time-limit 4 {BOTS} --no-video -o X",
+        "race R/b R/b@last -t oval -l 1 --time-limit 4 --trials 1 --secret --no-video -o X",
         "race R/b -t oval --type object-avoidance -l 1 --time-limit 4 --objects 1 --positions 0.5,1 --no-video -o X",
     ],
     "ladder": [
@@ -66,9 +67,9 @@ COMMANDS: dict[str, list[str]] = {
         "ladder R/b R/b@last -t oval --starts 1 --time-limit 4 --type object-avoidance --objects 1 --positions 0.5,1",
     ],
     "film": ["film P --car 1 --ghost best-lap -o F.mp4 --json"],
-    "verify": ["verify P --json"],
+    "verify": ["verify P --json", "verify D --race C"],
     "report": ["report R/b -o report.html --json"],
-    "import": ["import R/b -t oval -r racing --network RACECRAFT_SMALL -n k --runs R --json"],
+    "import": ["import R/b -t oval -r racing --network RACECRAFT_SMALL -n k --runs R -c best --json"],
     "replay": [
         "replay S -t oval -r racing --vehicle v5 -o S.png --rows S.csv --json",
         "replay --frame G -t oval --palette 2018",
@@ -174,6 +175,8 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]
     for verb, lines in COMMANDS.items():
         if verb == "film":
             places["P"] = next(str(path) for path in folder.glob("R/b/evaluation-*/evaluation.replay"))
+            places["D"] = next(str(path) for path in sorted(folder.glob("X/*/*.replay")))
+            places["C"] = str(Path(places["D"]).parent)
         found |= dict(zip(lines, run(lines), strict=True))
     return found
 

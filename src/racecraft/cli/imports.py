@@ -34,7 +34,7 @@ def import_(
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
     as_json: Json = False,
 ) -> None:
-    """Make a run from files of the original, with the weights that AWS trained; it runs none of them."""
+    """Make a run from the original's files and weights."""
     from racecraft.importing import import_run
 
     result = import_run(path, root=runs, name=name, track=track, reward=reward, network=network, checkpoint=checkpoint)

@@ -24,7 +24,7 @@ from racecraft.errors import RewardError
 from racecraft.reward.sandbox.bubblewrap import around
 from racecraft.reward.sandbox.plan import package_folder
 
-PROGRAM = Path(__file__).with_name("worker_process.py")
+PROGRAM = Path(__file__).resolve().with_name("worker_process.py")
 
 # No user or site packages, no folder of the script, no bytecode files: the packages below are added by path.
 INTERPRETER_OPTIONS = ("-s", "-S", "-P", "-B", "-X", "utf8")

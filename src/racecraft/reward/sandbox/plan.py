@@ -57,9 +57,9 @@ def readable(packages: Sequence[str]) -> tuple[list[str], list[str]]:
 
 @functools.cache
 def package_folder(name: str) -> Path | None:
-    """Where a package is installed, or None."""
+    """Where a package is installed, links resolved, or None."""
     spec = importlib.util.find_spec(name)
-    return Path(spec.origin).parent if spec is not None and spec.origin is not None else None
+    return Path(spec.origin).resolve().parent if spec is not None and spec.origin is not None else None
 
 
 def read_filter(machine: str, stage: str) -> bytes:
