@@ -94,7 +94,7 @@ def test_every_type_of_the_core_has_a_name_of_its_own():
         if "tests" in path.parts:
             continue
         text = re.sub(r"^namespace \{$.*?^\}  // namespace$", "", path.read_text(), flags=re.MULTILINE | re.DOTALL)
-        names.update(re.findall(r"^(?:struct|class|union|enum class|enum) (\w+)[^;]*?\{", text, flags=re.MULTILINE))
+        names.update(re.findall(r"^(?:struct|class|union|enum class|enum) ([\w:]+)[^;]*?\{", text, flags=re.MULTILINE))
     assert len(names) > 20
     assert {name: count for name, count in names.items() if count > 1} == {}
 
