@@ -6,8 +6,10 @@ from typing import Any
 
 import pytest
 
-from racecraft.bench import BENCHMARKS, learning, run_benchmarks, suite
+from racecraft.bench import BENCHMARKS, learning, run_benchmarks, suite, walls
 from racecraft.errors import ConfigError, RacecraftError
+from racecraft.reward import RewardWorker
+from racecraft.reward.sandbox import UNCONFINED, Confinement, find_confinement
 
 FIGURES = {
     "simulator": ("camera_steps_per_second", "state_steps_per_second", "bytes_per_car"),
@@ -39,6 +41,24 @@ def test_a_benchmark_alone_gives_its_figures_below_the_machines_limit(name: str)
         assert figure in results[name]
         assert limit["value"] > 0
         assert limit["what"]
+
+
+def test_walls_are_measured_beside_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Confinement] = []
+
+    class Watched(RewardWorker):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            asked.append(options["confinement"])
+            super().__init__(*arguments, **options)
+
+    monkeypatch.setattr(walls, "RewardWorker", Watched)
+    monkeypatch.setattr(walls, "STARTS", 2)
+    found = run_benchmarks(only=["reward"], seconds=0.1)["reward"]["confinement"]
+    assert asked == [UNCONFINED, find_confinement()] * 3
+    assert found["walls"] == str(find_confinement())
+    for figure in ("calls_per_processor_second", "start_ms"):
+        assert found[figure] > 0
+        assert found[f"unconfined_{figure}"] > 0
 
 
 def test_memory_of_a_car_is_below_25_kilobytes() -> None:

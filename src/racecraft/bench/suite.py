@@ -19,6 +19,7 @@ from racecraft.agent import action_space
 from racecraft.bench.learning import measure_learning
 from racecraft.bench.machine import copy_bandwidth, describe_machine, matrix_flops
 from racecraft.bench.rivals import measure_rivals
+from racecraft.bench.walls import measure_walls
 from racecraft.checks import check_number, check_whole
 from racecraft.errors import ConfigError, RacecraftError, did_you_mean
 from racecraft.learn import NetworkSpec, PPOConfig, forward_operations
@@ -139,7 +140,7 @@ def measure_races(seconds: float, seeds: int) -> dict[str, Any]:
 
 
 def measure_reward(seconds: float, seeds: int) -> dict[str, Any]:
-    """Calls per second of the centre-line reward through the worker process, at batch 64."""
+    """Calls per second of the centre-line reward through the worker process, at batch 64; and what its walls cost."""
     del seeds
     track = load_track(TRACK)
     source = load_preset(REWARD)
@@ -162,6 +163,7 @@ def measure_reward(seconds: float, seeds: int) -> dict[str, Any]:
         "microseconds_per_call": round(1e6 / calls, 3),
         **({"compiled_calls_per_second": round(compiled)} if compiled else {}),
         "batch": REWARD_BATCH,
+        "confinement": measure_walls(source, track, batches, seconds) if sys.platform == "linux" else None,
         "limits": {"calls_per_second": _limit(bare, "the same function called on ready params, in one process")},
     }
 
