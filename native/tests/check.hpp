@@ -1,7 +1,8 @@
 // A test framework in a page: TEST(name) { CHECK(...); CHECK_EQUAL(a, b); CHECK_NEAR(a, b, tolerance); }
 //
 // Every *_test.cpp is a program of its own; it runs all of its tests (or those whose names hold its first
-// argument), prints each failed check with its values, and returns 1 if there was one.
+// argument, or with ~word those that do not hold the word), prints each failed check with its values, and
+// returns 1 if there was one.
 #pragma once
 
 #include <cmath>
@@ -88,7 +89,8 @@ bool same_bits(const T& a, const T& b) {
 
 int main(int argc, char** argv) {
     for (const auto& [name, run] : racecraft::test::tests()) {
-        if (argc > 1 && std::strstr(name, argv[1]) == nullptr) continue;
+        const bool is_without = argc > 1 && argv[1][0] == '~';
+        if (argc > 1 && (std::strstr(name, argv[1] + is_without) == nullptr) != is_without) continue;
         const int before = racecraft::test::failures();
         try {
             run();
