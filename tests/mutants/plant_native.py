@@ -1,4 +1,6 @@
-"""Plant the small faults of `native/*.toml` in the native core, one at a time: `make mutants` runs it after the Python's.
+"""Plant the small faults of `native/*.toml` in the native core, one at a time.
+
+`make mutants` runs it after that of Python.
 
     copy of the tree ─ a fault is written into it ─ what changed is compiled ─ the covering tests run ─ taken out
 
@@ -58,7 +60,9 @@ class Fault:
 
     def plant(self, source: str) -> str:
         """The source with the fault."""
-        assert source.count(self.original) == 1, f"{self.file}: {self.original!r} is there {source.count(self.original)} times"
+        assert source.count(self.original) == 1, (
+            f"{self.file}: {self.original!r} is there {source.count(self.original)} times"
+        )
         return source.replace(self.original, self.mutated)
 
     @property
@@ -142,7 +146,7 @@ def build(tests: tuple[str, ...]) -> tuple[bool, str]:
     targets = [test for test in tests if "/" not in test]
     if len(targets) < len(tests):
         targets.append("_native")
-    is_done, output = _run(["ninja", "-C", BUILD, "-j2", *targets])
+    is_done, output = _run(["ninja", "-C", BUILD, "-j1", *targets])
     for module in BUILD.glob("_native*.so"):
         place = TREE / "src" / "racecraft" / module.name
         place.unlink(missing_ok=True)
@@ -157,7 +161,16 @@ def notice(tests: tuple[str, ...], *, is_golden: bool) -> str:
             is_good, output = _run([BUILD / test, "golden" if is_golden else "~golden"])
             failed = [line.split()[1] for line in output.splitlines() if line.startswith("FAILED ")]
         else:
-            words = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", "-k", "golden" if is_golden else "not golden"]
+            words = [
+                "-x",
+                "-q",
+                "-p",
+                "no:cacheprovider",
+                "-m",
+                "not slow",
+                "-k",
+                "golden" if is_golden else "not golden",
+            ]
             is_good, output = _run([sys.executable, "-c", PYTEST, *words, test])
             failed = [line.split()[1].partition("::")[2] for line in output.splitlines() if line.startswith("FAILED ")]
         if not is_good:
