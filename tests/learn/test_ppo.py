@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scheduled_world import ScheduledWorld
+from scheduled_world import ScheduledWorld, ticking
 from stripe_world import StripeWorld
 
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
@@ -217,6 +217,29 @@ def test_returns_and_lengths_are_those_of_the_episodes_that_ended(config):
     assert (first.total_steps, second.total_steps, second.num_steps) == (16, 32, 16)
 
 
+def test_the_seconds_of_an_iteration_are_its_own(config, monkeypatch):
+    world = ScheduledWorld([[3, 4], [6, 9]], [1.0, 0.5])
+    world.reset(np.ones(2, bool))
+    ppo = scheduled(dataclasses.replace(config, minibatch_size=8), world)
+    monkeypatch.setattr("racecraft.learn.ppo.time.perf_counter", ticking())
+    for _ in range(2):  # 8 steps of a second each of policy and environment, and an update
+        stats = ppo.iterate()
+        assert (stats.policy_seconds, stats.environment_seconds, stats.update_seconds) == (8.0, 8.0, 1.0)
+
+
+def test_values_are_the_same_however_many_are_computed_at_once(config, monkeypatch):
+    ppo = ppo_for(config)
+    ppo.return_scale = np.array([5.0, 2.0])
+    frames, states = ppo.environment.observe()
+    observations = ppo.learner.encode(frames)
+    whole = ppo._values(observations, states)
+    np.testing.assert_allclose(whole, 2.0 * ppo.learner.values(observations, states) + 5.0, rtol=1e-6)
+    monkeypatch.setattr("racecraft.learn.ppo._VALUE_BATCH", 5)
+    np.testing.assert_allclose(ppo._values(observations, states), whole, rtol=1e-5)
+    assert np.ptp(whole) > 0
+    assert ppo.spec == ppo.learner.spec
+
+
 def test_where_no_episode_ended_there_is_no_mean(config):
     world = ScheduledWorld([[100], [100]], [1.0, 1.0])
     stats = scheduled(dataclasses.replace(config, minibatch_size=8), world).iterate()
@@ -401,11 +424,16 @@ def test_continuous_commands_stay_within_bounds(config):
         ("gamma", "0.9"),
         ("clip_coef", None),
         ("average_share", 1.5),
+        ("num_steps", 10**9 + 1),
     ],
 )
 def test_impossible_settings_name_themselves(field, value):
     with pytest.raises(ConfigError, match=f"^{field} is"):
         PPOConfig(**{field: value})
+
+
+def test_the_largest_settings_there_may_be():
+    assert PPOConfig(num_steps=10**9, gamma=1.0, gae_lambda=0.0, average_share=1.0).num_steps == 10**9
 
 
 def test_settings_must_fit_environment_and_learner(config, learner):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scheduled_world import ticking
 from stripe_world import StripeWorld
 
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
@@ -146,6 +147,33 @@ def test_a_loss_that_is_not_finite_stops_it() -> None:
 def test_settings_that_cannot_work_are_refused(settings: dict[str, Any], match: str) -> None:
     with pytest.raises(ConfigError, match=match):
         SACConfig(**settings)
+
+
+def test_one_action_that_is_not_finite_stops_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    sac = make(replace(CONFIG, learning_starts=8))
+    monkeypatch.setattr(
+        sac.backend, "act", lambda observations, noise: np.where(np.arange(8)[:, None] == 3, np.nan, 0.5)
+    )
+    with pytest.raises(TrainingError, match="not finite"):
+        for _ in range(2):
+            sac.iterate()
+
+
+def test_the_seconds_of_an_iteration_are_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    sac = make()
+    monkeypatch.setattr("racecraft.learn.sac.time.perf_counter", ticking())
+    for _ in range(2):
+        stats = sac.iterate()
+        assert (stats.policy_seconds, stats.environment_seconds, stats.update_seconds) == (8.0, 8.0, 8.0)
+
+
+def test_a_reward_of_one_is_the_spread_of_the_returns_from_the_second_on() -> None:
+    sac = make()
+    for count, unit in ((0.0, 1.0), (1.0, 1.0), (2.0, 3.0), (8.0, 1.5)):
+        sac._moments = np.array([count, 0.0, 18.0])
+        assert sac._unit() == unit
+    sac._moments = np.array([2.0, 0.0, 0.0])
+    assert sac._unit() == np.float32(1e-6)
 
 
 def test_discrete_actions_are_refused() -> None:

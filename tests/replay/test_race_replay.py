@@ -80,6 +80,12 @@ def test_what_was_driven_is_driven_again_to_the_bit(evaluation: Evaluation) -> N
         assert verify(Replay.of(evaluation), num_threads=num_threads).difference is None
 
 
+def test_what_was_read_cannot_be_changed_by_mistake_and_is_told_as_genuine(clean: Path) -> None:
+    replay = read_replay(clean)
+    assert not any(car.recording.rows.flags.writeable for car in replay.cars)
+    assert verify(replay, num_threads=1).to_dict()["difference"] is None
+
+
 def test_it_says_what_happened_and_is_small(clean: Path) -> None:
     replay = read_replay(clean)
     assert (replay.title, replay.names) == ("mine", ("a", "b"))
@@ -157,10 +163,26 @@ def test_rewards_laps_and_results_are_checked_too(clean: Path) -> None:
             rewards=(replay.rewards[0], replay.rewards[1][:-3]),
         )
 
-    for change, what, car in ((reward, "reward", 0), (lap, "lap", 0), (result, "result", 1), (shorter, "length", 1)):
-        found = verify(forged(clean, change)).difference
+    def longer(replay: Replay) -> Replay:
+        recording = replay.cars[1].recording
+        more = (
+            np.concatenate([column, column[-1:]]) for column in (recording.rows, recording.clock, recording.actions)
+        )
+        return replace(
+            replay,
+            cars=(replay.cars[0], replace(replay.cars[1], recording=type(recording)(recording.track, *more))),
+            rewards=(replay.rewards[0], np.append(replay.rewards[1], 0.0)),
+        )
+
+    changes = ((reward, "reward", 0), (lap, "lap", 0), (result, "result", 1), (shorter, "length", 1))
+    for change, what, car in (*changes, (longer, "length", 1)):
+        verified = verify(forged(clean, change))
+        found = verified.difference
         assert found is not None
         assert (found.what, found.car) == (what, car)
+        told = verified.to_dict()
+        assert (told["difference"]["what"], told["difference"]["car"]) == (what, car)
+        assert told["difference"]["sentence"] == found.sentence
         if what == "reward":
             assert found.step == 7
 
