@@ -151,12 +151,10 @@ def test_settings_that_cannot_work_are_refused(settings: dict[str, Any], match: 
 
 def test_one_action_that_is_not_finite_stops_it(monkeypatch: pytest.MonkeyPatch) -> None:
     sac = make(replace(CONFIG, learning_starts=8))
-    monkeypatch.setattr(
-        sac.backend, "act", lambda observations, noise: np.where(np.arange(8)[:, None] == 3, np.nan, 0.5)
-    )
+    broken = np.where(np.arange(8)[:, None] == 3, np.nan, 0.5)
+    monkeypatch.setattr(sac.backend, "act", lambda observations, noise: broken)
     with pytest.raises(TrainingError, match="not finite"):
-        for _ in range(2):
-            sac.iterate()
+        sac.iterate()
 
 
 def test_the_seconds_of_an_iteration_are_its_own(monkeypatch: pytest.MonkeyPatch) -> None:

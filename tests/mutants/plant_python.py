@@ -131,7 +131,8 @@ def planned(only: str) -> list[Step]:
     for module, (number, tests) in COVERING.items():
         if module.startswith(only):
             source = (ROOT / "src" / "racecraft" / module).read_text(encoding="utf-8")
-            texts = [(ROOT / test).read_text(encoding="utf-8") for test in tests if test.endswith(".py")]
+            files = [ROOT / test.partition("::")[0] for test in tests if "/" in test]
+            texts = [path.read_text(encoding="utf-8") for path in files]
             for index, fault in enumerate(sample(source, number, seed=f"{SEED} {module}")):
                 found.append(Step(module, tests, fault, _digest(SEED, source, index), _digest(tests, texts)))
     return found

@@ -89,7 +89,7 @@ def test_with_a_fault_a_file_is_still_python_and_differs_in_that_place_alone(mod
 def test_there_are_faults_enough_and_tests_that_cover_them() -> None:
     for module, (number, tests) in COVERING.items():
         assert len(sample((SOURCES / module).read_text(encoding="utf-8"), number, seed="1")) == number, module
-        assert all((ROOT / test).is_file() for test in tests if "/" in test), module
+        assert all((ROOT / test.partition("::")[0]).is_file() for test in tests if "/" in test), module
     assert sum(number for number, _ in COVERING.values()) >= 180
 
 

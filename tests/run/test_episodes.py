@@ -43,6 +43,11 @@ def test_episodes_follow_each_other_on_one_clock_a_step_apart() -> None:
     assert counter.number == 42
 
 
+def test_a_fresh_run_counts_from_nothing() -> None:
+    (episode,) = EpisodeCounter(1).update(rows_of(steps=[15]), [1.0], np.array([True]))
+    assert (episode.number, episode.start_time, episode.end_time) == (0, 0.0, 1.0)
+
+
 def test_what_is_abandoned_is_not_counted() -> None:
     counter = EpisodeCounter(2)
     counter.update(rows_of(steps=[5, 5]), [1.0, 1.0], np.array([False, False]))
