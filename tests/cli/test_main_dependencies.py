@@ -230,8 +230,7 @@ def test_what_needs_no_extra_works(told: dict[str, tuple[int, str]]) -> None:
         "--device cuda",
         "ladder ",
         "--frame",
-        "limit T.npy",
-        "--vehicle v6",
+        "tracks limit ",
         "tune ",
         "serve ",
     )
