@@ -141,6 +141,7 @@ def test_another_run_begins_from_it(tmp_path: Path) -> None:
     for name, array in theirs.arrays.items():
         assert np.array_equal(ours.arrays[name], array)
     assert load_driver(found.run).learner.spec.name == DEEP
+    assert not RunFolder.open(found.run).read_info().foreign  # there was no reward function, so it has one of ours
 
 
 def test_settings_of_its_own_make_no_use_of_weights(tmp_path: Path) -> None:

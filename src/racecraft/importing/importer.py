@@ -118,6 +118,7 @@ def import_run(
         source = stack.enter_context(open_source(path))
         model = _Model(source, "" if source.reward else find_root(source.files, source=source.title))
         params, given = _read_params(model)
+        is_foreign = not reward and bool(source.reward or model.find(REWARD))
         model.weights = _find_weights(model, checkpoint, network)
         text = _read_reward(model, reward)
         metadata = _read_metadata(model)
@@ -173,7 +174,7 @@ def import_run(
             (folder.path / ORIGINAL).mkdir(exist_ok=True)
             write_json(folder.path / ORIGINAL / "import.json", {**report.to_dict(), "source": source.title})
             params = replace(params, world_name=tracks[0].name)
-            write_run(folder, settings, tracks, text, metadata, hyperparameters, params, foreign=not reward)
+            write_run(folder, settings, tracks, text, metadata, hyperparameters, params, foreign=is_foreign)
         except BaseException as error:
             shutil.rmtree(folder.path, ignore_errors=True)
             if isinstance(error, OSError):
