@@ -47,6 +47,20 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     page.get_by_role("row", name="bob").wait_for()
     assert page.get_by_title("Driven again from its actions").count() == 2
 
+    # while it is open nobody sees where it starts, only what was promised of it
+    commitment = page.locator(".proof code")
+    assert len(commitment.first.inner_text()) == 64
+    assert commitment.count() == 1
+    for name in ("Replay all together", "Video: bob", "3D, Replay: bob"):
+        assert page.get_by_role("button", name=name).count() == 0
+    page.get_by_role("button", name="Close the race").click()
+    page.get_by_text("The secret gives the starts").wait_for()
+    assert len(commitment.nth(1).inner_text()) == 64
+    assert page.get_by_role("button", name="Open it again").count() == 0
+    link = page.get_by_role("link", name="File: bob")
+    replay = visit.console.client.get(str(link.get_attribute("href"))).content
+    assert replay.startswith(b"RACECRAFTREPLAY")
+
     page.get_by_role("button", name="Replay all together").click()
     page.locator(".stage canvas").wait_for()
     clock = page.locator(".controls .number")
@@ -60,12 +74,22 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     source = str(video.get_attribute("src"))
     assert visit.console.client.get(source).headers["content-type"] == "video/mp4"
 
-    page.get_by_role("button", name="Close the race").click()
-    page.get_by_role("button", name="Open it again").wait_for()
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("heading", name="No race yet").wait_for()
     page.get_by_role("button", name="Undo").click()
     page.get_by_role("row", name="ada").wait_for()
+
+
+def test_a_race_for_practice_shows_everything_and_opens_again(visit: Visit) -> None:
+    page = visit.open("/races/new")
+    page.get_by_label("Title").fill("Practice")
+    page.get_by_label("Trials").fill("1")
+    page.get_by_role("checkbox", name="For practice").check()
+    page.get_by_role("button", name="Make the race").click()
+    page.get_by_text("Everybody knows where this race starts.").wait_for()
+    page.get_by_role("button", name="Close the race").click()
+    page.get_by_role("button", name="Open it again").click()
+    page.get_by_role("button", name="Close the race").wait_for()
 
 
 def test_the_settings_say_where_things_are(visit: Visit) -> None:

@@ -17,18 +17,24 @@ import sqlalchemy as sa
 from running_consoles import RunningConsole
 
 from racecraft.contest.classification import classify
+from racecraft.contest.terms import announced_terms
+from racecraft.errors import ConfigError
+from racecraft.judging.verification import published
 from racecraft.race import Lap, Recording, Trial
+from racecraft.race.announcement import Announcement, commitment_of, seed_of
+from racecraft.replay import read_replay, verify
 from racecraft.run import CheckpointStore
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races import races as races_module
 from racecraft.serve.races.races import Races
-from racecraft.serve.races.schemas import Enter, NewRace
-from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Entry, Job
+from racecraft.serve.races.schemas import Enter, NewRace, RaceChange
+from racecraft.serve.store.database import MIGRATIONS, Database
+from racecraft.serve.store.tables import Entry, Job, Race
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.vehicle import PRESETS
 from racecraft.track import load_track
 
 NOTHING = Recording(load_track("oval"), np.zeros((1, len(ROW_COLUMNS))), np.zeros(1), np.zeros((1, 2), np.float32))
@@ -263,6 +269,128 @@ def test_of_two_who_race_for_the_last_place_one_gets_it(
     assert len(stewards.queue.list(kind="race")) == 2
 
 
+# ---- secrets, trials, and races of before
+
+
+def test_every_race_has_a_secret_of_its_own_and_announces_what_decides_it(stewards: Stewards) -> None:
+    races = [stewards.race(laps=2, ranking="best") for _ in range(2)]
+    one, other = (stewards.races.announcement(race) for race in races)
+    assert one.document == other.document
+    assert one.commitment != other.commitment
+    assert one.is_secret
+    assert (one.document["kind"], one.document["trials"], one.document["minimum_laps"]) == ("time-trial", 5, 1)
+    assert one.document["rules"]["starts"] == "lap"
+    assert one.document["vehicle"] == vars(PRESETS["v5"])
+    kept = [_row(stewards, race) for race in races]
+    assert len({race.secret for race in kept}) == 2
+    for race, announced in zip(kept, (one, other), strict=True):
+        assert commitment_of(announced.document, bytes.fromhex(race.secret)) == announced.commitment
+        assert len(bytes.fromhex(race.secret)) == 32
+
+
+def test_the_secret_is_told_when_the_race_is_over_and_not_before(stewards: Stewards) -> None:
+    race = stewards.race()
+    stewards.drive(race, "ada", [10.0, 10.0, 10.0])
+    found = stewards.races.get(race)
+    assert (found.secret, found.is_withheld, found.seed) == ("", True, None)
+    with pytest.raises(Conflict, match="tells where it starts"):
+        stewards.races.driven(race, [found.standings[0].entry])
+    with stewards.database.transaction() as session:
+        moment = datetime.now(UTC)
+        session.execute(sa.update(Race).values(opens=moment - timedelta(days=2), closes=moment - timedelta(days=1)))
+    over = stewards.races.get(race)
+    assert over.secret == _row(stewards, race).secret
+    assert not over.is_withheld
+    assert Announcement.from_dict(stewards.races.announcement(race).to_dict()).seed is not None
+    assert stewards.races.driven(race, [found.standings[0].entry])
+
+
+def test_a_race_for_practice_tells_its_seed_and_can_be_opened_again(stewards: Stewards) -> None:
+    race = stewards.race(seed=7)
+    found = stewards.races.get(race)
+    assert (found.seed, found.secret, found.is_withheld) == (7, "", False)
+    assert stewards.races.announcement(race).seed == 7
+    stewards.races.change(race, RaceChange(closes=datetime.now(UTC)))
+    assert stewards.races.get(race).state == "closed"
+    stewards.races.change(race, RaceChange(closes=None))
+    assert stewards.races.get(race).state == "open"
+
+
+def test_the_median_of_an_entrys_trials_counts(stewards: Stewards) -> None:
+    race = stewards.race(laps=1)
+    stewards.drive(race, "lucky", [], lap_seconds=[[5.0], [20.0], [21.0], [22.0], [23.0]], mean_completion=1.0)
+    stewards.drive(race, "steady", [], lap_seconds=[[15.0], [16.0], [17.0], [18.0], []], mean_completion=0.9)
+    stewards.drive(race, "rare", [], lap_seconds=[[9.0], [9.0], [], [], []], mean_completion=0.8)
+    assert stewards.table(race) == [(1, "steady", 17.0, 0.0), (2, "lucky", 21.0, 4.0), (None, "rare", None, None)]
+    rows = stewards.races.get(race).standings
+    assert rows[0].scores == [15.0, 16.0, 17.0, 18.0, None]
+    assert (rows[1].best_lap, rows[1].laps) == (5.0, 5)
+
+
+def test_what_an_entry_drives_by_is_what_was_announced(stewards: Stewards) -> None:
+    race = stewards.race(kind="object-avoidance", objects=2, vehicle="v4", offtrack_penalty=2.0, trials=3)
+    stewards.model("ada")
+    stewards.races.enter(race, Enter(models=["ada"]), user_id=1)
+    (job,) = stewards.queue.list(kind="race")
+    assert set(job.payload) == {"track", "announcement", "checkpoint"}
+    announced = Announcement.from_dict(job.payload["announcement"])
+    terms = announced_terms(announced, load_track("oval"))
+    assert terms.conditions.seed == seed_of(bytes.fromhex(_row(stewards, race).secret))
+    assert terms.conditions.vehicle == PRESETS["v4"]
+    assert terms.conditions.rules.offtrack_penalty == 2.0
+    assert (terms.num_trials, terms.conditions.objects.count) == (3, 2)
+    with pytest.raises(ConfigError, match="secret"):
+        announced_terms(stewards.races.announcement(race), load_track("oval"))
+
+
+def test_races_of_before_say_so_and_take_nobody_any_more(tmp_path: Path) -> None:
+    """A database of the version before, with a race that was held then."""
+    database = Database(f"sqlite:///{tmp_path / 'console.db'}")
+    _upgrade_to(database, "0003")
+    with database.engine.begin() as connection:
+        connection.execute(sa.text("INSERT INTO users (id, name, created) VALUES (1, 'you', '2025-01-01')"))
+        connection.execute(
+            sa.text(
+                "INSERT INTO races (id, owner_id, title, description, visibility, kind, track, rules, objects, vehicle,"
+                " seed, ranking, minimum_laps, opens, created) VALUES (1, 1, 'Old cup', '', 'private', 'time-trial',"
+                " 'oval', '{\"laps\": 1}', '{}', '', 0, 'total', 1, '2025-01-01', '2025-01-01')"
+            )
+        )
+    database.close()
+    stewards = Stewards(tmp_path, database.url)
+    stewards.drive(1, "ada", [10.0])
+    stewards.drive(1, "bob", [9.0])
+    found = stewards.races.get(1)
+    assert (found.is_old, found.state, found.trials, found.commitment) == (True, "closed", 1, "")
+    assert stewards.table(1) == [(1, "bob", 9.0, 0.0), (2, "ada", 10.0, 1.0)]
+    assert stewards.races.cards()[0].is_old
+    stewards.model("ada")
+    with pytest.raises(Conflict, match="over"):
+        stewards.races.enter(1, Enter(models=["ada"]), user_id=1)
+    with pytest.raises(Conflict, match="old rules"):
+        stewards.races.change(1, RaceChange(closes=datetime.now(UTC) + timedelta(days=1)))
+    with pytest.raises(NotFound, match="old rules"):
+        stewards.races.announcement(1)
+    assert not stewards.races.get(stewards.race()).is_old
+    stewards.database.close()
+
+
+def _upgrade_to(database: Database, revision: str) -> None:
+    from alembic import command
+    from alembic.config import Config
+
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS))
+    with database.engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, revision)
+
+
+def _row(stewards: Stewards, race: int) -> Race:
+    with stewards.database.transaction() as session:
+        return session.get_one(Race, race)
+
+
 # ---- over HTTP
 
 
@@ -272,14 +400,14 @@ def make(console: RunningConsole, **settings: Any) -> dict[str, Any]:
     return dict(reply.json())
 
 
-def test_a_race_from_beginning_to_end(console: RunningConsole) -> None:
+def test_a_race_from_beginning_to_end(console: RunningConsole, tmp_path: Path) -> None:
     client = console.client
     for name in ("ada", "bob"):
         console.create(name=name, track="oval", until="3000 steps", seed=len(name) + ord(name[0]))
     for job in client.get("/api/jobs").json():
         assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
-    race = make(console, laps=1, offtrack_penalty=1.0, max_resets=3)
-    assert race["state"] == "open"
+    race = make(console, laps=1, offtrack_penalty=1.0, max_resets=3, trials=3)
+    assert (race["state"], race["is_withheld"], race["secret"], race["seed"]) == ("open", True, "", None)
     entered = client.post(f"/api/races/{race['id']}/entries", json={"models": ["ada", "bob", "ada"]})
     assert entered.status_code == 202, entered.text
     assert len(entered.json()["undecided"]) == 2
@@ -295,18 +423,60 @@ def test_a_race_from_beginning_to_end(console: RunningConsole) -> None:
     assert scores == sorted(scores)
     for row in found["standings"]:
         assert row["is_verified"] is True
-        assert row["has_replay"]
-        assert client.get(f"/api/models/{row['model']}/files/{row['video']}").headers["content-type"] == "video/mp4"
-        if row["laps"]:
-            assert row["score"] == pytest.approx(row["lap_times"][0])
-            assert row["penalty"] == pytest.approx(row["resets"] * 1.0, abs=0.1)
+        assert len(row["scores"]) == len(row["lap_times"]) == 3
+        assert (row["has_replay"], row["video"]) == (False, None)
+        for file in ("video", "replay"):
+            refused(client.get(f"/api/races/{race['id']}/entries/{row['entry']}/{file}"), 409)
     entries = ",".join(str(row["entry"]) for row in found["standings"])
-    film = client.get(f"/api/races/{race['id']}/replay", params={"entries": entries}).json()
-    assert [car["model"] for car in film["cars"]] == [row["model"] for row in found["standings"]]
-    for car, row in zip(film["cars"], found["standings"], strict=True):
+    refused(client.get(f"/api/races/{race['id']}/replay", params={"entries": entries}), 409)
+    # while it is open neither the secret, nor the seed, nor a place is to be had anywhere
+    open_race = client.get(f"/api/races/{race['id']}/race.json").json()
+    assert (open_race["commitment"], open_race["secret"]) == (race["commitment"], "")
+    addresses = ["/api/races", f"/api/races/{race['id']}", f"/api/races/{race['id']}/race.json", "/api/jobs"]
+    for name in ("ada", "bob"):
+        addresses += [f"/api/models/{name}", f"/api/models/{name}/evaluations"]
+        assert not list((console.runs / name).glob("evaluation-*"))  # nor as a ghost, a report or a download
+    texts = [client.get(address).text for address in addresses]
+    for job in client.get("/api/jobs").json():
+        if job["kind"] == "race":
+            assert "files" not in job["result"]
+    assert "model:" not in client.get("/api/ghosts", params={"track": "oval"}).text
+
+    # over: the secret is told, and everything can be looked at and checked
+    closed = client.patch(f"/api/races/{race['id']}", json={"closes": datetime.now(UTC).isoformat()}).json()
+    secret = closed["secret"]
+    assert (closed["state"], closed["is_withheld"], len(secret)) == ("closed", False, 64)
+    assert race["commitment"] == commitment_of(open_race["document"], bytes.fromhex(secret))
+    for text in texts:
+        assert secret not in text
+        assert str(seed_of(bytes.fromhex(secret))) not in text
+    told = client.get(f"/api/races/{race['id']}/race.json")
+    (tmp_path / "race.json").write_bytes(told.content)
+    for row in closed["standings"]:
+        assert row["has_replay"]
+        assert client.get(row["video"]).headers["content-type"] == "video/mp4"
+        content = client.get(f"/api/races/{race['id']}/entries/{row['entry']}/replay").content
+        (tmp_path / "entry.replay").write_bytes(content)
+        replay = read_replay(tmp_path / "entry.replay")
+        assert verify(replay, race=published(str(tmp_path / "race.json")), num_threads=1).is_genuine
+        assert verify(replay, race=race["commitment"], num_threads=1).is_genuine
+        assert len(replay.cars) == 3
+        assert [list(car.lap_times) for car in replay.cars] == row["lap_times"]
+        assert replay.conditions.vehicle == PRESETS["v5"]
+    film = client.get(f"/api/races/{race['id']}/replay", params={"entries": entries, "trial": 1}).json()
+    assert film["trial"] == 1
+    assert [car["model"] for car in film["cars"]] == [row["model"] for row in closed["standings"]]
+    begin = [car["trace"][0] for car in film["cars"]]
+    assert begin[0] == begin[1]  # everybody from the same place
+    other = client.get(f"/api/races/{race['id']}/replay", params={"entries": entries, "trial": 2}).json()
+    assert other["cars"][0]["trace"][0] != begin[0]
+    for car in film["cars"]:
         assert len(car["trace"]) > 10
-        if row["laps"] == 1:
-            assert len(car["trace"]) / 15 == pytest.approx(row["lap_times"][0], abs=0.3)
+    refused(client.post(f"/api/races/{race['id']}/entries", json={"models": ["ada"]}), 409)
+    for closes in (None, (datetime.now(UTC) + timedelta(days=1)).isoformat()):
+        again = refused(client.patch(f"/api/races/{race['id']}", json={"closes": closes}), 409)
+        assert "everybody knows its secret" in again["message"]
+    assert client.patch(f"/api/races/{race['id']}", json={"title": "Last cup"}).json()["title"] == "Last cup"
 
     # a model's new name is the standings', too; its files are found again
     client.patch("/api/models/ada", json={"name": "ada-lovelace"})
@@ -326,7 +496,7 @@ def test_a_race_is_changed_closed_deleted_and_brought_back(console: RunningConso
     address = f"/api/races/{race['id']}"
     assert race["state"] == "upcoming"
     refused(client.patch(address, json={"closes": moment.isoformat()}), 422)
-    race = make(console, title="  Night cup  ", description=" late ")
+    race = make(console, title="  Night cup  ", description=" late ", seed=3)
     address = f"/api/races/{race['id']}"
     assert (race["title"], race["description"]) == ("Night cup", "late")
     changed = client.patch(address, json={"closes": datetime.now(UTC).isoformat(), "title": "Day cup"}).json()
@@ -341,7 +511,7 @@ def test_a_race_is_changed_closed_deleted_and_brought_back(console: RunningConso
 
 def test_entries_that_cannot_be(console: RunningConsole) -> None:
     client = console.client
-    race = make(console)
+    race = make(console, seed=1)
     entries = f"/api/races/{race['id']}/entries"
     refused(client.post(entries, json={"models": ["nobody"]}), 404)
     refused(client.post(entries, json={"models": ["../../etc"]}), 422)
@@ -378,6 +548,11 @@ def test_entries_that_cannot_be(console: RunningConsole) -> None:
         {"opens": "2001-01-01T00:00:00"},
         {"opens": "soon"},
         {"vehicle": "../x"},
+        {"vehicle": ""},
+        {"trials": 0},
+        {"trials": 100},
+        {"secret": "00" * 32},
+        {"commitment": "00" * 32},
         {"owner_id": 2},
     ],
 )

@@ -14,6 +14,7 @@ from racecraft.errors import ConfigError
 from racecraft.race.announcement import Announcement
 from racecraft.race.conditions import Conditions
 from racecraft.sim.camera import CameraSpec
+from racecraft.track.track import Track
 
 ALONE: Final = ("time-trial", "object-avoidance", "head-to-bot")
 TOGETHER: Final = ("head-to-model", "grid")
@@ -91,6 +92,26 @@ def race_terms(
         ranking=ranking,
         minimum_laps=needed,
         num_trials=trials,
+        announcement=announcement,
+    )
+
+
+def announced_terms(announcement: Announcement, track: Track) -> RaceTerms:
+    """What an announced race is held by, its secret included.
+
+    Raises:
+        ConfigError: It is of another track, its starts are a secret, or it has a setting that is not one of ours.
+    """
+    if announcement.is_secret:
+        raise ConfigError("The race's starts are a secret; only who knows it can hold the race.")
+    document = announcement.document
+    check_trials(document["kind"], document["trials"])
+    return RaceTerms(
+        kind=document["kind"],
+        conditions=announcement.conditions(track),
+        ranking=document["ranking"],
+        minimum_laps=document["minimum_laps"],
+        num_trials=document["trials"],
         announcement=announcement,
     )
 

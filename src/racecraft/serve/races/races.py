@@ -1,25 +1,27 @@
 """Races: made, entered, decided by jobs, ranked.
 
-    race ──enter──▶ entry + job (kind race) ──▶ evaluation in the model's run folder, driven again to verify it
+    race ──enter──▶ entry + job (kind race) ──▶ replay and video below .racecraft/races, driven again to verify it
       └─ standings ◀── ranking_key of each model's best entry ◀── the job's result
 
-Every entry starts alike: one car, the race's rules, objects and seed. The table says whose a race and an entry are, so
-that accounts can come later.
+Every entry starts alike, by what was announced when the race was made: its document and the commitment of its secret
+are published at once, the secret when the race is over. Until then nothing is shown that tells where it starts. The
+table says whose a race and an entry are, so that accounts can come later.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from datetime import datetime
-from pathlib import Path
+from dataclasses import replace
 from typing import Any, Final
 
 import sqlalchemy as sa
 
-from racecraft.contest import Key, places, ranking_key, ranking_score
+from racecraft.contest.terms import RaceTerms, race_terms
 from racecraft.errors import ConfigError
-from racecraft.race import RaceRules
+from racecraft.race.announcement import Announcement, draw_secret
+from racecraft.race.conditions import Conditions
+from racecraft.race.rules import race_rules
 from racecraft.serve.jobs.queue import JobQueue, new_job
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.problems import Conflict, NotFound
@@ -30,19 +32,23 @@ from racecraft.serve.races.schemas import (
     RaceChange,
     RaceDetail,
     RaceState,
-    Standing,
     Undecided,
 )
+from racecraft.serve.races.standings import Entered, key_of, score_of, standings_of
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Race, User, now
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim import objects_for_race
 from racecraft.sim.objects import NO_OBJECTS, Objects
+from racecraft.sim.vehicle import load_vehicle
+from racecraft.track import Track
 
 KIND: Final = "race"
 """Of the jobs."""
 MAX_RACES: Final = 500
 MAX_ENTRIES: Final = 1000  # of a race
+RULES: Final = ("laps", "max_resets", "offtrack_penalty", "collision_penalty", "direction")
+"""Rules that who makes a race may choose; the others are deepracer-for-cloud's."""
 
 
 class Races:
@@ -57,7 +63,6 @@ class Races:
         Raises:
             RacecraftError: The track or a setting is not usable.
         """
-        self._courses.load(request.track)
         opens = request.opens or now()
         if request.closes is not None and request.closes <= opens:
             raise ConfigError("The race closes before it opens.", hint="Choose a later end, or none.")
@@ -66,13 +71,8 @@ class Races:
                 f"An average over {request.minimum_laps} laps cannot be had from {request.laps}.",
                 hint="Ask for more laps, or average over fewer.",
             )
-        rules = RaceRules(
-            laps=request.laps,
-            max_resets=request.max_resets,
-            offtrack_penalty=request.offtrack_penalty,
-            collision_penalty=request.collision_penalty,
-            direction=request.direction,
-        )
+        terms = _terms(request, self._courses.load(request.track))
+        announced = terms.announcement
         with self._database.transaction() as session:
             if (session.scalar(sa.select(sa.func.count(Race.id)).where(Race.deleted.is_(None))) or 0) >= MAX_RACES:
                 raise Conflict(f"There are {MAX_RACES} races already.", hint="Delete some first.")
@@ -82,12 +82,16 @@ class Races:
                 description=request.description.strip(),
                 kind=request.kind,
                 track=request.track,
-                rules=rules.to_dict(),
-                objects=_objects(request).to_dict(),
+                rules=terms.conditions.rules.to_dict(),
+                objects=terms.conditions.objects.to_dict(),
                 vehicle=request.vehicle,
-                seed=request.seed,
+                seed=request.seed or 0,
                 ranking=request.ranking,
-                minimum_laps=_laps_needed(request),
+                minimum_laps=terms.minimum_laps,
+                trials=terms.num_trials,
+                document=dict(announced.document),
+                commitment=announced.commitment,
+                secret=announced.secret,
                 opens=opens,
                 closes=request.closes,
             )
@@ -119,15 +123,29 @@ class Races:
             rules=race.rules,
             objects=race.objects,
             vehicle=race.vehicle,
-            seed=race.seed,
-            standings=_standings(race, entries, runs=self._garage.runs),
+            seed=None if race.secret else race.seed,
+            commitment=race.commitment,
+            secret="" if _is_withheld(race) else race.secret,
+            is_withheld=_is_withheld(race),
+            standings=standings_of(race, entries, runs=self._garage.runs, is_withheld=_is_withheld(race)),
             undecided=undecided,
         )
 
     def change(self, race_id: int, request: RaceChange) -> None:
-        """Another title, description or end."""
+        """Another title, description or end.
+
+        Raises:
+            Conflict: It is over and cannot be opened again.
+        """
         with self._database.transaction() as session:
+            _hold(session, race_id)
             race = _race(session, race_id)
+            if "closes" in request.model_fields_set and _is_told(race):
+                reason = "it was driven under the old rules" if not race.commitment else "everybody knows its secret"
+                raise Conflict(
+                    f"The race is over and cannot be opened again: {reason}.",
+                    hint="Make another one; it starts from other places.",
+                )
             for name, value in request.model_dump(exclude_unset=True).items():
                 if name != "title" or value is not None:
                     setattr(race, name, value if value is not None or name == "closes" else "")
@@ -160,10 +178,7 @@ class Races:
                 raise Conflict(f"A race takes {MAX_ENTRIES} entries.")
             payload = {
                 "track": self._courses.path_or_name(race.track),
-                "rules": race.rules,
-                "objects": race.objects,
-                "vehicle": race.vehicle,
-                "seed": race.seed,
+                "announcement": _announcement(race).to_dict(),
                 "checkpoint": request.checkpoint,
             }
             jobs = [new_job(KIND, name, payload) for name in models]
@@ -184,23 +199,38 @@ class Races:
             job_id = entry.job_id
         self._queue.cancel(job_id)
 
-    def evaluations(self, race_id: int, entry_ids: Iterable[int]) -> list[tuple[int, str, Path]]:
-        """Entry, model and folder of the evaluation of some decided entries, in the order asked for."""
+    def announcement(self, race_id: int) -> Announcement:
+        """What is published of a race: its secret only when it is over.
+
+        Raises:
+            NotFound: There is no such race, or nobody announced it.
+        """
         with self._database.transaction() as session:
-            _race(session, race_id)
+            race = _race(session, race_id)
+        if not race.commitment:
+            raise NotFound(f"Race {race_id} was driven under the old rules, and announced by nobody.")
+        announced = _announcement(race)
+        return replace(announced, secret="") if _is_withheld(race) else announced
+
+    def driven(self, race_id: int, entry_ids: Iterable[int]) -> list[tuple[int, Job]]:
+        """Decided entries with their jobs, in the order asked for, to be looked at.
+
+        Raises:
+            NotFound: There is no such race, or no such entry that is decided.
+            Conflict: The race is not over, and they would tell where it starts.
+        """
+        with self._database.transaction() as session:
+            race = _race(session, race_id)
             entries = {entry.id: job for entry, job, _ in _entries(session, [race_id]).get(race_id, [])}
+        if _is_withheld(race):
+            raise Conflict("What was driven in this race is shown when it is over: it tells where it starts.")
         found = []
         for entry_id in entry_ids:
             job = entries.get(entry_id)
-            folder = None if job is None else _folder(job, self._garage.runs)
-            if job is None or folder is None:
+            if job is None or job.state != "done":
                 raise NotFound(f"Entry {entry_id} has no replay in this race.")
-            found.append((entry_id, job.run, folder))
+            found.append((entry_id, job))
         return found
-
-
-Entered = tuple[Entry, Job, str]
-"""An entry, its job and its user's name."""
 
 
 def _race(session: Any, race_id: int, *, is_deleted: bool = False) -> Race:
@@ -234,9 +264,39 @@ def _entries(session: Any, race_ids: list[int]) -> dict[int, list[Entered]]:
     return found
 
 
-def _laps_needed(request: NewRace) -> int:
-    """Laps that an entry must complete to be ranked."""
-    return {"total": request.laps, "best": 1, "average": request.minimum_laps}[request.ranking]
+def _terms(request: NewRace, track: Track) -> RaceTerms:
+    """What a new race is held by, with a secret unless its seed is given."""
+    changes = {name: getattr(request, name) for name in RULES}
+    conditions = Conditions(
+        track=track,
+        rules=race_rules("drfc", changes),
+        seed=request.seed or 0,
+        vehicle=load_vehicle(request.vehicle),
+        objects=_objects(request),
+    )
+    return race_terms(
+        conditions,
+        kind=request.kind,
+        ranking=request.ranking,
+        minimum_laps=request.minimum_laps if request.ranking == "average" else None,
+        num_trials=request.trials,
+        secret=draw_secret() if request.seed is None else None,
+    )
+
+
+def _announcement(race: Race) -> Announcement:
+    """As it was made, with its secret."""
+    return Announcement(document=race.document, commitment=race.commitment, secret=race.secret)
+
+
+def _is_told(race: Race) -> bool:
+    """Whether it is over for good: driven under the old rules, or everybody may know its secret."""
+    return not race.commitment or (bool(race.secret) and _state(race) == "closed")
+
+
+def _is_withheld(race: Race) -> bool:
+    """Whether nobody may see yet where it starts."""
+    return bool(race.secret) and _state(race) != "closed"
 
 
 def _objects(request: NewRace) -> Objects:
@@ -248,124 +308,26 @@ def _objects(request: NewRace) -> Objects:
     return objects_for_race(request.kind, settings=settings)
 
 
-def _state(race: Race, moment: datetime | None = None) -> RaceState:
-    moment = moment or now()
+def _state(race: Race) -> RaceState:
+    moment = now()
+    if not race.commitment:
+        return "closed"  # nobody can enter what was driven under the old rules
     if moment < race.opens:
         return "upcoming"
     return "closed" if race.closes is not None and moment >= race.closes else "open"
 
 
 def _card(race: Race, entries: list[Entered]) -> dict[str, Any]:
-    ranked = [(entry.id, job) for entry, job, _ in entries if math.isfinite(_score(race, job))]
-    leader = min(ranked, key=lambda found: (_key(race, found[1]), found[0]), default=None)
+    ranked = [(entry.id, job) for entry, job, _ in entries if math.isfinite(score_of(race, job))]
+    leader = min(ranked, key=lambda found: (key_of(race, found[1]), found[0]), default=None)
     return {
         **{name: getattr(race, name) for name in RaceCard.model_fields if hasattr(race, name)},
         "laps": int(race.rules.get("laps", 1)),
         "state": _state(race),
+        "is_old": not race.commitment,
         "entries": len(entries),
         "models": len({job.run for _, job, _ in entries}),
         "running": sum(job.state in ("queued", "running") for _, job, _ in entries),
         "leader": leader[1].run if leader else None,
-        "leader_score": _score(race, leader[1]) if leader else None,
+        "leader_score": score_of(race, leader[1]) if leader else None,
     }
-
-
-def _lap_times(job: Job) -> list[float]:
-    trials = (job.result or {}).get("lap_seconds") or [[]]
-    return [float(seconds) for seconds in trials[0]]
-
-
-def _score(race: Race, job: Job) -> float:
-    if job.state != "done":
-        return math.inf
-    return ranking_score(_lap_times(job), ranking=race.ranking, minimum_laps=race.minimum_laps)
-
-
-def _key(race: Race, job: Job) -> Key:
-    """What the place of a decided entry is decided by."""
-    result: dict[str, Any] = job.result or {}
-    return ranking_key(
-        _score(race, job),
-        lap_times=_lap_times(job),
-        completion=float(result.get("mean_completion") or 0.0),
-        resets=int(result.get("resets") or 0),
-    )
-
-
-def _standings(race: Race, entries: list[Entered], *, runs: Path) -> list[Standing]:
-    """Each model's best entry, in the order of their places; of equals, who was first."""
-    best: dict[tuple[int, str], tuple[tuple[Key, int], Entered]] = {}
-    attempts: dict[tuple[int, str], int] = {}
-    for entered in entries:
-        entry, job, _ = entered
-        if job.state != "done" or job.result is None:
-            continue
-        who = (entry.user_id, job.run)
-        attempts[who] = attempts.get(who, 0) + 1
-        rank = (_key(race, job), entry.id)
-        if who not in best or rank < best[who][0]:
-            best[who] = (rank, entered)
-    ordered = sorted(best.values(), key=lambda found: found[0])
-    scores = [_score(race, job) for _, (_, job, _) in ordered]
-    first = min(scores, default=math.inf)
-    return [
-        _standing(
-            entered,
-            place=place,
-            score=score,
-            first=first,
-            attempts=attempts[entered[0].user_id, entered[1].run],
-            runs=runs,
-        )
-        for (_, entered), place, score in zip(ordered, places([rank[0] for rank, _ in ordered]), scores, strict=True)
-    ]
-
-
-def _standing(entered: Entered, *, place: int, score: float, first: float, attempts: int, runs: Path) -> Standing:
-    entry, job, user = entered
-    result: dict[str, Any] = job.result or {}
-    is_ranked = math.isfinite(score)
-    times = _lap_times(job)
-    folder = _folder(job, runs)
-    verification = result.get("verification")
-    return Standing(
-        place=place if is_ranked else None,
-        entry=entry.id,
-        model=job.run,
-        user=user,
-        score=score if is_ranked else None,
-        gap=score - first if is_ranked else None,
-        lap_times=times,
-        best_lap=min(times, default=None),
-        laps=len(times),
-        completion=float(result.get("mean_completion") or 0.0),
-        off_tracks=int(result.get("off_track_count") or 0),
-        crashes=int(result.get("crash_count") or 0),
-        resets=int(result.get("resets") or 0),
-        penalty=float(result.get("penalty_seconds") or 0.0),
-        attempts=attempts,
-        entered=entry.created,
-        video=_file(result, "video", runs / job.run),
-        picture=_file(result, "racing line", runs / job.run),
-        has_replay=folder is not None and (folder / "evaluation-simtrace" / "0-iteration.csv").is_file(),
-        is_verified=None if not isinstance(verification, dict) else bool(verification.get("is_genuine")),
-        verdict=str(verification.get("verdict", "")) if isinstance(verification, dict) else "",
-    )
-
-
-def _relative(result: dict[str, Any], name: str) -> Path | None:
-    """A file's place inside its run, which may have been renamed since."""
-    try:
-        return Path(result["files"][name]).relative_to(result["run"])
-    except (KeyError, TypeError, ValueError):
-        return None
-
-
-def _file(result: dict[str, Any], name: str, run: Path) -> str | None:
-    place = _relative(result, name)
-    return place.as_posix() if place is not None and (run / place).is_file() else None
-
-
-def _folder(job: Job, runs: Path) -> Path | None:
-    place = _relative(job.result or {}, "summary") if job.state == "done" else None
-    return (runs / job.run / place).parent if place is not None else None

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path as FilePath
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Query, Response
+from fastapi.responses import FileResponse
 
+from racecraft.contest.terms import MAX_TRIALS
 from racecraft.errors import ConfigError
+from racecraft.judging.race import FORMAT
+from racecraft.replay.replay import read_replay
 from racecraft.serve.context import InContext, InUser
 from racecraft.serve.evaluations.traces import read_laps
+from racecraft.serve.problems import NotFound
 from racecraft.serve.races.schemas import Enter, NewRace, RaceCard, RaceChange, RaceDetail, RaceReplay, ReplayCar
+from racecraft.serve.races.standings import replay_trace
+from racecraft.serve.races.tasks import REPLAY, VIDEO, entry_folder
+from racecraft.serve.store.tables import Job
 from racecraft.serve.tracks.courses import geometry
 
 router = APIRouter(prefix="/api/races", tags=["races"])
@@ -72,21 +82,86 @@ def withdraw_entry(race_id: Id, entry_id: Id, context: InContext) -> Response:
     return Response(status_code=204)
 
 
+@router.get("/{race_id}/race.json")
+def get_announcement(race_id: Id, context: InContext) -> Response:
+    """What is published of a race, for `racecraft verify --race`: the secret is in it when the race is over."""
+    announced = context.races.announcement(race_id)
+    text = json.dumps({"format": FORMAT, **announced.to_dict()}, indent=2, ensure_ascii=False)
+    return Response(text, media_type="application/json")
+
+
+@router.get("/{race_id}/entries/{entry_id}/video")
+def get_video(race_id: Id, entry_id: Id, context: InContext) -> FileResponse:
+    """The film of an entry's trial that counted."""
+    return _file(context, race_id, entry_id, VIDEO, media_type="video/mp4")
+
+
+@router.get("/{race_id}/entries/{entry_id}/replay")
+def get_entry_replay(race_id: Id, entry_id: Id, context: InContext) -> FileResponse:
+    """The replay file of an entry, for `racecraft verify`."""
+    return _file(context, race_id, entry_id, REPLAY, media_type="application/octet-stream")
+
+
 @router.get("/{race_id}/replay")
 def get_replay(
-    race_id: Id, context: InContext, entries: Annotated[str, Query(max_length=200, pattern=r"^\d+(,\d+)*$")]
+    race_id: Id,
+    context: InContext,
+    entries: Annotated[str, Query(max_length=200, pattern=r"^\d+(,\d+)*$")],
+    trial: Annotated[int | None, Query(ge=0, lt=MAX_TRIALS)] = None,
 ) -> RaceReplay:
-    """Some entries side by side, step by step; `entries` are their ids joined by commas."""
+    """One trial of some entries side by side, step by step.
+
+    `entries` are their ids joined by commas; by default it is the trial that the first of them is ranked by.
+    """
     wanted = list(dict.fromkeys(int(part) for part in entries.split(",")))
     if len(wanted) > MAX_CARS:
         raise ConfigError(f"A replay shows at most {MAX_CARS} cars, {len(wanted)} were asked for.")
-    race = context.races.get(race_id)
-    cars = []
-    for entry, model, folder in context.races.evaluations(race_id, wanted):
-        trace: list[list[int]] = []
-        ends = []
-        for lap in read_laps(folder / "evaluation-simtrace" / "0-iteration.csv"):
-            trace += lap.trace
-            ends.append(len(trace))
-        cars.append(ReplayCar(entry=entry, model=model, trace=trace, laps=ends))
-    return RaceReplay(geometry=geometry(race.track, context.courses.load(race.track)), cars=cars)
+    race, runs = context.races.get(race_id), context.settings.runs
+    driven = context.races.driven(race_id, wanted)
+    chosen = _median_trial(race, wanted[0]) if trial is None else min(trial, race.trials - 1)
+    cars = [
+        ReplayCar(entry=entry, model=job.run, trace=trace, laps=ends)
+        for entry, job in driven
+        for trace, ends in [_old_steps(job, runs) if race.is_old else _steps(job, runs, chosen)]
+    ]
+    return RaceReplay(trial=chosen, geometry=geometry(race.track, context.courses.load(race.track)), cars=cars)
+
+
+def _file(context: InContext, race_id: int, entry_id: int, name: str, *, media_type: str) -> FileResponse:
+    ((_, job),) = context.races.driven(race_id, [entry_id])
+    path = entry_folder(context.settings.runs, job.id) / name
+    if not path.is_file():
+        raise NotFound(f"Entry {entry_id} of race {race_id} has no such file.")
+    return FileResponse(path, media_type=media_type, filename=f"{job.run}-{name}", content_disposition_type="inline")
+
+
+def _median_trial(race: RaceDetail, entry: int) -> int:
+    """The trial that an entry is ranked by; the first where it has no score."""
+    row = next((one for one in race.standings if one.entry == entry), None)
+    if row is None or row.score is None:
+        return 0
+    away = [abs((one or 1e9) - row.score) for one in row.scores]
+    return away.index(min(away))
+
+
+def _steps(job: Job, runs: FilePath, trial: int) -> tuple[list[list[int]], list[int]]:
+    """Poses of one trial in whole mm and mrad, and the steps after which its laps ended."""
+    path = entry_folder(runs, job.id) / REPLAY
+    if not path.is_file():
+        raise NotFound(f"{job.run!r} has no replay in this race.")
+    recording = read_replay(path).cars[trial].recording
+    ends = [step + 1 for step, event in recording.events if event == "lap_complete"]
+    return (1000 * recording.poses).round().astype(int).tolist(), ends
+
+
+def _old_steps(job: Job, runs: FilePath) -> tuple[list[list[int]], list[int]]:
+    """The same of an entry under the old rules."""
+    path = replay_trace(job, runs=runs)
+    if path is None:
+        raise NotFound(f"{job.run!r} has no replay in this race.")
+    trace: list[list[int]] = []
+    ends = []
+    for lap in read_laps(path):
+        trace += lap.trace
+        ends.append(len(trace))
+    return trace, ends

@@ -36,8 +36,12 @@ class NewRace(Message):
     """Boxes or bot cars, where the kind has them."""
     bot_speed: float = Field(0.2, ge=0.0, le=4.0, allow_inf_nan=False)
     """m/s"""
-    vehicle: Literal["", "v4", "v5", "v6"] = ""
-    seed: int = Field(0, ge=0, le=2**32 - 1)
+    vehicle: Literal["v4", "v5", "v6"] = "v5"
+    """Everybody's, whatever they were trained with."""
+    trials: int = Field(5, ge=1, le=15)
+    """Of each entry, from as many places of the lap; the median of their scores counts."""
+    seed: int | None = Field(None, ge=0, le=2**32 - 1)
+    """Of starts and objects, for practice: everybody knows it. By default both are drawn from a secret."""
     opens: AwareDatetime | None = None
     """By default now."""
     closes: AwareDatetime | None = None
@@ -62,6 +66,10 @@ class RaceCard(Message):
     laps: int
     ranking: Ranking
     minimum_laps: int
+    trials: int
+    """Of each entry; the median of their scores counts."""
+    is_old: bool
+    """Whether it was driven under the old rules: once, from the line, each in the car that it was trained with."""
     opens: datetime
     closes: datetime | None
     created: datetime
@@ -86,7 +94,10 @@ class Standing(Message):
     """s"""
     gap: float | None
     """s behind the first."""
-    lap_times: list[float]
+    scores: list[float | None]
+    """s of each trial; None with too few laps."""
+    lap_times: list[list[float]]
+    """s, of each trial."""
     best_lap: float | None
     laps: int
     """Completed."""
@@ -100,8 +111,7 @@ class Standing(Message):
     """Entries of this model."""
     entered: datetime
     video: str | None
-    """Path below the model's files."""
-    picture: str | None
+    """Its address, once it may be seen."""
     has_replay: bool
     is_verified: bool | None
     """Whether it came out the same when it was driven again; None if that is not known."""
@@ -125,7 +135,14 @@ class RaceDetail(RaceCard):
     rules: dict[str, Any]
     objects: dict[str, Any]
     vehicle: str
-    seed: int
+    seed: int | None
+    """None where it is drawn from a secret."""
+    commitment: str
+    """SHA-256 of the secret and of what was announced, published from the beginning; empty of an old race."""
+    secret: str
+    """64 hexadecimal digits, once the race is over."""
+    is_withheld: bool
+    """Whether replays and videos wait for its end, as they would show where it starts."""
     standings: list[Standing]
     undecided: list[Undecided]
 
@@ -138,7 +155,7 @@ class Enter(Message):
 
 
 class ReplayCar(Message):
-    """A car of a race: x, y, heading every 1/15 s in whole mm and mrad, and the steps that ended its laps."""
+    """One trial of an entry: x, y, heading every 1/15 s in whole mm and mrad, and the steps that ended its laps."""
 
     entry: int
     model: str
@@ -147,7 +164,9 @@ class ReplayCar(Message):
 
 
 class RaceReplay(Message):
-    """Some entries of a race side by side."""
+    """The same trial of some entries side by side."""
 
+    trial: int
+    """From 0."""
     geometry: TrackGeometry
     cars: list[ReplayCar]

@@ -1,33 +1,63 @@
-"""The job of a race: a model drives by the race's rules, and its replay is driven again."""
+"""The job of a race: a model drives by the race's terms, and its replay is driven again.
+
+    FOLDER/entry.replay    every trial, to be driven again by anybody
+    FOLDER/video.mp4       the trial that counted
+
+Both show where the race starts, so they lie among the console's own files and not among the model's. What the job
+reports may be seen while the race is open, so it holds laps and mistakes and no place.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
-from racecraft.race.rules import RaceRules
 from racecraft.serve.jobs.task import Task
-from racecraft.sim.objects import Objects
+from racecraft.serve.settings import STATE_FOLDER
+
+FOLDER: Final = "races"
+REPLAY, VIDEO = "entry.replay", "video.mp4"
+
+
+def entry_folder(runs: Path, job_id: str) -> Path:
+    """Where the files of an entry lie, by its job."""
+    return runs / STATE_FOLDER / FOLDER / job_id
 
 
 def race(task: Task) -> dict[str, Any]:
-    """Drive a model's entry in a race by the race's rules, and drive its replay again."""
-    from racecraft.judging.evaluation import evaluate_run
-    from racecraft.replay.replay import read_replay
+    """Drive a model's entry in a race by the race's terms, and drive its replay again."""
+    from racecraft.contest.contest import hold_race
+    from racecraft.contest.terms import announced_terms
+    from racecraft.film.video import film
+    from racecraft.race.announcement import Announcement
+    from racecraft.race.entry import load_entry
+    from racecraft.race.results import Evaluation
+    from racecraft.replay.replay import read_replay, write_replay
     from racecraft.replay.verification import verify
+    from racecraft.track import load_track
 
     payload = task.job.payload
-    rules = RaceRules.from_dict(payload["rules"])
-    outcome = evaluate_run(
-        task.folder.path,
-        track=payload["track"],
-        rules=rules,
-        direction=rules.direction,
-        num_trials=1,
-        checkpoint=payload["checkpoint"],
-        vehicle=payload["vehicle"] or None,
-        objects=Objects.from_dict(payload["objects"]),
-        seed=payload["seed"],
+    announcement = Announcement.from_dict(payload["announcement"])
+    terms = announced_terms(announcement, load_track(payload["track"]))
+    entry = load_entry(f"{task.folder.path}@{payload['checkpoint']}")
+    contest = hold_race([entry], terms)
+    folder = entry_folder(task.runs, task.job.id)
+    folder.mkdir(parents=True, exist_ok=True)
+    ((_, replay),) = contest.replays()
+    write_replay(replay, folder / REPLAY)
+    found = verify(read_replay(folder / REPLAY), race=announcement)
+    (trials,) = contest.trials
+    film(
+        trials[contest.shown_trial].recording,
+        folder / VIDEO,
+        laps=terms.conditions.rules.laps,
+        name=task.job.run,
+        sensors=entry.sensors,
     )
-    found = verify(read_replay(outcome.files["replay"]))
-    verdict = found.difference.sentence if found.difference is not None else ""
-    return {**outcome.to_dict(), "verification": {"is_genuine": found.is_genuine, "verdict": verdict}}
+    summary = Evaluation(conditions=terms.conditions, trials=trials).summary()
+    return {
+        **{name: value for name, value in summary.items() if name != "seed"},
+        "step": entry.step,
+        "lap_seconds": [list(trial.lap_times) for trial in trials],
+        "verification": {"is_genuine": found.is_genuine, "verdict": "" if found.is_genuine else found.sentence},
+    }

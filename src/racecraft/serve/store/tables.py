@@ -114,10 +114,19 @@ class Race(Table):
     objects: Mapped[dict[str, Any]] = mapped_column(default=dict)
     """As `racecraft.sim.Objects.to_dict` gives them."""
     vehicle: Mapped[str] = mapped_column(String(16), default="")
-    """The same for all, or empty for the one that each model was trained with."""
+    """The same for all; of an old race empty for the one that each model was trained with."""
     seed: Mapped[int] = mapped_column(BigInteger, default=0)
+    """Of a race whose starts everybody may know."""
     ranking: Mapped[str] = mapped_column(String(16))
     minimum_laps: Mapped[int] = mapped_column(default=1)
+    trials: Mapped[int] = mapped_column(default=1)
+    """Of each entry."""
+    document: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    """As announced, see `racecraft.race.announcement`; empty of an old race, which nobody announced."""
+    commitment: Mapped[str] = mapped_column(String(64), default="")
+    """Published from the beginning; empty of an old race."""
+    secret: Mapped[str] = mapped_column(String(64), default="")
+    """Hexadecimal, published when the race is over; empty where everybody knows the seed."""
     opens: Mapped[datetime] = mapped_column(default=now)
     closes: Mapped[datetime | None]
     created: Mapped[datetime] = mapped_column(default=now)

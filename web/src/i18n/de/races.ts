@@ -2,7 +2,7 @@
 import type { races as english } from "../en/races";
 
 export const races: Record<keyof typeof english, string> = {
-  races_lead: "Lass Modelle nach denselben Regeln vom selben Start gegeneinander fahren.",
+  races_lead: "Lass Modelle nach denselben Regeln von denselben Plätzen gegeneinander fahren.",
   races_new: "Neues Rennen",
   races_new_lead: "Nur der Titel ist nötig; alles andere ist sinnvoll voreingestellt.",
   races_make: "Rennen anlegen",
@@ -42,7 +42,25 @@ export const races: Record<keyof typeof english, string> = {
   races_bots: "Bots",
   races_bot_speed: "Tempo der Bots, m/s",
   races_resets: "Erlaubte Resets",
-  races_own_car: "Wie trainiert",
+  races_trials: "Versuche",
+  races_trials_hint: "Jeder von einem anderen Platz der Runde; der Median zählt.",
+  races_practice: "Zum Üben: alle dürfen wissen, wo es losgeht",
+  races_practice_lead: "Wiederholungen und Videos sind gleich zu sehen, und das Rennen kann wieder geöffnet werden.",
+  races_secret_lead:
+    "Wo es losgeht, ist geheim, bis das Rennen vorbei ist; so lange warten auch Wiederholungen und Videos.",
+  races_old:
+    "Nach den alten Regeln gefahren: ein Versuch von der Linie, jedes Modell im Auto seines Trainings. Nicht mit heutigen Rennen zu vergleichen.",
+  races_state_old: "Alte Regeln",
+  races_fair: "Wie man es prüft",
+  races_fair_open:
+    "Notiere die Zusage jetzt. Ist das Rennen vorbei, wird sein Geheimnis veröffentlicht, und beide zeigen, dass die Starts gezogen waren, bevor jemand angemeldet war. Bis dahin sieht niemand, wo die Autos losfahren.",
+  races_fair_over:
+    "Aus dem Geheimnis folgen die Starts und mit race.json die Zusage, die zu Beginn veröffentlicht war: racecraft verify DATEI.replay --race race.json prüft jeden Eintrag.",
+  races_fair_known:
+    "Alle wissen, wo dieses Rennen losgeht. racecraft verify DATEI.replay --race race.json prüft jeden Eintrag.",
+  races_commitment: "Zusage",
+  races_secret: "Geheimnis",
+  races_replay_file: "Datei",
   races_opens: "Beginn",
   races_closes: "Schluss",
   races_opens_hint: "Leer: sofort.",
@@ -53,7 +71,8 @@ export const races: Record<keyof typeof english, string> = {
   races_until: "Bis {when}",
   races_since: "Seit {when}",
   races_enter: "Modelle anmelden",
-  races_enter_lead: "Jedes startet allein, vom selben Platz. Noch einmal anmelden zählt, wenn es schneller ist.",
+  races_enter_lead:
+    "Jedes fährt allein, von denselben Plätzen der Runde wie alle anderen. Noch einmal anmelden zählt, wenn es schneller ist.",
   races_no_models: "Kein trainiertes Modell passt.",
   races_go: "{count} anmelden und fahren",
   races_close: "Rennen schließen",

@@ -1,6 +1,6 @@
 /** Races. */
 export const races = {
-  races_lead: "Let models race each other by the same rules from the same start.",
+  races_lead: "Let models race each other by the same rules from the same places.",
   races_new: "New race",
   races_new_lead: "Only the title is needed; everything else has a good default.",
   races_make: "Make the race",
@@ -40,7 +40,24 @@ export const races = {
   races_bots: "Bot cars",
   races_bot_speed: "Speed of the bots, m/s",
   races_resets: "Resets allowed",
-  races_own_car: "As trained",
+  races_trials: "Trials",
+  races_trials_hint: "Each from another place of the lap; the median counts.",
+  races_practice: "For practice: everybody may know where it starts",
+  races_practice_lead: "Replays and videos can be seen at once, and the race can be opened again.",
+  races_secret_lead: "Where it starts is a secret until the race is over; replays and videos wait for that, too.",
+  races_old:
+    "Held under the old rules: one trial from the line, each model in the car of its own training. Not to be compared with races of today.",
+  races_state_old: "Old rules",
+  races_fair: "How to check it",
+  races_fair_open:
+    "Note the commitment now. When the race is over its secret is published, and both show that the starts were drawn before anybody entered. Until then nobody sees where the cars start.",
+  races_fair_over:
+    "The secret gives the starts, and with race.json the commitment that was published when the race opened: racecraft verify FILE.replay --race race.json checks every entry.",
+  races_fair_known:
+    "Everybody knows where this race starts. racecraft verify FILE.replay --race race.json checks every entry.",
+  races_commitment: "Commitment",
+  races_secret: "Secret",
+  races_replay_file: "File",
   races_opens: "Opens",
   races_closes: "Closes",
   races_opens_hint: "Left empty: at once.",
@@ -51,7 +68,8 @@ export const races = {
   races_until: "Until {when}",
   races_since: "Since {when}",
   races_enter: "Enter models",
-  races_enter_lead: "Each starts alone, from the same place. Entering again counts if it is faster.",
+  races_enter_lead:
+    "Each drives alone, from the same places of the lap as all others. Entering again counts if it is faster.",
   races_no_models: "No trained model fits.",
   races_go: "Enter {count} and drive",
   races_close: "Close the race",
