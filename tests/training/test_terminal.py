@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from racecraft.learn import IterationStats, UpdateStats
+from racecraft.learn.ledger import Ended
 from racecraft.training.progress import EvaluationReport, IterationReport
 from racecraft.training.terminal import TerminalReporter, curve
 
@@ -21,9 +22,7 @@ def iteration(step: int, *, completion: float = 0.5, remaining: float | None = N
         iteration=step // 512,
         total_steps=step,
         num_steps=512,
-        episodes=3,
-        mean_return=1.0,
-        mean_length=20.0,
+        ended=(Ended(0, 1.0, 20),) * 3,
         losses=LOSSES,
         explained_variance=math.nan,
         environment_seconds=0.1,

@@ -25,6 +25,7 @@ from racecraft.errors import CheckpointError, TrainingError
 from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights, below, holding
+from racecraft.learn.ledger import Ended, EpisodeLedger
 from racecraft.learn.native_state_learner import NativeStateLearner
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
@@ -167,8 +168,7 @@ class Distill:
         self._observations = np.zeros((capacity, *learner.observation_shape), np.uint8)
         self._answers = np.zeros((capacity, learner.spec.policy_size), np.float32)  # the teacher's outputs
         self._count = 0
-        self._totals = np.zeros(config.num_envs)
-        self._lengths = np.zeros(config.num_envs, np.int64)
+        self._ledger = EpisodeLedger(config.num_envs)
 
     @property
     def spec(self) -> NetworkSpec:
@@ -203,9 +203,9 @@ class Distill:
             return stats
         rng = np.random.default_rng([self.seed, self.iteration])
         clocks = {"environment": 0.0, "policy": 0.0}
-        finished: list[tuple[float, int]] = []
+        ended: list[Ended] = []
         for _ in range(self.config.num_steps):
-            self._drive(rng, clocks, finished)
+            ended += self._drive(rng, clocks)
         started = time.perf_counter()
         losses = self._learn(rng)
         self._average.add(iteration=self.iteration)
@@ -213,9 +213,7 @@ class Distill:
             iteration=self.iteration,
             total_steps=self.total_steps,
             num_steps=self.config.num_steps * self.config.num_envs,
-            episodes=len(finished),
-            mean_return=float(np.mean([total for total, _ in finished])) if finished else float("nan"),
-            mean_length=float(np.mean([length for _, length in finished])) if finished else float("nan"),
+            ended=tuple(ended),
             losses=losses,
             explained_variance=float("nan"),
             environment_seconds=clocks["environment"],
@@ -223,8 +221,8 @@ class Distill:
             update_seconds=time.perf_counter() - started,
         )
 
-    def _drive(self, rng: np.random.Generator, clocks: dict[str, float], finished: list[tuple[float, int]]) -> None:
-        """One step of the student's cars, and the teacher's answers there."""
+    def _drive(self, rng: np.random.Generator, clocks: dict[str, float]) -> list[Ended]:
+        """One step of the student's cars, and the teacher's answers there; the episodes that ended."""
         spec, started = self.spec, time.perf_counter()
         frames, states = self.environment.observe()
         observations = self.learner.encode(frames)
@@ -245,16 +243,13 @@ class Distill:
         acted = time.perf_counter()
         rewards, terminated, truncated = self.environment.step(actions if spec.is_discrete else actions.clip(-1.0, 1.0))
         done = terminated | truncated
-        self._totals += rewards
-        self._lengths += 1
-        ended = np.flatnonzero(done)
-        finished += zip(self._totals[ended].tolist(), self._lengths[ended].tolist(), strict=True)
-        self._totals[done], self._lengths[done] = 0.0, 0
-        if len(ended):
+        ended = self._ledger.add(rewards, done)
+        if ended:
             self.environment.reset(done)
         self.total_steps += len(outputs)
         clocks["policy"] += acted - started
         clocks["environment"] += time.perf_counter() - acted
+        return ended
 
     def _learn(self, rng: np.random.Generator) -> UpdateStats:
         """Gradient steps on the cross-entropy to the teacher's distribution.
@@ -355,7 +350,7 @@ class Distill:
     def state(self) -> dict[str, NDArray[Any]]:
         """Student, teacher, optimisers and counters; not the frames that are remembered."""
         counters = np.array([self.seed, self.iteration, self.total_steps], np.int64)
-        totals = np.stack([self._totals, self._lengths])
+        totals = np.stack([self._ledger.totals, self._ledger.lengths])
         lessons = {"distill/counters": counters, "distill/episodes": totals}
         lessons |= {f"teacher/{name}": array for name, array in self.teacher.state().items()}
         if self.refining is not None:
@@ -372,7 +367,7 @@ class Distill:
             raise CheckpointError(f"The training state is of {episodes.shape[-1]} cars, not of {self.config.num_envs}.")
         self.teacher.load_state(below("teacher/", state))
         self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
-        self._totals, self._lengths = episodes[0].copy(), episodes[1].astype(np.int64)
+        self._ledger.totals[:], self._ledger.lengths[:] = episodes
         self.refining = None
         if "ppo/counters" in state:
             self.refining = self._make_refining()

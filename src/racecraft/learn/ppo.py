@@ -23,6 +23,7 @@ from racecraft.errors import CheckpointError, TrainingError
 from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights, holding
+from racecraft.learn.ledger import Ended, EpisodeLedger
 from racecraft.learn.rollout import Rollout
 
 _VALUE_BATCH = 4096  # observations whose values are computed at once
@@ -138,12 +139,8 @@ class IterationStats:
     """Camera steps since the start of training, this iteration included."""
     num_steps: int
     """Camera steps of this iteration."""
-    episodes: int
+    ended: tuple[Ended, ...]
     """Episodes that ended in this iteration."""
-    mean_return: float
-    """Mean undiscounted sum of rewards of those episodes; NaN where there were none."""
-    mean_length: float
-    """Mean number of steps of those episodes; NaN where there were none."""
     losses: UpdateStats
     explained_variance: float
     """1 - Var(returns - values) / Var(returns): 1 for a perfect critic, 0 for a constant one."""
@@ -153,6 +150,21 @@ class IterationStats:
     """Wall-clock time of encoding frames and choosing actions."""
     update_seconds: float
     """Wall-clock time of values, advantages and gradient steps."""
+
+    @property
+    def episodes(self) -> int:
+        """Episodes that ended in this iteration."""
+        return len(self.ended)
+
+    @property
+    def mean_return(self) -> float:
+        """Mean undiscounted sum of rewards of those episodes; NaN where there were none."""
+        return float(np.mean([episode.total for episode in self.ended])) if self.ended else float("nan")
+
+    @property
+    def mean_length(self) -> float:
+        """Mean number of steps of those episodes; NaN where there were none."""
+        return float(np.mean([episode.length for episode in self.ended])) if self.ended else float("nan")
 
 
 class PPO:
@@ -193,8 +205,7 @@ class PPO:
             action_size=0 if spec.is_discrete else spec.num_actions,
             observation_dtype=getattr(learner, "observation_dtype", np.uint8),
         )
-        self._episode_returns = np.zeros(config.num_envs)
-        self._episode_lengths = np.zeros(config.num_envs, np.int64)
+        self._ledger = EpisodeLedger(config.num_envs)
         self.return_scale = np.array([0.0, 1.0])  # running mean and spread of the returns, in units of reward
         self.prefers_average = False
         """Whether the averaged weights drive. The mean of beginners is none: set it once the policy drives well."""
@@ -209,7 +220,7 @@ class PPO:
         """
         rng = np.random.default_rng([self.seed, self.iteration])
         self._clocks = dict.fromkeys(self._clocks, 0.0)
-        finished = self._collect(rng)
+        ended = self._collect(rng)
 
         started = time.perf_counter()
         advantages, returns = self._estimate()
@@ -225,9 +236,7 @@ class PPO:
             iteration=self.iteration,
             total_steps=self.total_steps,
             num_steps=int(used.sum()),
-            episodes=len(finished),
-            mean_return=float(np.mean([total for total, _ in finished])) if finished else float("nan"),
-            mean_length=float(np.mean([length for _, length in finished])) if finished else float("nan"),
+            ended=tuple(ended),
             losses=losses,
             explained_variance=1 - float(advantages[used].var()) / variance if variance > 0 else float("nan"),
             environment_seconds=self._clocks["environment"],
@@ -251,18 +260,19 @@ class PPO:
 
     # ---- collect: drive until the rollout is full
 
-    def _collect(self, rng: np.random.Generator) -> list[tuple[float, int]]:
-        """Fill the rollout; return (sum of rewards, length) of each episode that ended."""
+    def _collect(self, rng: np.random.Generator) -> list[Ended]:
+        """Fill the rollout; the episodes that ended."""
         rollout, environment = self._rollout, self.environment
         num_envs, episodes = self.config.num_envs, self.config.episodes_per_iteration
-        finished: list[tuple[float, int]] = []
+        ended: list[Ended] = []
         size = self.config.num_steps * num_envs
         budget = self.config.max_steps_per_iteration if episodes else size
         quota = np.full(num_envs, np.iinfo(np.int64).max)  # episodes each car may still begin
         if episodes:
             quota = np.array([episodes // num_envs + (car < episodes % num_envs) for car in range(num_envs)])
-            environment.reset(np.ones(num_envs, bool))
-            self._episode_returns[:], self._episode_lengths[:] = 0.0, 0
+            everyone = np.ones(num_envs, bool)
+            environment.reset(everyone)
+            self._ledger.forget(everyone)
         rollout.clear()
         cut: list[tuple[int, NDArray[np.intp], NDArray[np.uint8], NDArray[np.float32]]] = []
 
@@ -291,11 +301,7 @@ class PPO:
             cars = np.flatnonzero(truncated & ~terminated & is_driving)
             if len(cars):
                 cut.append((rollout.num_steps - 1, cars, *self._look(cars)))
-            self._episode_returns += rewards
-            self._episode_lengths += 1
-            ended = np.flatnonzero(done & is_driving)
-            finished += zip(self._episode_returns[ended].tolist(), self._episode_lengths[ended].tolist(), strict=True)
-            self._episode_returns[done], self._episode_lengths[done] = 0.0, 0
+            ended += self._ledger.add(rewards, done, is_counted=is_driving)
             if episodes:
                 quota -= done & is_driving
             begins = done & (quota > 0)
@@ -311,7 +317,7 @@ class PPO:
             cut.append((last, cars, *self._look(cars)))
         for row, cars, observations, states in cut:
             rollout.next_values[row, cars] = self._values(observations, states)
-        return finished
+        return ended
 
     def _act(
         self, observations: NDArray[np.uint8], rng: np.random.Generator
@@ -423,8 +429,8 @@ class PPO:
         """
         arrays: dict[str, NDArray[Any]] = {
             "ppo/counters": np.array([self.seed, self.iteration, self.total_steps], np.int64),
-            "ppo/episode_returns": self._episode_returns.copy(),
-            "ppo/episode_lengths": self._episode_lengths.copy(),
+            "ppo/episode_returns": self._ledger.totals.copy(),
+            "ppo/episode_lengths": self._ledger.lengths.copy(),
             "ppo/return_scale": self.return_scale.copy(),
         }
         return arrays | self._average.state(is_preferred=self.prefers_average)
@@ -441,12 +447,12 @@ class PPO:
             )
         except KeyError as error:
             raise CheckpointError(f"The training state has no entry {error}.") from None
-        if returns.shape != self._episode_returns.shape:
+        if returns.shape != self._ledger.totals.shape:
             raise CheckpointError(
-                f"The training state is of {len(returns)} cars, not of {len(self._episode_returns)}.",
+                f"The training state is of {len(returns)} cars, not of {self.config.num_envs}.",
                 hint=f"Resume with num_envs = {len(returns)}.",
             )
         self._average.load_state(state)
         self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
-        self._episode_returns, self._episode_lengths = returns.copy(), lengths.copy()
+        self._ledger.totals[:], self._ledger.lengths[:] = returns, lengths
         self.return_scale = scale.copy()

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from racecraft.checks import check_flag, check_number, check_whole, require
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights, below
+from racecraft.learn.ledger import Ended, EpisodeLedger
 from racecraft.learn.ppo import Environment, IterationStats
 from racecraft.learn.replay_buffer import ReplayBuffer, Transitions
 
@@ -134,8 +135,7 @@ class SAC:
         self._num_updates = 0
         self._returns = np.zeros(config.num_envs)  # discounted, so far, for the rewards' unit
         self._moments = np.zeros(3)  # count, mean and sum of squared deviations of those returns
-        self._episode_returns = np.zeros(config.num_envs)
-        self._episode_lengths = np.zeros(config.num_envs, np.int64)
+        self._ledger = EpisodeLedger(config.num_envs)
 
     @property
     def spec(self) -> NetworkSpec:
@@ -150,7 +150,7 @@ class SAC:
         """
         rng = np.random.default_rng([self.seed, self.iteration])
         clocks = {"environment": 0.0, "policy": 0.0, "update": 0.0}
-        finished: list[tuple[float, int]] = []
+        ended: list[Ended] = []
         stats: list[UpdateStats] = []
         for _ in range(self.config.num_steps):
             started = time.perf_counter()
@@ -168,7 +168,8 @@ class SAC:
                 truncated=truncated,
             )
             done = terminated | truncated
-            self._count(rewards, done, finished)
+            self._count(rewards, done)
+            ended += self._ledger.add(rewards, done)
             if done.any():
                 self.environment.reset(done)
             stepped = time.perf_counter()
@@ -181,9 +182,7 @@ class SAC:
             iteration=self.iteration,
             total_steps=self.total_steps,
             num_steps=self.config.num_steps * self.config.num_envs,
-            episodes=len(finished),
-            mean_return=float(np.mean([total for total, _ in finished])) if finished else float("nan"),
-            mean_length=float(np.mean([length for _, length in finished])) if finished else float("nan"),
+            ended=tuple(ended),
             losses=_mean(stats),
             explained_variance=float("nan"),
             environment_seconds=clocks["environment"],
@@ -210,8 +209,8 @@ class SAC:
             )
         return actions
 
-    def _count(self, rewards: NDArray[Any], done: NDArray[np.bool_], finished: list[tuple[float, int]]) -> None:
-        """Follow episodes and the spread of returns."""
+    def _count(self, rewards: NDArray[Any], done: NDArray[np.bool_]) -> None:
+        """Follow the spread of returns."""
         self.total_steps += len(rewards)
         self._returns = self.config.gamma * self._returns + rewards
         if not np.isfinite(self._returns).all():
@@ -224,11 +223,6 @@ class SAC:
             squares += delta * (value - mean)
         self._moments[:] = count, mean, squares
         self._returns[done] = 0.0
-        self._episode_returns += rewards
-        self._episode_lengths += 1
-        ended = np.flatnonzero(done)
-        finished += zip(self._episode_returns[ended].tolist(), self._episode_lengths[ended].tolist(), strict=True)
-        self._episode_returns[done], self._episode_lengths[done] = 0.0, 0
 
     def _learn(self, rng: np.random.Generator) -> list[UpdateStats]:
         """As many updates as this step of all cars is worth."""
@@ -271,7 +265,7 @@ class SAC:
         }
         arrays["sac/counters"] = np.array([self.seed, self.iteration, self.total_steps, self._num_updates], np.int64)
         arrays["sac/moments"] = self._moments.copy()
-        arrays["sac/returns"] = np.stack([self._returns, self._episode_returns, self._episode_lengths])
+        arrays["sac/returns"] = np.stack([self._returns, self._ledger.totals, self._ledger.lengths])
         return arrays | {f"sac/networks/{name}": array for name, array in self.backend.state().items()}
 
     def load_state(self, state: dict[str, NDArray[Any]]) -> None:
@@ -289,8 +283,8 @@ class SAC:
         self.backend.load_state(below("sac/networks/", state))
         self.seed, self.iteration, self.total_steps, self._num_updates = (int(number) for number in counters)
         self._moments = moments.copy()
-        self._returns, self._episode_returns = returns[0].copy(), returns[1].copy()
-        self._episode_lengths = returns[2].astype(np.int64)
+        self._returns = returns[0].copy()
+        self._ledger.totals[:], self._ledger.lengths[:] = returns[1:]
 
 
 def _mean(stats: list[UpdateStats]) -> UpdateStats:

@@ -22,6 +22,7 @@ from torch import Tensor
 from racecraft.errors import ConfigError, TrainingError
 from racecraft.learn.distributions import LOG_STD_MAX, LOG_STD_MIN
 from racecraft.learn.learner import UpdateStats
+from racecraft.learn.ledger import Ended
 from racecraft.learn.ppo import PPO, IterationStats, PPOConfig
 from racecraft.learn.torch_cuda_learner import CudaLearner, stats_of
 
@@ -65,7 +66,7 @@ class CudaPPO(PPO):
     """The algorithm of `PPO` on a device.
 
     Args:
-        config: Settings; whole episodes, growing rollouts and e-greedy exploration are not for a GPU.
+        config: Settings; whole episodes and e-greedy exploration are not for a GPU.
         learner: The network.
         environment: The cars.
         seed: Decides all sampling and shuffling, together with the number of the iteration.
@@ -127,7 +128,7 @@ class CudaPPO(PPO):
         self._generator.manual_seed((self.seed << 32) + self.iteration)
         started = time.perf_counter()
         self._run("rollout", self._collect_all, is_capturable=self.cars.is_capturable)
-        finished = self._tell_episodes()
+        ended = self._tell_episodes()
         collected = time.perf_counter()
         explained = self._estimate_all()
         losses = self._improve()
@@ -135,14 +136,11 @@ class CudaPPO(PPO):
         steps = self.config.num_steps * self.config.num_envs
         self.iteration += 1
         self.total_steps += steps
-        lengths = [length for _, length in finished]
         return IterationStats(
             iteration=self.iteration,
             total_steps=self.total_steps,
             num_steps=steps,
-            episodes=len(finished),
-            mean_return=float(np.mean([total for total, _ in finished])) if finished else float("nan"),
-            mean_length=float(np.mean(lengths)) if finished else float("nan"),
+            ended=tuple(ended),
             losses=losses,
             explained_variance=explained,
             environment_seconds=collected - started,  # with the policy: they are one graph
@@ -200,17 +198,17 @@ class CudaPPO(PPO):
         share = (actions.clamp(-1.0, 1.0) + 1.0) * 0.5
         return self._table[0] * (1.0 - share) + self._table[1] * share
 
-    def _tell_episodes(self) -> list[tuple[float, int]]:
-        """Hand the episodes that ended to the environment; (sum of rewards, steps) of each."""
+    def _tell_episodes(self) -> list[Ended]:
+        """Hand the episodes that ended to the environment."""
         steps, cars = (self._ends | self._cuts).nonzero(as_tuple=True)
         if not torch.isfinite(self._rewards).all():
             raise TrainingError(
                 "A reward is not a number.", hint="Train on device 'cpu' to see the line and the params at fault."
             )
-        returns = self._sums[steps, cars].cpu().numpy()
-        rows = self._judged[steps, cars].cpu().numpy()
-        self.cars.end_episodes(cars.cpu().numpy(), returns, rows)
-        return list(zip(returns.tolist(), (rows[:, 1] - 1).astype(int).tolist(), strict=True))
+        totals, rows = self._sums[steps, cars].cpu().numpy(), self._judged[steps, cars].cpu().numpy()
+        self.cars.end_episodes(cars.cpu().numpy(), totals, rows)
+        lengths = (rows[:, 1] - 1).astype(int)
+        return list(map(Ended, cars.tolist(), totals.tolist(), lengths.tolist()))
 
     # ---- estimate
 
@@ -313,10 +311,10 @@ class CudaPPO(PPO):
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Everything needed to continue, except where the cars are; the names of `PPO`."""
-        self._episode_returns[:] = self._running.cpu().numpy()
+        self._ledger.totals[:] = self._running.cpu().numpy()
         return super().state()
 
     def load_state(self, state: dict[str, NDArray[Any]]) -> None:
         """Continue from what ``state`` gave."""
         super().load_state(state)
-        self._running.copy_(torch.from_numpy(self._episode_returns))
+        self._running.copy_(torch.from_numpy(self._ledger.totals))

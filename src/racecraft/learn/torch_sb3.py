@@ -26,6 +26,7 @@ from racecraft.checks import require
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import networks, torch_networks
 from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights, below
+from racecraft.learn.ledger import Ended, EpisodeLedger
 from racecraft.learn.ppo import Environment, IterationStats
 from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3Config
 from racecraft.learn.torch_subnormals import subnormals_flushed
@@ -117,14 +118,11 @@ class SB3:
             for name, keys in _LOSSES.items()
         }
         losses["entropy"] *= -1.0
-        returns, lengths = zip(*cars.finished, strict=True) if cars.finished else ((), ())
         return IterationStats(
             iteration=self.iteration,
             total_steps=self.total_steps,
             num_steps=self.total_steps - before,
-            episodes=len(returns),
-            mean_return=float(np.mean(returns)) if returns else float("nan"),
-            mean_length=float(np.mean(lengths)) if lengths else float("nan"),
+            ended=tuple(cars.ended),
             losses=UpdateStats(**losses, grad_norm=float("nan")),
             explained_variance=float(seen.get("train/explained_variance", float("nan"))),
             environment_seconds=cars.seconds,
@@ -240,14 +238,13 @@ class _Cars(VecEnv):
         super().__init__(environment.num_envs, spaces.Box(0, 255, (size,), np.uint8), actions)
         self.environment, self.learner = environment, learner
         self.seconds = 0.0
-        self.finished: list[tuple[float, int]] = []
+        self.ended: list[Ended] = []
         self._actions: NDArray[Any] = np.zeros(0)
-        self._totals = np.zeros(environment.num_envs)
-        self._lengths = np.zeros(environment.num_envs, np.int64)
+        self._ledger = EpisodeLedger(environment.num_envs)
 
     def begin_iteration(self) -> None:
         """Count anew."""
-        self.seconds, self.finished = 0.0, []
+        self.seconds, self.ended = 0.0, []
 
     def reset(self) -> NDArray[np.uint8]:
         """Where the cars are; they are at the start of an episode, or go on after a resume."""
@@ -264,15 +261,12 @@ class _Cars(VecEnv):
         rewards, terminated, truncated = self.environment.step(actions)
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        self._totals += rewards
-        self._lengths += 1
+        self.ended += self._ledger.add(rewards, done)
         if done.any():
             last = self._look()
             for car in np.flatnonzero(done).tolist():
                 is_cut = bool(truncated[car] and not terminated[car])
                 infos[car] = {"terminal_observation": last[car], "TimeLimit.truncated": is_cut}
-                self.finished.append((float(self._totals[car]), int(self._lengths[car])))
-            self._totals[done], self._lengths[done] = 0.0, 0
             self.environment.reset(done)
         observations = self._look()
         self.seconds += time.perf_counter() - started

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from racecraft.learn.ledger import EpisodeLedger
+from racecraft.sim import CONTROL_DT
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 
-STEP_SECONDS = 1 / 15
 _STEPS, _PROGRESS, _STATUS, _TIME = (ROW_COLUMNS.index(name) for name in ("steps", "progress", "status", "time"))
 
 
@@ -45,7 +46,7 @@ class Episode:
 
 
 class EpisodeCounter:
-    """Adds up the steps of N cars into episodes.
+    """Numbers the episodes of N cars and places them on one clock.
 
     Args:
         num_envs: N.
@@ -56,7 +57,12 @@ class EpisodeCounter:
     def __init__(self, num_envs: int, *, number: int = 0, clock: float = 0.0) -> None:
         self.number = number
         self.clock = clock
-        self.rewards = np.zeros(num_envs)  # of the episodes under way
+        self._ledger = EpisodeLedger(num_envs)
+
+    @property
+    def rewards(self) -> NDArray[np.float64]:
+        """Sums of the episodes under way  (N,), to be written to when a run is resumed."""
+        return self._ledger.totals
 
     def update(self, rows: NDArray[np.float64], rewards: ArrayLike, done: NDArray[np.bool_]) -> list[Episode]:
         """Count one step of every car and return the episodes it ended.
@@ -66,19 +72,17 @@ class EpisodeCounter:
             rewards: Their rewards   (N,).
             done: Which episodes end with this step, terminated or truncated   (N,).
         """
-        self.rewards += np.asarray(rewards, dtype=np.float64)
-        ended = [self.end(int(env), rows[env], reward=float(self.rewards[env])) for env in np.flatnonzero(done)]
-        self.rewards[done] = 0.0
-        return ended
+        ended = self._ledger.add(np.asarray(rewards, np.float64), done)
+        return [self.end(car, rows[car], reward=total) for car, total, _ in ended]
 
     def abandon(self, mask: NDArray[np.bool_]) -> None:
         """Forget the episodes that the cars of the mask (N,) have under way; they get no number."""
-        self.rewards[mask] = 0.0
+        self._ledger.forget(mask)
 
     def place(self, duration: float) -> float:
         """Put something of this duration, an evaluation episode say, on the clock; returns when it starts."""
         start = self.clock
-        self.clock = start + duration + STEP_SECONDS
+        self.clock = start + duration + CONTROL_DT
         return start
 
     def end(self, env: int, row: NDArray[np.float64], *, reward: float) -> Episode:

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from racecraft.agent import ActionSpace, DiscreteActionSpace
 from racecraft.errors import CheckpointError, RunError
-from racecraft.run.episodes import STEP_SECONDS, Episode
+from racecraft.run.episodes import Episode
+from racecraft.sim import CONTROL_DT
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.number_text import number_texts
 
@@ -277,7 +278,7 @@ class SimTraceWriter:
         )
         rows = list(zip(*texts, strict=True))
         _, *pose_and_action, _, _, wheels, progress, closest, length, _, _ = rows[0]
-        before = repr(round(episode.start_time + float(column["time"][0]) - STEP_SECONDS, 3))
+        before = repr(round(episode.start_time + float(column["time"][0]) - CONTROL_DT, 3))
         prepare = (
             "1.0",
             *pose_and_action,
@@ -333,7 +334,7 @@ def _pauses(statuses: Sequence[str]) -> list[float]:
     """
     left, pauses = 0, []
     for status in reversed(statuses):
-        pauses.append(round(left * STEP_SECONDS, 3))
+        pauses.append(round(left * CONTROL_DT, 3))
         left = left + 1 if status == "pause" else 0
     return pauses[::-1]
 
