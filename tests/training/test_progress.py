@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from racecraft.learn import IterationStats, UpdateStats
+from racecraft.learn.ledger import Ended
 from racecraft.training import EvaluationReport, IterationReport
 from racecraft.training.progress import SilentReporter
 
@@ -41,9 +42,7 @@ def test_an_iterations_point_by_hand() -> None:
             iteration=2,
             total_steps=128,
             num_steps=64,
-            episodes=3,
-            mean_return=1.5,
-            mean_length=20.456,
+            ended=(Ended(0, 1.0, 20), Ended(1, 2.0, 20), Ended(2, 1.5, 21)),
             losses=UpdateStats(**LOSSES),
             explained_variance=0.7,
             **stats,
@@ -62,7 +61,7 @@ def test_an_iterations_point_by_hand() -> None:
         "episodes": 17,
         "reward": 0.1235,
         "completion": 0.6543,
-        "episode_length": 20.46,
+        "episode_length": 20.33,
         "remaining": 9.5,
         **{name: LOSSES[name] for name in ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction")},
         "explained_variance": 0.7,
