@@ -6,11 +6,16 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command 
 VENV := .venv
 BIN := $(VENV)/bin
 UV := $(BIN)/uv
+# A file of tests stays on one core, with what its tests share; tests/conftest.py puts the long files first.
+PYTEST := $(BIN)/python -m pytest -n auto --dist loadscope --no-loadscope-reorder
 NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/* native/gpu/*)
 
 PAGES := src/racecraft/serve/pages/index.html
 NODE := web/node_modules/.package-lock.json
 WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/* web/src/*/*/*)
+
+# Without bytecode kept, every process of a test compiles what it imports anew: most of the time of a server's start.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help train console test test-fast mutants lint format bench setup build stub clean requirements
 
@@ -23,11 +28,11 @@ train: $(VENV)/.built  ## set up if needed, then train a car from camera pixels 
 console: $(VENV)/.built $(VENV)/.serve $(PAGES)  ## set up if needed, build the console's pages, and open it in a browser
 	$(BIN)/racecraft serve
 
-test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every test
-	$(BIN)/python -m pytest
+test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every test, on every core
+	$(PYTEST) --durations=40
 
 test-fast: $(VENV)/.built $(VENV)/.dev  ## the tests that take seconds
-	$(BIN)/python -m pytest -m "not slow"
+	$(PYTEST) -m "not slow"
 
 mutants: $(VENV)/.built $(VENV)/.dev  ## plant small faults, one at a time, and count which ones the tests notice (hours; goes on where it stopped)
 	$(BIN)/python tests/mutants/plant_python.py --jobs 2

@@ -1,6 +1,15 @@
-"""Property tests run without a clock: a busy machine is slow, not wrong. No test leaves other arithmetic behind."""
+"""Property tests run without a clock: a busy machine is slow, not wrong. No test leaves other arithmetic behind.
 
+Several tests run side by side (`make test`), so libraries that would take every core for a small product take one:
+threads that wait for each other on cores they do not have cost many times what they save. Our own threads are as many
+as a test asks for.
+"""
+
+import os
 from collections.abc import Iterator
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and torch; child processes inherit it
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
@@ -14,3 +23,10 @@ settings.load_profile("unhurried")
 def _arithmetic_stays_as_it_was() -> Iterator[None]:
     yield
     assert np.float64(5e-324) * np.float64(1.0) != 0.0, "something left this thread without subnormal numbers"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Side by side, files that take long come first, so that no side is left with one of them at the end."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        long = {item.path for item in items if item.get_closest_marker("slow")}
+        items.sort(key=lambda item: (item.path.name != "test_cpp.py", item.path not in long))

@@ -1,6 +1,6 @@
 // Time per driver's frame on one thread, per instruction set, and per chase picture.
 //
-//   cmake -S . -B build/native -DRACECRAFT_BUILD_TESTS=ON && cmake --build build/native &&
+//   cmake -S . -B build/native && cmake --build build/native --target camera_benchmark &&
 //   build/native/camera_benchmark
 //
 // The cars stand all over a wobbly circuit of 20 m and look in all directions around its own; each figure is

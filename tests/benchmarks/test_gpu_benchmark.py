@@ -6,6 +6,7 @@ import importlib.util
 import json
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from racecraft.errors import ConfigError
 from racecraft.gpu import open_device
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "gpu.py"
-pytest.importorskip("torch", reason="torch is not installed")
+pytestmark = pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed")
 
 
 def load_script():

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 import pytest
 
 from racecraft.env import RacecraftEnv
 
-env_checker = pytest.importorskip("stable_baselines3.common.env_checker")
+pytestmark = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="stable-baselines3 is not installed")
 
 
 @pytest.mark.parametrize("action_space", ["default", "continuous"])
 @pytest.mark.parametrize("observation", ["camera", "state", "both"])
 def test_its_checker_has_nothing_to_say(observation, action_space):
+    from stable_baselines3.common.env_checker import check_env
+
     with RacecraftEnv("oval", observation=observation, action_space=action_space) as env:
-        env_checker.check_env(env)
+        check_env(env)
 
 
 @pytest.mark.parametrize(

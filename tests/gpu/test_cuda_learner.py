@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 from host_device import HostDevice
@@ -16,9 +18,7 @@ from racecraft.sim.columns import state_width
 from racecraft.track import load_track
 from racecraft.training.cuda_environment import CudaTrainingEnvironment
 
-torch = pytest.importorskip("torch", reason="torch is not installed")
-learner_module = pytest.importorskip("racecraft.learn.torch_cuda_learner")
-ppo_module = pytest.importorskip("racecraft.learn.torch_cuda_ppo")
+pytestmark = pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed")
 
 OBJECTIVE = Objective(
     learning_rate=1e-3, clip_coef=0.2, ent_coef=0.01, vf_coef=0.5, value_loss="mse", max_grad_norm=0.5
@@ -30,6 +30,12 @@ def spec_of(is_discrete: bool, state_size: int) -> NetworkSpec:
     return NetworkSpec(
         num_actions=5 if is_discrete else 2, is_discrete=is_discrete, state_size=state_size, frame_shape=(100, 128)
     )
+
+
+def CudaLearner(spec: NetworkSpec, **settings):
+    from racecraft.learn import torch_cuda_learner  # and torch, which takes seconds to load, not before it is needed
+
+    return torch_cuda_learner.CudaLearner(spec, device="cpu", **settings)
 
 
 def minibatch_of(learner, size: int, seed: int = 0) -> Minibatch:
@@ -50,7 +56,9 @@ def minibatch_of(learner, size: int, seed: int = 0) -> Minibatch:
 @pytest.mark.parametrize(("is_discrete", "state_size"), [(True, 16), (False, 16), (True, 0)])
 def test_gradient_steps_are_those_of_the_reference(is_discrete, state_size):
     spec = spec_of(is_discrete, state_size)
-    ours = learner_module.CudaLearner(spec, device="cpu", precision="float32")
+    import torch
+
+    ours = CudaLearner(spec, precision="float32")
     theirs = make_learner(spec, backend="torch")
     theirs._dtype = torch.float32
     for step in range(3):
@@ -65,13 +73,15 @@ def test_gradient_steps_are_those_of_the_reference(is_discrete, state_size):
 
 
 def test_frames_are_encoded_as_everywhere():
-    learner = learner_module.CudaLearner(spec_of(True, 16), device="cpu")
+    import torch
+
+    learner = CudaLearner(spec_of(True, 16))
     frames = np.random.default_rng(1).integers(0, 256, (5, 100, 128), dtype=np.uint8)
     assert (learner.encode_frames(torch.from_numpy(frames)).numpy() == learner.encode(frames)).all()
 
 
 def test_a_step_that_is_not_finite_changes_nothing():
-    learner = learner_module.CudaLearner(spec_of(True, 16), device="cpu")
+    learner = CudaLearner(spec_of(True, 16))
     minibatch = minibatch_of(learner, 16)
     learner.update(minibatch, OBJECTIVE)
     before, moments = learner.weights(), learner.optimizer_state()
@@ -86,6 +96,8 @@ def test_a_step_that_is_not_finite_changes_nothing():
 
 
 def test_without_a_gpu_the_learner_says_so():
+    import torch
+
     if torch.cuda.is_available():
         pytest.skip("this machine has a GPU")
     with pytest.raises(ConfigError, match="torch finds no GPU"):
@@ -93,6 +105,8 @@ def test_without_a_gpu_the_learner_says_so():
 
 
 def open_ppo(*, reward: str = "racing", config: PPOConfig | None = None, actions: str = "default", notes=None):
+    from racecraft.learn.torch_cuda_ppo import CudaPPO
+
     config = config or PPOConfig(num_envs=32, num_steps=8, minibatch_size=64)
     tracks = [load_track("oval")]
     simulation = CudaSimulation(
@@ -115,8 +129,8 @@ def open_ppo(*, reward: str = "racing", config: PPOConfig | None = None, actions
         state_size=state_width(0),
         frame_shape=(100, 128),
     )
-    learner = learner_module.CudaLearner(spec, device="cpu")
-    return ppo_module.CudaPPO(config, learner, environment, seed=3), environment
+    learner = CudaLearner(spec)
+    return CudaPPO(config, learner, environment, seed=3), environment
 
 
 @pytest.mark.parametrize("actions", ["default", "continuous"])
@@ -192,6 +206,6 @@ def test_what_a_gpu_does_not_train_is_refused():
     with pytest.raises(ConfigError, match="whole episodes"):
         open_ppo(config=PPOConfig(num_envs=32, episodes_per_iteration=20, minibatch_size=64))
     ppo, _ = open_ppo()
-    ppo._rewards[0, 0] = torch.nan
+    ppo._rewards[0, 0] = float("nan")
     with pytest.raises(TrainingError, match="not a number"):
         ppo._tell_episodes()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 
 import pytest
 from host_device import HostDevice
@@ -16,7 +17,7 @@ from racecraft.run import RunFolder
 from racecraft.training import resume, train
 from racecraft.training.settings import CUDA_PPO, TrainSettings, make_settings
 
-pytest.importorskip("torch", reason="torch is not installed")
+pytestmark = pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed")
 
 
 def has_gpu() -> bool:

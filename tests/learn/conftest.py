@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 import pytest
+from late_torch import TorchLearner
 
-from racecraft.learn import NetworkSpec, PPOConfig
-from racecraft.learn.torch_learner import TorchLearner
+from racecraft.learn import Learner, NetworkSpec, PPOConfig
 
 
 @pytest.fixture
@@ -12,5 +12,5 @@ def config() -> PPOConfig:
 
 
 @pytest.fixture
-def learner() -> TorchLearner:
+def learner() -> Learner:
     return TorchLearner(NetworkSpec(num_actions=3, state_size=2), seed=1, num_threads=2)

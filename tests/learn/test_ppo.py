@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from late_torch import TorchLearner
 from scheduled_world import ScheduledWorld, ticking
 from stripe_world import StripeWorld
 
 from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import PPO, NetworkSpec, PPOConfig, make_learner
-from racecraft.learn.torch_learner import TorchLearner
 
 
 def ppo_for(config: PPOConfig, *, seed: int = 0, spec: NetworkSpec | None = None, **world) -> PPO:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,18 +15,24 @@ from racecraft.errors import CheckpointError, ConfigError, TrainingError
 from racecraft.learn import SAC, Learner, NetworkSpec, SACConfig, distributions, make_learner
 from racecraft.learn.replay_buffer import ReplayBuffer
 
-torch = pytest.importorskip("torch")
-from racecraft.learn.torch_sac import TorchSAC  # noqa: E402
-from racecraft.learn.torch_subnormals import subnormals_flushed  # noqa: E402
+if TYPE_CHECKING:
+    from racecraft.learn.torch_sac import TorchSAC
 
+pytestmark = pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed")
 SPEC = NetworkSpec(num_actions=1, is_discrete=False, state_size=2, is_squashed=True)
 CONFIG = SACConfig(
     num_envs=8, num_steps=8, minibatch_size=64, buffer_size=4096, learning_starts=256, updates_per_step=0.5
 )
 
 
+def torch_sac(config: SACConfig = CONFIG, *, spec: NetworkSpec = SPEC, seed: int = 0) -> TorchSAC:
+    from racecraft.learn.torch_sac import TorchSAC
+
+    return TorchSAC(spec, config, state_size=spec.state_size, seed=seed, num_threads=1)
+
+
 def make(config: SACConfig = CONFIG, *, spec: NetworkSpec = SPEC, seed: int = 0) -> SAC:
-    backend = TorchSAC(spec, config, state_size=spec.state_size, seed=seed, num_threads=1)
+    backend = torch_sac(config, spec=spec, seed=seed)
     learner = make_learner(spec, num_threads=1)
     return SAC(config, backend, learner, StripeWorld(config.num_envs), seed=seed)
 
@@ -103,7 +110,9 @@ def test_what_drives_is_the_actors_mean_squashed() -> None:
 
 def test_the_log_density_is_that_of_the_squashed_gaussian() -> None:
     """Against the density's definition, by a slow sum: it integrates to one over (-1, 1)."""
-    backend = TorchSAC(SPEC, CONFIG, state_size=2, seed=0, num_threads=1)
+    import torch
+
+    backend = torch_sac()
     observation = torch.zeros((1, *make_learner(SPEC).observation_shape), dtype=torch.uint8)
     noise = torch.linspace(-6, 6, 4001)[:, None]
     actions, log_density = backend._draw(observation.expand(len(noise), *observation.shape[1:]), noise)
@@ -178,7 +187,7 @@ def test_discrete_actions_are_refused() -> None:
     spec = NetworkSpec(num_actions=3)
     learner = make_learner(spec, num_threads=1)
     with pytest.raises(ConfigError, match="continuous"):
-        SAC(CONFIG, TorchSAC(SPEC, CONFIG, state_size=2, seed=0), learner, StripeWorld(8))
+        SAC(CONFIG, torch_sac(), learner, StripeWorld(8))
 
 
 def test_the_buffer_gives_back_what_was_put_in_and_never_joins_two_episodes() -> None:
@@ -207,6 +216,8 @@ def test_the_buffer_gives_back_what_was_put_in_and_never_joins_two_episodes() ->
 
 
 def test_gradient_steps_flush_subnormals_and_nothing_else_does() -> None:
+    from racecraft.learn.torch_subnormals import subnormals_flushed
+
     def least() -> float:
         return float(np.float64(5e-324) * np.float64(1.0))
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -12,14 +13,16 @@ from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import NetworkSpec, distributions, make_learner
 from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3_ALGORITHMS, SB3Config
 
-torch = pytest.importorskip("torch")
-pytest.importorskip("stable_baselines3")
-from racecraft.learn.torch_sb3 import SB3  # noqa: E402
+if TYPE_CHECKING:
+    from racecraft.learn.torch_sb3 import SB3
 
+pytestmark = pytest.mark.skipif(find_spec("stable_baselines3") is None, reason="stable-baselines3 is not installed")
 CONFIG = SB3Config(num_envs=4, num_steps=16, buffer_size=400, learning_starts=16, batch_size=16)
 
 
 def make(name: str, *, config: SB3Config = CONFIG, seed: int = 0, is_discrete: bool | None = None) -> SB3:
+    from racecraft.learn.torch_sb3 import SB3
+
     discrete = name not in CONTINUOUS_ONLY if is_discrete is None else is_discrete
     spec = NetworkSpec(
         num_actions=3 if discrete else 1, is_discrete=discrete, state_size=2, is_squashed=name in CONTINUOUS_ONLY

@@ -6,11 +6,11 @@ import sys
 
 import numpy as np
 import pytest
+from late_torch import TorchLearner
 from minibatches import OBJECTIVE, minibatch_for, reference_tower
 
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import NetworkSpec, networks
-from racecraft.learn.torch_learner import TorchLearner
 
 
 @pytest.mark.parametrize("name", networks.network_names())

@@ -130,7 +130,6 @@ def configure() -> None:
         "CMAKE_BUILD_TYPE": "Mutant",
         "CMAKE_CXX_FLAGS_MUTANT": "-O1",
         "RACECRAFT_PORTABLE": "ON",
-        "RACECRAFT_BUILD_TESTS": "ON",
         "SKBUILD": "ON",
         "nanobind_DIR": nanobind,
         "Python_EXECUTABLE": sys.executable,

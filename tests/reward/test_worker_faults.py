@@ -106,19 +106,19 @@ def test_a_hang_is_ended(track, rows, body, line):
             worker(rows)
     assert caught.value.line in line
     assert caught.value.row_index == 0
-    assert time.perf_counter() - start < 3.0
+    assert time.perf_counter() - start < 30.0  # it would never end by itself; the machine may be busy
     assert not is_alive(process_id)
 
 
 def test_the_time_limit_is_for_one_call_and_not_for_the_batch(track, rows):
     source = function("import time", "time.sleep(0.12)", "return 1.0")
-    with running(source, track, timeout_s=0.3) as worker:
+    with running(source, track, timeout_s=1.0) as worker:  # ten calls take longer; the machine may be busy
         assert worker(rows).sum() == 10.0
 
 
 def test_a_hang_in_the_middle_of_a_batch_names_its_row(track, rows):
     source = function("while params['x'] == 6.0:", "    pass", "return 1.0")
-    with running(source, track, timeout_s=0.2) as worker, pytest.raises(RewardError) as caught:
+    with running(source, track, timeout_s=1.0) as worker, pytest.raises(RewardError) as caught:
         worker(rows)
     assert caught.value.row_index == 6
     assert caught.value.params["x"] == 6.0

@@ -144,10 +144,10 @@ def test_never_hangs(kind: str, num_points: int) -> None:
         centre = np.stack([angle * np.cos(angle), angle * np.sin(angle)], axis=1)
     side = np.array([0.5, 0.0])
     track = Track(name=kind, centerline=centre, inner=centre - side, outer=centre + side)
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(TrackError):
         validate(track)
     if num_points == 2_000:  # the search for crossings is quick also without the cheap checks before it
         with pytest.raises(TrackError):
             _check_crossings(track)
-    assert time.perf_counter() - start < 8.0
+    assert time.process_time() - start < 8.0

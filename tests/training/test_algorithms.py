@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from racecraft.training import resume
 from racecraft.training.plan import make_plan
 from racecraft.training.start import read_settings
 
-pytest.importorskip("torch")
+pytestmark = pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed")
 
 TINY_SAC = SACConfig(num_envs=4, num_steps=8, minibatch_size=16, learning_starts=32, buffer_size=512)
 TINY_SB3 = SB3Config(num_envs=4, num_steps=8, batch_size=16, learning_starts=16, buffer_size=256)
