@@ -12,9 +12,10 @@ Shape letters: N cars, M samples, B of them in a minibatch, A action dimensions,
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -104,6 +105,17 @@ class UpdateStats:
     """Share of samples whose ratio lay outside the clip range."""
     grad_norm: float
     """Global L2 norm of the gradient before clipping."""
+
+    @classmethod
+    def of(cls, values: Iterable[float]) -> UpdateStats:
+        """From all numbers in the order above."""
+        return cls(**dict(zip((field.name for field in fields(cls)), values, strict=True)))
+
+    @classmethod
+    def mean(cls, stats: Sequence[UpdateStats]) -> UpdateStats:
+        """Number by number; NaN where there are none."""
+        names = [field.name for field in fields(cls)]
+        return cls.of(float(np.mean([getattr(one, name) for one in stats])) if stats else math.nan for name in names)
 
     @property
     def is_finite(self) -> bool:

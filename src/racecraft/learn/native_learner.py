@@ -116,15 +116,7 @@ class NativeLearner:
             rows,
             self._objective[1],
         )
-        policy_loss, value_loss, entropy, approx_kl, clip_fraction, grad_norm = terms
-        return UpdateStats(
-            policy_loss=policy_loss,
-            value_loss=value_loss,
-            entropy=entropy,
-            approx_kl=approx_kl,
-            clip_fraction=clip_fraction,
-            grad_norm=grad_norm,
-        )
+        return UpdateStats.of(terms)
 
     def weights(self) -> Weights:
         """Copy of the parameters."""

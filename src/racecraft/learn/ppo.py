@@ -409,8 +409,7 @@ class PPO:
                         f"{stats[-1].grad_norm} in iteration {self.iteration + 1}; its step was not taken.",
                         hint="Lower learning_rate, set max_grad_norm, or look for huge rewards.",
                     )
-        names = [field.name for field in dataclasses.fields(UpdateStats)]
-        return UpdateStats(**{name: float(np.mean([getattr(s, name) for s in stats])) for name in names})
+        return UpdateStats.mean(stats)
 
     def _follow_returns(self, returns: NDArray[np.float32]) -> None:
         """Move the critic's unit towards the returns seen lately; the first rollout sets it."""

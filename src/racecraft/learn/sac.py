@@ -183,7 +183,7 @@ class SAC:
             total_steps=self.total_steps,
             num_steps=self.config.num_steps * self.config.num_envs,
             ended=tuple(ended),
-            losses=_mean(stats),
+            losses=UpdateStats.mean(stats),
             explained_variance=float("nan"),
             environment_seconds=clocks["environment"],
             policy_seconds=clocks["policy"],
@@ -285,11 +285,3 @@ class SAC:
         self._moments = moments.copy()
         self._returns = returns[0].copy()
         self._ledger.totals[:], self._ledger.lengths[:] = returns[1:]
-
-
-def _mean(stats: list[UpdateStats]) -> UpdateStats:
-    """Means over the updates; NaN where there were none, or the actor did not learn."""
-    names = ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm")
-    seen = {name: np.array([getattr(update, name) for update in stats]) for name in names}
-    known = {name: values[np.isfinite(values)] for name, values in seen.items()}
-    return UpdateStats(**{name: float(v.mean()) if len(v) else float("nan") for name, v in known.items()})

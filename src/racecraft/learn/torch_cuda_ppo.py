@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from racecraft.errors import ConfigError, TrainingError
-from racecraft.learn.distributions import LOG_STD_MAX, LOG_STD_MIN
 from racecraft.learn.learner import UpdateStats
 from racecraft.learn.ledger import Ended
 from racecraft.learn.ppo import PPO, IterationStats, PPOConfig
-from racecraft.learn.torch_cuda_learner import CudaLearner, stats_of
+from racecraft.learn.torch_cuda_learner import CudaLearner
+from racecraft.learn.torch_losses import gaussian, gaussian_densities
 
-_HALF_LOG_TWO_PI = 0.9189385332046727
 _WARM_UPS = 2  # runs before a graph is captured: libraries choose their kernels in them
 
 
@@ -187,10 +186,9 @@ class CudaPPO(PPO):
             # The largest of log p plus Gumbel noise is a draw from p.
             actions = (log_probs - torch.log(-torch.log(noise.clamp(1e-20, 1 - 1e-7)))).argmax(dim=1)
             return actions, log_probs.gather(1, actions[:, None])[:, 0]
-        mean, log_std = outputs.chunk(2, dim=1)
-        log_std = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
+        mean, log_std = gaussian(outputs)
         noise = torch.randn(mean.shape, generator=self._generator, device=outputs.device)
-        return mean + noise * log_std.exp(), (-0.5 * noise.square() - log_std - _HALF_LOG_TWO_PI).sum(1)
+        return mean + noise * log_std.exp(), gaussian_densities(noise, log_std).sum(1)
 
     def _commands(self, actions: Tensor) -> Tensor:
         if self.learner.spec.is_discrete:
@@ -257,7 +255,7 @@ class CudaPPO(PPO):
                 self._picked.copy_(order[start : start + size])
                 self._run("update", self._improve_once, is_capturable=True)
                 count += 1
-        stats = stats_of(self._losses / count)
+        stats = UpdateStats.of((self._losses / count).tolist())
         if not stats.is_finite:
             raise TrainingError(
                 f"The loss is {stats.policy_loss + stats.value_loss} with gradient norm {stats.grad_norm} in "

@@ -17,12 +17,14 @@ from torch.nn import functional
 
 from racecraft.errors import CheckpointError
 from racecraft.learn import networks, torch_networks
-from racecraft.learn.learner import NetworkSpec, UpdateStats, Weights
+from racecraft.learn.learner import NetworkSpec, UpdateStats, Weights, below
 from racecraft.learn.replay_buffer import Transitions
 from racecraft.learn.sac import SACConfig
+from racecraft.learn.torch_losses import gaussian, gaussian_densities
+from racecraft.learn.torch_optimizers import load_optimizers, optimizer_arrays
 from racecraft.learn.torch_subnormals import subnormals_flushed
 
-LOG_STD_MIN, LOG_STD_MAX = -20.0, 2.0
+LOG_STD_MAX = 2.0
 """Of the Gaussian before it is squashed, as AWS's."""
 BEGINNERS_LOG_STD = -0.5
 _FEATURES = 64  # what a critic's camera tower tells of a frame
@@ -152,10 +154,7 @@ class TorchSAC:
     def state(self) -> dict[str, NDArray[Any]]:
         """Parameters and Adam's moments."""
         arrays: dict[str, NDArray[Any]] = {name: array.detach().numpy().copy() for name, array in self._parts().items()}
-        for name, optimizer in self._optimizers.items():
-            for i, moments in optimizer.state_dict()["state"].items():
-                arrays |= {f"adam/{name}/{i}/{key}": value.numpy().copy() for key, value in moments.items()}
-        return arrays
+        return arrays | {f"adam/{name}": array for name, array in optimizer_arrays(self._optimizers).items()}
 
     def load_state(self, state: dict[str, NDArray[Any]]) -> None:
         """Continue from what ``state`` gave; CheckpointError where it does not fit."""
@@ -166,14 +165,7 @@ class TorchSAC:
         with torch.no_grad():
             for name, parameter in parts.items():
                 parameter.copy_(torch.from_numpy(state[name]))
-        for name, optimizer in self._optimizers.items():
-            document = optimizer.state_dict()
-            found: dict[int, dict[str, Tensor]] = {}
-            for key, saved in state.items():
-                if key.startswith(f"adam/{name}/"):
-                    i, what = key.split("/")[2:]
-                    found.setdefault(int(i), {})[what] = torch.from_numpy(np.array(saved))
-            optimizer.load_state_dict({**document, "state": found})
+        load_optimizers(self._optimizers, below("adam/", state))
 
     def _parts(self) -> Parameters:
         named = {f"actor/{name}": array for name, array in self._actor.items()}
@@ -186,13 +178,11 @@ class TorchSAC:
         outputs = torch_networks.sensor_tower(
             self._actor, observations, spec=self._tower, tower="policy", dtype=torch.float32
         )
-        mean, log_std = outputs.chunk(2, dim=1)
-        log_std = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
+        mean, log_std = gaussian(outputs, highest=LOG_STD_MAX)
         raw = mean + log_std.exp() * noise
-        density = -0.5 * noise.square() - log_std - 0.9189385332046727
         # log(1 - tanh(x)²), without the cancellation
         squashing = 2.0 * (_LOG_TWO - raw - functional.softplus(-2.0 * raw))
-        return raw.tanh(), (density - squashing).sum(1)
+        return raw.tanh(), (gaussian_densities(noise, log_std) - squashing).sum(1)
 
     def _judge(self, critics: Parameters, observations: Tensor, states: Tensor, actions: Tensor) -> list[Tensor]:
         """Both critics' values of actions  (B,) each."""
@@ -222,11 +212,4 @@ def _norm(parameters: Parameters) -> float:
 
 
 def _stats(policy_loss: float, value_loss: float, entropy: float, norm: float) -> UpdateStats:
-    return UpdateStats(
-        policy_loss=policy_loss,
-        value_loss=value_loss,
-        entropy=entropy,
-        approx_kl=float("nan"),
-        clip_fraction=float("nan"),
-        grad_norm=norm,
-    )
+    return UpdateStats.of([policy_loss, value_loss, entropy, float("nan"), float("nan"), norm])

@@ -29,6 +29,7 @@ from racecraft.learn.learner import Learner, NetworkSpec, UpdateStats, Weights, 
 from racecraft.learn.ledger import Ended, EpisodeLedger
 from racecraft.learn.ppo import Environment, IterationStats
 from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3Config
+from racecraft.learn.torch_optimizers import load_optimizers, optimizer_arrays
 from racecraft.learn.torch_subnormals import subnormals_flushed
 
 _CLASSES: dict[str, Any] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC, "td3": TD3}
@@ -160,10 +161,7 @@ class SB3:
         arrays: dict[str, NDArray[Any]] = {f"weights/{name}": array for name, array in self.weights().items()}
         for name, tensor in self._model.policy.state_dict().items():
             arrays[f"sb3/policy/{name}"] = tensor.detach().cpu().numpy().copy()
-        for name, optimizer in self._optimizers().items():
-            for i, moments in optimizer.state_dict()["state"].items():
-                for key, value in moments.items():
-                    arrays[f"sb3/optimizer/{name}/{i}/{key}"] = np.array(value.detach().cpu().numpy())
+        arrays |= {f"sb3/optimizer/{name}": array for name, array in optimizer_arrays(self._optimizers()).items()}
         if (log_alpha := getattr(self._model, "log_ent_coef", None)) is not None:
             arrays["sb3/log_alpha"] = log_alpha.detach().cpu().numpy().copy()
         counters = [self.iteration, self._model.num_timesteps, self._model._n_updates]
@@ -179,13 +177,7 @@ class SB3:
         try:
             given = below("sb3/policy/", state)
             model.policy.load_state_dict({name: torch.from_numpy(array) for name, array in given.items()})
-            for name, optimizer in self._optimizers().items():
-                found: dict[int, dict[str, Tensor]] = {}
-                for key, array in state.items():
-                    if key.startswith(f"sb3/optimizer/{name}/"):
-                        i, what = key.split("/")[3:]
-                        found.setdefault(int(i), {})[what] = torch.from_numpy(np.array(array))
-                optimizer.load_state_dict({**optimizer.state_dict(), "state": found})
+            load_optimizers(self._optimizers(), below("sb3/optimizer/", state))
             if getattr(model, "log_ent_coef", None) is not None:
                 with torch.no_grad():
                     model.log_ent_coef.copy_(torch.from_numpy(state["sb3/log_alpha"]))
