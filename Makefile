@@ -36,6 +36,7 @@ test-fast: $(VENV)/.built $(VENV)/.dev  ## the tests that take seconds
 
 mutants: $(VENV)/.built $(VENV)/.dev  ## plant small faults, one at a time, and count which ones the tests notice (hours; goes on where it stopped)
 	$(BIN)/python tests/mutants/plant_python.py --jobs 2
+	$(BIN)/python tests/mutants/plant_native.py --sample 100
 
 lint: $(VENV)/.built $(VENV)/.dev $(NODE)  ## ruff, mypy --strict, clang-format, prettier and eslint, changing nothing
 	$(BIN)/ruff check .

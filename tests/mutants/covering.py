@@ -18,7 +18,7 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     # a race: rules, placing, judging
     "race/marshal.py": (8, ("tests/race/test_evaluation.py", "tests/race/test_object_races.py")),
     "race/placement.py": (8, ("tests/race/test_object_races.py", "tests/race/test_evaluation.py", PUT_BACK)),
-    "race/evaluation.py": (6, ("tests/race/test_evaluation.py",)),
+    "race/evaluation.py": (6, ("tests/race/test_evaluation.py", "tests/contest/test_starts.py")),
     "race/results.py": (6, ("tests/race/test_evaluation.py",)),
     "race/statistics.py": (4, ("tests/race/test_statistics.py",)),
     "race/rules.py": (4, ("tests/race/test_rules.py", "tests/race/test_evaluation.py")),
@@ -36,7 +36,7 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     # replays, and logs of the original
     "replay/codec.py": (5, ("tests/replay/test_race_replay.py",)),
     "replay/replay.py": (5, ("tests/replay/test_race_replay.py",)),
-    "replay/verification.py": (5, ("tests/replay/test_race_replay.py",)),
+    "replay/verification.py": (5, ("tests/replay/test_race_replay.py", "tests/judging/test_race_verification.py")),
     "fidelity/differences.py": (3, ("tests/fidelity/test_fidelity.py", "tests/fidelity/test_replay.py")),
     "fidelity/rules.py": (4, ("tests/fidelity/test_replay.py", "tests/fidelity/test_fidelity.py")),
     "fidelity/logs.py": (4, ("tests/fidelity/test_replay.py", "tests/fidelity/test_fidelity.py")),

@@ -11,9 +11,7 @@ anew when its module has changed, and one that nobody noticed when its tests hav
 from __future__ import annotations
 
 import argparse
-import hashlib
 import importlib
-import json
 import os
 import resource
 import shutil
@@ -22,7 +20,6 @@ import subprocess
 import sys
 import time
 import traceback
-from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,16 +27,14 @@ from typing import Any
 
 import pytest
 from covering import COVERING, Tests
+from outcomes import FOLDER, ROOT, Log, Outcome, digest, report
 from planting import Fault, sample
 
-ROOT = Path(__file__).parents[2]
-FOLDER = ROOT / "build" / "mutants"
 SEED = "2026"
 CPU_SECONDS, WALL_SECONDS = 100, 900  # of one fault; who needs longer does not end, and that is noticed
 PRELOADED = ("numpy", "pydantic", "scipy.ndimage", "scipy.interpolate", "PIL.Image", "rich", "typer")
 PRELOADED += ("gymnasium", "sqlalchemy.orm", "shapely", "safetensors.numpy", "yaml", "openskill.models", "fastapi")
 PRELOADED += ("torch", "av", "httpx")
-Outcome = dict[str, Any]
 
 
 class FirstFailure:
@@ -134,15 +129,11 @@ def planned(only: str) -> list[Step]:
             files = [ROOT / test.partition("::")[0] for test in tests if "/" in test]
             texts = [path.read_text(encoding="utf-8") for path in files]
             for index, fault in enumerate(sample(source, number, seed=f"{SEED} {module}")):
-                found.append(Step(module, tests, fault, _digest(SEED, source, index), _digest(tests, texts)))
+                found.append(Step(module, tests, fault, digest(SEED, source, index), digest(tests, texts)))
     return found
 
 
-def _digest(*parts: object) -> str:
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:12]
-
-
-def work(tree: Path, plan: list[Step], log: Path) -> None:
+def work(tree: Path, plan: list[Step], log: Log) -> None:
     """Plant what is planned, one fault after the other."""
     copy_tree(tree)
     sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
@@ -164,26 +155,8 @@ def work(tree: Path, plan: list[Step], log: Path) -> None:
         noticed, seconds = run_tests(tree, tests)
         path.write_text(source, encoding="utf-8")
         os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
-        told = {"module": module, "line": fault.line, "before": fault.before, "after": fault.after, "noticed": noticed}
-        with log.open("a", encoding="utf-8") as file:
-            marks = {"key": step.key, "covered_by": step.covered_by, "seconds": round(seconds, 1)}
-            file.write(json.dumps({**told, **marks}) + "\n")
-        print("noticed " if noticed else "SURVIVED", _line(told), flush=True)
-
-
-def _outcome(step: Step, log: Path) -> Outcome | None:
-    """What came of a fault, if it was planted before and that still holds."""
-    found = None
-    for line in log.read_text(encoding="utf-8").splitlines() if log.exists() else []:
-        outcome = json.loads(line)
-        if outcome["key"] == step.key and (outcome["noticed"] or outcome["covered_by"] == step.covered_by):
-            found = outcome
-    return found
-
-
-def _line(outcome: Outcome) -> str:
-    before, after = (" ".join(outcome[name].split())[:60] for name in ("before", "after"))
-    return f"{outcome['module']}:{outcome['line']}  {before}  ->  {after}"
+        told = fault.line, fault.before, fault.after, noticed
+        log.add(Outcome(module, *told, step.key, step.covered_by, round(seconds, 1)))
 
 
 def main() -> None:
@@ -192,12 +165,11 @@ def main() -> None:
     parser.add_argument("--only", default="", help="modules whose names begin so")
     parser.add_argument("--again", action="store_true", help="forget earlier outcomes")
     given = parser.parse_args()
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    log = FOLDER / "python.jsonl"
+    log = Log("python")
     if given.again:
-        log.unlink(missing_ok=True)
+        log.forget()
     plan = planned(given.only)
-    todo = [step for step in plan if _outcome(step, log) is None]
+    todo = [step for step in plan if log.find(step.key, step.covered_by) is None]
     print(f"{len(plan)} faults in Python, {len(plan) - len(todo)} of them planted before")
     for name in PRELOADED if todo else ():
         with suppress(ImportError):
@@ -210,13 +182,8 @@ def main() -> None:
         children.append(child)
     failed = [child for child in children if os.waitpid(child, 0)[1] != 0]
 
-    outcomes = [outcome for step in plan if (outcome := _outcome(step, log)) is not None]
-    survivors = [outcome for outcome in outcomes if not outcome["noticed"]]
-    for name, count in Counter(outcome["module"] for outcome in survivors).most_common():
-        print(f"\n{name}: {count} survived")
-        print("\n".join(f"  {_line(outcome)}" for outcome in survivors if outcome["module"] == name))
-    share = 1 - len(survivors) / max(len(outcomes), 1)
-    print(f"\nPython: {len(outcomes)} faults planted, {len(outcomes) - len(survivors)} noticed, {share:.1%}")
+    outcomes = [log.find(step.key, step.covered_by) for step in plan]
+    report("Python", [outcome for outcome in outcomes if outcome is not None])
     sys.exit(bool(failed))
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from covering import COVERING
+from plant_native import drawn, load_faults
 from planting import faults_of, sample
 
 ROOT = Path(__file__).parents[2]
@@ -91,6 +93,37 @@ def test_there_are_faults_enough_and_tests_that_cover_them() -> None:
         assert len(sample((SOURCES / module).read_text(encoding="utf-8"), number, seed="1")) == number, module
         assert all((ROOT / test.partition("::")[0]).is_file() for test in tests if "/" in test), module
     assert sum(number for number, _ in COVERING.values()) >= 180
+
+
+def test_every_fault_of_the_core_names_a_file_another_text_and_tests_that_there_are() -> None:
+    faults = load_faults()
+    assert len({(fault.file, fault.original, fault.mutated) for fault in faults}) == len(faults)
+    for fault in faults:
+        assert (ROOT / "native" / fault.file).is_file(), fault
+        assert fault.original != fault.mutated, fault
+        assert fault.tests, fault
+        assert all((ROOT / test).is_file() for test in fault.files), fault
+        assert all((ROOT / "native" / "tests" / f"{program}.cpp").is_file() for program in fault.programs), fault
+    # where the core moved on, the planter says which texts are no longer there
+    assert sum(fault.can_be_planted for fault in faults) >= 250
+
+
+def test_a_fault_of_the_core_stands_in_its_function() -> None:
+    for fault in load_faults()[::5]:
+        lines = fault.source.splitlines()
+        block = [lines[number - 1] for number in fault.block]
+        assert fault.original in "\n".join(block), fault
+        assert not block[0].startswith((" ", "}", "#")), fault
+        assert block[-1].startswith("}") or not any(line.startswith("}") for line in block), fault
+
+
+def test_a_sample_of_the_core_takes_of_every_file_its_share_and_a_larger_one_begins_with_it() -> None:
+    faults = load_faults()
+    half = drawn(faults, len(faults) // 2)
+    assert drawn(faults, 50) == half[:50]
+    assert len(set(half)) == len(faults) // 2
+    every, taken = (Counter(fault.file for fault in some) for some in (faults, half))
+    assert all(abs(taken[file] - every[file] / 2) <= 1.0 for file in every)
 
 
 TESTS = """
