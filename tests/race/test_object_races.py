@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from racecraft.race import RaceRules, evaluate
+from racecraft.race import RaceRules, Recording, evaluate
 from racecraft.race.placement import avoiding_pose, reset_pose
 from racecraft.sim import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, Bots, Objects, Obstacles
 from racecraft.sim.columns import row_width
+from racecraft.sim.objects import OBJECT_KINDS
 from racecraft.sim.views import BoxView
 from racecraft.track import Track, load_track
 
@@ -95,6 +96,15 @@ def test_a_crash_costs_its_penalty_and_the_car_goes_on_in_the_other_lane():
     assert -side * recording.column("offset")[crash + 1] > 0.1
     assert [type(view) for view in recording.objects(0)] == [BoxView]
     assert found.summary()["crash_count"] == lap.crash_count
+
+
+def test_cars_that_stand_are_shown_as_solid_as_the_picture_asks_and_else_solid():
+    rows = np.zeros((1, row_width(2)))
+    for i, kind in enumerate(("frozen_racer", "racer")):
+        rows[0, len(ROW_COLUMNS) + len(OBJECT_HEADER) + i * len(OBJECT_COLUMNS)] = OBJECT_KINDS.index(kind)
+    recording = Recording(RING, rows, np.zeros(1), np.zeros((1, 2), np.float32))
+    assert [view.alpha for view in recording.objects(0)] == [1.0, 1.0]
+    assert [view.alpha for view in recording.objects(0, alpha=0.3)] == [0.3, 1.0]
 
 
 def test_mercy_comes_after_so_many_crashes_and_can_be_refused():

@@ -1,10 +1,11 @@
 import dataclasses
 import json
+import math
 
 import pytest
 
 from racecraft.errors import ConfigError
-from racecraft.race.rules import RULE_SETS, RaceRules, rules_by_name
+from racecraft.race.rules import RULE_SETS, RaceRules, race_rules, rules_by_name
 
 
 def test_defaults_are_those_of_deepracer_for_cloud():
@@ -12,6 +13,21 @@ def test_defaults_are_those_of_deepracer_for_cloud():
     assert (rules.laps, rules.is_continuous, rules.max_resets) == (3, True, 100)
     assert (rules.offtrack_penalty, rules.collision_penalty) == (5.0, 5.0)
     assert rules == RULE_SETS["drfc"]
+
+
+def test_defaults_of_our_own():
+    rules = RaceRules()
+    assert (rules.mercy_after, rules.time_limit, rules.immobilized_penalty) == (3, 0.0, 0.0)
+    assert (rules.starts, rules.start_offset, rules.direction) == ("line", 0.0, "forward")
+    assert (rules.lateral_jitter, rules.heading_jitter) == (0.02, math.radians(2.0))
+
+
+def test_entries_of_a_race_start_all_over_the_lap_unless_it_says_otherwise():
+    rules = race_rules("worker", {"laps": 2})
+    assert rules == dataclasses.replace(
+        RULE_SETS["worker"], laps=2, starts="lap", lateral_jitter=0.1, heading_jitter=math.radians(5.0)
+    )
+    assert race_rules("drfc", {"starts": "line", "lateral_jitter": 0.0}).starts == "line"
 
 
 def test_defaults_of_the_simulation_worker():

@@ -180,6 +180,8 @@ def test_rewards_laps_and_results_are_checked_too(clean: Path) -> None:
         found = verified.difference
         assert found is not None
         assert (found.what, found.car) == (what, car)
+        if what == "result":
+            assert found.step == len(read_replay(clean).cars[car].recording) - 1
         told = verified.to_dict()
         assert (told["difference"]["what"], told["difference"]["car"]) == (what, car)
         assert told["difference"]["sentence"] == found.sentence
@@ -277,6 +279,7 @@ def test_other_versions_and_impossible_sizes_are_refused(tmp_path: Path) -> None
     refused(path, sealed(bytes(10), version=0), "version 0")
     refused(path, sealed(bytes(10), size=2**63), "says it holds")
     refused(path, sealed(bytes(10), size=4), "damaged")
+    refused(path, sealed(bytes(10))[: -len(zlib.compress(bytes(10)))], "damaged")  # a beginning, and nothing after it
     refused(path, sealed(bytes(10_000_000), size=100), "damaged")  # a bomb goes off no further than it says
     refused(path, sealed(struct.pack("<I", 2**31) + b"{}"), "header has")
     refused(path, sealed(struct.pack("<I", 2) + b"[]"), "object")
