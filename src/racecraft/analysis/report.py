@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from racecraft.analysis.corners import passages, sectors_of
 from racecraft.analysis.laps import TracedLap, driven_direction, read_laps
+from racecraft.analysis.learned import bands, checkpoint_table, rewards, stretch_table
 from racecraft.analysis.maps import draw_maps, iterations_of
 from racecraft.analysis.report_page import page, pairs, section, table
 from racecraft.analysis.svg import Chart, Curve, action_fan, cell_map, line_chart, racing_line
 from racecraft.errors import RacecraftError, RunError
 from racecraft.json_file import read_json_object
-from racecraft.run import RunFolder
+from racecraft.run import RunFolder, Stretch, read_stretches
 from racecraft.run.atomic import write_file
 from racecraft.run.history import read_history
 from racecraft.track import Track, load_track, load_tracks
@@ -63,7 +64,8 @@ def report(folder: RunFolder) -> str:
     track = load_tracks(info.track)[0]
     points = _history(folder)
     evaluation = _latest_evaluation(folder)
-    sections = [_learning(points)]
+    stretches = read_stretches(folder)
+    sections = [_learning(points, stretches), stretch_table(folder, stretches)]
     figures = _training_figures(folder, points)
     lead = f"{escape(_title(info.track))} · {escape(info.created.replace('T', ' ')[:16])} UTC"
     hero = ""
@@ -73,9 +75,8 @@ def report(folder: RunFolder) -> str:
         with suppress(RacecraftError, KeyError):
             hero, more = _race(folder, stamp, summary, track)
             sections = [*more, *sections]
-    sections += [_maps(folder, track), _checkpoints(folder), _actions(folder, track)]
-    source = folder.read_reward_function()
-    sections.append(section("Reward function", f'<pre class="code"><code>{escape(source)}</code></pre>'))
+    sections += [_maps(folder, track), checkpoint_table(folder, stretches), _actions(folder, track)]
+    sections += rewards(stretches, folder.read_reward_function())
     sections.append(_settings(folder))
     return page(folder.name, lead, figures, hero, sections, versions=info.versions)
 
@@ -177,13 +178,14 @@ def _corners(track: Track, laps: Sequence[TracedLap]) -> str:
     return section("Corners", f"<p>{words}</p>{table(heads, rows)}")
 
 
-def _learning(points: list[dict[str, Any]]) -> str:
+def _learning(points: list[dict[str, Any]], stretches: Sequence[Stretch]) -> str:
     iterations = [point for point in points if point.get("kind") == "iteration"]
     evaluations = [point for point in points if point.get("kind") == "evaluation"]
     if not iterations:
         return ""
     seconds = np.array([_number(point.get("seconds")) for point in iterations])
     unit, x_label = (1.0, "seconds of training") if seconds[-1] < 180 else (60.0, "minutes of training")
+    parts = bands(stretches, iterations, unit)
     judged = [np.mean(point.get("completions") or [math.nan]) for point in evaluations]
     best = next((point for point in reversed(evaluations) if point.get("is_best")), None)
     charts = [
@@ -202,11 +204,12 @@ def _learning(points: list[dict[str, Any]]) -> str:
             y_text=lambda value: f"{100 * value:.0f} %",
             y_range=(0.0, 1.04),
             marks=[_number(best.get("seconds")) / unit] if best else [],
+            bands=parts,
         )
     ]
     for name, label in (("reward", "Reward of an episode"), ("entropy", "Entropy"), ("value_loss", "Value loss")):
         curve = Curve(label=label, x=seconds / unit, y=_column(iterations, name), kind="first")
-        charts.append(Chart(curves=[curve], x_label=x_label, y_label=label, height=200))
+        charts.append(Chart(curves=[curve], x_label=x_label, y_label=label, height=200, bands=parts))
     return section("Learning", "".join(line_chart(chart) for chart in charts))
 
 
@@ -218,21 +221,6 @@ def _maps(folder: RunFolder, track: Track) -> str:
     picture = cell_map(track, maps.grid, maps.reward, "Mean reward by place", maps.exits)
     words = f"Mean reward of the last {maps.episodes} episodes of training by place; crosses mark early ends."
     return section("Where it was paid", f"<p>{words}</p>{picture}") if picture else ""
-
-
-def _checkpoints(folder: RunFolder) -> str:
-    store = folder.checkpoints
-    best = store.best
-    rows = [
-        [
-            f"{entry.step:,}",
-            _percent(entry.metrics.get("completion")),
-            _seconds(entry.metrics.get("best_lap_s")),
-            "best" if best is not None and entry.step == best.step else "",
-        ]
-        for entry in store.entries()
-    ]
-    return section("Checkpoints", table(["Steps", "Completion", "Best lap", ""], rows)) if rows else ""
 
 
 def _actions(folder: RunFolder, track: Track) -> str:
@@ -319,10 +307,6 @@ def _number(value: Any) -> float:
 
 def _seconds(value: Any) -> str:
     return f"{value:.3f} s" if isinstance(value, int | float) else "–"
-
-
-def _percent(value: Any) -> str:
-    return f"{100 * value:.0f} %" if isinstance(value, int | float) else "–"
 
 
 def _title(track: str) -> str:

@@ -37,6 +37,7 @@ svg text.corner{fill:var(--quiet);font-weight:650}
 .grid{stroke:var(--line)}.mark{stroke:var(--good);stroke-dasharray:4 4}
 .curve{fill:none;stroke:var(--accent);stroke-width:2;stroke-linejoin:round}.curve.second{stroke:var(--second)}
 circle.dots{fill:var(--good)}.fan circle.dots{fill:var(--accent)}.arrow{stroke:var(--accent);stroke-width:1.6}
+.band0{fill:transparent}.band1{fill:var(--second);opacity:.14}
 .car{fill:var(--ink)}.road{fill:var(--road);stroke:var(--border)}.start{stroke:#fff}
 .line path{stroke-linecap:round;fill:none}.exits{stroke:#ff5a4d;fill:none}
 .bar{justify-content:center;color:var(--quiet);font-weight:400;align-items:center;margin-top:8px}

@@ -46,6 +46,8 @@ class Chart:
     height: int = 260
     marks: Sequence[float] = ()
     """Places on the x axis for dashed lines."""
+    bands: Sequence[tuple[float, float, str]] = ()
+    """From, to and title of parts of the x axis that are told apart by their ground."""
 
 
 def nice_ticks(low: float, high: float, count: int = 5) -> list[float]:
@@ -77,6 +79,12 @@ def line_chart(chart: Chart) -> str:
         return TOP + field_height * (1 - (y - y_low) / (y_high - y_low))
 
     parts = []
+    for place, (start, end, words) in enumerate(chart.bands):
+        parts.append(
+            f'<rect class="band{place % 2}" x="{px(start):.1f}" y="{TOP}" width="{px(end) - px(start):.1f}" '
+            f'height="{field_height}"><title>{escape(words)}</title></rect>'
+            f'<text x="{px(start) + 6:.1f}" y="{TOP + 14}">{escape(words)}</text>'
+        )
     for tick in nice_ticks(y_low, y_high):
         text = escape(chart.y_text(tick))
         parts.append(f'<path class="grid" d="M{LEFT} {py(tick):.1f}H{WIDTH - RIGHT}"/>')

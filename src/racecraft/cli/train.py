@@ -126,7 +126,12 @@ def train(
     with SilentReporter() if is_quiet else TerminalReporter(title=title) as reporter:
         if resume is not None:
             result = training.resume(
-                resume, until=until or None, reporter=reporter, aws_log=aws_log or None, started=started
+                resume,
+                until=until or None,
+                reward=reward if is_given(context, "reward") else None,
+                reporter=reporter,
+                aws_log=aws_log or None,
+                started=started,
             )
         else:
             options: dict[str, Any] = {
@@ -182,11 +187,12 @@ def train(
 
 
 def _refuse_beside_resume(context: typer.Context) -> None:
-    """A resumed run keeps its settings: only its limit may change."""
+    """A resumed run keeps its settings: only its limit and its reward function may change."""
     for option in context.command.params:
         if is_given(context, str(option.name)) and option.name not in (
             "resume",
             "until",
+            "reward",
             "video",
             "aws_log",
             "as_json",

@@ -50,6 +50,8 @@ def role(name: str) -> Role:
         return "settings"
     if name == RUN or name.endswith((f"/{RUN}", "metrics/history.jsonl")):
         return "own"
+    if parent == "stretches" and base.endswith(".json"):
+        return "own"
     if parent == "checkpoints" and (base == "manifest.json" or base.endswith(".safetensors")):
         return "own"
     if base.endswith("-iteration.csv") and parent in ("training-simtrace", "evaluation-simtrace"):

@@ -19,12 +19,14 @@ from racecraft.importing.layout import HYPERPARAMETERS, RUN
 from racecraft.importing.source import Source, SourceFile
 from racecraft.json_file import parse_json_object
 from racecraft.run import RunFolder
+from racecraft.run.stretches import FILE_NAME, recorded_stretches
 from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.settings import TrainSettings
 
 _TRACKS: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_:.,+-]{0,199}")
 _WEIGHTS: Final = re.compile(r"checkpoints/(manifest\.json|\d{9,18}-[0-9a-f]{8}\.safetensors)")
 _HISTORY: Final = "metrics/history.jsonl"
+_STRETCHES: Final = "stretches/"
 
 
 @dataclass(frozen=True)
@@ -36,10 +38,10 @@ class OwnRun:
     has_hyperparameters: bool
     """Whether the run follows AWS's hyperparameters."""
     files: dict[str, SourceFile]
-    """Checkpoints and curves, by their path in the run."""
+    """Checkpoints, curves and stretches, by their path in the run."""
 
     def restore(self, folder: RunFolder, notes: list[str]) -> dict[str, str]:
-        """Put checkpoints and curves into a new run folder; what became of what.
+        """Put checkpoints, curves and stretches into a new run folder; what became of what.
 
         Args:
             folder: Of the new run.
@@ -49,6 +51,11 @@ class OwnRun:
             if file.path is not None:
                 (folder.path / path).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(file.path, folder.path / path)
+        try:
+            recorded_stretches(folder)
+        except RunError as error:
+            shutil.rmtree(folder.stretches, ignore_errors=True)
+            notes.append(f"What the run learned with before its last change is not known: {error}")
         store = folder.checkpoints
         try:
             with warnings.catch_warnings():
@@ -57,6 +64,7 @@ class OwnRun:
         except CheckpointError as error:
             shutil.rmtree(store.folder, ignore_errors=True)
             folder.history.unlink(missing_ok=True)
+            shutil.rmtree(folder.stretches, ignore_errors=True)
             if any(path.startswith("checkpoints/") for path in self.files):
                 notes.append(f"No checkpoint is whole, so training begins with fresh weights: {error}")
             return {}
@@ -95,6 +103,11 @@ def read_own(source: Source, root: str) -> OwnRun | None:
     files = {
         name.removeprefix(root): file
         for name, file in source.files.items()
-        if name.startswith(root) and (_WEIGHTS.fullmatch(name[len(root) :]) or name[len(root) :] == _HISTORY)
+        if name.startswith(root) and _is_restored(name[len(root) :])
     }
     return OwnRun(settings, tracks, root + HYPERPARAMETERS in source.files, files)
+
+
+def _is_restored(path: str) -> bool:
+    is_stretch = path.startswith(_STRETCHES) and FILE_NAME.fullmatch(path.removeprefix(_STRETCHES)) is not None
+    return is_stretch or path == _HISTORY or _WEIGHTS.fullmatch(path) is not None

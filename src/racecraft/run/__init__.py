@@ -6,9 +6,11 @@ from racecraft.run.checkpoint import Checkpoint, CheckpointStore, CheckpointWarn
 from racecraft.run.episodes import Episode, EpisodeCounter
 from racecraft.run.events import EventWriter
 from racecraft.run.folder import RunFolder, RunInfo, list_runs
+from racecraft.run.judged import Judged, best_of, judged_laps
 from racecraft.run.metrics import TrainingMetrics, Trial, read_metrics, write_evaluation_metrics
 from racecraft.run.print_log import PrintLog
 from racecraft.run.simtrace import SimTraceWriter, read_simtrace
+from racecraft.run.stretches import Stretch, begin_stretch, change_reward, read_stretches, stretch_at
 
 __all__ = [
     "AwsLog",
@@ -18,15 +20,23 @@ __all__ = [
     "Episode",
     "EpisodeCounter",
     "EventWriter",
+    "Judged",
     "PrintLog",
     "RunFolder",
     "RunInfo",
     "SimTraceWriter",
+    "Stretch",
     "TrainingMetrics",
     "Trial",
     "archive_chunks",
+    "begin_stretch",
+    "best_of",
+    "change_reward",
+    "judged_laps",
     "list_runs",
     "read_metrics",
     "read_simtrace",
+    "read_stretches",
+    "stretch_at",
     "write_evaluation_metrics",
 ]

@@ -9,6 +9,7 @@ runs/<name>/run.json                      what is needed to repeat the run
             mp4/  events/                 videos, TensorBoard
             model/  ip/                   for AWS's tools: index of checkpoints, metadata; hyperparameters
             checkpoints/                  weights, see racecraft.run.checkpoint
+            stretches/                    what it learned with from which step on, see racecraft.run.stretches
             parent/                       weights it began with, where another run gave them
             logs/                         reward.log: what the reward function printed
 """
@@ -193,6 +194,11 @@ class RunFolder:
     def checkpoints(self) -> CheckpointStore:
         """Weights, with AWS's index of them in ``model/``."""
         return CheckpointStore(self.path / "checkpoints", aws_index=self.path / "model" / "deepracer_checkpoints.json")
+
+    @property
+    def stretches(self) -> Path:
+        """What it learned with, a file for every change, see racecraft.run.stretches."""
+        return self.path / "stretches"
 
     @property
     def parent_checkpoint(self) -> CheckpointStore:

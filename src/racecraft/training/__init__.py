@@ -122,15 +122,19 @@ def resume(
     run: str | Path,
     *,
     until: str | Until | None = None,
+    reward: str | Path | None = None,
     reporter: Reporter | None = None,
     aws_log: str | Path | None = None,
     started: float | None = None,
 ) -> TrainResult:
     """Continue a run from its last checkpoint, as if it had never stopped.
 
+    What was changed in its files since is a new stretch of it, see `racecraft.run.stretches`.
+
     Args:
         run: The run folder.
         until: A new limit; by default the one it was started with. Seconds count from the run's first start.
+        reward: Preset or path of another reward function, from here on.
         reporter: Is told how it goes.
         aws_log: File for the log lines that AWS's tools read, ``-`` for stdout.
         started: `time.monotonic()` of when the clock began to run; by default now.
@@ -138,9 +142,15 @@ def resume(
     Raises:
         RacecraftError: There is no such run, it is in use, or training cannot go on.
     """
+    from racecraft.reward import load_reward
     from racecraft.run import RunFolder
     from racecraft.training.job import Training
 
     if isinstance(until, str):
         until = Until.parse(until)
-    return Training(RunFolder.open(run), until=until, reporter=reporter, aws_log=aws_log, started=started).run()
+    folder = RunFolder.open(run)
+    if reward is not None:
+        from racecraft.training.start import replace_reward
+
+        replace_reward(folder, load_reward(reward))
+    return Training(folder, until=until, reporter=reporter, aws_log=aws_log, started=started).run()

@@ -21,8 +21,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import FrameType
 
-import numpy as np
-
 from racecraft.agent import Hyperparameters
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RewardError, RunError
 from racecraft.learn import Algorithm, make_learner
@@ -38,6 +36,8 @@ from racecraft.run import (
     RunFolder,
     SimTraceWriter,
     TrainingMetrics,
+    begin_stretch,
+    read_stretches,
 )
 from racecraft.run.history import HistoryWriter
 from racecraft.sim import Simulation
@@ -49,7 +49,7 @@ from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
 from racecraft.training.opponents import OpponentPool
 from racecraft.training.parent import begin_from, is_weights_only
-from racecraft.training.progress import EvaluationReport, IterationReport, Reporter, SilentReporter, TrainResult
+from racecraft.training.progress import Reporter, SilentReporter, TrainResult
 from racecraft.training.start import aws_hyperparameters, read_settings, require_trainable, require_valid_reward
 from racecraft.training.stop import Until
 
@@ -107,6 +107,7 @@ class Training:
         self.settings = settings if until is None else replace(settings, until=until)
         self.meter = Meter(self.settings.until, started=time.monotonic() if started is None else started)
         self._stop = threading.Event()
+        self._since = -1  # step that the stretch under way began at
 
     def run(self) -> TrainResult:
         """Train until a limit is reached or somebody interrupts; the run can always be resumed.
@@ -170,6 +171,11 @@ class Training:
                 )
             )
             kept = saved.step if saved is not None else 0
+            stretch = begin_stretch(folder, step=kept)
+            self._since = stretch.step
+            if kept and stretch.step == kept:
+                before = read_stretches(folder)[-2]
+                self.reporter.note(f"From here on with other {', '.join(stretch.changes(before))}.".replace("_", " "))
             after = kept if saved is not None else -1
             events = stack.enter_context(EventWriter(folder.events, after_step=after))
             history = stack.enter_context(HistoryWriter(folder.history, step=kept))
@@ -275,7 +281,7 @@ class Training:
             meter.add(finished)
             report = meter.report(stats, episodes=session.counter.number)
             self.reporter.iteration(report)
-            session.events.add_scalars(_iteration_scalars(report), step=algorithm.total_steps)
+            session.events.add_scalars(report.scalars(), step=algorithm.total_steps)
             session.history.add_iteration(report.point())
             if session.aws_log is not None:
                 session.aws_log.write_policy(
@@ -299,6 +305,8 @@ class Training:
     def _limit_reached(self, session: _Session) -> str:
         """Why training is to end now, or an empty string."""
         until, steps, last = self.settings.until, session.algorithm.total_steps, session.evaluator.last
+        if last is not None and last.step <= self._since:
+            last = None  # what was driven before something changed is no end of what comes after
         if self._stop.is_set():
             return "interrupted"
         if until.laps and last is not None and last.laps_completed >= until.laps:
@@ -339,7 +347,7 @@ class Training:
         for trial in trials:
             session.metrics.add(trial, phase="evaluation")
         assert evaluator.last is not None
-        session.events.add_scalars(_evaluation_scalars(evaluator.last), step=session.algorithm.total_steps)
+        session.events.add_scalars(evaluator.last.scalars(), step=session.algorithm.total_steps)
         session.history.add("evaluation", evaluator.last.point())
         self.reporter.evaluation(evaluator.last)
         self.meter.parts["evaluation"] += time.perf_counter() - begun
@@ -473,28 +481,3 @@ class Training:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
-
-
-def _iteration_scalars(report: IterationReport) -> dict[str, float]:
-    """For TensorBoard; what is not known yet is left out."""
-    stats = report.stats
-    scalars = {
-        "training/reward": report.mean_reward,
-        "training/completion": report.completion,
-        "training/steps_per_second": report.steps_per_second,
-        "training/episode_length": stats.mean_length,
-        "losses/policy": stats.losses.policy_loss,
-        "losses/value": stats.losses.value_loss,
-        "losses/entropy": stats.losses.entropy,
-        "losses/approx_kl": stats.losses.approx_kl,
-        "losses/clip_fraction": stats.losses.clip_fraction,
-        "losses/explained_variance": stats.explained_variance,
-    }
-    return {tag: value for tag, value in scalars.items() if np.isfinite(value)}
-
-
-def _evaluation_scalars(report: EvaluationReport) -> dict[str, float]:
-    scalars = {"evaluation/completion": report.completion, "evaluation/laps": float(report.laps_completed)}
-    if report.best_lap is not None:
-        scalars["evaluation/best_lap_s"] = report.best_lap
-    return scalars

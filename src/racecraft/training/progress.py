@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -37,6 +38,11 @@ class EvaluationReport:
             "lap_times": [round(lap, 3) for lap in self.lap_times],
             "is_best": self.is_best,
         }
+
+    def scalars(self) -> dict[str, float]:
+        """For TensorBoard."""
+        scalars = {"evaluation/completion": self.completion, "evaluation/laps": float(self.laps_completed)}
+        return scalars if self.best_lap is None else {**scalars, "evaluation/best_lap_s": self.best_lap}
 
     @property
     def completion(self) -> float:
@@ -91,6 +97,23 @@ class IterationReport:
             "clip_fraction": losses.clip_fraction,
             "explained_variance": self.stats.explained_variance,
         }
+
+    def scalars(self) -> dict[str, float]:
+        """For TensorBoard; what is not known yet is left out."""
+        losses = self.stats.losses
+        scalars = {
+            "training/reward": self.mean_reward,
+            "training/completion": self.completion,
+            "training/steps_per_second": self.steps_per_second,
+            "training/episode_length": self.stats.mean_length,
+            "losses/policy": losses.policy_loss,
+            "losses/value": losses.value_loss,
+            "losses/entropy": losses.entropy,
+            "losses/approx_kl": losses.approx_kl,
+            "losses/clip_fraction": losses.clip_fraction,
+            "losses/explained_variance": self.stats.explained_variance,
+        }
+        return {tag: value for tag, value in scalars.items() if math.isfinite(value)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from racecraft.errors import ConfigError
 from racecraft.learn import DistillConfig, PPOConfig, SACConfig
 from racecraft.learn.sb3 import SB3Config
 from racecraft.reward import dry_run, validate_reward
-from racecraft.run import RunFolder, RunInfo
+from racecraft.run import RunFolder, RunInfo, change_reward
 from racecraft.run.training_params import TrainingParams
 from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.parent import WEIGHTS, Parent
@@ -145,6 +145,19 @@ def read_settings(folder: RunFolder) -> TrainSettings:
     """The settings a run was started with."""
     info = folder.read_info()
     return TrainSettings.from_dict({**info.settings, "seed": info.seed, "track": info.track})
+
+
+def replace_reward(folder: RunFolder, source: str) -> None:
+    """Give a run another reward function, from its next step on.
+
+    Raises:
+        RewardError: The function has a mistake that can be seen before training.
+        RunError: The run is in use, or cannot be read or written.
+    """
+    info = folder.read_info()
+    require_valid_reward(source, load_tracks(info.track)[0], foreign=info.foreign)
+    with folder.lock():
+        change_reward(folder, source)
 
 
 def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:

@@ -4,6 +4,7 @@ import type { components } from "./schema";
 type Schemas = components["schemas"];
 export type ModelCard = Schemas["ModelCard"];
 export type ModelDetail = Schemas["ModelDetail"];
+export type TrainingStretch = Schemas["TrainingStretch"];
 export type ImportedModel = Schemas["ImportedModel"];
 export type TrackFacts = Schemas["TrackFacts"];
 export type TrackGeometry = Schemas["TrackGeometry"];

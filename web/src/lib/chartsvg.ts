@@ -1,5 +1,6 @@
 /** A line chart as an SVG text of its own, for reports and slides. */
 import { span } from "./colors";
+import type { Band } from "./stretches";
 
 export interface ChartLine {
   label: string;
@@ -34,6 +35,7 @@ export function chartSvg(chart: {
   isWhole?: boolean;
   least?: number;
   marks?: number[];
+  bands?: Band[];
   mark?: string;
   height?: number;
   ink: string;
@@ -56,6 +58,12 @@ export function chartSvg(chart: {
   const text = (x: number, y: number, words: string, more = "") =>
     `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" ${more}>${escape(words)}</text>`;
   const parts: string[] = [];
+  for (const band of chart.bands ?? []) {
+    const [from, to] = [px(band.from), px(band.to)];
+    parts.push(
+      `<rect x="${from.toFixed(1)}" y="${TOP}" width="${Math.max(to - from, 0).toFixed(1)}" height="${height - TOP - BOTTOM}" fill="${band.color}" fill-opacity="0.13"><title>${escape(band.label)}</title></rect>`,
+    );
+  }
   for (const tick of ticks(y0, y1)) {
     parts.push(`<path d="M${LEFT} ${py(tick).toFixed(1)}H${WIDTH - RIGHT}" stroke="${chart.grid}"/>`);
     parts.push(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import re
 import shutil
@@ -18,9 +19,9 @@ from sqlalchemy.dialects import sqlite
 from sqlalchemy.orm import Session
 
 from racecraft.errors import RacecraftError, RunError
-from racecraft.run import RunFolder, list_runs
+from racecraft.run import RunFolder, Stretch, best_of, judged_laps, list_runs, read_stretches, stretch_at
 from racecraft.run.history import read_history
-from racecraft.serve.models.schemas import Checkpoint, ModelCard
+from racecraft.serve.models.schemas import Checkpoint, ModelCard, TrainingStretch
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Model, now
@@ -29,6 +30,8 @@ TRASH: Final = "trash"  # inside the state folder
 PICTURE: Final = "racing-line.png"
 NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
 SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
+SUMMARY: Final = "2"
+"""Changes with what a summary says, so that those kept by an earlier version are made anew."""
 Status = Literal["training", "queued", "stopped", "finished", "failed", "new"]
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
@@ -122,17 +125,40 @@ class Garage:
 
     def checkpoints(self, folder: RunFolder) -> list[Checkpoint]:
         """The states of a model's policy that are kept."""
-        store = folder.checkpoints
+        store, stretches = folder.checkpoints, read_stretches(folder)
         best = store.best
         return [
             Checkpoint(
                 step=entry.step,
+                stretch=stretch_at(stretches, entry.step).number,
                 is_best=best is not None and entry.step == best.step,
                 completion=entry.metrics.get("completion"),
                 best_lap=entry.metrics.get("best_lap_s"),
             )
             for entry in store.entries()
         ]
+
+    def stretches(self, folder: RunFolder) -> list[TrainingStretch]:
+        """What a model learned with, part by part, and how well each drove."""
+        stretches, judged = read_stretches(folder), judged_laps(folder)
+        found = []
+        for place, stretch in enumerate(stretches):
+            own = [one for one in judged if stretch_at(stretches, one.step) is stretch]
+            fastest = best_of(own)
+            found.append(
+                TrainingStretch(
+                    number=stretch.number,
+                    step=stretch.step,
+                    began=datetime.fromisoformat(stretch.began),
+                    changes=stretch.changes(stretches[place - 1]) if place else [],
+                    reward=stretch.reward_function,
+                    settings=learned_with(stretch),
+                    best_lap=fastest.best_lap if fastest is not None else None,
+                    completion=max((one.completion for one in own if one.completion is not None), default=None),
+                    evaluations=len(own),
+                )
+            )
+        return found
 
     def tag(self, name: str, tags: list[str]) -> None:
         """Replace a model's tags."""
@@ -202,9 +228,31 @@ class Garage:
             yield
 
 
+def learned_with(stretch: Stretch) -> dict[str, Any]:
+    """The settings of a stretch as one document; what JSON cannot say becomes null."""
+    document: dict[str, Any] = finite(
+        {
+            "track": Path(stretch.track).stem,
+            **stretch.settings,
+            "model_metadata": stretch.model_metadata,
+            "hyperparameters": stretch.hyperparameters,
+        }
+    )
+    return document
+
+
+def finite(value: Any) -> Any:
+    """A document whose numbers JSON can say."""
+    if isinstance(value, dict):
+        return {name: finite(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _fingerprint(folder: RunFolder) -> str:
     """Changes when a card may change: the settings, the checkpoints, an evaluation."""
-    marks = []
+    marks = [SUMMARY]
     for path in (folder.path, folder.path / "run.json", folder.path / "checkpoints"):
         try:
             marks.append(str(path.stat().st_mtime_ns))
@@ -218,10 +266,11 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
     try:
         info = folder.read_info()
         best, last = folder.checkpoints.best, folder.checkpoints.last
+        fastest = best_of(judged_laps(folder))
         created = datetime.fromisoformat(info.created).isoformat()
     except (RacecraftError, ValueError, TypeError):
         return {}, True
-    raced, picture, is_settled = _evaluations(folder)
+    raced, picture, is_settled = _evaluations(folder, fastest.stamp if fastest is not None else None)
     metrics = best.metrics if best is not None else {}
     return {
         "track": Path(info.track).stem,
@@ -229,22 +278,26 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
         "steps": last.step if last is not None else 0,
         "seconds": _seconds(folder),
         "completion": metrics.get("completion"),
-        "best_lap": metrics.get("best_lap_s"),
+        "best_lap": fastest.best_lap if fastest is not None else None,
         "evaluations": raced,
         "picture": picture,
         "until": str(info.settings.get("until", "")),
     }, is_settled
 
 
-def _evaluations(folder: RunFolder) -> tuple[int, str | None, bool]:
-    """How many evaluations there are, the newest picture, and whether none is under way; looks at the newest only."""
+def _evaluations(folder: RunFolder, fastest: str | None) -> tuple[int, str | None, bool]:
+    """How many evaluations there are, the picture of the fastest, else of the newest, and whether none is under way.
+
+    Looks at the newest only, and at the one of the best lap.
+    """
     with os.scandir(folder.path) as entries:
         names = sorted((entry.name for entry in entries if entry.name.startswith("evaluation-")), reverse=True)
     newest = names[:NEWEST]
     raced = [name for name in newest if (folder.path / name / "evaluation.json").exists()]
     unfinished = set(newest).difference(raced)
     youngest = max(((folder.path / name).stat().st_mtime for name in unfinished), default=0.0)
-    picture = next((f"{name}/{PICTURE}" for name in raced if (folder.path / name / PICTURE).is_file()), None)
+    shown = [*([f"evaluation-{fastest}"] if fastest is not None else []), *raced]
+    picture = next((f"{name}/{PICTURE}" for name in shown if (folder.path / name / PICTURE).is_file()), None)
     return len(names) - len(unfinished), picture, time.time() - youngest > SETTLED
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -15,10 +14,10 @@ from racecraft.errors import ConfigError
 from racecraft.learn import PPOConfig
 from racecraft.reward import load_preset, preset_names
 from racecraft.run import RunFolder
-from racecraft.run.atomic import write_file
 from racecraft.run.history import read_history
 from racecraft.serve.context import Context, InContext
 from racecraft.serve.jobs.schemas import JobInfo, job_info
+from racecraft.serve.models.garage import finite
 from racecraft.serve.models.schemas import (
     CloneModel,
     HistoryPage,
@@ -33,10 +32,9 @@ from racecraft.serve.problems import Conflict, NotFound
 from racecraft.sim import Objects
 from racecraft.sim.objects import objects_for_race
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
-from racecraft.track import load_track
 from racecraft.training import Until
 from racecraft.training.settings import make_settings
-from racecraft.training.start import read_settings, require_valid_reward, start_run
+from racecraft.training.start import read_settings, replace_reward, start_run
 
 router = APIRouter(prefix="/api/models", tags=["models"])
 
@@ -110,9 +108,10 @@ def get_model(name: str, context: InContext) -> ModelDetail:
         reward=folder.read_reward_function(),
         model_metadata=folder.read_model_metadata().to_dict(),
         hyperparameters=parameters.to_dict() if parameters is not None else None,
-        settings=_finite(info.settings),
+        settings=finite(info.settings),
         seed=info.seed,
         checkpoints=context.garage.checkpoints(folder),
+        stretches=context.garage.stretches(folder),
         job=job_info(jobs[0]) if jobs else None,
     )
 
@@ -172,9 +171,8 @@ def train_model(name: str, request: TrainOn, context: InContext) -> JobInfo:
     if request.until is not None:
         Until.parse(request.until)
     if request.reward is not None:
-        info = folder.read_info()
-        require_valid_reward(request.reward, load_track(info.track), foreign=info.foreign)
-        write_file(folder.reward_function, request.reward.encode())
+        _require_idle(context, folder)
+        replace_reward(folder, request.reward)
     return _train(context, folder, until=request.until)
 
 
@@ -210,11 +208,15 @@ def get_file(name: str, path: str, context: InContext) -> FileResponse:
 
 
 def _train(context: Context, folder: RunFolder, *, until: str | None) -> JobInfo:
-    if context.queue.active(folder.name) is not None:
-        raise Conflict(f"Model {folder.name!r} is being trained already.")
+    _require_idle(context, folder)
     job = context.queue.add("train", folder.name, {"until": until})
     context.supervisor.wake()
     return job_info(job)
+
+
+def _require_idle(context: Context, folder: RunFolder) -> None:
+    if context.queue.active(folder.name) is not None:
+        raise Conflict(f"Model {folder.name!r} is being trained already.")
 
 
 def _metadata(request: NewModel) -> ModelMetadata:
@@ -263,12 +265,3 @@ def _vehicle(name: str) -> str:
     if name not in ("", "v4", "v5", "v6"):
         raise ConfigError(f"vehicle is {name[:40]!r}; allowed are v4, v5 and v6.")
     return name
-
-
-def _finite(value: Any) -> Any:
-    """A document whose numbers JSON can say."""
-    if isinstance(value, dict):
-        return {name: _finite(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -74,6 +74,7 @@ class ModelCard(Message):
     completion: float | None
     """Of the best checkpoint's evaluation."""
     best_lap: float | None
+    """s; the fastest whole lap with its penalties of all evaluations on its track, in training and afterwards."""
     evaluations: int
     """Races by the rules, not those during training."""
     picture: str | None
@@ -100,9 +101,34 @@ class Checkpoint(Message):
     """A saved state of a policy."""
 
     step: int
+    stretch: int
+    """Number of the part of the training that it comes from."""
     is_best: bool
     completion: float | None
     best_lap: float | None
+
+
+class TrainingStretch(Message):
+    """A part of a training in which nothing was changed."""
+
+    number: int
+    """From 1."""
+    step: int
+    """Camera steps of training before it."""
+    began: datetime
+    changes: list[str]
+    """Against the one before: ``reward``, ``actions``, ``model_metadata``, ``hyperparameters``, ``track``, ``vehicle``,
+    ``settings``."""
+    reward: str
+    """Source of the reward function."""
+    settings: dict[str, Any]
+    """Track, vehicle, actions, hyperparameters and everything else."""
+    best_lap: float | None
+    """s, of its own evaluations, in training and afterwards."""
+    completion: float | None
+    """Of the best of them."""
+    evaluations: int
+    """How many that are."""
 
 
 class ModelDetail(ModelCard):
@@ -114,6 +140,8 @@ class ModelDetail(ModelCard):
     settings: dict[str, Any]
     seed: int
     checkpoints: list[Checkpoint]
+    stretches: list[TrainingStretch]
+    """In the order trained; one at least. A step belongs to the last one that began before it."""
     job: JobInfo | None
 
 

@@ -1,0 +1,91 @@
+"""A run's evaluations, during training and afterwards, and with them its best lap.
+
+The best lap of a run is the fastest whole lap, penalties included, that it drove in any evaluation on the track it
+learns on: those during training, and those by the rules of a race afterwards.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from racecraft.errors import ConfigError, RunError
+from racecraft.json_file import read_json_object
+from racecraft.run.folder import RunFolder
+from racecraft.run.history import MAX_LINE
+
+_EVALUATION: Final = b'{"kind": "evaluation"'
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """One evaluation."""
+
+    step: int
+    """Camera steps of training behind the policy that drove."""
+    completion: float | None
+    """Mean fraction of the laps begun."""
+    best_lap: float | None
+    """s, the fastest whole lap with its penalties; None where there was none."""
+    stamp: str | None = None
+    """Of an evaluation afterwards, when it began; None during training."""
+
+
+def judged_laps(folder: RunFolder) -> list[Judged]:
+    """The evaluations of a run on its own track: those during training in their order, then those afterwards.
+
+    Evaluations that cannot be read are left out.
+
+    Raises:
+        RunError: The run itself cannot be read.
+    """
+    tracks = {Path(part).stem for part in folder.read_info().track.split(",")}
+    known = [*_during_training(folder.history)]
+    seen = {judged.step for judged in known}
+    for entry in folder.checkpoints.entries():  # all that an imported run may have
+        lap = _number(entry.metrics.get("best_lap_s"))
+        if entry.step not in seen and (lap is not None or entry.metrics.get("completion") is not None):
+            known.append(Judged(step=entry.step, completion=_number(entry.metrics.get("completion")), best_lap=lap))
+    return [*known, *_afterwards(folder, tracks)]
+
+
+def best_of(judged: Sequence[Judged]) -> Judged | None:
+    """The one with the fastest lap, the earliest of equal ones; None where no lap was completed."""
+    driven = [one for one in judged if one.best_lap is not None]
+    return min(driven, key=lambda one: one.best_lap or math.inf, default=None)
+
+
+def _during_training(history: Path) -> Iterator[Judged]:
+    with suppress(OSError), history.open("rb") as file:
+        while line := file.readline(MAX_LINE):
+            if not line.startswith(_EVALUATION):
+                continue
+            with suppress(ValueError, KeyError, TypeError):
+                point = json.loads(line)
+                shares = [share for share in map(_number, point["completions"]) if share is not None]
+                laps = [lap for lap in map(_number, point["lap_times"]) if lap is not None]
+                mean = sum(shares) / len(shares) if shares else None
+                yield Judged(step=int(point["step"]), completion=mean, best_lap=min(laps, default=None))
+
+
+def _afterwards(folder: RunFolder, tracks: set[str]) -> Iterator[Judged]:
+    for path in sorted(folder.path.glob("evaluation-*/evaluation.json")):
+        with suppress(ConfigError, RunError, TypeError, ValueError):
+            summary = read_json_object(path)
+            if Path(str(summary.get("track", ""))).stem in tracks:
+                yield Judged(
+                    step=int(summary.get("step") or 0),
+                    completion=_number(summary.get("mean_completion")),
+                    best_lap=_number(summary.get("best_lap_seconds")),
+                    stamp=path.parent.name.removeprefix("evaluation-"),
+                )
+
+
+def _number(value: Any) -> float | None:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if is_number and math.isfinite(value) and value >= 0 else None

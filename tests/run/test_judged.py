@@ -1,0 +1,60 @@
+"""A run's best lap: the fastest whole lap of all its evaluations on its own track, and of no other."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from racecraft.run import RunFolder, RunInfo, best_of, judged_laps
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> RunFolder:
+    folder = RunFolder.create(tmp_path, name="a")
+    folder.write_info(RunInfo(seed=1, track="oval", track_digest=""))
+    return folder
+
+
+def train(folder: RunFolder, *laps: list[float]) -> None:
+    folder.history.parent.mkdir(exist_ok=True)
+    lines = [
+        {"kind": "evaluation", "step": 100 * number, "completions": [1.0, 0.5], "lap_times": times}
+        for number, times in enumerate(laps, start=1)
+    ]
+    folder.history.write_text("".join(json.dumps(line) + "\n" for line in lines))
+
+
+def race(folder: RunFolder, stamp: str, **summary: Any) -> None:
+    folder.evaluation(stamp).mkdir()
+    document = {"track": "oval", "step": 200, "mean_completion": 1.0, **summary}
+    (folder.evaluation(stamp) / "evaluation.json").write_text(json.dumps(document))
+
+
+def test_a_lap_in_training_and_a_lap_afterwards_count_alike(run: RunFolder) -> None:
+    assert best_of(judged_laps(run)) is None
+    train(run, [], [10.8, 10.47], [11.0])
+    best = best_of(judged_laps(run))
+    assert best is not None
+    assert (best.best_lap, best.step, best.stamp) == (10.47, 200, None)
+    race(run, "20260101000000", best_lap_seconds=9.6)
+    race(run, "20260101000001", best_lap_seconds=10.8)
+    race(run, "20260101000002", best_lap_seconds=5.0, track="hairpin")
+    best = best_of(judged_laps(run))
+    assert best is not None
+    assert (best.best_lap, best.stamp) == (9.6, "20260101000000")
+
+
+def test_damaged_files_are_passed_over(run: RunFolder) -> None:
+    train(run, [10.0])
+    with run.history.open("a") as file:
+        file.write('{"kind": "evaluation", "step": 4\n{"kind": "evaluation", "step": 5, "lap_times": "x"}\n')
+    race(run, "20260101000000", best_lap_seconds="fast")
+    (run.evaluation("20260101000000") / "evaluation.json").with_name("other").write_text("")
+    run.evaluation("20260101000003").mkdir()
+    (run.evaluation("20260101000003") / "evaluation.json").write_text("{")
+    best = best_of(judged_laps(run))
+    assert best is not None
+    assert best.best_lap == 10.0

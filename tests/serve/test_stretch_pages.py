@@ -1,0 +1,97 @@
+"""A training that went on with something changed, in a real browser: what drove which lap is said everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsers import Visit, needs_browser, needs_pages, visiting
+from running_consoles import RunningConsole, running_console
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+OTHER = "def reward_function(params):\n    return -params['speed']\n"
+
+
+@pytest.fixture(scope="module")
+def changed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
+    """A console with a model that learned a lap, and went on with a reward for standing still; and another model."""
+    with running_console(tmp_path_factory.mktemp("console") / "runs") as console:
+        console.create(name="heron", track="oval", until="1 laps or 60000 steps", seed=1)
+        console.create(name="other", track="oval", until="500 steps", seed=1, reward="centerline")
+        _wait(console, "other")
+        _wait(console, "heron")
+        steps = console.client.get("/api/models/heron").json()["steps"]
+        request = {"reward": OTHER, "until": f"{steps + 9000} steps"}
+        assert console.client.post("/api/models/heron/train", json=request).status_code == 202
+        _wait(console, "heron")
+        with visiting(console) as visit:
+            yield visit
+            assert visit.complaints == []
+
+
+def _wait(console: RunningConsole, name: str) -> None:
+    job = console.client.get("/api/jobs", params={"run": name}).json()[0]
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+
+
+def test_every_stretch_keeps_what_it_learned_with(changed: Visit) -> None:
+    model = changed.console.client.get("/api/models/heron").json()
+    first, second = model["stretches"]
+    assert (first["step"], first["changes"], second["changes"]) == (0, [], ["reward"])
+    assert "progress" in first["reward"] or "speed" in first["reward"]
+    assert second["reward"] == model["reward"] == OTHER
+    assert first["best_lap"] == model["best_lap"] is not None
+    of = {saved["step"]: saved["stretch"] for saved in model["checkpoints"]}
+    assert all(number == (1 if step <= second["step"] else 2) for step, number in of.items())
+    assert 2 in of.values()
+
+
+def test_the_old_reward_is_shown_and_comes_back_into_the_editor(changed: Visit) -> None:
+    page = changed.open("/models/heron/setup")
+    table = page.get_by_role("region", name="Stretches of the training").locator("table").first
+    assert "Stretch 2 · reward" in table.inner_text()
+    assert page.locator("tr.removed").count() > 2
+    assert page.locator("tr.added", has_text="-params['speed']").count() == 1
+    page.get_by_role("button", name="Show changes: Stretch 1").click()
+    page.get_by_role("button", name="Put the reward of stretch 1 into the editor").click()
+    first = changed.console.client.get("/api/models/heron").json()["stretches"][0]["reward"]
+    page.get_by_text(first.strip().splitlines()[-1].strip()).first.wait_for()
+    assert page.get_by_role("button", name="Go on with this reward").is_enabled()
+
+
+def test_the_curve_has_a_band_for_each_stretch(changed: Visit) -> None:
+    page = changed.open("/models/heron/watch")
+    bands = page.get_by_role("list", name="Stretches of the training")
+    bands.wait_for()
+    assert [text.strip() for text in bands.locator("li").all_inner_texts()] == [
+        "Stretch 1 · the beginning",
+        "Stretch 2 · reward",
+    ]
+
+
+def test_compare_credits_the_lap_to_the_reward_that_drove_it(changed: Visit) -> None:
+    page = changed.open("/compare/heron/other")
+    chosen = page.get_by_label("Stretch: heron")
+    chosen.wait_for()
+    first = changed.console.client.get("/api/models/heron").json()["stretches"][0]
+    assert chosen.input_value() == "1"
+    row = page.get_by_role("region", name="Results").locator("tbody tr").first
+    assert f"{first['best_lap']:.2f}" in row.inner_text()
+    code = page.get_by_role("region", name="Reward code")
+    assert "-params['speed']" not in code.inner_text()
+    chosen.select_option("2")
+    code.get_by_text("-params['speed']").wait_for()
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+@pytest.mark.parametrize("width", [390, 1440])
+def test_nothing_is_wider_than_the_window(changed: Visit, width: int, language: str, tmp_path: Path) -> None:
+    changed.look("dark" if width == 390 else "light", language)
+    for path in ("/models/heron/setup", "/models/heron/watch", "/compare/heron/other"):
+        page: Any = changed.open(path, width=width)
+        page.wait_for_timeout(800)
+        assert changed.overflow() == 0, path
+    changed.look("light", "en")
