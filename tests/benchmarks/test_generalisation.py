@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from racecraft import generalize, train
-from racecraft.training.settings import FAR_PPO
+from racecraft.training.regimes import MANY_TRACKS
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "generalisation.py"
 TRACKS = ["library", "generated:0..7,radius=0.5"]
@@ -51,7 +51,7 @@ def test_a_policy_drives_tracks_it_never_saw(tmp_path: Path) -> None:
         "root": tmp_path,
     }
     learned = train(TRACKS, **recipe, until="60000 steps", evaluate_every=20_000, seed=1)
-    ignorant = train(TRACKS, **recipe, until="2048 steps", ppo=replace(FAR_PPO, learning_rate=0.0))
+    ignorant = train(TRACKS, **recipe, until="2048 steps", ppo=replace(MANY_TRACKS.ppo, learning_rate=0.0))
     found = {
         (name, conditions): generalize(run, tracks=UNSEEN, randomize=conditions, checkpoint="last").generalization
         for name, run in (("learned", learned.run), ("ignorant", ignorant.run))

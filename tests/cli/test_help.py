@@ -61,7 +61,7 @@ def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:
     import inspect
 
     from racecraft import train
-    from racecraft.training import defaults
+    from racecraft.training.regimes import TIME_TRIAL
 
     shown = {name: parameter.default for name, parameter in inspect.signature(cli.train.train).parameters.items()}
     public = {name: parameter.default for name, parameter in inspect.signature(train).parameters.items()}
@@ -70,7 +70,7 @@ def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:
     for name in ("reward", "actions", "until", "sensors", "critic"):
         assert not shown[name]  # as the race has it
         assert not public.get(name)
-    assert defaults.TIME_TRIAL.until == str(settings.until)
+    assert TIME_TRIAL.until == str(settings.until)
     for name in ("direction", "evaluate_every", "num_threads", "seed"):
         assert shown[name] == getattr(settings, name)
 

@@ -15,7 +15,8 @@ from racecraft.gpu import open_device
 from racecraft.learn import PPOConfig
 from racecraft.run import RunFolder
 from racecraft.training import resume, train
-from racecraft.training.settings import CUDA_PPO, TrainSettings, make_settings
+from racecraft.training.regimes import CUDA
+from racecraft.training.settings import TrainSettings, make_settings
 
 pytestmark = pytest.mark.skipif(find_spec("torch") is None, reason="torch is not installed")
 
@@ -57,7 +58,7 @@ def test_settings_know_the_device():
 
     metadata = ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
     settings = make_settings(metadata=metadata, device="cuda")
-    assert settings.ppo == CUDA_PPO
+    assert settings.ppo == CUDA.ppo
     assert settings.evaluate_every == 100_000
     document = settings.to_dict()
     assert TrainSettings.from_dict(document) == settings

@@ -19,7 +19,8 @@ from racecraft.run import EpisodeCounter
 from racecraft.sim import Objects, Obstacles
 from racecraft.training import EvaluationReport, Until, evaluator
 from racecraft.training.evaluator import Evaluator
-from racecraft.training.settings import RACE_GOOD, TrainSettings
+from racecraft.training.regimes import OBJECTS
+from racecraft.training.settings import TrainSettings
 
 SETTINGS = TrainSettings(track="oval", until=Until(steps=1000), evaluation_trials=2, num_threads=1)
 Judge = Callable[..., EvaluationReport]
@@ -96,7 +97,7 @@ def test_it_was_good_once_every_lap_was_completed_and_stays_so(judge: Judge, jud
 
 def test_among_objects_enough_of_the_way_is_good() -> None:
     among = evaluator_for(replace(SETTINGS, objects=Objects(obstacles=Obstacles(count=2))))
-    for completion, is_good in ((RACE_GOOD - 0.01, False), (RACE_GOOD, True)):
+    for completion, is_good in ((OBJECTS.good - 0.01, False), (OBJECTS.good, True)):
         among.best_score = (completion, -1e6)
         assert among.was_good is is_good
 

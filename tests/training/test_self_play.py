@@ -19,7 +19,7 @@ from racecraft.track import load_track
 from racecraft.training import resume
 from racecraft.training.job import Training
 from racecraft.training.opponents import BESIDE_REACH, BESIDE_SPEED, CURRENT, OpponentPool, Opponents
-from racecraft.training.settings import RACING
+from racecraft.training.regimes import DUEL
 
 SELF = Opponents(cars=3, pool_size=4, snapshot_every=64)
 
@@ -94,7 +94,7 @@ def races(opponents: Opponents, *, objects: Objects = NO_OBJECTS, seed: int = 3)
         load_track("oval"),
         num_envs=60 * opponents.cars,
         cars_per_race=opponents.cars,
-        start=RACING,
+        start=DUEL.start,
         objects=objects,
         seed=seed,
     )

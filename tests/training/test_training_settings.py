@@ -12,27 +12,12 @@ from racecraft.errors import ConfigError, RunError
 from racecraft.learn import DistillConfig, PPOConfig, SACConfig
 from racecraft.reward import load_preset, load_reward
 from racecraft.sim import Bots, Objects, Obstacles, Start, Vehicle
-from racecraft.sim.objects import NO_OBJECTS
 from racecraft.training import Until, train
 from racecraft.training import settings as settings_module
-from racecraft.training.defaults import DUEL, RACE, TIME_TRIAL, defaults_for
 from racecraft.training.opponents import Opponents
 from racecraft.training.plan import make_plan
-from racecraft.training.settings import (
-    DUEL_EVALUATE_EVERY,
-    DUEL_PPO,
-    EVALUATE_EVERY,
-    FAST_DISTILL,
-    FAST_START,
-    MAX_ENVS,
-    RACE_EVALUATE_EVERY,
-    RACE_PPO,
-    RACE_TRIALS,
-    SCATTERED,
-    VEHICLE_OF_VERSION,
-    TrainSettings,
-    make_settings,
-)
+from racecraft.training.regimes import DUEL, FAST_DISTILL, MANY_TRACKS, OBJECTS, TIME_TRIAL
+from racecraft.training.settings import VEHICLE_OF_VERSION, TrainSettings, make_settings
 from racecraft.training.start import aws_hyperparameters
 
 DISCRETE = ModelMetadata(neural_network="RACECRAFT_SMALL")
@@ -139,14 +124,15 @@ def test_what_awss_tools_are_told_is_how_the_algorithm_learns(algorithm: str, ex
 def test_a_distillation_of_continuous_actions_is_for_fast_laps() -> None:
     continuous = ModelMetadata(neural_network="RACECRAFT_SMALL", action_space=action_space("continuous"))
     fast = make_settings(metadata=continuous, algorithm="distill", num_envs=32)
-    assert fast.distill == replace(FAST_DISTILL, num_envs=32)
+    assert FAST_DISTILL.distill is not None
+    assert fast.distill == replace(FAST_DISTILL.distill, num_envs=32)
     assert fast.distill.teacher_steps > DistillConfig().teacher_steps
-    assert fast.start == FAST_START
+    assert fast.start == FAST_DISTILL.start
     own = make_settings(
         metadata=continuous, algorithm="distill", distill=DistillConfig(teacher_steps=5), start=SETTINGS.start
     )
     assert (own.distill.teacher_steps, own.start) == (5, SETTINGS.start)
-    assert make_settings(metadata=continuous, algorithm="distill", track=["oval", "kidney"]).start == SCATTERED
+    assert make_settings(metadata=continuous, algorithm="distill", track=["oval", "kidney"]).start == MANY_TRACKS.start
     for other in (make_settings(metadata=DISCRETE, algorithm="distill"), make_settings(metadata=continuous)):
         assert (other.distill, other.start) == (DistillConfig(), Start(spread=True))
 
@@ -201,14 +187,14 @@ def test_version_and_network_of_the_metadata_are_used_unless_said_otherwise(vers
     assert make_settings(metadata=metadata, vehicle=Vehicle(mass=2.0)).vehicle.mass == 2.0
 
 
-@pytest.mark.parametrize("num_envs", [1, 3, 64, 100, 1000, MAX_ENVS])
+@pytest.mark.parametrize("num_envs", [1, 3, 64, 100, 1000, TIME_TRIAL.most_envs])
 def test_any_number_of_cars_makes_rollouts_that_ppo_accepts(num_envs: int) -> None:
     ppo = make_settings(metadata=DISCRETE, num_envs=num_envs).ppo
     assert ppo.num_envs == num_envs
     assert 1 <= ppo.minibatch_size <= ppo.num_envs * ppo.num_steps
 
 
-@pytest.mark.parametrize("num_envs", [-1, MAX_ENVS + 1, 10**9])
+@pytest.mark.parametrize("num_envs", [-1, TIME_TRIAL.most_envs + 1, 10**9])
 def test_an_impossible_number_of_cars_is_refused(num_envs: int) -> None:
     with pytest.raises(ConfigError, match="num_envs"):
         make_settings(metadata=DISCRETE, num_envs=num_envs)
@@ -253,30 +239,28 @@ def test_aws_own_files_give_settings() -> None:
 @pytest.mark.parametrize("objects", [Objects(obstacles=Obstacles(count=2)), Objects(bots=Bots(count=1))])
 def test_among_objects_training_takes_its_time(objects: Objects) -> None:
     """What is not said is chosen for the race; what is said stays."""
-    assert (defaults_for(objects), defaults_for(NO_OBJECTS)) == (RACE, TIME_TRIAL)
     settings = make_settings(metadata=DISCRETE, objects=objects)
     assert (settings.ppo, settings.evaluate_every, settings.evaluation_trials) == (
-        RACE_PPO,
-        RACE_EVALUATE_EVERY,
-        RACE_TRIALS,
+        OBJECTS.ppo,
+        OBJECTS.evaluate_every,
+        OBJECTS.evaluation_trials,
     )
     chosen = make_settings(metadata=DISCRETE, objects=objects, ppo=PPOConfig(), evaluate_every=7, evaluation_trials=6)
     assert (chosen.ppo, chosen.evaluate_every, chosen.evaluation_trials) == (PPOConfig(), 7, 6)
-    assert make_settings(metadata=DISCRETE).evaluate_every == EVALUATE_EVERY
+    assert make_settings(metadata=DISCRETE).evaluate_every == TIME_TRIAL.evaluate_every == 4096
     with pytest.raises(ConfigError, match="5 or minutes"):
         train("oval", objects=objects, until="5 or minutes")
 
 
 def test_against_other_models_training_takes_its_time() -> None:
     rivals = Opponents()
-    assert (defaults_for(NO_OBJECTS, rivals), defaults_for(NO_OBJECTS, None)) == (DUEL, TIME_TRIAL)
-    assert defaults_for(Objects(bots=Bots(count=1)), rivals) == RACE
     settings = make_settings(metadata=CONTINUOUS, opponents=rivals)
-    assert (settings.ppo, settings.evaluate_every) == (replace(DUEL_PPO, ent_coef=0.0), DUEL_EVALUATE_EVERY)
+    assert DUEL.ppo is not None
+    assert (settings.ppo, settings.evaluate_every) == (replace(DUEL.ppo, ent_coef=0.0), DUEL.evaluate_every)
     chosen = make_settings(metadata=CONTINUOUS, opponents=rivals, ppo=PPOConfig(), evaluate_every=7)
     assert (chosen.ppo, chosen.evaluate_every) == (PPOConfig(), 7)
     alone = make_settings(metadata=CONTINUOUS)
-    assert (alone.ppo, alone.evaluate_every) == (PPOConfig(ent_coef=0.0), EVALUATE_EVERY)
+    assert (alone.ppo, alone.evaluate_every) == (PPOConfig(ent_coef=0.0), 4096)
     plan = make_plan(opponents=rivals)
     assert (plan.settings.until, plan.metadata.action_space) == (Until(seconds=600), action_space("continuous"))
     assert plan.reward == load_reward("duel")
@@ -287,6 +271,6 @@ def test_a_training_among_objects_has_the_reward_and_the_actions_of_its_race(tmp
     ppo = PPOConfig(num_envs=2, num_steps=8, minibatch_size=16, update_epochs=1)
     boxes = Objects(obstacles=Obstacles(count=2))
     result = train("oval", objects=boxes, until="16 steps", evaluation_trials=1, ppo=ppo, num_threads=1, root=tmp_path)
-    assert (result.run / "reward_function.py").read_text() == load_preset(RACE.reward)
+    assert (result.run / "reward_function.py").read_text() == load_preset(OBJECTS.reward)
     metadata = ModelMetadata.load(result.run / "model_metadata.json")
-    assert (metadata.action_space, metadata.sensors) == (action_space(RACE.actions), RACE.sensors)
+    assert (metadata.action_space, metadata.sensors) == (action_space(OBJECTS.actions), OBJECTS.sensors)

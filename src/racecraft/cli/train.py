@@ -112,13 +112,13 @@ def train(
     if resume is not None:
         _refuse_beside_resume(context)
     from racecraft import training
-    from racecraft.training.defaults import defaults_for
     from racecraft.training.progress import SilentReporter
+    from racecraft.training.regimes import regime_of
     from racecraft.training.terminal import TerminalReporter
 
     race, rivals = race_options.opponents_of(race, opponents=opponents, cars=cars)
     on_track = race_options.objects_of(race, context.params)
-    reward = reward or defaults_for(on_track, rivals).reward
+    reward = reward or regime_of(objects=on_track, opponents=rivals).reward
     where = Path(track[0]).stem if len(track) == 1 else f"{len(track)} tracks"
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
     if parent is not None:

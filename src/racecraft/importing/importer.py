@@ -49,7 +49,7 @@ from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.run.training_params import TrainingParams
 from racecraft.track import Track, load_track, track_names
-from racecraft.training.defaults import TIME_TRIAL
+from racecraft.training.regimes import TIME_TRIAL
 from racecraft.training.settings import DEFAULT_TRACK, make_settings
 from racecraft.training.start import require_trainable, write_run
 

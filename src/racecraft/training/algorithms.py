@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent import ActionSpace
-from racecraft.errors import ConfigError
 from racecraft.extras import needed_for
 from racecraft.learn import PPO, SAC, Algorithm, Distill, Environment, Learner, make_cuda_ppo
 from racecraft.learn.distill import TEACHER_PPO
@@ -54,8 +53,6 @@ def make_algorithm(
         backend = torch_sac.TorchSAC(learner.spec, settings.sac, state_size=state_size, seed=seed, num_threads=threads)
         return SAC(settings.sac, backend, learner, environment, seed=seed)
     if settings.algorithm == "distill":
-        if settings.opponents is not None:
-            raise ConfigError("distill trains alone on the track; opponents need --algorithm ppo.")
         return Distill(settings.distill, learner, environment, open_teacher(), seed=seed, num_threads=threads)
     if settings.algorithm.startswith("sb3:"):
         torch_sb3 = _import("torch_sb3", settings.algorithm)

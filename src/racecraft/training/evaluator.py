@@ -18,7 +18,8 @@ from racecraft.run import Episode, EpisodeCounter
 from racecraft.sim import CONTROL_DT
 from racecraft.track import Track
 from racecraft.training.progress import EvaluationReport
-from racecraft.training.settings import RACE_GOOD, TrainSettings
+from racecraft.training.regimes import regime_of
+from racecraft.training.settings import TrainSettings
 
 SLOWEST: Final = 0.3  # m/s; an evaluation does not wait for a car that needs longer for its lap
 SEED: Final = 0x6576616C  # evaluation starts never coincide with training's
@@ -53,7 +54,7 @@ class Evaluator:
             has_lidar=bool(policy.sensors.lidar_name),
             num_threads=settings.num_threads,
         )
-        self._good = RACE_GOOD if settings.objects.count else 1.0
+        self._good = regime_of(objects=settings.objects).good
         self.last: EvaluationReport | None = None
         self.best_score: tuple[float, ...] | None = None
         self.best_lap: float | None = None

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_space
-from racecraft.learn.sb3 import CONTINUOUS_ONLY
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
 from racecraft.sim.objects import NO_OBJECTS
-from racecraft.training.defaults import TIME_TRIAL, defaults_for
 from racecraft.training.parent import Parent, open_parent
+from racecraft.training.regimes import METHODS, TIME_TRIAL, regime_of
 from racecraft.training.settings import DEFAULT_TRACK, TrainSettings, make_settings
 from racecraft.training.start import read_settings, start_run
 from racecraft.training.stop import Until
@@ -83,20 +82,20 @@ def make_plan(
     before = None if theirs is None else read_settings(theirs)
     objects = settings.get("objects", NO_OBJECTS if before is None else before.objects)
     opponents = settings.get("opponents", None if before is None else before.opponents)
-    defaults = defaults_for(objects, opponents)
-    limit = Until.parse(until or defaults.until) if isinstance(until, str) else until
+    regime, method = regime_of(objects=objects, opponents=opponents), METHODS.get(algorithm, METHODS["ppo"])
+    limit = Until.parse(until or regime.until) if isinstance(until, str) else until
     if reward or theirs is None:
-        source, is_foreign = load_reward(reward or defaults.reward), False
+        source, is_foreign = load_reward(reward or regime.reward), False
     else:
         source, is_foreign = theirs.read_reward_function(), theirs.read_info().foreign
     if model_metadata is not None:
         metadata = ModelMetadata.load(model_metadata)
     elif theirs is None or actions is not None:
-        suited = "continuous" if algorithm.removeprefix("sb3:") in CONTINUOUS_ONLY else defaults.actions
+        suited = regime.actions if "discrete" in method.actions else "continuous"
         chosen = suited if actions is None else actions
         space = action_space(chosen) if isinstance(chosen, str) else chosen
         if theirs is None:
-            suite = TIME_TRIAL.sensors if algorithm.startswith("sb3:") else defaults.sensors
+            suite = regime.sensors if method.sees_all else TIME_TRIAL.sensors
             metadata = ModelMetadata(
                 action_space=space, neural_network="RACECRAFT_SMALL", sensors=tuple(sensors or suite)
             )

@@ -15,7 +15,8 @@ from racecraft.run import RunFolder, RunInfo, change_reward
 from racecraft.run.training_params import TrainingParams
 from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.parent import WEIGHTS, Parent
-from racecraft.training.settings import Learning, TrainSettings
+from racecraft.training.regimes import METHODS, AlgorithmConfig
+from racecraft.training.settings import TrainSettings
 
 
 def start_run(
@@ -110,7 +111,7 @@ def write_run(
     )
 
 
-def aws_hyperparameters(config: Learning, given: Hyperparameters | None = None) -> dict[str, Any]:
+def aws_hyperparameters(config: AlgorithmConfig, given: Hyperparameters | None = None) -> dict[str, Any]:
     """How a run learns by AWS's names, for its tools; ours may lie outside of AWS's ranges."""
     if given is not None:
         return given.to_dict()
@@ -167,7 +168,7 @@ def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:
         ConfigError: Settings exclude each other.
     """
     suite = metadata.suite
-    if settings.algorithm.startswith("sb3:") and (suite.lenses != 1 or suite.lidar_name):
+    if not METHODS[settings.algorithm].sees_all and (suite.lenses != 1 or suite.lidar_name):
         raise ConfigError(
             f"sensor is {', '.join(suite.names)}; allowed with {settings.algorithm} is one camera of one lens.",
             hint="Train with ppo or sac, which see every sensor.",

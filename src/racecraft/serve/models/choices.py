@@ -15,7 +15,8 @@ from racecraft.serve.context import Context, InContext
 from racecraft.serve.models.schemas import Choices, NumberChoice
 from racecraft.sim.objects import RACE_TYPES
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
-from racecraft.training.settings import ALGORITHMS, CRITICS
+from racecraft.training.regimes import METHODS
+from racecraft.training.settings import CRITICS
 from racecraft.training.start import aws_hyperparameters
 
 router = APIRouter(prefix="/api/choices", tags=["choices"])
@@ -34,7 +35,7 @@ def list_choices(context: InContext) -> Choices:
         networks=list(network_names()),
         vehicles=list(VEHICLES),
         sensors=[name for name in SENSOR_NAMES if name not in OLD_NAMES],
-        algorithms=[name for name in ALGORITHMS if ":" not in name],
+        algorithms=[name for name in METHODS if ":" not in name],
         races=list(RACE_TYPES),
         critics=list(CRITICS),
         randomizations=list(RANDOMIZATIONS),

@@ -33,6 +33,7 @@ from racecraft.sim import Objects
 from racecraft.sim.objects import objects_for_race
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.training import Until
+from racecraft.training.regimes import TIME_TRIAL
 from racecraft.training.settings import make_settings
 from racecraft.training.start import read_settings, replace_reward, start_run
 
@@ -221,7 +222,7 @@ def _require_idle(context: Context, folder: RunFolder) -> None:
 
 def _metadata(request: NewModel) -> ModelMetadata:
     if request.model_metadata is None:
-        sensors = tuple(request.sensors or ("FRONT_FACING_CAMERA",))
+        sensors = tuple(request.sensors or TIME_TRIAL.sensors)
         return ModelMetadata(
             action_space=action_space(request.actions), sensors=sensors, neural_network="RACECRAFT_SMALL"
         )

@@ -9,6 +9,8 @@ from pydantic import Field
 
 from racecraft.serve.jobs.schemas import JobInfo
 from racecraft.serve.schemas import Message, RunName
+from racecraft.training.regimes import TIME_TRIAL
+from racecraft.training.settings import DEFAULT_TRACK
 
 
 class Tuning(Message):
@@ -26,11 +28,11 @@ class NewModel(Message):
     """Everything about a new model; every field has a good default."""
 
     name: RunName | None = None
-    track: str = Field("reinvent_2018", max_length=200)
+    track: str = Field(DEFAULT_TRACK, max_length=200)
     direction: Literal["forward", "reverse", "alternate"] = "forward"
-    reward: str = Field("racing", max_length=140_000)
+    reward: str = Field(TIME_TRIAL.reward, max_length=140_000)
     """Name of a preset, or the source of a reward function."""
-    actions: str = "default"
+    actions: str = TIME_TRIAL.actions
     """Name of a preset."""
     model_metadata: dict[str, Any] | None = None
     """AWS's document; replaces actions."""
@@ -50,12 +52,12 @@ class NewModel(Message):
     """A preset of what differs from episode to episode."""
     algorithm: str = Field("", max_length=40)
     """``ppo`` or ``sac``, which needs a continuous action space; by default the metadata's."""
-    critic: str = Field("privileged", max_length=40)
+    critic: str = Field(TIME_TRIAL.critic, max_length=40)
     """What the critic sees while training: ``privileged`` state, that and the ``lap``'s place, or the ``camera``."""
     network: str = ""
     vehicle: str = ""
     seed: int = Field(0, ge=0, le=2**32 - 1)
-    until: str = Field("5 laps", max_length=200)
+    until: str = Field(TIME_TRIAL.until, max_length=200)
     tags: list[Annotated[str, Field(min_length=1, max_length=40)]] = Field(default_factory=list, max_length=20)
     train: bool = True
     """Start training at once."""

@@ -1,0 +1,210 @@
+"""The kinds of training, a row each: what one does where nothing else is said, and what does not go with it.
+
+A training is of several kinds at once, say among objects on many tracks. `regime_of` reads the table from the top:
+every default is that of the first row that applies and has one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Final
+
+from racecraft.errors import ConfigError
+from racecraft.learn import DistillConfig, PPOConfig, SACConfig
+from racecraft.learn.sb3 import CONTINUOUS_ONLY, DISCRETE_ONLY, SB3_ALGORITHMS, SB3Config
+from racecraft.sim import Start
+from racecraft.sim.objects import NO_OBJECTS, Objects
+
+if TYPE_CHECKING:
+    from racecraft.training.opponents import Opponents
+
+AlgorithmConfig = PPOConfig | SACConfig | DistillConfig | SB3Config
+"""Settings of one algorithm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Regime:
+    """One kind of training; what is left out is decided by the rows below."""
+
+    reward: str = ""
+    """Preset of the reward."""
+    actions: str = ""
+    """Preset of the action space."""
+    sensors: tuple[str, ...] = ()
+    """AWS's names of what the policy sees through."""
+    until: str = ""
+    """When to stop."""
+    start: Start | None = None
+    """Where training episodes start."""
+    critic: str = ""
+    """What the critic sees."""
+    ppo: PPOConfig | None = None
+    """How PPO learns."""
+    distill: DistillConfig | None = None
+    """How distillation does."""
+    most_envs: int = 0
+    """Cars at once, at most."""
+    evaluate_every: int = 0
+    """Camera steps between two evaluations."""
+    evaluation_trials: int = 0
+    """Laps of each."""
+    good: float = 0.0
+    """Mean completion of an evaluation from which on the averaged weights drive."""
+    only: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """By setting: the one value that is allowed, and why."""
+
+
+CUDA: Final = Regime(
+    # A GPU is fast when it has much to do at once; minibatches and steps are a compromise with learning.
+    ppo=PPOConfig(num_envs=1024, num_steps=8, minibatch_size=1024),
+    most_envs=65536,
+    evaluate_every=100_000,
+    only={"algorithm": ("ppo", "device {device!r} trains 'ppo' only")},
+)
+MANY_TRACKS: Final = Regime(
+    # What the car meets, no single line prepares it for.
+    start=Start(mode="random", lateral_jitter=0.12, heading_jitter=0.2),
+    critic="privileged",
+    # More cars see more of the tracks at once, and smaller steps keep what was learned on the others.
+    ppo=PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4, ent_coef=0.005),
+    evaluate_every=50_000,  # as one of them drives hundreds of metres
+    evaluation_trials=24,
+)
+OBJECTS: Final = Regime(
+    # 1 m/s, a reward that knows what is ahead, and a LIDAR, which sees what is beside the car.
+    reward="dodge",
+    actions="steady",
+    sensors=("FRONT_FACING_CAMERA", "LIDAR"),
+    until="20 laps or 5 minutes",
+    # Boxes and other cars take ten times the steps of a lap on a free road.
+    ppo=PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4, rate_steps=250_000, ent_coef=0.005),
+    evaluate_every=25_000,
+    evaluation_trials=20,  # the places differ from lap to lap: five would say little
+    good=0.6,
+)
+DUEL: Final = Regime(
+    # Pace, with dearer mistakes; time to find it; a LIDAR that sees who is beside.
+    reward="duel",
+    actions="continuous",
+    sensors=("FRONT_FACING_CAMERA", "LIDAR"),
+    until="10 minutes",
+    start=Start(mode="random", lateral_jitter=0.05, shuffle=True),  # anywhere, and in any order
+    critic="lap",
+    # Minutes, not seconds. Rollouts of two seconds tell what a line is worth, which short ones leave to the critic.
+    ppo=PPOConfig(
+        num_envs=128,
+        num_steps=32,
+        minibatch_size=512,
+        update_epochs=4,
+        rate_steps=700_000,
+        gamma=0.97,
+        ent_coef=0.005,
+    ),
+    evaluate_every=50_000,
+    only={
+        "algorithm": ("ppo", "among other cars only ppo learns in this version"),
+        "device": ("cpu", "races of several cars are driven on the cpu"),
+    },
+)
+FAST_DISTILL: Final = Regime(
+    # Every fourth episode starts as a race does, since a car that comes from standing meets the first corner otherwise
+    # than one that flies past the line, as the other three do.
+    start=Start(advance=0.25, lateral_jitter=0.02, heading_jitter=math.radians(2.0)),
+    distill=DistillConfig(teacher_steps=2_000_000),  # a teacher of continuous actions gets faster for so long
+)
+TIME_TRIAL: Final = Regime(
+    reward="racing",
+    actions="default",
+    sensors=("FRONT_FACING_CAMERA",),
+    until="5 laps",
+    start=Start(spread=True),
+    critic="privileged",
+    ppo=PPOConfig(),
+    distill=DistillConfig(),
+    most_envs=4096,  # 80 MB of frames, and more would only wait for each other
+    evaluate_every=4096,
+    evaluation_trials=5,
+    good=1.0,
+)
+"""Alone against the clock on one track, on the CPU: what all others differ from."""
+
+
+def regimes_of(
+    *,
+    objects: Objects = NO_OBJECTS,
+    opponents: Opponents | None = None,
+    num_tracks: int = 1,
+    device: str = "cpu",
+    is_fast_distill: bool = False,
+) -> tuple[Regime, ...]:
+    """The rows that apply, the most particular first."""
+    rows = (
+        (CUDA, device != "cpu"),
+        (MANY_TRACKS, num_tracks > 1),
+        (OBJECTS, objects != NO_OBJECTS),
+        (DUEL, opponents is not None),
+        (FAST_DISTILL, is_fast_distill),
+        (TIME_TRIAL, True),
+    )
+    return tuple(regime for regime, applies in rows if applies)
+
+
+def regime_of(**circumstances: Any) -> Regime:
+    """The whole row of a training; the arguments are those of `regimes_of`."""
+    rows = regimes_of(**circumstances)
+    names = [setting.name for setting in fields(Regime) if setting.name != "only"]
+    return Regime(**{name: next(value for row in rows if (value := getattr(row, name))) for name in names})
+
+
+def check_regimes(chosen: Mapping[str, Any], **circumstances: Any) -> None:
+    """Refuse settings that do not go with a training's kind; the other arguments are those of `regimes_of`.
+
+    Raises:
+        ConfigError: Two settings exclude each other.
+    """
+    for regime in regimes_of(**circumstances):
+        for name, (allowed, reason) in regime.only.items():
+            if chosen[name] != allowed:
+                raise ConfigError(f"{name} is {chosen[name]!r}; {reason.format(**chosen)}.")
+
+
+_KINDS: Final = (("discrete", CONTINUOUS_ONLY), ("continuous", DISCRETE_ONLY))
+"""Kinds of action space, with the algorithms of Stable-Baselines3 that are for others only."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Method:
+    """An algorithm, as far as others must know it."""
+
+    settings: str
+    """Field of `TrainSettings` that holds its own."""
+    config: type[AlgorithmConfig]
+    """What is in there."""
+    actions: tuple[str, ...] = ("discrete", "continuous")
+    """Kinds of action space that it can choose from."""
+    is_squashed: bool = False
+    """Whether its best action is the hyperbolic tangent of the policy's mean."""
+    is_awss: bool = False
+    """Whether AWS's hyperparameters are for it."""
+    sees_all: bool = True
+    """Whether it learns with every sensor, not with one camera only."""
+
+
+METHODS: Final[Mapping[str, Method]] = {
+    "ppo": Method(settings="ppo", config=PPOConfig, is_awss=True),
+    "sac": Method(settings="sac", config=SACConfig, actions=("continuous",), is_squashed=True, is_awss=True),
+    "distill": Method(settings="distill", config=DistillConfig),
+    **{
+        f"sb3:{name}": Method(
+            settings="sb3",
+            config=SB3Config,
+            actions=tuple(kind for kind, others in _KINDS if name not in others),
+            is_squashed=name in CONTINUOUS_ONLY,
+            sees_all=False,
+        )
+        for name in SB3_ALGORITHMS
+    },
+}
+"""The algorithms by name."""
