@@ -17,7 +17,7 @@ from racecraft.errors import CheckpointError, RacecraftError, RewardError, RunEr
 from racecraft.learn import UpdateStats, make_learner
 from racecraft.reward import RewardWorker
 from racecraft.run import RunFolder, checkpoint, metrics, simtrace
-from racecraft.training import job, resume
+from racecraft.training import resume, session
 
 # Never true in the dry run, whose only situation off the track has 95 steps.
 LATE = """\
@@ -57,7 +57,7 @@ def test_a_reward_that_fails_late_stops_with_line_and_params(
     code, says = FAULTS[fault]
     source = tmp_path / "reward_function.py"
     source.write_text(LATE.format(fault=code))
-    monkeypatch.setattr(job, "RewardWorker", partial(RewardWorker, timeout_s=0.3))
+    monkeypatch.setattr(session, "RewardWorker", partial(RewardWorker, timeout_s=0.3))
     with pytest.raises(RewardError) as caught:
         tiny(reward=source, name="mine", until="2048 steps", evaluate_every=64)
     error = caught.value
@@ -189,7 +189,7 @@ def test_a_loss_that_is_not_finite_stops_and_the_checkpoint_is_good(
         monkeypatch.setattr(learner, "update", spoiled)
         return learner
 
-    monkeypatch.setattr(job, "make_learner", spoil)
+    monkeypatch.setattr(session, "make_learner", spoil)
     with pytest.raises(TrainingError) as caught:
         tiny(name="mine")
     assert isinstance(caught.value, RacecraftError)

@@ -1,4 +1,4 @@
-"""The training job: environment, learner, run folder and evaluation, tied together.
+"""The training job: what `session` has made, driven until a limit is reached.
 
     while not done:  iterate (PPO) -> every few thousand steps: evaluate -> checkpoint
 
@@ -15,65 +15,18 @@ import threading
 import time
 import warnings
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 
-from racecraft.agent import Hyperparameters
-from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RewardError, RunError
-from racecraft.learn import Algorithm, make_learner
-from racecraft.race.policy import NetworkPolicy
-from racecraft.reward import RewardWorker, keeps_state
-from racecraft.run import (
-    AwsLog,
-    Checkpoint,
-    CheckpointWarning,
-    EpisodeCounter,
-    EventWriter,
-    PrintLog,
-    RunFolder,
-    SimTraceWriter,
-    TrainingMetrics,
-    begin_stretch,
-    read_stretches,
-)
-from racecraft.run.history import HistoryWriter
-from racecraft.sim import Simulation
-from racecraft.track import Track, joint_digest, load_tracks
-from racecraft.training.algorithms import make_algorithm, teacher_environment
-from racecraft.training.cuda_environment import CudaTrainingEnvironment
-from racecraft.training.environment import TrainingEnvironment, open_simulation
-from racecraft.training.evaluator import Evaluator
+from racecraft.errors import CheckpointError, RacecraftError, RewardError
+from racecraft.run import CheckpointWarning, RunFolder
 from racecraft.training.meter import Meter
-from racecraft.training.opponents import OpponentPool
-from racecraft.training.parent import begin_from, is_weights_only
 from racecraft.training.progress import Reporter, SilentReporter, TrainResult
-from racecraft.training.start import aws_hyperparameters, read_settings, require_trainable, require_valid_reward
+from racecraft.training.session import Session, open_session
+from racecraft.training.start import read_settings
 from racecraft.training.stop import Until
-
-AWS_EPISODES = 20  # between two trainings at AWS; its metrics and sim-traces are numbered by it
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Session:
-    """What a training works with while it runs."""
-
-    environment: TrainingEnvironment | CudaTrainingEnvironment
-    algorithm: Algorithm
-    evaluator: Evaluator
-    trace: SimTraceWriter
-    metrics: TrainingMetrics
-    events: EventWriter
-    history: HistoryWriter
-    hyperparameters: Hyperparameters | None
-    aws_log: AwsLog | None
-    opponents: OpponentPool | None
-
-    @property
-    def counter(self) -> EpisodeCounter:
-        return self.environment.counter
 
 
 class Training:
@@ -107,7 +60,6 @@ class Training:
         self.settings = settings if until is None else replace(settings, until=until)
         self.meter = Meter(self.settings.until, started=time.monotonic() if started is None else started)
         self._stop = threading.Event()
-        self._since = -1  # step that the stretch under way began at
 
     def run(self) -> TrainResult:
         """Train until a limit is reached or somebody interrupts; the run can always be resumed.
@@ -117,7 +69,14 @@ class Training:
         """
         with self.folder.lock(), self._interruptible():
             try:
-                with self._session() as session:
+                with open_session(
+                    self.folder,
+                    self.settings,
+                    self.meter,
+                    aws_log=self.aws_log,
+                    is_checked=self.is_checked,
+                    note=self.reporter.note,
+                ) as session:
                     reason = self._train(session)
                 return self._result(reason, session)
             except RacecraftError as error:
@@ -133,137 +92,7 @@ class Training:
 
     # ---- the run, top to bottom
 
-    @contextmanager
-    def _session(self) -> Iterator[_Session]:
-        """Everything made, and brought to where the last checkpoint was; closed at the end, however that comes."""
-        settings, folder = self.settings, self.folder
-        metadata = folder.read_model_metadata()
-        require_trainable(settings, metadata)
-        saved, begun = self._beginning()
-        resumed = saved.metadata if saved is not None else {}
-        source, is_foreign = folder.read_reward_function(), folder.read_info().foreign
-
-        # The learner's backend takes longest to import, so it starts first, beside everything else.
-        with ThreadPoolExecutor(1) as pool:
-            spec = settings.network_spec(metadata)
-            future = pool.submit(
-                make_learner, spec, seed=settings.seed, num_threads=settings.num_threads, device=settings.device
-            )
-            tracks = self._load_tracks()
-            simulation = open_simulation(settings, tracks, metadata.suite)
-            if not self.is_checked:
-                require_valid_reward(source, tracks[0], foreign=is_foreign)
-            learner = future.result()
-            if begun is not None:
-                begin_from(learner, begun)
-
-        with ExitStack() as stack:
-            # A function that remembers something gets a memory for each car: on AWS one process drove one car.
-            copies = settings.num_envs if keeps_state(source) else 1
-            worker = stack.enter_context(
-                RewardWorker(
-                    source,
-                    list(tracks),
-                    seed=settings.seed,
-                    num_cars=copies,
-                    num_objects=settings.num_objects,
-                    foreign=is_foreign,
-                )
-            )
-            kept = saved.step if saved is not None else 0
-            stretch = begin_stretch(folder, step=kept)
-            self._since = stretch.step
-            if kept and stretch.step == kept:
-                before = read_stretches(folder)[-2]
-                self.reporter.note(f"From here on with other {', '.join(stretch.changes(before))}.".replace("_", " "))
-            after = kept if saved is not None else -1
-            events = stack.enter_context(EventWriter(folder.events, after_step=after))
-            history = stack.enter_context(HistoryWriter(folder.history, step=kept))
-            episodes = int(resumed.get("episodes", 0))
-            counter = EpisodeCounter(settings.num_envs, number=episodes, clock=float(resumed.get("clock", 0.0)))
-            hyperparameters = folder.read_hyperparameters()
-            log = None
-            if self.aws_log is not None:
-                log = stack.enter_context(AwsLog(self.aws_log, steps=kept))
-                log.write_settings(
-                    world=tracks[0].name,
-                    metadata=metadata,
-                    hyperparameters=aws_hyperparameters(settings.learning, hyperparameters),
-                )
-            per_iteration = settings.ppo.episodes_per_iteration or AWS_EPISODES
-            trace = SimTraceWriter(
-                folder.training_simtrace,
-                num_envs=settings.num_envs,
-                tracks=list(tracks),
-                action_space=metadata.action_space,
-                episodes_per_iteration=per_iteration,
-                episodes=episodes,
-                log=log,
-            )
-            metrics = TrainingMetrics(
-                folder.training_metrics,
-                episodes_per_iteration=per_iteration,
-                episodes=episodes,
-                clock=counter.clock,
-            )
-            prints = stack.enter_context(PrintLog(folder.reward_log))
-            environment: TrainingEnvironment | CudaTrainingEnvironment
-            opponents = None
-            if isinstance(simulation, Simulation):
-                if settings.opponents is not None:
-                    own = NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite)
-                    opponents = OpponentPool(
-                        settings.opponents, simulation, own, seed=settings.seed, num_threads=settings.num_threads
-                    )
-                environment = TrainingEnvironment(
-                    simulation,
-                    worker,
-                    metadata.action_space,
-                    counter=counter,
-                    sensors=metadata.suite,
-                    trace=trace,
-                    prints=prints,
-                    opponents=opponents,
-                    goes_on=settings.algorithm == "distill" or opponents is not None,
-                    tells_place=settings.critic == "lap",
-                )
-            else:
-                environment = CudaTrainingEnvironment(
-                    simulation, worker, source, metadata.action_space, counter=counter, note=self.reporter.note
-                )
-
-            def open_teacher() -> TrainingEnvironment:
-                return teacher_environment(settings, source, tracks, metadata.action_space, stack, foreign=is_foreign)
-
-            session = _Session(
-                environment=environment,
-                algorithm=make_algorithm(settings, learner, environment, open_teacher=open_teacher),
-                evaluator=Evaluator(
-                    NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite), tracks, settings
-                ),
-                trace=trace,
-                metrics=metrics,
-                events=events,
-                history=history,
-                hyperparameters=hyperparameters,
-                aws_log=log,
-                opponents=opponents,
-            )
-            if saved is not None:
-                self._load_state(session, saved)
-                forgotten = "; what the reward function remembered begins anew" if copies > 1 else ""
-                self.reporter.note(f"Resumed at step {session.algorithm.total_steps:,}{forgotten}.")
-            try:
-                yield session
-            except BaseException:
-                with suppress(RunError):  # the first error is the one to tell
-                    trace.close()
-                    metrics.write()
-                raise
-            trace.close()
-            metrics.write()
-
-    def _train(self, session: _Session) -> str:
+    def _train(self, session: Session) -> str:
         """Train until a limit is reached; its name."""
         algorithm, meter = session.algorithm, self.meter
         meter.begin(steps=algorithm.total_steps)
@@ -277,21 +106,21 @@ class Training:
                 session.opponents.learn_from(algorithm, step=algorithm.total_steps)
             self._account(session, stats.environment_seconds, stats.policy_seconds, stats.update_seconds)
             for episode in (finished := session.environment.take_finished()):
-                session.metrics.add(episode)
+                session.logs.metrics.add(episode)
             meter.add(finished)
-            report = meter.report(stats, episodes=session.counter.number)
+            report = meter.report(stats, episodes=session.logs.counter.number)
             self.reporter.iteration(report)
-            session.events.add_scalars(report.scalars(), step=algorithm.total_steps)
-            session.history.add_iteration(report.point())
-            if session.aws_log is not None:
-                session.aws_log.write_policy(
+            session.logs.events.add_scalars(report.scalars(), step=algorithm.total_steps)
+            session.logs.history.add_iteration(report.point())
+            if session.logs.aws is not None:
+                session.logs.aws.write_policy(
                     surrogate_loss=stats.losses.policy_loss,
                     kl_divergence=stats.losses.approx_kl,
                     entropy=stats.losses.entropy,
                     epoch=self.settings.ppo.update_epochs - 1,
                     learning_rate=self.settings.ppo.learning_rate,
                 )
-                session.aws_log.flush()
+                session.logs.aws.flush()
 
             reason = self._limit_reached(session)
             is_due = algorithm.total_steps - session.evaluator.evaluated_at >= self.settings.evaluate_every
@@ -302,10 +131,10 @@ class Training:
                 self._checkpoint(session)
         return reason
 
-    def _limit_reached(self, session: _Session) -> str:
+    def _limit_reached(self, session: Session) -> str:
         """Why training is to end now, or an empty string."""
         until, steps, last = self.settings.until, session.algorithm.total_steps, session.evaluator.last
-        if last is not None and last.step <= self._since:
+        if last is not None and last.step <= session.since:
             last = None  # what was driven before something changed is no end of what comes after
         if self._stop.is_set():
             return "interrupted"
@@ -318,66 +147,42 @@ class Training:
         if until.seconds and self.meter.seconds >= until.seconds:
             return "seconds"
         if session.hyperparameters is not None:
-            if session.counter.number >= session.hyperparameters.term_cond_max_episodes:
+            if session.logs.counter.number >= session.hyperparameters.term_cond_max_episodes:
                 return "episodes"
             if self.meter.mean_reward >= session.hyperparameters.term_cond_avg_score:  # never, while it is NaN
                 return "score"
         return ""
 
-    def _load_tracks(self) -> tuple[Track, ...]:
-        tracks = load_tracks(self.settings.track)
-        digest, before = joint_digest(tracks), self.folder.read_info().track_digest
-        if digest != before:
-            raise ConfigError(
-                f"Track {self.settings.track!r} is not the one this run was started on: its digest is "
-                f"{digest[:12]}, it was {before[:12]}.",
-                hint="Start a new run on the changed track.",
-            )
-        return tracks
+    # ---- evaluate and save
 
-    # ---- evaluate, save, resume
-
-    def _evaluate(self, session: _Session) -> None:
+    def _evaluate(self, session: Session) -> None:
         begun = time.perf_counter()
         evaluator = session.evaluator
-        algorithm, counter = session.algorithm, session.counter
+        algorithm, counter = session.algorithm, session.logs.counter
         algorithm.prefers_average = evaluator.was_good
         with algorithm.driving():
             trials = evaluator.evaluate(step=algorithm.total_steps, seconds=self.meter.seconds, counter=counter)
         for trial in trials:
-            session.metrics.add(trial, phase="evaluation")
+            session.logs.metrics.add(trial, phase="evaluation")
         assert evaluator.last is not None
-        session.events.add_scalars(evaluator.last.scalars(), step=session.algorithm.total_steps)
-        session.history.add("evaluation", evaluator.last.point())
+        session.logs.events.add_scalars(evaluator.last.scalars(), step=session.algorithm.total_steps)
+        session.logs.history.add("evaluation", evaluator.last.point())
         self.reporter.evaluation(evaluator.last)
         self.meter.parts["evaluation"] += time.perf_counter() - begun
 
-    def _checkpoint(self, session: _Session) -> None:
+    def _checkpoint(self, session: Session) -> None:
         """Logs first: what a checkpoint counts is then on disk, whatever happens in between."""
         begun = time.perf_counter()
-        algorithm, evaluator, counter = session.algorithm, session.evaluator, session.counter
-        session.trace.flush()
-        session.metrics.write()
+        algorithm, evaluator = session.algorithm, session.evaluator
+        session.logs.trace.flush()
+        session.logs.metrics.write()
         last = evaluator.last
         is_judged = last is not None and last.step == algorithm.total_steps
         lap = last.best_lap if last is not None else None
         self.folder.checkpoints.save(
             algorithm.total_steps,
-            {
-                **algorithm.state(),
-                **session.trace.state(),
-                **(session.opponents.state() if session.opponents is not None else {}),
-                "simulation": session.environment.simulation.save(),
-                "episode_rewards": counter.rewards,
-                "recent_episodes": self.meter.state(),
-            },
-            metadata={
-                "network": asdict(algorithm.spec),
-                "episodes": counter.number,
-                "clock": counter.clock,
-                "seconds": self.meter.seconds,
-                "evaluator": evaluator.state(),
-            },
+            session.state(),
+            metadata=session.metadata(),
             metrics={
                 "completion": last.completion,
                 "laps": last.laps_completed,
@@ -388,40 +193,6 @@ class Training:
             score=evaluator.score if is_judged else None,
         )
         self.meter.parts["checkpoint"] += time.perf_counter() - begun
-
-    def _last_checkpoint(self) -> Checkpoint | None:
-        """Where to continue; a damaged checkpoint is passed over with a note."""
-        store = self.folder.checkpoints
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", CheckpointWarning)
-            saved = store.load("last") if store.entries() else None
-        for text in dict.fromkeys(str(warning.message) for warning in caught):
-            self.reporter.note(text)
-        return saved
-
-    def _beginning(self) -> tuple[Checkpoint | None, Checkpoint | None]:
-        """The checkpoint to resume from, or else the weights to begin with: imported ones, or a parent's."""
-        saved = self._last_checkpoint()
-        if saved is None and self.folder.read_info().parent is not None:
-            return None, self.folder.parent_checkpoint.load()
-        return (None, saved) if saved is not None and is_weights_only(saved) else (saved, None)
-
-    def _load_state(self, session: _Session, saved: Checkpoint) -> None:
-        arrays, metadata = saved.arrays, saved.metadata
-        try:
-            session.algorithm.load_state(arrays)
-            session.environment.simulation.load(arrays["simulation"])
-            session.counter.rewards[:] = arrays["episode_rewards"]
-            if session.opponents is not None:
-                session.opponents.load_state(arrays)
-            session.trace.load_state(arrays)
-            session.evaluator.load_state(metadata["evaluator"])
-            session.algorithm.prefers_average = session.evaluator.was_good
-            self.meter.load_state(arrays["recent_episodes"], seconds=float(metadata["seconds"]))
-        except RacecraftError:
-            raise
-        except (KeyError, TypeError, ValueError) as error:
-            raise CheckpointError(f"{saved.path} cannot be resumed: {error!r}.") from error
 
     def _way_on(self, error: RacecraftError) -> str:
         """What to do after an error, as a hint."""
@@ -436,7 +207,7 @@ class Training:
     # ---- tell
 
     def _account(
-        self, session: _Session, environment_seconds: float, policy_seconds: float, update_seconds: float
+        self, session: Session, environment_seconds: float, policy_seconds: float, update_seconds: float
     ) -> None:
         environment, parts = session.environment, self.meter.parts
         reward, log = environment.reward_seconds, environment.trace_seconds
@@ -447,7 +218,7 @@ class Training:
         parts["policy"] += policy_seconds
         parts["learner"] += update_seconds
 
-    def _result(self, reason: str, session: _Session) -> TrainResult:
+    def _result(self, reason: str, session: Session) -> TrainResult:
         last = session.evaluator.last
         return TrainResult(
             run=self.folder.path,

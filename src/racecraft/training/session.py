@@ -1,0 +1,361 @@
+"""What a training works with while it runs, made part by part and brought to where the last checkpoint was.
+
+    run folder -> learner, cars -> reward worker, logs -> environment -> algorithm, evaluator -> checkpoint
+
+`Session` is what comes of it; every part has a function of its own.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from racecraft.agent import Hyperparameters, ModelMetadata
+from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
+from racecraft.learn import Algorithm, Learner, make_learner
+from racecraft.race.policy import NetworkPolicy
+from racecraft.reward import RewardWorker, keeps_state
+from racecraft.run import (
+    AwsLog,
+    Checkpoint,
+    CheckpointWarning,
+    EpisodeCounter,
+    EventWriter,
+    PrintLog,
+    RunFolder,
+    SimTraceWriter,
+    TrainingMetrics,
+    begin_stretch,
+    read_stretches,
+)
+from racecraft.run.history import HistoryWriter
+from racecraft.sim import CudaSimulation, Simulation
+from racecraft.track import Track, joint_digest, load_tracks
+from racecraft.training.algorithms import make_algorithm, teacher_environment
+from racecraft.training.cuda_environment import CudaTrainingEnvironment
+from racecraft.training.environment import TrainingEnvironment, open_simulation
+from racecraft.training.evaluator import Evaluator
+from racecraft.training.meter import Meter
+from racecraft.training.opponents import OpponentPool
+from racecraft.training.parent import begin_from, is_weights_only
+from racecraft.training.settings import TrainSettings
+from racecraft.training.start import aws_hyperparameters, require_trainable, require_valid_reward
+
+AWS_EPISODES = 20  # between two trainings at AWS; its metrics and sim-traces are numbered by it
+
+Environment = TrainingEnvironment | CudaTrainingEnvironment
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Logs:
+    """The files that a training writes while it runs."""
+
+    counter: EpisodeCounter
+    trace: SimTraceWriter
+    metrics: TrainingMetrics
+    events: EventWriter
+    history: HistoryWriter
+    prints: PrintLog
+    aws: AwsLog | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Session:
+    """Everything that drives, learns, judges and is written."""
+
+    environment: Environment
+    algorithm: Algorithm
+    evaluator: Evaluator
+    logs: Logs
+    hyperparameters: Hyperparameters | None
+    opponents: OpponentPool | None
+    meter: Meter
+    since: int
+    """Step that the stretch under way began at."""
+
+    def state(self) -> dict[str, Any]:
+        """The arrays that the next step depends on, by name."""
+        return {
+            **self.algorithm.state(),
+            **self.logs.trace.state(),
+            **(self.opponents.state() if self.opponents is not None else {}),
+            "simulation": self.environment.simulation.save(),
+            "episode_rewards": self.logs.counter.rewards,
+            "recent_episodes": self.meter.state(),
+        }
+
+    def metadata(self) -> dict[str, Any]:
+        """What belongs to the arrays, as JSON."""
+        return {
+            "network": asdict(self.algorithm.spec),
+            "episodes": self.logs.counter.number,
+            "clock": self.logs.counter.clock,
+            "seconds": self.meter.seconds,
+            "evaluator": self.evaluator.state(),
+        }
+
+    def load(self, saved: Checkpoint) -> None:
+        """Go to where a checkpoint was; the counter's number and clock and the logs are there already.
+
+        Raises:
+            CheckpointError: It is not of this run.
+        """
+        arrays, metadata = saved.arrays, saved.metadata
+        try:
+            self.algorithm.load_state(arrays)
+            self.environment.simulation.load(arrays["simulation"])
+            self.logs.counter.rewards[:] = arrays["episode_rewards"]
+            if self.opponents is not None:
+                self.opponents.load_state(arrays)
+            self.logs.trace.load_state(arrays)
+            self.evaluator.load_state(metadata["evaluator"])
+            self.algorithm.prefers_average = self.evaluator.was_good
+            self.meter.load_state(arrays["recent_episodes"], seconds=float(metadata["seconds"]))
+        except RacecraftError:
+            raise
+        except (KeyError, TypeError, ValueError) as error:
+            raise CheckpointError(f"{saved.path} cannot be resumed: {error!r}.") from error
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Run:
+    """What a run folder says of the training to come."""
+
+    folder: RunFolder
+    settings: TrainSettings
+    metadata: ModelMetadata
+    hyperparameters: Hyperparameters | None
+    source: str
+    is_foreign: bool
+    tracks: tuple[Track, ...]
+    saved: Checkpoint | None
+    """To go on from; None at the beginning."""
+
+    @property
+    def copies(self) -> int:
+        """Of the reward function: one that remembers gets a memory for each car, as AWS drove one car to a process."""
+        return self.settings.num_envs if keeps_state(self.source) else 1
+
+
+@contextmanager
+def open_session(
+    folder: RunFolder,
+    settings: TrainSettings,
+    meter: Meter,
+    *,
+    aws_log: str | Path | None,
+    is_checked: bool,
+    note: Note,
+) -> Iterator[Session]:
+    """Everything made, and brought to where the last checkpoint was; closed at the end, however that comes.
+
+    Args:
+        folder: The run.
+        settings: Of the run.
+        meter: Of the training.
+        aws_log: File for the log lines that AWS's tools read, ``-`` for stdout; none without it.
+        is_checked: The reward function has just been checked and tried.
+        note: Told what the user should know.
+
+    Raises:
+        RacecraftError: The training cannot begin.
+    """
+    metadata = folder.read_model_metadata()
+    require_trainable(settings, metadata)
+    saved, begun = _beginning(folder, note)
+
+    # The learner's backend takes longest to import, so it starts first, beside everything else.
+    with ThreadPoolExecutor(1) as pool:
+        spec = settings.network_spec(metadata)
+        future = pool.submit(
+            make_learner, spec, seed=settings.seed, num_threads=settings.num_threads, device=settings.device
+        )
+        run = _Run(
+            folder=folder,
+            settings=settings,
+            metadata=metadata,
+            hyperparameters=folder.read_hyperparameters(),
+            source=folder.read_reward_function(),
+            is_foreign=folder.read_info().foreign,
+            tracks=_load_tracks(folder, settings),
+            saved=saved,
+        )
+        simulation = open_simulation(settings, run.tracks, metadata.suite)
+        if not is_checked:
+            require_valid_reward(run.source, run.tracks[0], foreign=run.is_foreign)
+        learner = future.result()
+        if begun is not None:
+            begin_from(learner, begun)
+
+    with ExitStack() as stack:
+        worker = _open_worker(run, stack)
+        since = _begin_stretch(run, note)
+        logs = _open_logs(run, stack, aws_log=aws_log)
+        opponents = _open_opponents(run, simulation, learner)
+        environment = _make_environment(run, simulation, worker, logs, opponents, note)
+        session = Session(
+            environment=environment,
+            algorithm=_make_algorithm(run, learner, environment, stack),
+            evaluator=Evaluator(_policy(run, learner), run.tracks, settings),
+            logs=logs,
+            hyperparameters=run.hyperparameters,
+            opponents=opponents,
+            meter=meter,
+            since=since,
+        )
+        if saved is not None:
+            session.load(saved)
+            forgotten = "; what the reward function remembered begins anew" if run.copies > 1 else ""
+            note(f"Resumed at step {session.algorithm.total_steps:,}{forgotten}.")
+        try:
+            yield session
+        except BaseException:
+            with suppress(RunError):  # the first error is the one to tell
+                logs.trace.close()
+                logs.metrics.write()
+            raise
+        logs.trace.close()
+        logs.metrics.write()
+
+
+def _beginning(folder: RunFolder, note: Note) -> tuple[Checkpoint | None, Checkpoint | None]:
+    """The checkpoint to resume from, or else the weights to begin with: imported ones, or a parent's.
+
+    A damaged checkpoint is passed over with a note.
+    """
+    store = folder.checkpoints
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", CheckpointWarning)
+        saved = store.load("last") if store.entries() else None
+    for text in dict.fromkeys(str(warning.message) for warning in caught):
+        note(text)
+    if saved is None and folder.read_info().parent is not None:
+        return None, folder.parent_checkpoint.load()
+    return (None, saved) if saved is not None and is_weights_only(saved) else (saved, None)
+
+
+def _load_tracks(folder: RunFolder, settings: TrainSettings) -> tuple[Track, ...]:
+    tracks = load_tracks(settings.track)
+    digest, before = joint_digest(tracks), folder.read_info().track_digest
+    if digest != before:
+        raise ConfigError(
+            f"Track {settings.track!r} is not the one this run was started on: its digest is "
+            f"{digest[:12]}, it was {before[:12]}.",
+            hint="Start a new run on the changed track.",
+        )
+    return tracks
+
+
+def _open_worker(run: _Run, stack: ExitStack) -> RewardWorker:
+    worker = RewardWorker(
+        run.source,
+        list(run.tracks),
+        seed=run.settings.seed,
+        num_cars=run.copies,
+        num_objects=run.settings.num_objects,
+        foreign=run.is_foreign,
+    )
+    return stack.enter_context(worker)
+
+
+def _begin_stretch(run: _Run, note: Note) -> int:
+    """The step that the stretch under way began at: now, where the run's files changed since the last one."""
+    kept = run.saved.step if run.saved is not None else 0
+    stretch = begin_stretch(run.folder, step=kept)
+    if kept and stretch.step == kept:
+        before = read_stretches(run.folder)[-2]
+        note(f"From here on with other {', '.join(stretch.changes(before))}.".replace("_", " "))
+    return stretch.step
+
+
+def _open_logs(run: _Run, stack: ExitStack, *, aws_log: str | Path | None) -> Logs:
+    """The files, going on behind the last checkpoint."""
+    folder, settings, saved = run.folder, run.settings, run.saved
+    kept, resumed = (saved.step, saved.metadata) if saved is not None else (0, {})
+    episodes, clock = int(resumed.get("episodes", 0)), float(resumed.get("clock", 0.0))
+    per_iteration = settings.ppo.episodes_per_iteration or AWS_EPISODES
+    events = stack.enter_context(EventWriter(folder.events, after_step=kept if saved is not None else -1))
+    history = stack.enter_context(HistoryWriter(folder.history, step=kept))
+    aws = None
+    if aws_log is not None:
+        aws = stack.enter_context(AwsLog(aws_log, steps=kept))
+        aws.write_settings(
+            world=run.tracks[0].name,
+            metadata=run.metadata,
+            hyperparameters=aws_hyperparameters(settings.learning, run.hyperparameters),
+        )
+    return Logs(
+        counter=EpisodeCounter(settings.num_envs, number=episodes, clock=clock),
+        trace=SimTraceWriter(
+            folder.training_simtrace,
+            num_envs=settings.num_envs,
+            tracks=list(run.tracks),
+            action_space=run.metadata.action_space,
+            episodes_per_iteration=per_iteration,
+            episodes=episodes,
+            log=aws,
+        ),
+        metrics=TrainingMetrics(
+            folder.training_metrics, episodes_per_iteration=per_iteration, episodes=episodes, clock=clock
+        ),
+        events=events,
+        history=history,
+        prints=stack.enter_context(PrintLog(folder.reward_log)),
+        aws=aws,
+    )
+
+
+def _policy(run: _Run, learner: Learner) -> NetworkPolicy:
+    return NetworkPolicy(learner, run.metadata.action_space, sensors=run.metadata.suite)
+
+
+def _open_opponents(run: _Run, simulation: Simulation | CudaSimulation, learner: Learner) -> OpponentPool | None:
+    settings = run.settings
+    if settings.opponents is None or not isinstance(simulation, Simulation):
+        return None
+    return OpponentPool(
+        settings.opponents,
+        simulation,
+        _policy(run, learner),
+        seed=settings.seed,
+        num_threads=settings.num_threads,
+    )
+
+
+def _make_environment(
+    run: _Run,
+    simulation: Simulation | CudaSimulation,
+    worker: RewardWorker,
+    logs: Logs,
+    opponents: OpponentPool | None,
+    note: Note,
+) -> Environment:
+    space = run.metadata.action_space
+    if not isinstance(simulation, Simulation):
+        return CudaTrainingEnvironment(simulation, worker, run.source, space, counter=logs.counter, note=note)
+    return TrainingEnvironment(
+        simulation,
+        worker,
+        space,
+        counter=logs.counter,
+        sensors=run.metadata.suite,
+        trace=logs.trace,
+        prints=logs.prints,
+        opponents=opponents,
+        goes_on=run.settings.algorithm == "distill" or opponents is not None,
+        tells_place=run.settings.critic == "lap",
+    )
+
+
+def _make_algorithm(run: _Run, learner: Learner, environment: Environment, stack: ExitStack) -> Algorithm:
+    def open_teacher() -> TrainingEnvironment:
+        space = run.metadata.action_space
+        return teacher_environment(run.settings, run.source, run.tracks, space, stack, foreign=run.is_foreign)
+
+    return make_algorithm(run.settings, learner, environment, open_teacher=open_teacher)
