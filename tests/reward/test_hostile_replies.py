@@ -16,6 +16,7 @@ import pytest
 from workers import function, running
 
 from racecraft.errors import RewardError
+from racecraft.reward import worker as worker_module
 from racecraft.reward.sandbox import UNCONFINED
 
 DIG = """
@@ -76,8 +77,9 @@ def test_a_worker_that_takes_no_requests_does_not_block_the_trainer(track):
             ring_for_ever(worker)
 
 
-def test_progress_that_is_none_ends(track, rows):
+def test_progress_that_is_none_ends(track, rows, monkeypatch):
     """The first reward that is missing, now here, now there: every look finds another number of rows done, for ever."""
+    monkeypatch.setattr(worker_module, "PATIENCE", 1.0)  # as it sleeps between looks
     source = hostile(
         "until = time.monotonic() + 4.0",
         "while time.monotonic() < until:",

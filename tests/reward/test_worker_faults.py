@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from workers import function, is_alive, running
 
 from racecraft.errors import RewardError
+from racecraft.reward import worker as worker_module
 from racecraft.reward.worker import MAX_BATCH
 
 FAULTS = [
@@ -108,6 +110,27 @@ def test_a_hang_is_ended(track, rows, body, line):
     assert caught.value.row_index == 0
     assert time.perf_counter() - start < 30.0  # it would never end by itself; the machine may be busy
     assert not is_alive(process_id)
+
+
+def test_a_busy_loop_is_ended_by_the_time_it_had_a_core(track, rows, monkeypatch):
+    monkeypatch.setattr(worker_module, "PATIENCE", 1e4)
+    monkeypatch.setattr(worker_module, "MOST_PATIENCE", 1e4)
+    start = time.perf_counter()
+    with running(function("while True: pass"), track, timeout_s=0.3) as worker, pytest.raises(RewardError):
+        worker(rows)
+    assert time.perf_counter() - start < 60.0
+
+
+def test_a_worker_that_gets_no_core_is_waited_for(track, rows):
+    """A busy machine is no fault of the function: here its process stands still for three times its limit."""
+    with running(function("return 1.0"), track, timeout_s=0.3) as worker:
+        os.kill(worker.process_id, signal.SIGSTOP)
+        wake = threading.Timer(0.9, os.kill, (worker.process_id, signal.SIGCONT))
+        wake.start()
+        try:
+            assert worker(rows).sum() == 10.0
+        finally:
+            wake.join()
 
 
 def test_the_time_limit_is_for_one_call_and_not_for_the_batch(track, rows):

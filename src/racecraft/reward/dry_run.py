@@ -63,7 +63,7 @@ def dry_run(
     Args:
         source: Text of the user's ``reward_function.py``.
         track: The track that the situations lie on.
-        timeout_s: How long one call may take, s.
+        timeout_s: How long one call may run, s of a core; see `RewardWorker`.
         seed: Seeds ``random`` and ``numpy.random``.
         foreign: The source is somebody else's; see `RewardWorker`.
 

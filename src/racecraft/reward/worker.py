@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 Rows = npt.NDArray[np.float64]
 
 TEXT_BYTES = 8 * 1024  # longest description of a failure
+PATIENCE, MOST_PATIENCE = 10.0, 30.0  # times its limit, or s beyond it: how long a call may last by the wall
+LEAST_WAIT = 0.01  # s, between two looks at a core's time
 LOG_BYTES = 64 * 1024  # how much of the last printed text is kept
 SHOWN_LINES = 5  # of what was printed, in an error
 SHOWN_WIDTH = 200  # characters of such a line
@@ -69,8 +71,9 @@ class RewardWorker:
         tracks: The simulation's tracks; a row's ``track_index`` selects the waypoints, i + len(tracks) means
             track i driven the other way.
         seed: Seeds ``random`` and ``numpy.random`` in the process, so that a run repeats.
-        timeout_s: How long one call of the function may take before the process is killed, s.
-        start_timeout_s: How long the top level of the source may take, imports included, s.
+        timeout_s: How long one call of the function may run before the process is killed, s of a core. What it sleeps,
+            or waits while others have the cores, counts far less: see `PATIENCE`.
+        start_timeout_s: The same for the top level of the source, imports included.
         memory_limit_mb: Address space of the process, MB.
         num_cars: How many copies of the source's globals there are: row i belongs to car i modulo this. One
             is right for functions that keep no state, and loads fastest; see `keeps_state`.
@@ -198,7 +201,7 @@ class RewardWorker:
                 pipe.write(protocol.SIZE.pack(len(setup)) + setup)
             os.set_blocking(self._requests, False)
             for expected in (protocol.LOCKED, protocol.READY):
-                if not self._poll.poll(timeout_s * 1000):
+                if not self._replies_within(timeout_s):
                     raise self._stalled(None, timeout_s)
                 self._read_reply(None, 0, expected)
         except BaseException:
@@ -246,7 +249,7 @@ class RewardWorker:
             with contextlib.suppress(BrokenPipeError):
                 self._ring(count, first)
             num_done = 0
-            while not self._poll.poll(self._timeout_s * 1000):
+            while not self._replies_within(self._timeout_s):
                 before, num_done = num_done, max(num_done, _num_done(shared))
                 if num_done == before:
                     raise self._stalled(rows, self._timeout_s, first=first)
@@ -259,6 +262,18 @@ class RewardWorker:
             self._end("The reward worker answered without all rewards: user code wrote into its memory.")
             raise RewardError(self._failure)
         return rewards
+
+    def _replies_within(self, timeout_s: float) -> bool:
+        """Whether it replies, or ends, before it has had a core for so long, or has lasted far longer."""
+        longest = min(PATIENCE * timeout_s, timeout_s + MOST_PATIENCE)
+        used, deadline = self._process.seconds(), time.monotonic() + longest
+        left = timeout_s
+        while not self._poll.poll(left * 1000):
+            left = min(used + timeout_s - self._process.seconds(), deadline - time.monotonic())
+            if left <= 0:
+                return bool(self._poll.poll(0))
+            left = max(left, LEAST_WAIT)
+        return True
 
     def _ring(self, count: int, first: int) -> None:
         try:
