@@ -1,4 +1,7 @@
-"""Pictures for a report as SVG texts: line charts, a track with a line on it, a map of cells, an action space."""
+"""Pictures for a report as SVG texts: line charts, a track with a line on it, a map of cells, an action space.
+
+The one drawer of charts in Python; pictures in pixels (`track.canvas`, `film`) show roads and cars.
+"""
 
 from __future__ import annotations
 

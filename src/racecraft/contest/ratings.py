@@ -51,13 +51,6 @@ def rate(ratings: Sequence[Rating], places: Sequence[int]) -> list[Rating]:
     return [Rating(float(team[0].mu), float(team[0].sigma)) for team in rated]
 
 
-def win_probability(one: Rating, other: Rating) -> float:
-    """Of the first against the second, 0 to 1."""
-    model = _model()
-    teams = [[model.create_rating([rating.mean, rating.deviation])] for rating in (one, other)]
-    return float(model.predict_win(teams)[0])
-
-
 def _model() -> Any:
     with needed_for("A table of ratings"):
         from openskill.models import PlackettLuce

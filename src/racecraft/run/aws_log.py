@@ -11,10 +11,10 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Self, TextIO
+from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from racecraft.errors import RunError
+from racecraft.run.closing import Closing
 from racecraft.run.episodes import Episode
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ STDOUT: Final = "-"
 _LIDAR: Final = {"num_sectors": 8, "num_values_per_sector": 8, "clipping_dist": 2.0}
 
 
-class AwsLog:
+class AwsLog(Closing):
     """Writes the lines to a file or to stdout; a context manager.
 
     Args:
@@ -100,14 +100,6 @@ class AwsLog:
     def _failure(self, error: OSError) -> RunError:
         name = self.path if self._is_own else "stdout"
         return RunError(f"The log {name} cannot be written: {error.strerror or error}.")
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _rounded(row: Sequence[str]) -> str:

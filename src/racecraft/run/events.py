@@ -18,16 +18,15 @@ import time
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from racecraft.errors import RunError
+from racecraft.run.closing import Closing
 
 _SESSION_START = b"\x08\x01"  # SessionLog  1: status (varint) = START
 FLUSH_SECONDS = 2.0  # how late TensorBoard may see a number
 
 
-class EventWriter:
+class EventWriter(Closing):
     """Appends scalars to a new event file in a folder; a context manager.
 
     Args:
@@ -73,14 +72,6 @@ class EventWriter:
                 self.flush()
             finally:
                 self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _write(self, event: bytes) -> None:
         length = struct.pack("<Q", len(event))

@@ -15,15 +15,16 @@ import math
 import os
 import time
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from racecraft.errors import RunError
+from racecraft.run.closing import Closing
 
 SPACING: Final = 0.25  # s between two iterations that are written, at least: an hour is 3 MB
 MAX_LINE: Final = 64 * 1024  # bytes; a longer one is not ours
 
 
-class HistoryWriter:
+class HistoryWriter(Closing):
     """Appends points to a run's history; a context manager.
 
     Args:
@@ -56,12 +57,6 @@ class HistoryWriter:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _write(self, kind: str, point: dict[str, Any]) -> None:
         plain = {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in point.items()}

@@ -6,16 +6,16 @@ The last few megabytes are kept: a function that prints in every call writes tha
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Final, Self
+from typing import BinaryIO, Final
 
 from racecraft.errors import RunError
+from racecraft.run.closing import Closing
 
 MAX_BYTES: Final = 4 * 2**20
 """Of one file; a full one becomes ``reward.1.log`` and the one before is gone."""
 
 
-class PrintLog:
+class PrintLog(Closing):
     """Appends text to a file that is made with the first of it; a context manager.
 
     Args:
@@ -67,12 +67,3 @@ class PrintLog:
         if self._file is not None:
             self._file.close()
             self._file = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Finish the file."""
-        self.close()

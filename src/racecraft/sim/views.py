@@ -16,10 +16,6 @@ from racecraft.sim.objects import OBJECT_KINDS
 from racecraft.sim.simulation import ground_map, native_camera
 from racecraft.track.track import Track
 
-CHASE_DISTANCE: Final = 1.5
-"""m that the chase camera is behind the car, 1 m above the ground."""
-
-
 TEXEL: Final = 0.005
 """m of a ground texel in pictures for people; the driver's camera makes do with twice that."""
 

@@ -1,4 +1,5 @@
-/** A line chart as an SVG text of its own, for reports and slides. */
+/** A line chart as an SVG text of its own, for reports and slides. On the page uPlot draws the same on a canvas, which
+ *  follows thousands of live points and a cursor, but cannot be saved as lines and words; hence two. */
 import { span } from "./colors";
 import type { Band } from "./stretches";
 

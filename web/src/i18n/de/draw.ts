@@ -40,6 +40,4 @@ export const draw: Record<keyof typeof english, string> = {
   draw_begin: "Beginnen mit",
   draw_begin_oval: "Oval",
   draw_begin_random: "Zufallsstrecke",
-  draw_length: "Länge",
-  draw_metres: "m",
 };

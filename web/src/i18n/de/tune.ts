@@ -45,7 +45,6 @@ export const tune: Record<keyof typeof english, string> = {
   tune_mattered_not_yet: "Es sind noch zu wenige Versuche beendet, um zu sagen, worauf es ankam.",
   tune_number: "Zahl",
   tune_share: "Anteil",
-  tune_searched: "Gesucht",
   tune_result: "Ergebnis",
   tune_after: "{steps} Schritte",
   tune_of_a_lap: "{share} einer Runde",

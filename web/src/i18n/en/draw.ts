@@ -38,6 +38,4 @@ export const draw = {
   draw_begin: "Begin with",
   draw_begin_oval: "An oval",
   draw_begin_random: "A random track",
-  draw_length: "Length",
-  draw_metres: "m",
 } as const;

@@ -43,7 +43,6 @@ export const tune = {
   tune_mattered_not_yet: "Too few trials have ended to say what mattered.",
   tune_number: "Number",
   tune_share: "Share",
-  tune_searched: "Searched",
   tune_result: "Result",
   tune_after: "{steps} steps",
   tune_of_a_lap: "{share} of a lap",
