@@ -32,6 +32,7 @@ LAYERS = (
     "training",
     "tuning",
     "importing",
+    "car",
     "analysis",
     "serve",
     "bench",

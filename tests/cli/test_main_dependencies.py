@@ -69,6 +69,7 @@ COMMANDS: dict[str, list[str]] = {
     "film": ["film P --car 1 --ghost best-lap -o F.mp4 --json"],
     "verify": ["verify P --json", "verify D --race C"],
     "report": ["report R/b -o report.html --json"],
+    "export": ["export R/b --to car --checkpoint last -o exported.tar.gz --json"],
     "import": ["import R/b -t oval -r racing --network RACECRAFT_SMALL -n k --runs R -c best --json"],
     "replay": [
         "replay S -t oval -r racing --vehicle v5 -o S.png --rows S.csv --json",

@@ -6,9 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from PIL import Image
-from tensorflow_graphs import GraphWriter, attribute, bytes_field, number, run_graph, shape_message
 
 from racecraft.agent import ModelMetadata
 from racecraft.agent.sensor_suite import SensorSuite
@@ -16,25 +13,20 @@ from racecraft.errors import SourceError
 from racecraft.importing.frozen_graph import open_frozen_graph
 from racecraft.importing.policy_weights import policy_weights
 from racecraft.learn import NetworkSpec, make_learner
+from real_frames import simulated_frames
+from tensorflow_graphs import GraphWriter, attribute, bytes_field, number, run_graph, shape_message
 
 SHARED = Path(__file__).parents[3] / "shared"
 AWS_MODEL = SHARED / "aws_model"
-FRAMES = SHARED / "params_2026"
 ONLINE = "main_level/agent/main/online"
 SHALLOW = "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
-
-
-def real_frames() -> NDArray[np.uint8]:
-    """What the original's camera saw on two laps  (467, 120, 160)."""
-    files = sorted(FRAMES.glob("run_*/*.jpg"))
-    return np.stack([np.asarray(Image.open(file).convert("L")) for file in files])
 
 
 @pytest.mark.skipif(not AWS_MODEL.is_dir(), reason="the models are not in the repository")
 @pytest.mark.parametrize("name", ["model_30.pb", "model_48.pb"])
 def test_probabilities_are_those_of_the_graph(name: str) -> None:
     metadata = ModelMetadata.load(AWS_MODEL / "model_metadata.json")
-    frames = real_frames()
+    frames = simulated_frames()
     assert len(frames) == 467
     spec = NetworkSpec(name=metadata.neural_network, num_actions=metadata.action_space.size)
     learner = make_learner(spec, seed=None, num_threads=1)

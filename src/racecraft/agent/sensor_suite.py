@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.lidar import observe_lidar
-from racecraft.agent.sensors import LIDARS, LidarConfig, camera_of, check_sensors, observation_shape
+from racecraft.agent.sensors import CAMERAS, LIDARS, LidarConfig, camera_of, check_sensors, observation_shape
 from racecraft.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -50,6 +50,11 @@ class SensorSuite:
         return 2 if "STEREO_CAMERAS" in self.names else 1
 
     @property
+    def camera_name(self) -> str:
+        """Name of the camera."""
+        return next(name for name in self.names if name in CAMERAS)
+
+    @property
     def lidar_name(self) -> str:
         """Name of the LIDAR sensor, or an empty string."""
         return next((name for name in self.names if name in LIDARS), "")
@@ -58,6 +63,11 @@ class SensorSuite:
     def lidar_size(self) -> int:
         """Values of the LIDAR sensor; 0 without one."""
         return observation_shape(self.lidar_name, lidar=self.lidar)[0] if self.lidar_name else 0
+
+    @property
+    def lidar_is_first(self) -> bool:
+        """Whether AWS's networks put what comes of the LIDAR before what comes of the camera: they go by name."""
+        return bool(self.lidar_name) and self.lidar_name < self.camera_name
 
     def camera(self, camera: CameraSpec | None = None) -> CameraSpec:
         """The simulator's camera; `camera` gives its size and look, AWS's by default."""

@@ -16,7 +16,20 @@ from racecraft.extras import not_installed
 
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])  # typer hands out no name for this base
 
-VERBS = ("train", "imports", "evaluate", "races", "report", "tracks", "reward", "tune", "logs", "serve", "machine")
+VERBS = (
+    "train",
+    "imports",
+    "evaluate",
+    "races",
+    "report",
+    "export",
+    "tracks",
+    "reward",
+    "tune",
+    "logs",
+    "serve",
+    "machine",
+)
 """Files of verbs in the order of ``--help``; to import one is to register it."""
 
 for name in VERBS:

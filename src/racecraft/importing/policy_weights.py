@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import SensorSuite
-from racecraft.agent.sensors import CAMERAS
 from racecraft.errors import SourceError
 from racecraft.learn import NetworkSpec
 from racecraft.learn.learner import Weights
-from racecraft.learn.networks import architecture_of, flat_size, weight_shapes
+from racecraft.learn.networks import architecture, architecture_of, flat_size, weight_shapes
 
 MIDDLEWARE: Final = "middleware_fc_embedder"
 CRITIC_HEAD: Final = "v_values_head_0/output"
@@ -105,22 +104,40 @@ def critic_weights(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite) ->
     return _tower(tensors, spec, sensors, scope=scope, head=CRITIC_HEAD, tower="critic")
 
 
-def _tower(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite, *, scope: str, head: str, tower: str) -> Weights:
-    """The layers of one tower by our names."""
+def layer_names(spec: NetworkSpec, sensors: SensorSuite, *, head: str, tower: str = "policy") -> dict[str, str]:
+    """AWS's name of each of our layers, below a tower's scope, from the sensors to the head.
+
+    ``RACECRAFT_SMALL``, which AWS has not, is called by the same rules.
+
+    Args:
+        spec: The network.
+        sensors: Of the car, by AWS's names.
+        head: Name of the last layer.
+        tower: ``policy`` or ``critic``.
+    """
     arch = architecture_of(spec)
-    shapes = {name: shape for name, shape in weight_shapes(spec).items() if name.startswith(f"{tower}.")}
-    camera = next(name for name in sensors.names if name in CAMERAS)
-    layers: dict[str, str] = {}  # our layer -> AWS's
-    for i, conv in enumerate(arch.convs):
-        layers[f"{tower}.conv{i + 1}"] = f"{camera}/{'Dense' if conv.kernel == 1 else 'Conv2d'}_{2 * i}"
+    layers = {
+        f"{tower}.conv{i + 1}": f"{sensors.camera_name}/{'Dense' if conv.kernel == 1 else 'Conv2d'}_{2 * i}"
+        for i, conv in enumerate(arch.convs)
+    }
     for i in range(len(arch.lidar) if spec.lidar_size else 0):
         layers[f"{tower}.lidar{i + 1}"] = f"{sensors.lidar_name}/Dense_{2 * i}"
     for i in range(len(arch.dense)):
         layers[f"{tower}.dense{i + 1}"] = f"{MIDDLEWARE}/Dense_{2 * i}"
-    if spec.is_squashed and tower == "policy":
-        units = shapes[f"{tower}.dense{len(arch.dense)}.weight"][::-1]
-        layers[f"{tower}.dense{len(arch.dense)}"] = _unnamed(tensors, scope, head.split("/")[0], units)
+    if tower == "policy" and len(arch.dense) > len(architecture(spec.name, lenses=spec.lenses).dense):
+        layers[f"{tower}.dense{len(arch.dense)}"] = f"{head.split('/')[0]}/dense"  # SAC's own
     layers[f"{tower}.head"] = head
+    return layers
+
+
+def _tower(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite, *, scope: str, head: str, tower: str) -> Weights:
+    """The layers of one tower by our names."""
+    shapes = {name: shape for name, shape in weight_shapes(spec).items() if name.startswith(f"{tower}.")}
+    layers = layer_names(spec, sensors, head=head, tower=tower)
+    for ours, theirs in layers.items():
+        if theirs.endswith("/dense"):
+            units = shapes[f"{ours}.weight"][::-1]
+            layers[ours] = _unnamed(tensors, scope, theirs.split("/")[0], units)
     weights: Weights = {}
     for ours, theirs in layers.items():
         shape = shapes[f"{ours}.weight"]
@@ -130,7 +147,7 @@ def _tower(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite, *, scope: 
         )
         turned = kernel.transpose((1, 0) if is_dense else (3, 2, 0, 1))
         weight = weights[f"{ours}.weight"] = np.empty(shape, np.float32)
-        if theirs == f"{MIDDLEWARE}/Dense_0" and spec.lidar_size and sensors.lidar_name < camera:
+        if theirs == f"{MIDDLEWARE}/Dense_0" and spec.lidar_size and sensors.lidar_is_first:
             size = flat_size(spec)  # the camera's inputs come last there, first here
             weight[:, :size], weight[:, size:] = turned[:, -size:], turned[:, :-size]
         else:

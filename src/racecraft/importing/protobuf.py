@@ -1,8 +1,8 @@
-"""Protocol Buffers' wire format, read without a schema: the fields of a message, one after the other.
+"""Protocol Buffers' wire format without a schema: the fields of a message, one after the other, read and written.
 
-https://protobuf.dev/programming-guides/encoding/. Nothing is copied and nothing recurses: a field that holds bytes is a
-view of the file, and whoever knows it to be a message asks for its fields in turn. Groups, which nothing of TensorFlow
-writes, are refused.
+https://protobuf.dev/programming-guides/encoding/. Reading copies nothing and does not recurse: a field that holds bytes
+is a view of the file, and whoever knows it to be a message asks for its fields in turn. Groups, which nothing of
+TensorFlow writes, are refused. Writing joins bytes: a message is the fields of it, one behind the other.
 """
 
 from __future__ import annotations
@@ -102,3 +102,24 @@ class Wire:
 def signed(value: int) -> int:
     """An ``int64`` field's number."""
     return value - (1 << 64) if value >> 63 else value
+
+
+def varint(value: int) -> bytes:
+    """A number as it is written; a negative one as an ``int64`` is."""
+    value &= 0xFFFFFFFFFFFFFFFF
+    written = bytearray()
+    while value > 127:
+        written.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*written, value])
+
+
+def number_field(number: int, value: int) -> bytes:
+    """A field that holds a number."""
+    return varint(number << 3 | _VARINT) + varint(value)
+
+
+def bytes_field(number: int, data: bytes | str) -> bytes:
+    """A field that holds bytes: a text, packed numbers, a message."""
+    data = data.encode() if isinstance(data, str) else data
+    return b"".join([varint(number << 3 | _BYTES), varint(len(data)), data])

@@ -88,7 +88,10 @@ def _check_operations(graph: FrozenGraph, spec: NetworkSpec) -> None:
     head = policy_head(spec)
     scope = find_tower(graph, head)
     expected = {name: "Relu" for name in graph.nodes if name.startswith(scope) and name.endswith("_activation")}
-    expected[f"{scope}/{head.partition('/')[0]}/policy"] = "Softmax" if spec.is_discrete else "Identity"
+    output = f"{scope}/{head.partition('/')[0]}/policy"
+    expected[output] = "Softmax" if spec.is_discrete else "Identity"
+    if spec.is_squashed and output in graph.nodes and graph.nodes[output].operation == "Tanh":
+        expected[output] = "Tanh"  # as we export it, for a car clips what SAC squashes
     for name, operation in expected.items():
         node = graph.nodes.get(name)
         if node is None or node.operation != operation:

@@ -205,7 +205,29 @@ def _run(node: ParsedNode, inputs: list[Any]) -> Any:
         return inputs[0].reshape([int(size) for size in inputs[1]])
     if kind == "ConcatV2":
         return np.concatenate(inputs[:-1], axis=int(inputs[-1]))
-    if kind == "StridedSlice":  # value[begin], as the trainer uses it
-        assert node.attributes["shrink_axis_mask"][3] == 1
-        return inputs[0][int(inputs[1][0])]
+    if kind == "StridedSlice":
+        masks = {name: value[3] for name, value in node.attributes.items() if name.endswith("_mask")}
+        if masks["shrink_axis_mask"] == 1:  # value[begin], as the trainer uses it
+            return inputs[0][int(inputs[1][0])]
+        assert masks["shrink_axis_mask"] == masks["ellipsis_mask"] == masks["new_axis_mask"] == 0
+        begins, ends, steps = (part.tolist() for part in inputs[1:])
+        return inputs[0][
+            tuple(
+                slice(
+                    None if masks["begin_mask"] >> i & 1 else begins[i],
+                    None if masks["end_mask"] >> i & 1 else ends[i],
+                    step,
+                )
+                for i, step in enumerate(steps)
+            )
+        ]
+    if kind == "AvgPool":
+        assert node.attributes["padding"][2] == b"VALID"
+        _, rows, columns, _ = _signed_list(node.attributes["ksize"][1])
+        assert _signed_list(node.attributes["strides"][1]) == [1, rows, columns, 1]
+        count, height, width, channels = inputs[0].shape
+        squares = inputs[0].reshape(count, height // rows, rows, width // columns, columns, channels)
+        return squares.mean(axis=(2, 4), dtype=np.float32)
+    if kind == "Floor":
+        return np.floor(inputs[0])
     raise AssertionError(f"the graph has a node {kind}")

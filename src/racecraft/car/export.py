@@ -1,0 +1,111 @@
+"""A run becomes the archive of a physical car, and an archive the policy that it holds.
+
+run -> policy -> graph, metadata -> *export_run* -> NAME.tar.gz -> *read_exported* -> policy
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from racecraft.agent.model_metadata import ModelMetadata
+from racecraft.car.archive import GRAPH, METADATA, archive_name, check_archive_name, write_archive
+from racecraft.car.metadata import car_metadata, car_notes
+from racecraft.car.policy_graph import policy_graph
+from racecraft.checks import check_choice
+from racecraft.importing.model_files import ModelFiles
+from racecraft.importing.source import open_source
+from racecraft.importing.weights import open_model, read_weights
+from racecraft.json_file import parse_json_object
+from racecraft.learn import NetworkSpec, make_learner
+from racecraft.race.policy import NetworkPolicy, load_policy
+from racecraft.run import RunFolder
+
+TARGETS: Final = ("car",)
+"""What a run can become."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportedModel:
+    """What was written."""
+
+    run: Path
+    """The run folder."""
+    step: int
+    """Camera steps of training behind the checkpoint."""
+    archive: Path
+    """The file."""
+    size: int
+    """Bytes."""
+    network: str
+    """Name of the network."""
+    notes: tuple[str, ...]
+    """Sentences on what a car does otherwise than the simulator."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        return {**asdict(self), "run": str(self.run), "archive": str(self.archive), "notes": list(self.notes)}
+
+
+def export_run(
+    run: str | Path, *, to: str = "car", output: str | Path | None = None, checkpoint: str | int = "best"
+) -> ExportedModel:
+    """Write the archive that a physical car takes.
+
+    Args:
+        run: The run folder.
+        to: What it is for, one of `TARGETS`.
+        output: The archive; by default it lies in the run folder and is called like the run.
+        checkpoint: ``best``, ``last`` or a number of steps.
+
+    Raises:
+        RunError: There is no such run, or the archive cannot be written.
+        CheckpointError: There is no such checkpoint, or it is damaged.
+        ConfigError: The car has not what the policy needs, or would not take the archive's name.
+    """
+    check_choice("--to", to, TARGETS)
+    folder = RunFolder.open(run)
+    archive = folder.path / archive_name(folder.name) if output is None else Path(output)
+    check_archive_name(archive)
+    step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=1)
+    metadata, spec = folder.read_model_metadata(), policy.learner.spec
+    document = car_metadata(metadata, spec)
+    write_archive(archive, policy_graph(policy.learner.weights(), spec, metadata.suite), document)
+    return ExportedModel(
+        run=folder.path,
+        step=step,
+        archive=archive,
+        size=archive.stat().st_size,
+        network=spec.name,
+        notes=tuple(car_notes(metadata, spec)),
+    )
+
+
+def read_exported(archive: str | Path, *, num_threads: int = 1) -> NetworkPolicy:
+    """The policy in an archive that `export_run` wrote.
+
+    Args:
+        archive: The file.
+        num_threads: 0 takes one per core.
+
+    Raises:
+        RacecraftError: The archive is damaged, or of another kind.
+    """
+    with open_source(archive) as source:
+        metadata = ModelMetadata.from_dict(parse_json_object(source.text(METADATA), name=METADATA), name=METADATA)
+        space, suite = metadata.action_space, metadata.suite
+        spec = NetworkSpec(
+            name=metadata.neural_network,
+            num_actions=space.size,
+            is_discrete=space.kind == "discrete",
+            is_squashed=metadata.training_algorithm == "sac",
+            state_size=1,  # the smallest critic there is: it does not drive
+            lenses=suite.lenses,
+            lidar_size=suite.lidar_size,
+        )
+        with open_model(source, ModelFiles(graph=GRAPH)) as tensors:
+            weights = read_weights(tensors, spec, suite, [])
+    learner = make_learner(spec, seed=None, num_threads=num_threads)
+    learner.load_weights({**learner.weights(), **weights})
+    return NetworkPolicy(learner, space, sensors=suite)
