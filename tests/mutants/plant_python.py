@@ -37,6 +37,18 @@ PRELOADED += ("gymnasium", "sqlalchemy.orm", "shapely", "safetensors.numpy", "ya
 PRELOADED += ("torch", "av", "httpx")
 
 
+SITE = """import sys
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
+"""
+"""Run by every interpreter that a test starts: the package is found by a finder of its own, and the tree's is meant."""
+
+
+def environment(tree: Path) -> dict[str, str]:
+    """What lets processes import the package of a tree, which is left as it is."""
+    path = os.pathsep.join((str(tree / "src"), str(tree / "site")))
+    return {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+
+
 class FirstFailure:
     """A pytest plugin that remembers the first test that failed."""
 
@@ -59,6 +71,8 @@ def copy_tree(folder: Path) -> None:
         if name and (ROOT / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, folder / name)
+    (folder / "site").mkdir()
+    (folder / "site" / "sitecustomize.py").write_text(SITE, encoding="utf-8")
     from racecraft import _native
 
     shutil.copy2(_native.__file__, folder / "src" / "racecraft")
@@ -80,6 +94,7 @@ def run_tests(tree: Path, tests: Tests, *, keeps_bytecode: bool = False) -> tupl
             for number in (1, 2):
                 os.dup2(os.open(tree / "output.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
             resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
+            os.environ.update(environment(tree))
             sys.dont_write_bytecode = not keeps_bytecode
             failure = FirstFailure()
             options = ["-x", "-p", "no:cacheprovider", "-m", "not slow", "--basetemp", f"{tree}-tmp"]
