@@ -28,7 +28,13 @@ def test_discrete_commands_are_rows_of_the_table():
     assert commands.dtype == np.float32
     np.testing.assert_allclose(commands, space.table, rtol=1e-6)
     assert space.to_commands([4])[0].tolist() == [0.0, 1.0]
-    assert space.labels[0] == "right 30° 1 m/s"
+    assert (space.labels[0], space.labels[4]) == ("right 30° 1 m/s", "straight 1 m/s")
+    assert DiscreteActionSpace.from_aws([{"steering_angle": 1, "speed": 1}] * 2).labels[0] == "left 1° 1 m/s"
+
+
+def test_equal_tables_are_one_space():
+    assert len({action_space("default"), action_space("default")}) == 1
+    assert hash(action_space("default")) == hash(DiscreteActionSpace.from_aws(action_space("default").to_aws()))
 
 
 def test_steering_of_45_degrees_drives_as_30():

@@ -33,6 +33,7 @@ def test_all_real_runs_are_accepted():
 def test_missing_fields_get_the_defaults_of_aws_code():
     assert Hyperparameters.from_dict({}) == Hyperparameters()
     assert Hyperparameters().discount_factor == 0.999
+    assert Hyperparameters().term_cond_max_episodes == Hyperparameters().term_cond_avg_score == 100_000
 
 
 def test_numbers_may_be_strings():
@@ -98,6 +99,13 @@ def test_sac_trains_after_every_episode():
     Hyperparameters().check_algorithm("clipped_ppo")
     with pytest.raises(ConfigError, match="num_episodes_between_training is 20; allowed is 1 with 'sac'"):
         Hyperparameters().check_algorithm("sac")
+
+
+def test_sac_is_that_of_aws_with_an_update_a_step_and_nothing_of_ours():
+    found = Hyperparameters(lr=1e-4, batch_size=128, sac_alpha=0.3).to_sac()
+    assert (found["learning_rate"], found["minibatch_size"], found["alpha"], found["gamma"]) == (1e-4, 128, 0.3, 0.999)
+    assert (found["tau"], found["updates_per_step"], found["policy_frequency"]) == (1.0, 1.0, 1)
+    assert (found["learns_alpha"], found["normalize_rewards"]) == (False, False)
 
 
 def test_ppo_settings_are_named_as_the_learner_names_them():

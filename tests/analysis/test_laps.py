@@ -49,6 +49,8 @@ def test_laps_are_read_back(tmp_path: Path, oval: Track) -> None:
     write_trace(path, oval, [(2.0, "lap_complete", 1.0), (1.0, "off_track", 0.4)])
     whole, part = read_laps(path)
     assert (whole.number, whole.is_complete, part.is_complete) == (1, True, False)
+    assert (len(whole.time), whole.time[0], whole.share[0]) == (round(oval.length / 2.0 / DT) + 1, 0.0, 0.0)
+    assert (whole.penalty_seconds, part.penalty_seconds) == (0.0, 0.0)
     assert whole.seconds == pytest.approx(oval.length / 2.0, abs=2 * DT)
     assert np.median(whole.speed) == pytest.approx(2.0, rel=0.02)
     assert part.share[-1] == pytest.approx(0.4, abs=0.01)
@@ -56,6 +58,17 @@ def test_laps_are_read_back(tmp_path: Path, oval: Track) -> None:
     assert start_place(oval, whole) == pytest.approx(0.0, abs=0.01)
     assert driven_direction(oval, [whole, part]) is oval
     assert driven_direction(oval.reversed(), [whole]).point_at(1.0) == pytest.approx(oval.point_at(1.0), abs=0.05)
+
+
+def test_steps_that_a_car_stands_are_its_penalty(tmp_path: Path, oval: Track) -> None:
+    path = tmp_path / "0-iteration.csv"
+    write_trace(path, oval, [(2.0, "lap_complete", 1.0)])
+    lines = path.read_text().splitlines()
+    path.write_text(
+        "\n".join([*lines[:10], *(line.replace("in_progress", "pause") for line in lines[10:40]), *lines[40:]])
+    )
+    (lap,) = read_laps(path)
+    assert lap.penalty_seconds == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("name", ["oval", "reinvent_2018", "hairpin"])

@@ -309,6 +309,16 @@ def test_the_verbs(lines, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+def test_episodes_are_handed_on_whole(lines, tmp_path, monkeypatch):
+    monkeypatch.setattr("racecraft.fidelity.logs.BATCH_ROWS", 100)
+    logs = list(read_logs([write(tmp_path / "a.csv", lines)], Faults()))
+    assert len(logs) > 3
+    assert sum(len(log) for log in logs) == len(lines)
+    assert all(log.is_first[0] and log.is_prepare[0] for log in logs)
+    episodes = [set(log.episode.tolist()) for log in logs]
+    assert sum(map(len, episodes)) == len(set.union(*episodes)) == 25
+
+
 def test_a_long_log_does_not_fill_the_memory(lines, tmp_path):
     # From /proc, not getrusage: that one starts a process at the peak of the parent it was forked from.
     if not Path("/proc/self/status").exists():

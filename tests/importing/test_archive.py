@@ -104,6 +104,7 @@ def test_folders_and_dots_are_no_files(tmp_path: Path) -> None:
             tar.addfile(info)
         tar.addfile(tarfile.TarInfo("./model//a"))
     assert read(buffer.getvalue(), tmp_path) == {"model/a": b""}
+    assert read(member("model/"), tmp_path) == {}  # a folder as old writers put it: a file whose name ends so
     assert read(make_zip({"model/": b"", "model/a": b"1"}), tmp_path) == {"model/a": b"1"}
     assert read(make_zip({}), tmp_path) == {}
     assert read(make_tar({}), tmp_path) == {}

@@ -63,7 +63,8 @@ def test_the_students_steps_become_smaller() -> None:
     moved = []
     for rate_steps in (0, 10):
         trained = make(replace(CONFIG, rate_steps=rate_steps))
-        trained.iterate()  # the teacher
+        lesson = trained.iterate()  # the teacher
+        assert (lesson.iteration, lesson.total_steps, lesson.num_steps) == (1, 0, 0)  # the student has driven nowhere
         before = trained.learner.weights()
         for _ in range(3):
             trained.iterate()

@@ -409,6 +409,7 @@ def test_continuous_commands_stay_within_bounds(config):
         ("learning_rate", float("inf")),
         ("learning_rate", -1e-4),
         ("clip_coef", 0.0),
+        ("clip_coef", 1.0),
         ("value_loss", "mae"),
         ("exploration", "boltzmann"),
         ("update_epochs", 0),

@@ -215,6 +215,23 @@ def test_the_buffer_gives_back_what_was_put_in_and_never_joins_two_episodes() ->
     assert not (~is_first & (steps % 5 == 0)).any()
 
 
+def test_a_sample_is_whole_however_few_steps_can_be_drawn_and_none_where_there_is_none() -> None:
+    for num_good, size in ((1, 64), (0, 0)):
+        buffer = ReplayBuffer(200, num_envs=1, observation_shape=(1,), state_size=1, action_size=1)
+        for step in range(200):
+            buffer.add(
+                observations=np.zeros((1, 1), np.uint8),
+                states=np.zeros((1, 1), np.float32),
+                actions=np.zeros((1, 1), np.float32),
+                rewards=np.array([step]),
+                terminated=np.array([False]),
+                truncated=np.array([step >= num_good]),
+            )
+        found = buffer.sample(64, np.random.default_rng(0))
+        assert len(found.rewards) == size
+        assert (found.rewards == 0).all()
+
+
 def test_gradient_steps_flush_subnormals_and_nothing_else_does() -> None:
     from racecraft.learn.torch_subnormals import subnormals_flushed
 

@@ -58,6 +58,9 @@ def test_a_round_road_is_round() -> None:
     assert road.left == pytest.approx(np.full(len(road.s), 0.5), abs=0.02)
     assert road.right == pytest.approx(np.full(len(road.s), 0.5), abs=0.02)
     assert road.at(road.length + 1.0, road.left) == pytest.approx(road.at(1.0, road.left))
+    places = road.at(np.array([0.0, 1.0, 2.0]), road.places)
+    assert places.shape == (3, 2)
+    assert np.hypot(*places.T) == pytest.approx([3.0] * 3, abs=0.02)
 
 
 def test_a_narrowed_road_has_lost_the_same_strip_on_both_sides() -> None:

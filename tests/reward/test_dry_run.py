@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from racecraft.errors import RewardError
-from racecraft.reward.dry_run import dry_run, situations
+from racecraft.reward.dry_run import dry_run, moment, situations
 from racecraft.reward.source import load_preset, preset_names
 from racecraft.sim.columns import ROW_COLUMNS
 
@@ -33,6 +33,11 @@ def test_situations_cover_what_training_meets(track):
     assert column(by_name["off track"], "is_offtrack") == 1.0
     assert column(by_name["left edge"], "offset") > 0.0 > column(by_name["right edge"], "offset")
     assert column(by_name["other way"], "track_index") == 1.0
+    speeds = [column(by_name[name], "speed") for name in ("slow", "straight", "fast")]
+    assert speeds == [0.5, 1.5, 4.0]
+    pace = by_name["on pace"]
+    assert (column(pace, "steps"), column(pace, "progress")) == (100, 2 / 3)
+    assert column(pace, "projection_distance") == pytest.approx(track.length * 2 / 3)
     for situation in by_name.values():
         assert situation.row.shape == (len(ROW_COLUMNS),)
         assert np.isfinite(situation.row).all()
@@ -50,6 +55,15 @@ def test_rows_agree_with_the_track(track):
         assert (
             road.arc_length[behind] - 1e-9 <= column(situation, "projection_distance") <= road.arc_length[ahead] + 1e-9
         )
+
+
+def test_every_place_lies_between_its_two_waypoints(track):
+    last = len(track.arc_length) - 1
+    for place in np.linspace(0.0, track.length, 200, endpoint=False):
+        row = dict(zip(ROW_COLUMNS, moment(track, float(place)), strict=True))
+        before, after = int(row["closest_prev"]), int(row["closest_next"])
+        assert 0 <= before < after <= last
+        assert track.arc_length[before] - 1e-9 <= place <= track.arc_length[after] + 1e-9
 
 
 @pytest.mark.parametrize("name", preset_names())

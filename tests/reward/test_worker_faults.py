@@ -180,7 +180,7 @@ def test_killed_from_outside(track, rows):
     with running(function("return 1.0"), track) as worker:
         worker(rows)
         os.kill(worker.process_id, signal.SIGKILL)
-        with pytest.raises(RewardError, match="SIGKILL"):
+        with pytest.raises(RewardError, match=r"SIGKILL \(killed from outside, or by the system"):
             worker(rows)
 
 

@@ -14,6 +14,7 @@ import pytest
 
 from racecraft.errors import CheckpointError
 from racecraft.run import CheckpointStore, CheckpointWarning
+from racecraft.run.checkpoint import MANIFEST
 
 ROOT = Path(__file__).parents[2]
 
@@ -83,6 +84,16 @@ def test_last_four_and_best_are_kept(store):
     assert index["last_checkpoint"]["name"] == store.last.file
     assert index.keys() == {"best_checkpoint", "last_checkpoint"}
     assert index["last_checkpoint"].keys() == {"name", "avg_eval_metric", "time_stamp"}
+
+
+def test_without_scores_the_best_is_the_last(store):
+    for step in (100, 200, 300):
+        save(store, step)
+    assert store.best.step == store.last.step == 300
+    index = json.loads(store.aws_index.read_text())
+    assert index["best_checkpoint"]["name"] == index["last_checkpoint"]["name"] == store.last.file
+    manifest = json.loads((store.folder / MANIFEST).read_text())
+    assert manifest["best"] == manifest["last"] == store.last.file
 
 
 def test_what_no_manifest_lists_is_removed_and_what_is_no_checkpoint_stays(store):

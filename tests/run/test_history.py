@@ -57,6 +57,11 @@ def test_half_lines_damaged_lines_and_foreign_files(tmp_path: Path) -> None:
     assert [point["step"] for point in points] == [1, 2]
     assert path.read_bytes()[offset:] == b'{"step"'
     assert read_history(path, offset=10**9)[0] == points  # shorter than it was: from its start
+    path.write_bytes(b'{"step"')
+    assert read_history(path) == ([], 0)  # the whole file is half a line
+    long = b'{"step": 1}\n' * 6000
+    path.write_bytes(long + b'{"step"')
+    assert read_history(path)[1] == len(long) > 64 * 1024
     path.write_bytes(b"\0" * 200_000)
     assert read_history(path) == ([], 200_000)
     assert read_history(path, max_bytes=100_000) == ([], 100_000)

@@ -105,6 +105,25 @@ def test_writing_is_rare(tmp_path):
     assert len(read_metrics(metrics.path)["metrics"]) == 2
 
 
+def test_a_file_that_takes_long_to_write_is_written_the_more_rarely(tmp_path, monkeypatch):
+    """Half a second of writing is a hundredth of the time until it is written again."""
+    clock = [1000.0]
+
+    def write(path, data, *, durable):
+        clock[0] += 0.5
+        path.write_bytes(data)
+
+    monkeypatch.setattr("racecraft.run.metrics.write_file", write)
+    monkeypatch.setattr("racecraft.run.metrics.time.monotonic", lambda: clock[0])
+    metrics = TrainingMetrics(tmp_path / "m.json", interval_s=1.0)
+    seen = []
+    for number, later in enumerate((0.0, 49.0, 2.0)):
+        clock[0] += later
+        metrics.add(episode(number))
+        seen.append(len(read_metrics(metrics.path)["metrics"]))
+    assert seen == [1, 1, 3]
+
+
 def test_every_status_has_a_label():
     assert tuple(STATUS_LABELS) == STATUS_NAMES
 

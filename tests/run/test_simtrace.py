@@ -328,7 +328,7 @@ def test_reader_refuses_what_is_no_simtrace(tmp_path, text, words):
 
 def test_reader_takes_a_header_alone_and_refuses_bytes(tmp_path):
     (tmp_path / "x.csv").write_text(",".join(WRITTEN) + "\n")
-    assert {len(values) for values in read_simtrace(tmp_path / "x.csv").values()} == {0}
+    assert {values.shape for values in read_simtrace(tmp_path / "x.csv").values()} == {(0,)}
     (tmp_path / "x.csv").write_bytes(b"\xff\xfe")
     for path in (tmp_path / "x.csv", tmp_path, tmp_path / "none"):
         with pytest.raises(RunError):

@@ -163,6 +163,13 @@ def test_aws_own_conditions_end_a_training(tiny: Train, tmp_path: Path, conditio
     assert result.steps < 5000
 
 
+def test_a_mean_reward_of_just_the_score_is_enough(tiny: Train, tmp_path: Path) -> None:
+    source = tmp_path / "reward_function.py"
+    source.write_text("def reward_function(params):\n    return 0.0\n")
+    parameters = save(replace(AWS_LIKE, term_cond_avg_score=0.0), tmp_path)
+    assert tiny(reward=source, hyperparameters=parameters, until="1000 steps").reason == "score"
+
+
 # ---- ways to train
 
 
