@@ -1,4 +1,4 @@
-"""`racecraft export`: what it prints, and its wrong options."""
+"""`racecraft export`, `racecraft car` and `racecraft evaluate --as`: what they print, and their wrong options."""
 
 from __future__ import annotations
 
@@ -38,5 +38,46 @@ def test_a_wrong_option_writes_nothing(racecraft: Run, trained: Path, arguments:
     outcome = racecraft("export", str(trained), *arguments)
     assert outcome.status == 1, outcome.err
     assert says in outcome.err
+    assert set(trained.rglob("*")) == before
+    assert not list(Path().iterdir())
+
+
+def test_a_car_is_measured_and_driven(racecraft: Run, trained: Path) -> None:
+    measured = ["--circle-left", "0.8", "--servo", "1.7,1.45,1.25", "--speed", "60=1.9", "--speed", "30=0.7"]
+    outcome = racecraft("car", "calibrate", *measured, "-o", "mine.json")
+    assert outcome.status == 0, outcome.err
+    assert "Full lock: 22.294° to the left, 24° to the right." in outcome.out
+    assert "0.7 m/s at 30 %, 1.9 m/s at 60 %; slider where it suits." in outcome.out
+    assert "racecraft evaluate RUN --as mine.json" in outcome.out
+    driving = ["--as", "mine.json", "--laps", "1", "--trials", "1", "--max-resets", "0", "--no-video", "--json"]
+    document = racecraft("evaluate", str(trained), *driving).document
+    assert document["as_car"]["right_degrees"] == 24.0
+    assert document["as_car"]["slider_driven_percent"] == pytest.approx(63.2)
+    assert Path(document["files"]["as a car"]).read_bytes().startswith(b"\x89PNG")
+    assert "as_car" not in racecraft("evaluate", str(trained), *driving[2:]).document
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "says"),
+    [
+        (["car", "calibrate"], 1, "Nothing was measured"),
+        (["car", "calibrate", "--speed", "fast"], 2, "expected 2 numbers with '=' between them"),
+        (["car", "calibrate", "--speed", "30=fast"], 2, "--speed is '30=fast'"),
+        (["car", "calibrate", "--servo", "1.2,1.7"], 2, "expected 3 numbers with ',' between them"),
+        (["car", "calibrate", "--servo", "nan,nan,nan"], 1, "servo is nan"),
+        (["car", "calibrate", "--circle-left", "0.1"], 1, "A circle of 0.1 m to the left"),
+        (["car", "calibrate", "--slider", "50", "-o", "no/where/car.json"], 1, "cannot be written"),
+        (["evaluate", "RUN", "--as", "crr"], 1, "Did you mean 'car'?"),
+        (["evaluate", "RUN", "--as", "car", "--tracks", "oval"], 2, "--as does not go with --tracks"),
+        (["evaluate", "RUN", "--as", "car", "--checkpoint", "77"], 1, "77"),
+    ],
+)
+def test_a_wrong_number_of_a_car_writes_nothing(
+    racecraft: Run, trained: Path, arguments: list[str], status: int, says: str
+) -> None:
+    before = set(trained.rglob("*"))
+    outcome = racecraft(*(str(trained) if word == "RUN" else word for word in arguments))
+    assert outcome.status == status, outcome.err
+    assert says in " ".join(outcome.err.replace("│", " ").split())
     assert set(trained.rglob("*")) == before
     assert not list(Path().iterdir())

@@ -48,6 +48,7 @@ COMMANDS: dict[str, list[str]] = {
         f"evaluate R/b -l 1 --trials 1 --max-resets 1 --race head-to-bot {BOTS} --no-video",
         f"evaluate R/b -l 1 --trials 1 --max-resets 1 --race object-avoidance {BOXES} --no-video",
         "evaluate R/b -l 1 --trials 1 --race object-avoidance --objects 1 --positions 0.5,1 --no-video",
+        "evaluate R/b --as car -l 1 --trials 1 --max-resets 1 --no-video",
         "evaluate R/b --tracks oval",
     ],
     "race": [
@@ -70,6 +71,10 @@ COMMANDS: dict[str, list[str]] = {
     "verify": ["verify P --json", "verify D --race C"],
     "report": ["report R/b -o report.html --json"],
     "export": ["export R/b --to car --checkpoint last -o exported.tar.gz --json"],
+    "car": [
+        "car calibrate --circle-left 0.8 --circle-right 0.9 --servo 1.7,1.45,1.2 --speed 40=1.1 --slider 40"
+        " --latency 0.05 -o car.json --json",
+    ],
     "import": ["import R/b -t oval -r racing --network RACECRAFT_SMALL -n k --runs R -c best --json"],
     "replay": [
         "replay S -t oval -r racing --vehicle v5 -o S.png --rows S.csv --json",

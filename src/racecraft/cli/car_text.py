@@ -1,4 +1,4 @@
-"""What `racecraft export` prints for people."""
+"""What `racecraft export` and `racecraft car` print for people."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from rich.console import Console
 from rich.text import Text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from racecraft.car import ExportedModel
+    from racecraft.car.calibration import CarCalibration
 
 
 def say_exported(exported: ExportedModel) -> None:
@@ -18,3 +21,18 @@ def say_exported(exported: ExportedModel) -> None:
         console.print(Text.assemble(("note: ", "bold"), note), soft_wrap=True)
     kind = f"{exported.network}, step {exported.step:,}, {exported.size / 1e6:.1f} MB"
     console.print(Text.assemble("For the car: ", (str(exported.archive), "bold"), (f"  {kind}", "dim")), soft_wrap=True)
+
+
+def say_calibrated(car: CarCalibration, path: Path) -> None:
+    """What was made of the numbers, and how to go on."""
+    speeds = ", ".join(f"{speed:g} m/s at {position:g} %" for position, speed in car.speeds)
+    slider = f"slider at {car.slider_percent:g} %" if car.slider_percent is not None else "slider where it suits"
+    lines = [
+        f"Full lock: {car.left_degrees:g}° to the left, {car.right_degrees:g}° to the right.",
+        f"Full throttle: {speeds or 'not measured, so as fast as a model was trained to drive'}; {slider}.",
+        f"Latency: {1000 * car.latency_seconds:g} ms.",
+    ]
+    console = Console()
+    for line in lines:
+        console.print(Text(line), soft_wrap=True)
+    console.print(Text.assemble("Drive with it: ", (f"racecraft evaluate RUN --as {path}", "bold")), soft_wrap=True)

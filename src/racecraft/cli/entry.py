@@ -23,6 +23,7 @@ VERBS = (
     "races",
     "report",
     "export",
+    "car",
     "tracks",
     "reward",
     "tune",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -10,7 +11,7 @@ import typer
 from racecraft.cli import race_options
 from racecraft.cli.app import AwsLog, Json, app, is_given, print_json, text
 
-RACE_ONLY: Final = ("track", "laps", "rules", "offtrack_penalty", "max_resets", "video", "aws_log", "ghost")
+RACE_ONLY: Final = ("as_what", "track", "laps", "rules", "offtrack_penalty", "max_resets", "video", "aws_log", "ghost")
 
 
 @app.command()
@@ -22,6 +23,9 @@ def evaluate(
         list[str] | None,
         typer.Option("--tracks", help="A table of one lap on each: all, library, generated:0..99 or a folder."),
     ] = None,
+    as_what: Annotated[
+        str, typer.Option("--as", help="car, or a file of 'racecraft car calibrate': as that physical car would drive.")
+    ] = "",
     laps: Annotated[int | None, typer.Option("--laps", "-l", help="Laps to a trial; by default the rules'.")] = None,
     trials: Annotated[
         int | None, typer.Option("--trials", help="Cars that start side by side, 5; with --tracks on each of them, 1.")
@@ -76,8 +80,14 @@ def evaluate(
         context.fail("--json and --aws-log - both want stdout; give the log a file.")
     from racecraft.judging.evaluation import evaluate_run
 
+    judge: Any = evaluate_run
+    if as_what:
+        from racecraft.car.calibration import load_calibration
+        from racecraft.car.evaluation import evaluate_as_car
+
+        judge = partial(evaluate_as_car, car=load_calibration(as_what))
     given = race_options.objects_of(race, context.params)
-    outcome = evaluate_run(
+    outcome = judge(
         run,
         track=track or None,
         laps=laps,

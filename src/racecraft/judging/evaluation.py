@@ -10,11 +10,12 @@ mp4/camera-pip/<n>-video.mp4                             the best trial, filmed
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Protocol
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.film.ghost import Ghost
@@ -36,10 +37,18 @@ from racecraft.replay.replay import Replay, write_replay
 from racecraft.run.atomic import write_json
 from racecraft.run.aws_log import AwsLog
 from racecraft.run.folder import RunFolder
+from racecraft.sim.camera import CameraSpec
 from racecraft.sim.objects import Objects
 from racecraft.sim.randomization import Randomization, load_randomization
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import Track, load_track
+
+
+class PolicyLoader(Protocol):
+    """What takes a policy from a run, as `load_policy` does."""
+
+    def __call__(self, run: RunFolder, /, *, checkpoint: str | int, num_threads: int) -> tuple[int, NetworkPolicy]:
+        """Steps of training behind it, and the policy."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +65,8 @@ class RunEvaluation:
     """What was written, by what it is."""
     limit: TrackLimit | None = None
     """The least a lap takes with this vehicle, where that is known without computing it."""
+    about: Mapping[str, Any] = field(default_factory=dict)
+    """What else stands in ``evaluation.json``: how it was driven."""
 
     @property
     def summary(self) -> str:
@@ -84,6 +95,7 @@ class RunEvaluation:
             "run": str(self.run),
             "step": self.step,
             **self.evaluation.summary(),
+            **self.about,
             "driven": self.provenance.to_dict(),
             "lap_seconds": [list(trial.lap_times) for trial in self.evaluation.trials],
             "limit": self._against_limit(),
@@ -123,6 +135,9 @@ def evaluate_run(
     ghosts: Sequence[str] = (),
     job: str = "",
     num_threads: int = 0,
+    load: PolicyLoader = load_policy,
+    camera: CameraSpec = CameraSpec(),
+    about: Mapping[str, Any] = MappingProxyType({}),
 ) -> RunEvaluation:
     """Race a run's policy against the clock.
 
@@ -148,6 +163,9 @@ def evaluate_run(
             ``best-lap``.
         job: Written into ``evaluation.json``, by which whoever asked for the evaluation finds it again.
         num_threads: 0 takes one per core.
+        load: Takes the policy from the run.
+        camera: What the policy sees with.
+        about: Written into ``evaluation.json``, too: how it was driven.
 
     Raises:
         RacecraftError: The run, its checkpoint, the track or a setting is not usable.
@@ -173,7 +191,7 @@ def evaluate_run(
     where = track if isinstance(track, Track) else load_track(track) if track else trained_track(info)
 
     check_sources(ghosts, run=folder.path)
-    step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=num_threads)
+    step, policy = load(folder, checkpoint=checkpoint, num_threads=num_threads)
     evaluation = evaluate(
         policy,
         where,
@@ -181,6 +199,7 @@ def evaluate_run(
         num_trials=num_trials,
         seed=seed,
         vehicle=vehicle,
+        camera=camera,
         randomize=randomize,
         objects=trained_objects(info) if objects is None else objects,
         num_threads=num_threads,
@@ -190,11 +209,20 @@ def evaluate_run(
         load_ghosts(ghosts, evaluation.conditions, run=folder.path, recordings=recordings) if video and ghosts else []
     )
     try:
-        files = _write(folder, evaluation, policy, step=step, is_filmed=video, aws_log=aws_log, ghosts=shown, job=job)
+        files = _write(
+            folder,
+            evaluation,
+            policy,
+            step=step,
+            is_filmed=video,
+            aws_log=aws_log,
+            ghosts=shown,
+            about={**about, **({"job": job} if job else {})},
+        )
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
     limit = known_limit(driven_track(where, rules), vehicle)
-    return RunEvaluation(run=folder.path, step=step, evaluation=evaluation, files=files, limit=limit)
+    return RunEvaluation(run=folder.path, step=step, evaluation=evaluation, files=files, limit=limit, about=about)
 
 
 def _own_rules(folder: RunFolder) -> RaceRules:
@@ -212,7 +240,7 @@ def _write(
     step: int,
     is_filmed: bool,
     aws_log: str | Path | None,
-    job: str,
+    about: Mapping[str, Any],
     ghosts: Sequence[Ghost] = (),
 ) -> dict[str, Path]:
     stamp, inside = folder.new_evaluation()
@@ -252,6 +280,6 @@ def _write(
         )
     video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
     driven = provenance(evaluation.conditions).to_dict()
-    summary = {**evaluation.summary(), "driven": driven, "step": step, "video": video, **({"job": job} if job else {})}
+    summary = {**evaluation.summary(), "driven": driven, "step": step, "video": video, **about}
     write_json(inside / "evaluation.json", summary)
     return files
