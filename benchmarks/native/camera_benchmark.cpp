@@ -52,7 +52,7 @@ int main() {
                 const size_t k = static_cast<size_t>(i * 7) % (road.num_waypoints() - 1);
                 const double* p = &road.center[2 * k];
                 const double heading = std::atan2(p[3] - p[1], p[2] - p[0]) + 0.06 * (i % 11 - 5);
-                render_grey(camera, ground, palette, static_cast<float>(p[0]), static_cast<float>(p[1]),
+                render_grey(camera, ground, palette, {}, static_cast<float>(p[0]), static_cast<float>(p[1]),
                             static_cast<float>(heading), pixels.data());
             }
         });

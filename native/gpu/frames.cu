@@ -20,6 +20,7 @@ RC_KERNEL(draw_frames, kImageThreads) {
         frame.ground = ground_of(batch, env);
         frame.table = shade_table(batch.palettes[env]);
         frame.lens = lens_of(batch, env, camera, frame.ground);
+        frame.sheen = sheen_share(camera, batch.colours.sheen, frame.lens);
         frame.num_walls = walls_in_view(frame.ground, frame.lens, frame.walls);
         frame.is_above_walls = camera.spec.above >= kWallHeight;
     }
@@ -30,7 +31,10 @@ RC_KERNEL(draw_frames, kImageThreads) {
         RC_SYNC();
         RC_EACH(i, camera.row_begin[end] - first) samples[i] = draw_sample(camera, frame, first + i);
         RC_SYNC();
-        RC_EACH(i, end - row) rows[i] = draw_row(camera, frame, samples, first, row + i);
+        RC_EACH(i, end - row) {
+            rows[i] =
+                draw_row(camera, frame, batch.palettes[env], batch.colours.sheen, samples, first, row + i);
+        }
         RC_SYNC();
         const int32_t quads = (width + kQuad - 1) / kQuad;
         RC_EACH(i, (end - row) * quads) {

@@ -24,6 +24,7 @@ struct DrawnSample {
 struct DrawnRow {
     int32_t begin, samples;  // in the block's samples
     bool is_shared;          // pairs of pixels share their texels
+    GroundShades ground;
     WallEdge edges[kNumWalls];
 };
 
@@ -31,6 +32,7 @@ struct DrawnRow {
 struct DrawnFrame {
     GroundView ground;
     ShadeTable table;
+    float sheen;  // share of it that the ground shows
     WallSpan walls[kNumWalls];
     int32_t num_walls;
     LensPose lens;
@@ -54,9 +56,11 @@ RC_HD DrawnSample draw_sample(const CameraView& camera, const DrawnFrame& frame,
     return drawn;
 }
 
-RC_HD DrawnRow draw_row(const CameraView& camera, const DrawnFrame& frame, const DrawnSample* samples,
-                        int32_t first, int32_t row) {
+RC_HD DrawnRow draw_row(const CameraView& camera, const DrawnFrame& frame, const GreyPalette& palette,
+                        const Sheen& sheen, const DrawnSample* samples, int32_t first, int32_t row) {
     DrawnRow drawn;
+    drawn.ground =
+        frame.sheen > 0.0f ? row_shades(camera, palette, sheen, frame.sheen, row) : frame.table.ground;
     const int32_t width = camera.spec.width;
     drawn.begin = camera.row_begin[row] - first;
     drawn.samples = camera.row_begin[row + 1] - camera.row_begin[row];
@@ -92,14 +96,15 @@ RC_HD int32_t wall_pixel(const DrawnFrame& frame, const DrawnRow& row, int32_t x
 }
 
 // The same of the ground.
-RC_HD int32_t ground_pixel(const DrawnFrame& frame, const DrawnSample& sample, int32_t x) {
+RC_HD int32_t ground_pixel(const DrawnFrame& frame, const DrawnRow& row, const DrawnSample& sample,
+                           int32_t x) {
     const uint32_t i = static_cast<uint32_t>(x);
     const uint32_t u = static_cast<uint32_t>(sample.walk.u) + i * static_cast<uint32_t>(sample.walk.du);
     const uint32_t v = static_cast<uint32_t>(sample.walk.v) + i * static_cast<uint32_t>(sample.walk.dv);
     const uint32_t texel = frame.ground.texels[texel_index(frame.ground.levels[sample.level], u, v)];
     return sample.level == 0
-               ? shade_edge(texel, edge_distance(texel, u, v), sample.sharpness, frame.table.blend)
-               : shade_coverage(texel, frame.table.weights);
+               ? shade_edge(texel, edge_distance(texel, u, v), sample.sharpness, row.ground.blend)
+               : shade_coverage(texel, row.ground.weights);
 }
 
 // The same of a sample, whatever it shows there.
@@ -108,7 +113,7 @@ RC_HD int32_t sample_pixel(const DrawnFrame& frame, const DrawnRow& row, const D
     const int32_t begin = sample.walk.begin;
     const int32_t end = sample.walk.end;
     const bool is_inside = x >= begin && x < end;
-    if (sample.kind == kSampleGround && is_inside) return ground_pixel(frame, sample, x);
+    if (sample.kind == kSampleGround && is_inside) return ground_pixel(frame, row, sample, x);
     if (sample.kind == kSampleSky && is_inside) return frame.table.sky;
     if (!frame.is_above_walls) return wall_pixel(frame, row, x);
     if (sample.kind != kSampleGround) return frame.table.sky;
@@ -140,8 +145,8 @@ RC_HD void draw_quad(const DrawnFrame& frame, const DrawnRow& row, const DrawnSa
             const uint32_t texel = frame.ground.texels[texel_index(frame.ground.levels[0], u, v)];
             const int32_t distance = edge_distance(texel, u, v);
             const int32_t growth = edge_growth(texel, sample.walk.du >> 9, sample.walk.dv >> 9);
-            sums[i] += shade_edge(texel, distance - growth, sample.sharpness, frame.table.blend);
-            sums[i + 1] += shade_edge(texel, distance + growth, sample.sharpness, frame.table.blend);
+            sums[i] += shade_edge(texel, distance - growth, sample.sharpness, row.ground.blend);
+            sums[i + 1] += shade_edge(texel, distance + growth, sample.sharpness, row.ground.blend);
         }
     }
     for (int32_t i = 0; i < kQuad; ++i) out[i] = static_cast<uint8_t>(sums[i] >> shift);

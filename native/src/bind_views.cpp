@@ -24,7 +24,7 @@ void bind_views(nb::module_& m) {
         .def(nb::init<const CameraSpec&>(), "spec"_a);
     m.def(
         "render_grey",
-        [](const CameraModel& camera, const GroundMap& ground, const GreyPalette& palette, Poses poses,
+        [](const CameraModel& camera, const GroundMap& ground, const std::string& palette, Poses poses,
            Frames out) {
             const CameraSpec& spec = camera.spec();
             const size_t size = static_cast<size_t>(spec.height) * static_cast<size_t>(spec.width);
@@ -34,11 +34,13 @@ void bind_views(nb::module_& m) {
                     "The frames do not have the poses' number and the camera's size.");
             }
             const size_t count = poses.shape(0);
+            const RgbPalette& colours = rgb_palette(palette);
+            const GreyPalette grey = grey_palette(colours);
             const float* pose = poses.data();
             uint8_t* pixels = out.data();
             nb::gil_scoped_release release;
             for (size_t i = 0; i < count; ++i, pose += 3, pixels += size)
-                render_grey(camera, ground, palette, pose[0], pose[1], pose[2], pixels);
+                render_grey(camera, ground, grey, colours.sheen, pose[0], pose[1], pose[2], pixels);
         },
         "camera"_a, "ground"_a, "palette"_a, "poses"_a, "out"_a);
     m.def("chase_camera", &chase_camera, "width"_a, "height"_a);

@@ -31,7 +31,8 @@ void bind_views(nb::module_& m);    // bind_views.cpp
 const RgbPalette& rgb_palette(const std::string& name) {
     if (name == "2018") return kPalette2018;
     if (name == "2020") return kPalette2020;
-    throw std::invalid_argument("Palette '" + name + "' does not exist; choose '2018' or '2020'.");
+    if (name == "2026") return kPalette2026;
+    throw std::invalid_argument("Palette '" + name + "' does not exist; choose '2018', '2020' or '2026'.");
 }
 
 namespace {
@@ -128,8 +129,6 @@ void bind_camera(nb::module_& m) {
             "width"_a, "height"_a, "hfov"_a, "forward"_a, "left"_a, "above"_a, "pitch"_a)
         .def_ro("width", &CameraSpec::width)
         .def_ro("height", &CameraSpec::height);
-    nb::class_<GreyPalette>(m, "GreyPalette", "Brightness of everything a driver's camera can see.");
-    m.def("grey_palette", [](const std::string& name) { return grey_palette(rgb_palette(name)); }, "name"_a);
     nb::class_<GroundMap>(m, "GroundMap", "The ground of a track as cameras see it.")
         .def(
             "__init__",
@@ -192,12 +191,12 @@ void bind_engine(nb::module_& m) {
             "__init__",
             [](Engine* self, const std::vector<const NativeTrack*>& tracks,
                const std::vector<std::shared_ptr<GroundMap>>& grounds, const std::vector<float>& vehicle,
-               const CameraSpec* camera, const GreyPalette& palette, size_t num_envs, uint64_t seed,
-               int substeps, int num_threads, int laps, int max_steps, double time_limit, int start_mode,
-               double start_offset, double start_advance, bool start_spread, float lateral_jitter,
-               float heading_jitter, int direction, const ObjectRule& objects, bool has_lidar, float baseline,
-               bool draws_tracks, const std::vector<float>& randomization, const std::string& world,
-               size_t cars_per_race, bool shuffle) {
+               const CameraSpec* camera, size_t num_envs, uint64_t seed, int substeps, int num_threads,
+               int laps, int max_steps, double time_limit, int start_mode, double start_offset,
+               double start_advance, bool start_spread, float lateral_jitter, float heading_jitter,
+               int direction, const ObjectRule& objects, bool has_lidar, float baseline, bool draws_tracks,
+               const std::vector<float>& randomization, const std::string& world, size_t cars_per_race,
+               bool shuffle) {
                 std::vector<TrackStore> stores;
                 for (const bool reversed : {false, true}) {
                     for (const NativeTrack* track : tracks) stores.push_back(track->store(reversed));
@@ -218,15 +217,15 @@ void bind_engine(nb::module_& m) {
                     cars_per_race};
                 std::optional<Randomization> ranges;
                 if (!randomization.empty()) ranges = randomization_of(randomization);
-                new (self) Engine(
-                    config, std::move(stores),
-                    std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
-                    vehicle_of(vehicle), camera, palette, ranges ? &*ranges : nullptr, rgb_palette(world));
+                new (self)
+                    Engine(config, std::move(stores),
+                           std::vector<std::shared_ptr<const GroundMap>>(grounds.begin(), grounds.end()),
+                           vehicle_of(vehicle), camera, ranges ? &*ranges : nullptr, rgb_palette(world));
             },
-            "tracks"_a, "grounds"_a, "vehicle"_a, "camera"_a.none(), "palette"_a, "num_envs"_a, "seed"_a,
-            "substeps"_a, "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a,
-            "start_offset"_a, "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a,
-            "direction"_a, "objects"_a, "has_lidar"_a, "baseline"_a, "draws_tracks"_a = false,
+            "tracks"_a, "grounds"_a, "vehicle"_a, "camera"_a.none(), "num_envs"_a, "seed"_a, "substeps"_a,
+            "num_threads"_a, "laps"_a, "max_steps"_a, "time_limit"_a, "start_mode"_a, "start_offset"_a,
+            "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a, "direction"_a,
+            "objects"_a, "has_lidar"_a, "baseline"_a, "draws_tracks"_a = false,
             "randomization"_a = std::vector<float>(), "world"_a = "2018", "cars_per_race"_a = size_t{1},
             "shuffle"_a = false)
         .def(

@@ -96,12 +96,12 @@ void add_ground(const GroundView& ground, const GroundLevel& level, const Ground
             const Lanes mix = coverage_lanes(distance_lanes(texel, at.u, at.v), sharp);
             const Lanes pair = shift_right(texel, 24);
             for (int c = 0; c < kChannels; ++c) {
-                add_to(sums + c * stride + i, dot_halves(look_up(tables[c].blend, pair), mix), mask);
+                add_to(sums + c * stride + i, dot_halves(look_up(tables[c].ground.blend, pair), mix), mask);
             }
         } else {
             for (int c = 0; c < kChannels; ++c) {
                 add_to(sums + c * stride + i,
-                       dot_bytes(splat(static_cast<int32_t>(tables[c].weights)), texel), mask);
+                       dot_bytes(splat(static_cast<int32_t>(tables[c].ground.weights)), texel), mask);
             }
         }
         at.u = at.u + at.du;
@@ -133,7 +133,7 @@ void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTab
             const Lanes texel = gather_all(texels, index_lanes(at[k].u, at[k].v, tile_row));
             const Lanes distance = distance_lanes(texel, at[k].u, at[k].v);
             const Lanes growth = dot_bytes(step, texel) - dot_bytes(origin, texel);
-            const Lanes blend = look_up(table.blend, shift_right(texel, 24));
+            const Lanes blend = look_up(table.ground.blend, shift_right(texel, 24));
             left = left + dot_halves(blend, coverage_lanes(distance - growth, sharp));
             right = right + dot_halves(blend, coverage_lanes(distance + growth, sharp));
             at[k].u = at[k].u + at[k].du;
@@ -165,8 +165,8 @@ void add_ground(const GroundView& ground, const GroundLevel& level, const Ground
         const uint32_t texel = ground.texels[texel_index(level, u, v)];
         for (int c = 0; c < kChannels; ++c) {
             sums[c * stride + i] +=
-                kIsEdge ? shade_edge(texel, edge_distance(texel, u, v), sharpness, tables[c].blend)
-                        : shade_coverage(texel, tables[c].weights);
+                kIsEdge ? shade_edge(texel, edge_distance(texel, u, v), sharpness, tables[c].ground.blend)
+                        : shade_coverage(texel, tables[c].ground.weights);
         }
         u += walk.du;
         v += walk.dv;
@@ -186,8 +186,8 @@ void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTab
             const uint32_t texel = ground.texels[texel_index(ground.levels[0], u, v)];
             const int32_t distance = edge_distance(texel, u, v);
             const int32_t growth = edge_growth(texel, row.half_x[k], row.half_y[k]);
-            left += shade_edge(texel, distance - growth, row.sharpness[k], table.blend);
-            right += shade_edge(texel, distance + growth, row.sharpness[k], table.blend);
+            left += shade_edge(texel, distance - growth, row.sharpness[k], table.ground.blend);
+            right += shade_edge(texel, distance + growth, row.sharpness[k], table.ground.blend);
         }
         line[i] = static_cast<uint8_t>(left >> shift);
         line[i + 1] = static_cast<uint8_t>(right >> shift);
@@ -212,20 +212,29 @@ void fill(int32_t* values, int32_t value, int begin, int end) {
 template <int kChannels>
 class Painter {
   public:
-    Painter(const CameraView& camera, const GroundView& ground, const ShadeTable* tables,
-            const LensPose& lens)
+    Painter(const CameraView& camera, const GroundView& ground, const GreyPalette* palettes,
+            const Sheen& sheen, const LensPose& lens)
         : camera_(camera),
           ground_(ground),
-          tables_(tables),
+          palettes_(palettes),
+          sheen_(sheen),
+          sheen_share_(sheen_share(camera, sheen, lens)),
           width_(camera.spec.width),
           stride_((camera.spec.width + 15) / 16 * 16),
           is_above_walls_(camera.spec.above >= kWallHeight),
-          num_walls_(walls_in_view(ground, lens, walls_)) {}
+          num_walls_(walls_in_view(ground, lens, walls_)) {
+        for (int c = 0; c < kChannels; ++c) tables_[c] = shade_table(palettes[c]);
+    }
 
     // begin is the row's first sample; its walks start at index i of block (and of upper, their counterparts
     // in the plane of the walls' upper edge, used only from above it).
     void draw_row(int row, int begin, int samples, const Block& block, const Block& upper, int i,
                   uint8_t* line) {
+        if (sheen_share_ > 0.0f && row % kSheenRows == 0) {
+            for (int c = 0; c < kChannels; ++c) {
+                tables_[c].ground = row_shades(camera_, palettes_[c], sheen_, sheen_share_, row);
+            }
+        }
         if (kChannels == 1 && can_share(begin, samples, block, i)) {
             SharedRow shared;
             shared.samples = samples;
@@ -357,7 +366,10 @@ class Painter {
 
     const CameraView& camera_;
     const GroundView& ground_;
-    const ShadeTable* tables_;
+    const GreyPalette* palettes_;
+    const Sheen& sheen_;
+    float sheen_share_;
+    ShadeTable tables_[kChannels];
     int width_;
     int stride_;  // of a channel in the arrays below
     bool is_above_walls_;
@@ -368,9 +380,9 @@ class Painter {
 };
 
 template <int kChannels>
-void render(const CameraView& camera, const GroundView& ground, const ShadeTable* tables,
-            const LensPose& lens, uint8_t* out) {
-    Painter<kChannels> painter(camera, ground, tables, lens);
+void render(const CameraView& camera, const GroundView& ground, const GreyPalette* palettes,
+            const Sheen& sheen, const LensPose& lens, uint8_t* out) {
+    Painter<kChannels> painter(camera, ground, palettes, sheen, lens);
     const bool is_above_walls = camera.spec.above >= kWallHeight;
     alignas(64) Block block;
     alignas(64) Block upper;
@@ -391,12 +403,12 @@ void render(const CameraView& camera, const GroundView& ground, const ShadeTable
 
 }  // namespace
 
-void render_room(const CameraView& camera, const GroundView& ground, const ShadeTable* tables,
-                 int num_channels, const LensPose& lens, uint8_t* out) {
+void render_room(const CameraView& camera, const GroundView& ground, const GreyPalette* palettes,
+                 const Sheen& sheen, int num_channels, const LensPose& lens, uint8_t* out) {
     if (num_channels == 1) {
-        render<1>(camera, ground, tables, lens, out);
+        render<1>(camera, ground, palettes, sheen, lens, out);
     } else {
-        render<3>(camera, ground, tables, lens, out);
+        render<3>(camera, ground, palettes, sheen, lens, out);
     }
 }
 

@@ -68,11 +68,10 @@ void CameraModel::resize_samples(size_t count) {
     for (std::vector<float>* table : {&distance_, &start_, &step_, &sharpness_}) table->resize(count);
 }
 
-void render_grey(const CameraModel& camera, const GroundMap& ground, const GreyPalette& palette, float x,
-                 float y, float heading, uint8_t* out) {
-    const ShadeTable table = shade_table(palette);
+void render_grey(const CameraModel& camera, const GroundMap& ground, const GreyPalette& palette,
+                 const Sheen& sheen, float x, float y, float heading, uint8_t* out) {
     const LensPose lens = place_lens(camera.view(), ground.view(), x, y, heading);
-    RC_DISPATCH(render_room, camera.view(), ground.view(), &table, 1, lens, out);
+    RC_DISPATCH(render_room, camera.view(), ground.view(), &palette, sheen, 1, lens, out);
 }
 
 }  // namespace racecraft

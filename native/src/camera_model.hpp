@@ -35,7 +35,7 @@ class CameraModel {
 
 // What the camera of a car at (x, y, heading) sees, into out (height, width). Allocates nothing and may be
 // called from any thread. Poses outside the room are moved to its walls.
-void render_grey(const CameraModel& camera, const GroundMap& ground, const GreyPalette& palette, float x,
-                 float y, float heading, uint8_t* out);
+void render_grey(const CameraModel& camera, const GroundMap& ground, const GreyPalette& palette,
+                 const Sheen& sheen, float x, float y, float heading, uint8_t* out);
 
 }  // namespace racecraft

@@ -64,8 +64,7 @@ struct Engine::DriveHere {
 
 Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
                std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
-               const CameraSpec* camera, const GreyPalette& palette, const Randomization* randomization,
-               const RgbPalette& colours)
+               const CameraSpec* camera, const Randomization* randomization, const RgbPalette& colours)
     : seed_(config.seed),
       tracks_(std::move(tracks)),
       grounds_(std::move(grounds)),
@@ -80,7 +79,7 @@ Engine::Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
         if (config.baseline != 0.0f) right_camera_ = std::make_unique<CameraModel>(spec);
     }
     set_up_batch(config, vehicle, camera != nullptr ? *camera : CameraSpec{}, randomization, colours);
-    allocate(palette);
+    allocate();
     reset(nullptr);
 }
 
@@ -119,7 +118,7 @@ void Engine::set_up_batch(const EngineConfig& config, const VehicleParameters& v
 }
 
 // The cars, before their first episode.
-void Engine::allocate(const GreyPalette& palette) {
+void Engine::allocate() {
     Batch& b = batch_;
     const size_t n = num_envs();
     const size_t cars = static_cast<size_t>(b.cars_per_race);
@@ -140,7 +139,7 @@ void Engine::allocate(const GreyPalette& palette) {
     b.races = place(races_, has_racers(b) ? n / cars : 0, -1);
     b.seeds = place(seeds_, n, seed_);
     b.streams = place(streams_, n, 0u);
-    b.palettes = place(palettes_, n, palette);
+    b.palettes = place(palettes_, n, grey_palette(b.colours));
     b.conditions = place(conditions_, b.is_randomized ? n : 0, Conditions{});
     b.delay = place(delay_, b.has_latency ? n : 0, 0);
     b.earlier = place(earlier_, b.has_latency ? 4 * n : 0, 0.0f);
@@ -187,7 +186,8 @@ void Engine::draw(int32_t env) {
 void Engine::render(const CameraModel& camera, int32_t env, const VehicleState& state, uint8_t* frame) {
     const size_t car = static_cast<size_t>(env);
     const GroundMap& ground = *grounds_[static_cast<size_t>(episodes_[car].track) % num_tracks()];
-    render_grey(camera, ground, palettes_[car], state.x, state.y, state.heading, frame);
+    const Sheen& sheen = batch_.colours.sheen;
+    render_grey(camera, ground, palettes_[car], sheen, state.x, state.y, state.heading, frame);
     if (batch_.num_objects > 0) {
         const LensPose lens = place_lens(camera.view(), ground.view(), state.x, state.y, state.heading);
         RC_DISPATCH(draw_objects, camera.spec(), lens, around(batch_, env), frame);

@@ -32,11 +32,10 @@ struct EngineConfig {
 class Engine {
   public:
     // Tracks come in order; the reversed twin of track i is track i + num_tracks. Both drive over ground map
-    // i. Without a camera there are no frames. With randomization every episode has its own conditions, and
-    // colours take the place of the palette.
+    // i. Without a camera there are no frames. With randomization every episode has its own conditions.
     Engine(const EngineConfig& config, std::vector<TrackStore> tracks,
            std::vector<std::shared_ptr<const GroundMap>> grounds, const VehicleParameters& vehicle,
-           const CameraSpec* camera, const GreyPalette& palette, const Randomization* randomization = nullptr,
+           const CameraSpec* camera, const Randomization* randomization = nullptr,
            const RgbPalette& colours = kPalette2018);
 
     // Puts the masked cars (all of them without a mask) at the start of their next episode. Where that is all
@@ -87,7 +86,7 @@ class Engine {
 
     void set_up_batch(const EngineConfig& config, const VehicleParameters& vehicle, const CameraSpec& eyes,
                       const Randomization* randomization, const RgbPalette& colours);
-    void allocate(const GreyPalette& palette);
+    void allocate();
     void see_from(int32_t env);     // the current pose
     void show_others(int32_t env);  // the others of its race what has changed about a car between two steps
     void draw(int32_t env);

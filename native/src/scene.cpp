@@ -301,9 +301,9 @@ void render_rgb(const CameraModel& camera, const GroundMap& ground, const RgbPal
                 float y, float heading, const CarPicture* cars, int num_cars, const ScanPicture* scan,
                 uint8_t* out) {
     const LensPose lens = place_lens(camera.view(), ground.view(), x, y, heading);
-    ShadeTable tables[3];
-    for (int c = 0; c < 3; ++c) tables[c] = shade_table(channel_of(palette, c));
-    RC_DISPATCH(render_room, camera.view(), ground.view(), tables, 3, lens, out);
+    GreyPalette channels[3];
+    for (int c = 0; c < 3; ++c) channels[c] = channel_of(palette, c);
+    RC_DISPATCH(render_room, camera.view(), ground.view(), channels, palette.sheen, 3, lens, out);
     if (scan != nullptr) draw_scan(camera.spec(), lens, ground.view(), *scan, ScanPart::beams, out);
 
     // Far cars first, so that near ones cover them.

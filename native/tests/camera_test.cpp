@@ -1,4 +1,5 @@
 // The driver's camera against its reference, across instruction sets, and at poses that no car should reach.
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 
@@ -39,7 +40,7 @@ Outline octagon() {
 std::vector<uint8_t> frame(const CameraModel& camera, const GroundMap& ground, float x, float y,
                            float heading, const GreyPalette& palette = kGrey) {
     std::vector<uint8_t> pixels(size_t(camera.spec().width) * camera.spec().height);
-    render_grey(camera, ground, palette, x, y, heading, pixels.data());
+    render_grey(camera, ground, palette, {}, x, y, heading, pixels.data());
     return pixels;
 }
 
@@ -129,8 +130,8 @@ TEST(mirrored_track_gives_mirrored_frames) {
     const int width = camera.spec().width;
     std::vector<uint8_t> a(size_t(width) * camera.spec().height), b = a;
     for (const Pose& p : kPoses) {
-        render_grey(camera, ground, palette, p.x, p.y, p.heading, a.data());
-        render_grey(camera, mirror, palette, p.x, -p.y, -p.heading, b.data());
+        render_grey(camera, ground, palette, {}, p.x, p.y, p.heading, a.data());
+        render_grey(camera, mirror, palette, {}, p.x, -p.y, -p.heading, b.data());
         double sum = 0.0;
         for (int i = 0; i < width * camera.spec().height; ++i) {
             sum += std::abs(a[i] - b[i / width * width + width - 1 - i % width]);
@@ -304,8 +305,35 @@ TEST(palette_reaches_every_part_of_a_frame) {
     palette.sky = 255;
     std::vector<uint8_t> pixels(size_t(level.width) * level.height);
     for (const Pose& p : kPoses) {
-        render_grey(camera, ground, palette, p.x, p.y, p.heading, pixels.data());
+        render_grey(camera, ground, palette, {}, p.x, p.y, p.heading, pixels.data());
         for (const uint8_t pixel : pixels) CHECK_EQUAL(int(pixel), 255);
+    }
+}
+
+// Against its formula: as the square of the cosine to the light, more or less of it the steeper a row looks
+// down.
+TEST(ground_shines_towards_a_light_and_nowhere_else) {
+    const Outline road = octagon();
+    const GroundMap ground(road.view());
+    const Sheen sheen{0.6f, 0.8f, {-10, -10, -10, -10}, {30, 30, 30, 30}};
+    GreyPalette palette{};
+    for (uint8_t& shade : palette.ground) shade = 100;
+    for (const float heading : {0.2f, 0.9272952f, 1.8f, 2.6f, -0.9f, -2.2f}) {
+        for (const float pitch : {0.2385f, 1.2f}) {
+            CameraSpec spec;
+            spec.pitch = pitch;
+            const CameraModel camera(spec);
+            std::vector<uint8_t> pixels(size_t(spec.width) * spec.height);
+            render_grey(camera, ground, palette, sheen, 0.0f, 0.0f, heading, pixels.data());
+            const double facing = std::max(0.6 * std::cos(heading) + 0.8 * std::sin(heading), 0.0);
+            const double focal = 80.0 / std::tan(0.5 * spec.hfov);
+            for (int row = 60; row < spec.height; ++row) {
+                const double down = std::sin(pitch) + (row - row % 4 + 2 - 60) / focal * std::cos(pitch);
+                const double lit = facing * facing * (-10.0 + 2.0 * down * 40.0);
+                const double expected = 100.0 + (pitch < 1.0f ? lit : 0.0);
+                CHECK_NEAR(double(pixels[size_t(row) * 160 + 80]), expected, 1.01);
+            }
+        }
     }
 }
 

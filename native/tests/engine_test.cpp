@@ -92,12 +92,11 @@ std::unique_ptr<Engine> make_engine(const Settings& settings) {
     CameraSpec camera;
     camera.width = 40;
     camera.height = 30;
-    const GreyPalette palette = grey_palette(kPalette2018);
     std::vector<std::shared_ptr<const GroundMap>> grounds;
     if (settings.camera)
         grounds.push_back(std::make_shared<const GroundMap>(road.view(), GroundOptions{.texel = 0.04f}));
     return std::make_unique<Engine>(config, std::move(tracks), grounds, kCar,
-                                    settings.camera ? &camera : nullptr, palette);
+                                    settings.camera ? &camera : nullptr);
 }
 
 // What car number `car` does in its step `step`: mostly gentle, sometimes wild, so that episodes end in many

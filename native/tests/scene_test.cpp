@@ -47,7 +47,7 @@ TEST(colour_and_grey_show_the_same) {
     std::vector<uint8_t> grey(160 * 120);
     const float x = static_cast<float>(road.center[40]);
     const float y = static_cast<float>(road.center[41]);
-    render_grey(camera, ground, grey_palette(kPalette2018), x, y, 2.0f, grey.data());
+    render_grey(camera, ground, grey_palette(kPalette2018), {}, x, y, 2.0f, grey.data());
     const auto colour = frame(camera, ground, x, y, 2.0f, {});
     double sum = 0.0;
     for (size_t i = 0; i < grey.size(); ++i) sum += std::abs(grey[i] - grey_of(&colour[3 * i]));

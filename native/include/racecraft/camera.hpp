@@ -22,6 +22,7 @@
 namespace racecraft {
 
 constexpr int32_t kMaxImageWidth = 4096;
+constexpr float kSteep = 1.0f;  // rad; cameras that look down more steeply see no walls, as on a map
 
 struct CameraSpec {
     int32_t width = 160;       // pixels
@@ -54,6 +55,7 @@ struct CameraView {
     const float* step;          // m to the right per pixel                                 (M,)
     const float* sharpness;     // 256 / filter width, 1/m                                  (M,)
     const float* corner_scale;  // pixels to the right of the middle per unit of right/ahead   (height,)
+    float down, down_step;      // what a ray through row 0 falls per unit along the axis, and each row more
     float upper_scale;          // what stretches a walk on the ground to the plane of the walls' upper edge
 };
 

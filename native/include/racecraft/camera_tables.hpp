@@ -8,7 +8,6 @@ namespace racecraft {
 constexpr float kFarthest = 60.0f;  // m; rows that look farther along the ground show only wall
 constexpr float kStretch = 4.25f;  // length over width of a sample's footprint on the ground, at most, before
 constexpr int32_t kMaxRowSamples = 8;  // the row is split into twice as many, up to this many
-constexpr float kSteep = 1.0f;         // rad; cameras that look down more steeply see no walls, as on a map
 constexpr int32_t kSkySamples = 4;     // of rows above the horizon: they only smooth the walls' upper edge
 
 // Sideways shifts of the samples of a row, in pixels, so that upright borders are smoothed as well.
@@ -104,6 +103,8 @@ RC_HD CameraView fill_camera(const CameraSpec& spec, const CameraTables& out) {
     view.step = out.step;
     view.sharpness = out.sharpness;
     view.corner_scale = out.corner_scale;
+    view.down = ray(0.5f).down;
+    view.down_step = cosine / focal;
     view.upper_scale = spec.pitch > kSteep ? 1.0f : (spec.above - kWallHeight) / spec.above;
     return view;
 }

@@ -56,6 +56,21 @@ RC_HD bool can_share_texels(const CameraView& camera, const GroundView& ground, 
            camera.step[sample] < largest_step * ground.texel;
 }
 
+constexpr int32_t kSheenRows = 4;  // neighbouring rows that share the shades of their sheen
+
+// How much of its sheen the ground shows to a lens; from above, where there is no way it looks, none.
+RC_HD float sheen_share(const CameraView& camera, const Sheen& sheen, const LensPose& lens) {
+    return camera.spec.pitch > kSteep ? 0.0f : sheen_towards(sheen, lens.sine, lens.cosine);
+}
+
+// The shades of the ground in a row of a lens to which it shows that much.
+RC_HD GroundShades row_shades(const CameraView& camera, const GreyPalette& palette, const Sheen& sheen,
+                              float share, int32_t row) {
+    const int32_t first = row / kSheenRows * kSheenRows;
+    const float middle = static_cast<float>(first) + 0.5f * static_cast<float>(kSheenRows - 1);
+    return shades_in_sheen(palette, sheen, share, camera.down + middle * camera.down_step);
+}
+
 // Half of a signed step of a walk.
 RC_HD uint32_t half_step(uint32_t step) {
     return static_cast<uint32_t>(static_cast<int32_t>(step) >> 1);

@@ -32,7 +32,7 @@ def replay(
         Path | None,
         typer.Option("--frame", help="Instead of logs: a camera frame of the original; find where it was taken."),
     ] = None,
-    palette: Annotated[str, typer.Option("--palette", help="Colours of the frame's world: 2018 or 2020.")] = "2018",
+    palette: Annotated[str, typer.Option("--palette", help="Colours of the frame's world: 2018, 2020, 2026.")] = "2018",
     as_json: Json = False,
 ) -> None:
     """Compare logs or a frame of the original with ours."""

@@ -99,7 +99,7 @@ def fit_frame(frame: str | Path, *, track: str | Path | Track, palette: str = "2
     Args:
         frame: Picture of the original's front camera, 640 x 480 in colour (any size of that shape will do).
         track: Name of a track, file of a route, or a track.
-        palette: Colours of its world: ``2018`` or ``2020``.
+        palette: Colours of its world: ``2018``, ``2020`` or ``2026``.
 
     Raises:
         ConfigError: The file is no such picture.

@@ -59,7 +59,7 @@ def film(
         name: The racer's, or the run's.
         laps: Laps that the race has; 0 if that is not known.
         color: Of the car.
-        palette: Colours of the world: ``2018`` or ``2020``.
+        palette: Colours of the world: ``2018``, ``2020`` or ``2026``.
         ghosts: Translucent cars that drove at another time; the driver does not see them.
         rivals: The other cars of the race, for the table of who is ahead and for the map.
         sensors: Of the car: its driver's view, of a stereo camera an anaglyph, the left lens in red; its LIDAR's beams.

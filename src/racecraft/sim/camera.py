@@ -7,7 +7,7 @@ from typing import Final
 
 from racecraft.checks import check_choice, check_number, check_whole
 
-PALETTES: Final = ("2018", "2020")
+PALETTES: Final = ("2018", "2020", "2026")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class CameraSpec:
     """m between the two lenses of a stereo camera, half of it to either side of `left`; 0 for one lens. AWS's
     has 0.06."""
     palette: str = "2018"
-    """Colours of the world: ``2018`` or ``2020``."""
+    """Colours of the world: ``2018``, ``2020`` or ``2026``."""
 
     def __post_init__(self) -> None:
         check_whole("Camera setting width", self.width, 8, 2048)

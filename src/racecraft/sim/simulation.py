@@ -201,7 +201,6 @@ class Simulation:
             grounds=[ground_map(track) for track in self.tracks] if camera else [],
             vehicle=self.vehicle.values(),
             camera=native_camera(camera) if camera else None,
-            palette=_native.grey_palette(camera.palette if camera else "2018"),
             num_envs=num_envs,
             seed=seed,
             substeps=substeps,

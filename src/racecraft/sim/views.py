@@ -31,7 +31,7 @@ def driver_frames(track: Track, poses: ArrayLike, camera: CameraSpec = CameraSpe
     table = np.ascontiguousarray(poses, dtype=np.float32)
     out = np.empty((len(table), camera.height, camera.width), dtype=np.uint8)
     model = _native.CameraModel(native_camera(camera))
-    _native.render_grey(model, ground_map(track), _native.grey_palette(camera.palette), table, out)
+    _native.render_grey(model, ground_map(track), camera.palette, table, out)
     return out
 
 
@@ -125,7 +125,7 @@ class Scene:
 
     Args:
         track: What is shown.
-        palette: Colours of the world: ``2018`` or ``2020``.
+        palette: Colours of the world: ``2018``, ``2020`` or ``2026``.
     """
 
     def __init__(self, track: Track, *, palette: str = "2018") -> None:
