@@ -9,10 +9,12 @@ namespace racecraft {
 struct DriveOnDevice {
     const Batch& batch;
 
-    void move(int32_t begin, int32_t end, const Commands& commands) {
+    void move(int32_t begin, int32_t end, const Commands& commands, int32_t first, int32_t last) {
         for (int32_t env = begin; env < end; ++env) {
             const int32_t i = env - commands.first;
-            if (commands.is_moving[i] != 0.0f) drive(env, commands.steering[i], commands.speed[i]);
+            if (commands.is_moving[i] != 0.0f) {
+                drive(env, commands.steering[i], commands.speed[i], first, last);
+            }
         }
     }
 
@@ -26,8 +28,8 @@ struct DriveOnDevice {
 
     void see(int32_t env) { batch.is_changed[env] = 1; }
 
-    // One control step of physics.
-    void drive(int32_t env, float steering, float speed) {
+    // Substeps [first, last) of a control step of physics.
+    void drive(int32_t env, float steering, float speed, int32_t first, int32_t last) {
         const size_t n = static_cast<size_t>(batch.num_envs);
         const float* parameter = batch.parameters + env;
         const float sim_dt = kControlDt / static_cast<float>(batch.substeps);
@@ -41,7 +43,7 @@ struct DriveOnDevice {
             for (size_t k = 0; k < 4; ++k) earlier[k] = batch.earlier[k * n + static_cast<size_t>(env)];
         }
         VehicleState car = load_vehicle(batch, env);
-        for (int32_t substep = 0; substep < batch.substeps; ++substep) {
+        for (int32_t substep = first; substep < last; ++substep) {
             car = vehicle_substep(
                 constants, car,
                 acting_command(substep, batch.substeps, delay, steering, earlier[0], earlier[2]),

@@ -19,8 +19,8 @@ RC_HD const GroundView& ground_of(const Batch& batch, int32_t env) {
 }
 
 RC_HD LensPose lens_of(const Batch& batch, int32_t env, const CameraView& camera, const GroundView& ground) {
-    const VehicleState car = load_vehicle(batch, env);
-    return place_lens(camera, ground, car.x, car.y, car.heading);
+    const Sight from = sight_of(batch, env);
+    return place_lens(camera, ground, from.x, from.y, from.heading);
 }
 
 }  // namespace racecraft

@@ -196,7 +196,7 @@ void bind_engine(nb::module_& m) {
                double start_advance, bool start_spread, float lateral_jitter, float heading_jitter,
                int direction, const ObjectRule& objects, bool has_lidar, float baseline, bool draws_tracks,
                const std::vector<float>& randomization, const std::string& world, size_t cars_per_race,
-               bool shuffle) {
+               bool shuffle, int picture_age) {
                 std::vector<TrackStore> stores;
                 for (const bool reversed : {false, true}) {
                     for (const NativeTrack* track : tracks) stores.push_back(track->store(reversed));
@@ -214,7 +214,8 @@ void bind_engine(nb::module_& m) {
                     has_lidar,
                     baseline,
                     draws_tracks,
-                    cars_per_race};
+                    cars_per_race,
+                    picture_age};
                 std::optional<Randomization> ranges;
                 if (!randomization.empty()) ranges = randomization_of(randomization);
                 new (self)
@@ -227,7 +228,7 @@ void bind_engine(nb::module_& m) {
             "start_advance"_a, "start_spread"_a, "lateral_jitter"_a, "heading_jitter"_a, "direction"_a,
             "objects"_a, "has_lidar"_a, "baseline"_a, "draws_tracks"_a = false,
             "randomization"_a = std::vector<float>(), "world"_a = "2018", "cars_per_race"_a = size_t{1},
-            "shuffle"_a = false)
+            "shuffle"_a = false, "picture_age"_a = 0)
         .def(
             "reset",
             [](Engine& self, Mask mask, std::optional<Seeds> seeds) {

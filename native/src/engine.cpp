@@ -17,7 +17,7 @@ namespace racecraft {
 struct Engine::DriveHere {
     Engine& engine;
 
-    void move(int32_t begin, int32_t end, const Commands& commands) {
+    void move(int32_t begin, int32_t end, const Commands& commands, int32_t first, int32_t last) {
         const size_t n = engine.num_envs();
         float* fields = engine.vehicles_.data();
         const VehicleArrays arrays{fields,
@@ -36,7 +36,8 @@ struct Engine::DriveHere {
                                    engine.earlier_.empty() ? nullptr : engine.earlier_.data()};
         for (int32_t env = begin; env < end; env += kLanes) {
             const int count = std::min(end - env, kLanes);
-            RC_DISPATCH(advance_vehicles, arrays, static_cast<size_t>(env), count, engine.batch_.substeps);
+            RC_DISPATCH(advance_vehicles, arrays, static_cast<size_t>(env), count, first, last,
+                        engine.batch_.substeps);
         }
     }
 
@@ -102,6 +103,7 @@ void Engine::set_up_batch(const EngineConfig& config, const VehicleParameters& v
     b.has_cameras = randomization != nullptr && randomization->has_cameras() && camera_ != nullptr;
     b.draws_tracks = config.draws_tracks;
     b.substeps = config.substeps;
+    b.picture_age = camera_ != nullptr ? config.picture_age : 0;
     b.direction = config.direction;
     b.limits = config.limits;
     b.start = config.start;
@@ -143,6 +145,7 @@ void Engine::allocate() {
     b.conditions = place(conditions_, b.is_randomized ? n : 0, Conditions{});
     b.delay = place(delay_, b.has_latency ? n : 0, 0);
     b.earlier = place(earlier_, b.has_latency ? 4 * n : 0, 0.0f);
+    b.seen_from = place(seen_from_, b.picture_age > 0 ? 3 * n : 0, 0.0f);
     flags_ = std::make_unique<bool[]>(2 * n);
     b.terminated = reinterpret_cast<uint8_t*>(flags_.get());
     b.truncated = b.terminated + n;
@@ -176,20 +179,20 @@ void Engine::draw(int32_t env) {
     const size_t car = static_cast<size_t>(env);
     const size_t pixels = static_cast<size_t>(batch_.num_pixels);
     uint8_t* frame = &frames_[car * num_lenses() * pixels];
-    const VehicleState state = load_vehicle(batch_, env);
-    render(cameras_.empty() ? *camera_ : cameras_[car], env, state, frame);
+    render(cameras_.empty() ? *camera_ : cameras_[car], env, frame);
     if (right_camera_ != nullptr) {
-        render(right_cameras_.empty() ? *right_camera_ : right_cameras_[car], env, state, frame + pixels);
+        render(right_cameras_.empty() ? *right_camera_ : right_cameras_[car], env, frame + pixels);
     }
 }
 
-void Engine::render(const CameraModel& camera, int32_t env, const VehicleState& state, uint8_t* frame) {
+void Engine::render(const CameraModel& camera, int32_t env, uint8_t* frame) {
     const size_t car = static_cast<size_t>(env);
     const GroundMap& ground = *grounds_[static_cast<size_t>(episodes_[car].track) % num_tracks()];
     const Sheen& sheen = batch_.colours.sheen;
-    render_grey(camera, ground, palettes_[car], sheen, state.x, state.y, state.heading, frame);
+    const Sight from = sight_of(batch_, env);
+    render_grey(camera, ground, palettes_[car], sheen, from.x, from.y, from.heading, frame);
     if (batch_.num_objects > 0) {
-        const LensPose lens = place_lens(camera.view(), ground.view(), state.x, state.y, state.heading);
+        const LensPose lens = place_lens(camera.view(), ground.view(), from.x, from.y, from.heading);
         RC_DISPATCH(draw_objects, camera.spec(), lens, around(batch_, env), frame);
     }
     if (!conditions_.empty()) {
@@ -251,6 +254,7 @@ void Engine::set_pose(size_t car, float x, float y, float heading, float speed) 
     state.heading = wrap_angle(heading);
     state.speed = speed;
     store_vehicle(batch_, env, state);
+    take_sight(batch_, env);
     forget_commands(batch_, env);
     Episode& episode = episodes_[car];
     episode.falling_steps = 0;
@@ -283,6 +287,7 @@ void Engine::visit_saved(Visitor&& visit) {
     visit(palettes_.data(), palettes_.size() * sizeof(GreyPalette));
     visit(objects_.data(), objects_.size() * sizeof(ObjectState));
     visit(earlier_.data(), earlier_.size() * sizeof(float));
+    visit(seen_from_.data(), seen_from_.size() * sizeof(float));
     visit(flags_.get(), 2 * num_envs() * sizeof(bool));
 }
 
@@ -363,6 +368,7 @@ const char* Engine::find_fault() const {
     if (!std::all_of(rows_.begin(), rows_.end(), [](double value) { return std::isfinite(value); }))
         return "holds a row that cannot be.";
     if (!std::all_of(vehicles_.begin(), vehicles_.end(), is_number)) return "holds a car that is nowhere.";
+    if (!std::all_of(seen_from_.begin(), seen_from_.end(), is_number)) return "holds a picture from nowhere.";
     if (!std::all_of(earlier_.begin(), earlier_.end(), is_number)) return "holds a command that cannot be.";
     if (!std::all_of(parameters_.begin(), parameters_.end(), is_number)) return "holds a car that cannot be.";
     if (const char* fault = racecraft::find_fault(objects_)) return fault;

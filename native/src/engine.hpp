@@ -26,6 +26,7 @@ struct EngineConfig {
         0.0f;  // m between the two lenses of a stereo camera, left and right of its place; 0 for one
     bool draws_tracks = false;  // a track for every episode by chance, instead of track_choice
     size_t cars_per_race = 1;   // num_envs is a multiple of it
+    int picture_age = 0;        // substeps from when a picture is taken to the end of its step
 };
 
 // Calls from several threads wait for each other; the arrays are shared all the same.
@@ -90,7 +91,7 @@ class Engine {
     void see_from(int32_t env);     // the current pose
     void show_others(int32_t env);  // the others of its race what has changed about a car between two steps
     void draw(int32_t env);
-    void render(const CameraModel& camera, int32_t env, const VehicleState& state, uint8_t* frame);
+    void render(const CameraModel& camera, int32_t env, uint8_t* frame);
     size_t chunk_size(size_t most) const;
     template <typename Work>
     void for_chunks(size_t most, Work&& work);  // work(begin, end, here) by all threads
@@ -113,6 +114,7 @@ class Engine {
     std::vector<float> vehicles_, parameters_, steering_command_, speed_command_, is_moving_, state_;
     std::vector<double> rows_;
     std::vector<float> lidar_;
+    std::vector<float> seen_from_;  // (3, N), empty where pictures are as new as the cars
     std::vector<uint8_t> frames_;
     std::vector<Episode> episodes_;
     std::vector<ObjectState> objects_;  // the worlds of all races, one after the other

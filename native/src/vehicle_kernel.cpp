@@ -18,7 +18,8 @@ struct ConstantLanes {
 
 }  // namespace
 
-void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int substeps) {
+void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int first, int last,
+                      int substeps) {
     const float sim_dt = kControlDt / static_cast<float>(substeps);
     alignas(64) Lanes lanes;
     alignas(64) ConstantLanes constants;
@@ -53,14 +54,14 @@ void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int 
             }
         }
     };
-    const size_t last = begin + static_cast<size_t>(count) - 1;
+    const size_t last_car = begin + static_cast<size_t>(count) - 1;
     if (count == kLanes) {
         load([&](int i) { return begin + static_cast<size_t>(i); });  // in a row: vector code
     } else {  // unused lanes repeat the last car and are not stored
-        load([&](int i) { return std::min(begin + static_cast<size_t>(i), last); });
+        load([&](int i) { return std::min(begin + static_cast<size_t>(i), last_car); });
     }
 
-    for (int substep = 0; substep < substeps; ++substep) {
+    for (int substep = first; substep < last; ++substep) {
 #pragma GCC ivdep
         for (int i = 0; i < kLanes; ++i) {
 #define RC_LOAD(name) constants.name[i],

@@ -28,10 +28,12 @@ struct VehicleArrays {
                                      // it, (4, stride)
 };
 
-// Advances cars [begin, begin + count), count in 1..kLanes, by one control step of `substeps` physics steps.
-#define RC_DECLARE(isa)                                                                        \
-    namespace isa {                                                                            \
-    void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int substeps); \
+// Advances cars [begin, begin + count), count in 1..kLanes, by substeps [first, last) of the `substeps` of a
+// control step.
+#define RC_DECLARE(isa)                                                                              \
+    namespace isa {                                                                                  \
+    void advance_vehicles(const VehicleArrays& arrays, size_t begin, int count, int first, int last, \
+                          int substeps);                                                             \
     }
 RC_FOR_EACH_ISA(RC_DECLARE)
 #undef RC_DECLARE

@@ -365,7 +365,7 @@ double drive_corners(const std::vector<uint32_t>& corners, int steps, int subste
         if (step % 150 == 90) speed.assign(n, step % 300 == 90 ? 0.0f : kMaxSpeedCommand);
         for (size_t begin = 0; begin < n; begin += kLanes) {
             const int count = static_cast<int>(std::min(n - begin, size_t{kLanes}));
-            RC_DISPATCH(advance_vehicles, arrays, begin, count, substeps);
+            RC_DISPATCH(advance_vehicles, arrays, begin, count, 0, substeps, substeps);
         }
         for (size_t car = 0; car < n; ++car) {
             const double total =

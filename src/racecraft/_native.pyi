@@ -49,11 +49,6 @@ class CameraSpec:
     @property
     def height(self) -> int: ...
 
-class GreyPalette:
-    """Brightness of everything a driver's camera can see."""
-
-def grey_palette(name: str) -> GreyPalette: ...
-
 class GroundMap:
     """The ground of a track as cameras see it."""
 
@@ -67,7 +62,7 @@ class CameraModel:
 
     def __init__(self, spec: CameraSpec) -> None: ...
 
-def render_grey(camera: CameraModel, ground: GroundMap, palette: GreyPalette, poses: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.uint8], dict(shape=(None, None, None), order='C', device='cpu')]) -> None: ...
+def render_grey(camera: CameraModel, ground: GroundMap, palette: str, poses: Annotated[NDArray[numpy.float32], dict(shape=(None, 3), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.uint8], dict(shape=(None, None, None), order='C', device='cpu')]) -> None: ...
 
 def chase_camera(width: int, height: int) -> CameraSpec: ...
 
@@ -93,7 +88,7 @@ class NativeTrack:
 class Engine:
     """A batch of cars; see racecraft.sim.Simulation, its Python face."""
 
-    def __init__(self, tracks: Sequence[NativeTrack], grounds: Sequence[GroundMap], vehicle: Sequence[float], camera: CameraSpec | None, palette: GreyPalette, num_envs: int, seed: int, substeps: int, num_threads: int, laps: int, max_steps: int, time_limit: float, start_mode: int, start_offset: float, start_advance: float, start_spread: bool, lateral_jitter: float, heading_jitter: float, direction: int, objects: ObjectRule, has_lidar: bool, baseline: float, draws_tracks: bool = False, randomization: Sequence[float] = [], world: str = '2018', cars_per_race: int = 1, shuffle: bool = False) -> None: ...
+    def __init__(self, tracks: Sequence[NativeTrack], grounds: Sequence[GroundMap], vehicle: Sequence[float], camera: CameraSpec | None, num_envs: int, seed: int, substeps: int, num_threads: int, laps: int, max_steps: int, time_limit: float, start_mode: int, start_offset: float, start_advance: float, start_spread: bool, lateral_jitter: float, heading_jitter: float, direction: int, objects: ObjectRule, has_lidar: bool, baseline: float, draws_tracks: bool = False, randomization: Sequence[float] = [], world: str = '2018', cars_per_race: int = 1, shuffle: bool = False, picture_age: int = 0) -> None: ...
 
     def reset(self, mask: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)], seeds: Annotated[NDArray[numpy.uint64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None) -> None: ...
 
@@ -244,7 +239,7 @@ class DevicePlan:
 
     def batch(self, world: int, addresses: Sequence[int]) -> Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C')]: ...
 
-BATCH_BYTES: int = 1424
+BATCH_BYTES: int = 1456
 
 CAR_THREADS: int = 128
 

@@ -22,6 +22,7 @@ CASES = {
     "small camera": {"camera": CameraSpec(width=64, height=48), **PLAIN},
     "odd camera": {"camera": CameraSpec(width=37, height=29, pitch=0.4, above_ground=0.3), **PLAIN},
     "original camera": {"camera": CameraSpec(), **PLAIN, "start": Start(spread=True)},
+    "camera of 2026": {"camera": CameraSpec(width=64, height=48, palette="2026", age=0.025), **PLAIN},
     "stereo": {"camera": CameraSpec(width=64, height=48, baseline=0.06), **PLAIN},
     "laps and time": {"camera": None, "start": Start(spread=True), "laps": 2, "time_limit": 3.0, "substeps": 5},
     "lidar": {"camera": None, "lidar": True, "objects": Objects(obstacles=Obstacles(count=5)), **PLAIN},
@@ -88,7 +89,7 @@ def test_kernels_and_engine_give_the_same_bits(name, device):
     assert kernels.save().tobytes() == engine.save().tobytes()
 
 
-@pytest.mark.parametrize("name", ["bots", "randomised"])
+@pytest.mark.parametrize("name", ["bots", "randomised", "camera of 2026"])
 def test_states_go_from_one_to_the_other(name, device):
     kernels, engine = pair(name, device, cars=9)
     for step in range(12):

@@ -103,10 +103,12 @@ def rates(car: Vehicle, state: np.ndarray, steering_command: float, speed_comman
     )
 
 
-def move(car: Vehicle, pose: Pose, action: tuple[float, float], *, substeps: int = 8) -> Pose:
-    """One control step of classic Runge-Kutta of fourth order."""
+def move(
+    car: Vehicle, pose: Pose, action: tuple[float, float], *, substeps: int = 8, sim_dt: float | None = None
+) -> Pose:
+    """One control step of classic Runge-Kutta of fourth order, or with sim_dt so many substeps of that."""
     steering, speed = command(action)
-    state, dt = pose.array(), DT / substeps
+    state, dt = pose.array(), DT / substeps if sim_dt is None else sim_dt
     for _ in range(substeps):
         k1 = rates(car, state, steering, speed)
         k2 = rates(car, state + dt / 2 * k1, steering, speed)

@@ -30,9 +30,10 @@ namespace racecraft {
     X(truncated, uint8_t, 1)                                                                        \
     X(is_changed, uint8_t, 1) /* its frame is old */                                                \
     X(conditions, Conditions, is_randomized)                                                        \
-    X(delay, int32_t, has_latency)      /* substeps */                                              \
-    X(earlier, float, 4 * has_latency)  /* (4, N), see VehicleArrays */                             \
-    X(cameras, CameraView, has_cameras) /* of each car, where they differ */                        \
+    X(delay, int32_t, has_latency)             /* substeps */                                       \
+    X(earlier, float, 4 * has_latency)         /* (4, N), see VehicleArrays */                      \
+    X(seen_from, float, 3 * (picture_age > 0)) /* (3, N), x, y, heading: see sight_of() */          \
+    X(cameras, CameraView, has_cameras)        /* of each car, where they differ */                 \
     X(camera_tables, uint8_t, has_cameras* camera_bytes)                                            \
     X(blurred, uint8_t, is_randomized * num_lenses * num_pixels) /* between two passes of a blur */
 
@@ -50,6 +51,7 @@ struct Batch {
 
     // Settings.
     int32_t substeps;
+    int32_t picture_age;  // substeps from when a picture is taken to the end of its step
     Direction direction;
     RuleLimits limits;
     StartRule start;

@@ -62,6 +62,27 @@ RC_HD void store_vehicle(const Batch& batch, int32_t env, const VehicleState& st
     field[6 * n] = state.steering;
 }
 
+// --- where a car's picture is taken from
+
+struct Sight {
+    float x, y, heading;
+};
+
+// Keeps where a car is for the picture that it takes there; nothing where pictures are as new as the car.
+RC_HD void take_sight(const Batch& batch, int32_t env) {
+    if (batch.picture_age == 0) return;
+    const size_t n = static_cast<size_t>(batch.num_envs);
+    for (size_t field = 0; field < 3; ++field)  // the first of a VehicleState
+        batch.seen_from[field * n + static_cast<size_t>(env)] =
+            batch.vehicles[field * n + static_cast<size_t>(env)];
+}
+
+RC_HD Sight sight_of(const Batch& batch, int32_t env) {
+    const size_t n = static_cast<size_t>(batch.num_envs);
+    const float* field = (batch.picture_age > 0 ? batch.seen_from : batch.vehicles) + env;
+    return {field[0], field[n], field[2 * n]};
+}
+
 RC_HD void store_parameters(const Batch& batch, int32_t env, const VehicleParameters& car) {
     const size_t n = static_cast<size_t>(batch.num_envs);
     float* parameter = batch.parameters + env;

@@ -7,9 +7,9 @@
 // Each is done for all cars of a race before the next, so the order of the cars means nothing. What the two
 // do differently is in a Device:
 //
-//   move(begin, end, commands)   physics of the cars that move
-//   aim(env)                     new conditions: the car's cameras follow
-//   see(env)                     a new view: LIDAR and frames follow
+//   move(begin, end, commands, first, last)   physics of the cars that move, substeps [first, last)
+//   aim(env)                                  new conditions: the car's cameras follow
+//   see(env)                                  a new view: LIDAR and frames follow
 #pragma once
 
 #include "racecraft/cars.hpp"
@@ -127,11 +127,17 @@ RC_HD void step_races(const Batch& batch, int32_t begin, int32_t end, const floa
     for (int32_t env = begin; env < end; ++env) {
         any_moving |= judge_car(batch, env, actions[2 * env], actions[2 * env + 1], commands);
     }
-    // Others drive on around a car that stands as a penalty, so its view changes, too.
-    const bool is_lively = has_bots(batch) || has_racers(batch);
+    // Others drive on around a car that stands as a penalty, so its view changes, too; and where pictures
+    // are older than the car, one that has just stopped sees the last of its way a step later.
+    const bool is_lively = has_bots(batch) || has_racers(batch) || batch.picture_age > 0;
     if (!any_moving && !is_lively) return;
 
-    device.move(begin, end, commands);
+    const int32_t taken = batch.substeps - batch.picture_age;
+    if (taken > 0) device.move(begin, end, commands, 0, taken);
+    for (int32_t env = begin; env < end; ++env) {
+        if (commands.is_moving[env - commands.first] != 0.0f || !is_over(batch, env)) take_sight(batch, env);
+    }
+    if (taken < batch.substeps) device.move(begin, end, commands, taken, batch.substeps);
     for (int32_t env = begin; env < end; ++env) {
         const int32_t i = env - commands.first;
         if (commands.is_moving[i] != 0.0f) {
@@ -205,6 +211,7 @@ RC_HD void begin_episode(const Batch& batch, int32_t env, int32_t slot, bool is_
     }
     forget_commands(batch, env);
     store_vehicle(batch, env, start_of(batch, env, slot, is_new_race));
+    take_sight(batch, env);
     publish(batch, env);
 }
 

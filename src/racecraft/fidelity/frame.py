@@ -116,7 +116,7 @@ def fit_frame(frame: str | Path, *, track: str | Path | Track, palette: str = "2
         fits = [_refine(road, smaller, target, pose, divisor) for pose in best]
         fits.sort(key=lambda fit: fit[0])
         best = _distinct([pose for _, pose in fits], keep)
-    camera, pose = _refine_lens(road, camera, seen, _next_dashes(road, camera, seen, best[0]))
+    camera, pose = refine_lens(road, camera, seen, _next_dashes(road, camera, seen, best[0]))
     pose[2] = np.arctan2(np.sin(pose[2]), np.cos(pose[2]))
     small = np.asarray(_shrink_image(picture), dtype=float)
     colour = Scene(road, palette=palette).driver_view(camera, lit_walls=False).draw(*pose)
@@ -293,8 +293,15 @@ def _shifted(track: Track, camera: CameraSpec, pose: Numbers) -> list[Numbers]:
     return poses
 
 
-def _refine_lens(track: Track, camera: CameraSpec, seen: Grey, pose: Numbers) -> tuple[CameraSpec, Numbers]:
-    """Pose, pitch and height of the lens together."""
+def refine_lens(track: Track, camera: CameraSpec, seen: Grey, pose: Numbers) -> tuple[CameraSpec, Numbers]:
+    """Pose, pitch and height of the lens together, from a pose that is nearly right.
+
+    Args:
+        track: Where the frame was taken.
+        camera: Its look, and a lens to begin with.
+        seen: The frame, grey (120, 160).
+        pose: x [m], y [m] and heading [rad] of the car's origin (3,).
+    """
     lens = np.array([camera.pitch, camera.above_ground])
 
     def with_lens(values: Numbers) -> CameraSpec:

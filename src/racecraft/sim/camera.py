@@ -31,6 +31,9 @@ class CameraSpec:
     baseline: float = 0.0
     """m between the two lenses of a stereo camera, half of it to either side of `left`; 0 for one lens. AWS's
     has 0.06."""
+    age: float = 0.0
+    """s that a picture is old when the command that answers it begins to act, 0 to 1/15; rounded to whole substeps of
+    physics. What moves besides the car is drawn where it is at the end of the step."""
     palette: str = "2018"
     """Colours of the world: ``2018``, ``2020`` or ``2026``."""
 
@@ -44,7 +47,17 @@ class CameraSpec:
             "above_ground": (0.02, 0.9),
             "pitch": (0.0, 1.5),
             "baseline": (0.0, 0.5),
+            "age": (0.0, 1.0 / 15.0),
         }
         for name, (low, high) in limits.items():
             check_number(f"Camera setting {name}", getattr(self, name), low, high)
         check_choice("Camera palette", self.palette, PALETTES)
+
+
+CAMERAS: Final = {
+    "2018": CameraSpec(),
+    "2020": CameraSpec(palette="2020"),
+    "2026": CameraSpec(palette="2026", pitch=0.2365, age=0.0275),
+}
+"""The original's camera over the years. That of 2026 is fitted to a lap of its frames and judged by another
+(``docs/fidelity.md``): colours and sheen, the pitch, and how much older a frame is than the row that comes next."""

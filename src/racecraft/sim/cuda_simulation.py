@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -40,6 +41,7 @@ SAVED: Final = (  # the order of Engine::visit_saved, so that states go from one
     "palettes",
     "objects",
     "earlier",
+    "seen_from",
     "terminated",
     "truncated",
 )
@@ -206,7 +208,9 @@ class CudaSimulation:
         Raises:
             ShapeError: The bytes are not from a simulation of this shape, or damaged.
         """
-        settings = {**self.settings, "camera": None, "lidar": False, "num_threads": 0}
+        camera = self.camera  # its pictures' age is part of what is saved, its pictures are not
+        small = None if camera is None or camera.age == 0.0 else replace(camera, width=8, height=8)
+        settings = {**self.settings, "camera": small, "lidar": False, "num_threads": 0}
         Simulation(self.tracks, num_envs=self.num_envs, **settings).load(saved)  # refuses what a kernel must not read
         begin = 0
         for name in SAVED:

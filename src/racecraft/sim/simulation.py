@@ -223,6 +223,7 @@ class Simulation:
             baseline=camera.baseline if camera else 0.0,
             cars_per_race=cars_per_race,
             shuffle=start.shuffle,
+            picture_age=round(camera.age / CONTROL_DT * substeps) if camera else 0,
         )
         frames: NDArray[np.uint8] = self._engine.frames  # (N, lenses, height, width)
         is_stereo = camera is not None and camera.baseline > 0.0
