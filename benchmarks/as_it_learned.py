@@ -53,21 +53,27 @@ def main() -> None:
     parser.add_argument("--track", required=True, help="the route it was trained on")
     parser.add_argument("--seeds", default="1,2,3,4,5", help="as 1,2,3")
     parser.add_argument("--vehicle", default="v5")
+    parser.add_argument("--camera", default="2018", help="2026 has pictures as old as the original's")
     parser.add_argument("--num-threads", type=int, default=1)
-    parser.add_argument("-o", "--output", type=Path, help="write the table here")
+    parser.add_argument("-o", "--output", type=Path, help="the table; seeds in it are not trained again")
     parser.add_argument("--picture", type=Path, help="draw the curves here")
     options = parser.parse_args()
 
     known = json.loads(options.run.with_suffix(".json").read_text(encoding="utf-8"))
     per_iteration = known["hyperparameters"]["num_episodes_between_training"]
     real = of_the_original(options.run.with_suffix(".csv.gz"), known, per_iteration)
-    ours = []
-    for seed in map(int, options.seeds.split(",")):
-        ours.append(learn(known, seed, options, num_episodes=per_iteration * len(real)))
-        print(f"seed {seed}: {shown(ours[-1], 'progress')} % of a lap, {shown(ours[-1], 'steps')} steps", flush=True)
-        table = {"original": real, "seeds": ours}
+    learned: dict[str, Iterations] = {}
+    if options.output is not None and options.output.exists():
+        learned = json.loads(options.output.read_text(encoding="utf-8"))["seeds"]
+    for seed in options.seeds.split(","):
+        if seed not in learned:
+            learned[seed] = learn(known, int(seed), options, num_episodes=per_iteration * len(real))
+        found = learned[seed]
+        print(f"seed {seed}: {shown(found, 'progress')} % of a lap, {shown(found, 'steps')} steps", flush=True)
         if options.output is not None:
+            table = {"original": real, "seeds": learned}
             options.output.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    ours = list(learned.values())
     print(f"original: {shown(real, 'progress')} % of a lap, {shown(real, 'steps')} steps")
     inside = []
     for number, iteration in enumerate(real):
@@ -109,6 +115,7 @@ def learn(known: dict[str, Any], seed: int, options: argparse.Namespace, *, num_
             until="10 hours",
             critic="camera",
             vehicle=options.vehicle,
+            camera=options.camera,
             seed=seed,
             num_threads=options.num_threads,
             root=folder / "runs",

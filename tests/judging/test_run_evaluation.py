@@ -12,8 +12,10 @@ from racecraft import evaluate, train
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
 from racecraft.learn import PPOConfig
 from racecraft.run import RunFolder
-from racecraft.sim import Vehicle
+from racecraft.sim import CameraSpec, Vehicle
+from racecraft.sim.camera import CAMERAS
 from racecraft.track import generate_track
+from racecraft.training import SilentReporter
 
 
 def trained(root: Path, **settings: Any) -> Path:
@@ -34,6 +36,25 @@ def test_it_evaluates_as_it_was_trained(tmp_path: Path) -> None:
     assert evaluate(run, **QUICK, direction="forward").evaluation.rules.direction == "forward"
     best = [evaluate(run, **QUICK, vehicle=vehicle).to_dict()["mean_completion"] for vehicle in (None, "v4")]
     assert best[0] == found.to_dict()["mean_completion"]
+
+
+def test_a_run_learns_and_is_evaluated_with_its_camera(tmp_path: Path) -> None:
+    class Seen(SilentReporter):
+        def begin(self, simulation: Any, policy: Any) -> None:
+            cameras.append(simulation.camera)
+
+    cameras: list[CameraSpec] = []
+    run = trained(tmp_path, camera="2026", reporter=Seen())
+    assert cameras == [CAMERAS["2026"]]
+    assert evaluate(run, **QUICK).evaluation.conditions.camera == CAMERAS["2026"]
+    document = json.loads((run / "run.json").read_text())
+    assert document["settings"].pop("camera") == "2026"
+    (run / "run.json").write_text(json.dumps(document))  # as runs of earlier versions are
+    assert evaluate(run, **QUICK).evaluation.conditions.camera == CameraSpec()
+    document["settings"]["camera"] = "2031"
+    (run / "run.json").write_text(json.dumps(document))
+    with pytest.raises(RunError, match=r"'2031' in run\.json is none of this version"):
+        evaluate(run, **QUICK)
 
 
 def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ SETTINGS = TrainSettings(
     network="DEEP_CONVOLUTIONAL_NETWORK_SHALLOW",
     critic="camera",
     vehicle=Vehicle(mass=5.0),
+    camera="2026",
     start=Start(mode="random", lateral_jitter=0.1),
     direction="alternate",
     ppo=PPOConfig(num_envs=7, learning_rate=1e-4, exploration="e-greedy"),

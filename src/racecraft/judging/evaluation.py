@@ -23,7 +23,7 @@ from racecraft.film.ghost_source import check_sources, load_ghosts
 from racecraft.film.racing_line import draw_racing_line
 from racecraft.film.video import film
 from racecraft.json_file import read_json_object
-from racecraft.judging.trained import trained_objects, trained_track, trained_vehicle
+from racecraft.judging.trained import trained_camera, trained_objects, trained_track, trained_vehicle
 from racecraft.limits import TrackLimit, known_limit
 from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.evaluation import evaluate
@@ -136,7 +136,7 @@ def evaluate_run(
     job: str = "",
     num_threads: int = 0,
     load: PolicyLoader = load_policy,
-    camera: CameraSpec = CameraSpec(),
+    camera: CameraSpec | None = None,
     about: Mapping[str, Any] = MappingProxyType({}),
 ) -> RunEvaluation:
     """Race a run's policy against the clock.
@@ -164,7 +164,7 @@ def evaluate_run(
         job: Written into ``evaluation.json``, by which whoever asked for the evaluation finds it again.
         num_threads: 0 takes one per core.
         load: Takes the policy from the run.
-        camera: What the policy sees with.
+        camera: What the policy sees with; by default what it was trained with.
         about: Written into ``evaluation.json``, too: how it was driven.
 
     Raises:
@@ -199,7 +199,7 @@ def evaluate_run(
         num_trials=num_trials,
         seed=seed,
         vehicle=vehicle,
-        camera=camera,
+        camera=trained_camera(info) if camera is None else camera,
         randomize=randomize,
         objects=trained_objects(info) if objects is None else objects,
         num_threads=num_threads,

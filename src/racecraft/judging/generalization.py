@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.errors import RunError
-from racecraft.judging.trained import trained_vehicle
+from racecraft.judging.trained import trained_camera, trained_vehicle
 from racecraft.race.generalization import DIRECTIONS, Generalization, generalize
 from racecraft.race.policy import load_policy
 from racecraft.run.atomic import write_json
@@ -79,6 +79,7 @@ def generalize_run(
         num_trials=num_trials,
         seed=seed,
         vehicle=vehicle,
+        camera=trained_camera(info),
         randomize=randomize,
         sensors=policy.sensors,
         num_threads=num_threads,

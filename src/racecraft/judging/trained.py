@@ -1,9 +1,10 @@
-"""What a run was trained with, where nothing else is asked for: its car, its objects and its track."""
+"""What a run was trained with, where nothing else is asked for: its car, its camera, its objects and its track."""
 
 from __future__ import annotations
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.run.folder import RunInfo
+from racecraft.sim.camera import CAMERAS, CameraSpec
 from racecraft.sim.objects import Objects
 from racecraft.sim.vehicle import Vehicle
 from racecraft.track import Track, joint_digest, load_tracks
@@ -19,6 +20,18 @@ def trained_vehicle(info: RunInfo) -> Vehicle:
         return Vehicle(**info.settings.get("vehicle", {}))
     except TypeError as error:
         raise RunError(f"The vehicle in run.json does not fit this version of Racecraft: {error}.") from error
+
+
+def trained_camera(info: RunInfo) -> CameraSpec:
+    """The camera of run.json; runs of earlier versions have the only one that there was.
+
+    Raises:
+        RunError: It is of another version.
+    """
+    name = info.settings.get("camera", "2018")
+    if name not in CAMERAS:
+        raise RunError(f"The camera {name!r} in run.json is none of this version of Racecraft: {', '.join(CAMERAS)}.")
+    return CAMERAS[name]
 
 
 def trained_objects(info: RunInfo) -> Objects:

@@ -20,6 +20,7 @@ from racecraft.errors import RewardError, RunError
 from racecraft.reward.worker import RewardWorker
 from racecraft.run import Episode, EpisodeCounter, PrintLog, SimTraceWriter
 from racecraft.sim import CudaSimulation, Simulation
+from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.track import Track
 from racecraft.training.lap_place import lap_place
@@ -175,7 +176,7 @@ def open_simulation(
         "track_order": "random" if len(tracks) > 1 else "fixed",
         "randomize": settings.randomize,
         "objects": settings.objects,
-        **sensors.simulation_settings(),
+        **sensors.simulation_settings(CAMERAS[settings.camera]),
     }
     if settings.device == "cpu":
         return Simulation(tracks, num_threads=settings.num_threads, **common)

@@ -16,6 +16,7 @@ from racecraft.race.policy import NetworkPolicy
 from racecraft.race.rules import RULE_SETS
 from racecraft.run import Episode, EpisodeCounter
 from racecraft.sim import CONTROL_DT
+from racecraft.sim.camera import CAMERAS
 from racecraft.track import Track
 from racecraft.training.progress import EvaluationReport
 from racecraft.training.regimes import regime_of
@@ -50,7 +51,7 @@ class Evaluator:
             vehicle=settings.vehicle,
             randomize=settings.randomize,
             objects=settings.objects,
-            camera=policy.sensors.camera(),
+            camera=policy.sensors.camera(CAMERAS[settings.camera]),
             has_lidar=bool(policy.sensors.lidar_name),
             num_threads=settings.num_threads,
         )

@@ -12,7 +12,8 @@ from racecraft.checks import check_choice, check_type, check_whole
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.learn import DistillConfig, NetworkSpec, PPOConfig, SACConfig, network_names
 from racecraft.learn.sb3 import SB3Config
-from racecraft.sim import CameraSpec, Randomization, Start, Vehicle, load_randomization, load_vehicle
+from racecraft.sim import Randomization, Start, Vehicle, load_randomization, load_vehicle
+from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import state_width
 from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import DIRECTIONS
@@ -24,7 +25,7 @@ from racecraft.training.stop import Until
 
 DEFAULT_TRACK: Final = "reinvent_2018"
 VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
-_ADDED: Final = ("algorithm", "opponents", "sac", "distill", "sb3", "device")
+_ADDED: Final = ("algorithm", "opponents", "sac", "distill", "sb3", "device", "camera")
 """Fields that runs of earlier versions lack."""
 _DROPPED: Final = (("growth_steps", 0),)
 """Settings of PPO that runs of earlier versions have, with the value that meant nothing."""
@@ -48,6 +49,8 @@ class TrainSettings:
     ``camera`` alone, as AWS's."""
     vehicle: Vehicle = field(default_factory=Vehicle)
     """The car."""
+    camera: str = "2018"
+    """What it sees with, one of `racecraft.sim.camera.CAMERAS`; evaluations of the run do, too."""
     start: Start = field(default_factory=lambda: Start(spread=True))
     """Where training episodes start."""
     direction: str = "forward"
@@ -83,6 +86,7 @@ class TrainSettings:
             ("network", self.network, network_names()),
             ("critic", self.critic, CRITICS),
             ("direction", self.direction, DIRECTIONS),
+            ("camera", self.camera, CAMERAS),
         ):
             check_choice(name, choice, allowed)
         for name, value, low, high in (
@@ -93,7 +97,7 @@ class TrainSettings:
             ("num_threads", self.num_threads, 0, 1024),
         ):
             check_whole(name, value, low, high, is_plain=True)
-        self.randomize.check(self.vehicle, CameraSpec())
+        self.randomize.check(self.vehicle, CAMERAS[self.camera])
         check_type("objects", self.objects, Objects, "use racecraft.sim.Objects(...)")
         kind, _, number = self.device.partition(":") if isinstance(self.device, str) else ("", "", "")
         if self.device != "cpu" and (kind != "cuda" or (":" in self.device and not number.isdecimal())):
