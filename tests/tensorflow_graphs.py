@@ -85,7 +85,7 @@ class GraphWriter:
 # ---- parse
 
 
-def _fields(data: bytes) -> Iterator[tuple[int, Any]]:
+def fields(data: bytes) -> Iterator[tuple[int, Any]]:
     place = 0
 
     def read() -> int:
@@ -118,21 +118,21 @@ class ParsedNode:
 
 def parse_graph(data: bytes) -> dict[str, ParsedNode]:
     nodes = {}
-    for field, body in _fields(data):
+    for field, body in fields(data):
         if field == 1:
-            parts = list(_fields(body))
+            parts = list(fields(body))
             attributes = {}
             for entry in (value for part, value in parts if part == 5):
-                pair = dict(_fields(entry))
-                attributes[pair[1].decode()] = dict(_fields(pair[2]))
+                pair = dict(fields(entry))
+                attributes[pair[1].decode()] = dict(fields(pair[2]))
             text = {part: value.decode() for part, value in parts if part in (1, 2)}
             nodes[text[1]] = ParsedNode(text[2], [value.decode() for part, value in parts if part == 3], attributes)
     return nodes
 
 
 def _tensor(data: bytes) -> NDArray[Any]:
-    parts = dict(_fields(data))
-    shape = [dict(_fields(size)).get(1, 0) for _, size in _fields(parts[2])]
+    parts = dict(fields(data))
+    shape = [dict(fields(size)).get(1, 0) for _, size in fields(parts[2])]
     dtype = _TYPES[parts[1]]
     if 4 in parts:
         values = np.frombuffer(parts[4], dtype)
@@ -140,12 +140,12 @@ def _tensor(data: bytes) -> NDArray[Any]:
         values = np.frombuffer(parts[5], dtype)
     else:
         packed = parts[7] + b"\x00"
-        values = np.array([next(_fields(b"\x08" + packed))[1]], np.uint64).astype(np.int32)
+        values = np.array([next(fields(b"\x08" + packed))[1]], np.uint64).astype(np.int32)
     return values.reshape(shape)
 
 
 def _signed_list(data: bytes) -> list[int]:
-    return [byte for field, packed in _fields(data) if field == 3 for byte in packed]
+    return [byte for field, packed in fields(data) if field == 3 for byte in packed]
 
 
 # ---- run

@@ -45,9 +45,9 @@ def unpacked(archive: Path) -> dict[str, bytes]:
 
 def test_the_archive_is_what_a_car_takes(run: Path) -> None:
     exported = export_run(run)
-    assert exported.archive == run / "to-floor.tar.gz"  # the car would cut the name at its dot
-    assert exported.size == exported.archive.stat().st_size
-    files = unpacked(exported.archive)
+    assert exported.file == run / "to-floor.tar.gz"  # the car would cut the name at its dot
+    assert exported.size == exported.file.stat().st_size
+    files = unpacked(exported.file)
     assert set(files) == {"model_metadata.json", "agent/model.pb"}
     metadata = json.loads(files["model_metadata.json"])
     assert all({"steering_angle", "speed"} <= set(action) for action in metadata["action_space"])
@@ -59,12 +59,12 @@ def test_the_archive_is_what_a_car_takes(run: Path) -> None:
 
 
 def test_the_same_model_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
-    first, second = (export_run(run, output=tmp_path / name / "model.tar.gz").archive for name in ("a", "b"))
+    first, second = (export_run(run, output=tmp_path / name / "model.tar.gz").file for name in ("a", "b"))
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_what_is_read_back_has_the_same_weights_to_the_bit(run: Path) -> None:
-    ours, theirs = load_driver(run).learner.weights(), read_exported(export_run(run).archive).learner.weights()
+    ours, theirs = load_driver(run).learner.weights(), read_exported(export_run(run).file).learner.weights()
     names = [name for name in ours if name.startswith("policy.")]
     assert len(names) > 8
     assert all(np.array_equal(ours[name], theirs[name]) for name in names)
@@ -74,7 +74,7 @@ def test_what_is_read_back_has_the_same_weights_to_the_bit(run: Path) -> None:
 def test_other_actions_and_sensors_are_read_back_as_well(options: dict[str, object], tmp_path: Path) -> None:
     run = trained(tmp_path, name="other", **options)
     policy = load_driver(run)
-    again = read_exported(export_run(run).archive)
+    again = read_exported(export_run(run).file)
     assert again.action_space == policy.action_space
     assert again.sensors.names == policy.sensors.names
     rng = np.random.default_rng(1)
@@ -84,7 +84,7 @@ def test_other_actions_and_sensors_are_read_back_as_well(options: dict[str, obje
 
 def test_an_exported_model_can_be_imported(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    found = import_run(export_run(run, output=tmp_path / "model.tar.gz").archive, track="oval", name="again")
+    found = import_run(export_run(run, output=tmp_path / "model.tar.gz").file, track="oval", name="again")
     frames = np.random.default_rng(2).integers(0, 256, (8, 120, 160), np.uint8)
     assert np.array_equal(load_driver(found.run)(frames), load_driver(run)(frames))
 
@@ -117,7 +117,7 @@ def same(one: Evaluation, other: Evaluation) -> bool:
 @pytest.mark.parametrize("seed", range(5))
 def test_the_file_alone_drives_the_laps_of_its_run_to_the_bit(seed: int, tmp_path: Path) -> None:
     run = train("oval", until="5 laps", seed=seed, num_threads=1, root=tmp_path, name="lapper").run
-    archive = export_run(run).archive
+    archive = export_run(run).file
     own = driven(load_driver(run), seed=seed)
     assert own.laps_completed == 1
     assert same(driven(GraphDriver(archive), seed=seed), own)
@@ -131,7 +131,8 @@ WRONG = {
     "a space": ({"output": "my model.tar.gz"}, ConfigError, "replaces spaces"),
     "no name": ({"output": ".tar.gz"}, ConfigError, "use letters, digits, - and _"),
     "a checkpoint that is not there": ({"checkpoint": 77}, CheckpointError, "77"),
-    "another target": ({"to": "bike"}, ConfigError, "--to is 'bike'; allowed are car"),
+    "another target": ({"to": "bike"}, ConfigError, "--to is 'bike'; allowed are car, onnx"),
+    "an archive as ONNX": ({"to": "onnx", "output": "a.tar.gz"}, ConfigError, "an ONNX model's name ends in .onnx"),
     "a folder in the way": ({"output": "taken/model.tar.gz"}, RunError, "cannot be written"),
 }
 
@@ -165,8 +166,15 @@ def test_a_run_that_a_car_cannot_sense_leaves_no_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kept", [0, 1, 30, 300, 1000, -1])
 def test_a_damaged_archive_is_one_sentence(kept: int, run: Path, tmp_path: Path) -> None:
-    data = export_run(run, output=tmp_path / "model.tar.gz").archive.read_bytes()
+    data = export_run(run, output=tmp_path / "model.tar.gz").file.read_bytes()
     (tmp_path / "model.tar.gz").write_bytes(data[:kept])
     with pytest.raises(RacecraftError) as caught:
         read_exported(tmp_path / "model.tar.gz")
     assert "\n" not in str(caught.value)
+
+
+def test_an_onnx_model_lies_beside_the_run_s_files(run: Path) -> None:
+    exported = export_run(run, to="onnx")
+    assert exported.file == run / "to.floor.onnx"
+    assert exported.notes == ()
+    assert exported.size == exported.file.stat().st_size > 100_000

@@ -12,13 +12,13 @@ def test_export(racecraft: Run, trained: Path) -> None:
     outcome = racecraft("export", str(trained), "--to", "car", "--output", "floor.tar.gz")
     assert outcome.status == 0, outcome.err
     assert "note: Only relative speed counts on a car: 1 m/s, 50 %" in outcome.out
-    assert "For the car: floor.tar.gz  RACECRAFT_SMALL, step" in outcome.out
+    assert "Written: floor.tar.gz  RACECRAFT_SMALL, step" in outcome.out
     assert Path("floor.tar.gz").read_bytes().startswith(b"\x1f\x8b")
 
 
 def test_export_as_json(racecraft: Run, trained: Path) -> None:
     document = racecraft("export", str(trained), "-o", "floor.tar.gz", "--json").document
-    assert document["archive"] == "floor.tar.gz"
+    assert document["file"] == "floor.tar.gz"
     assert document["size"] == Path("floor.tar.gz").stat().st_size
     assert document["run"] == str(trained)
     assert len(document["notes"]) == 1

@@ -70,7 +70,7 @@ COMMANDS: dict[str, list[str]] = {
     "film": ["film P --car 1 --ghost best-lap -o F.mp4 --json"],
     "verify": ["verify P --json", "verify D --race C"],
     "report": ["report R/b -o report.html --json"],
-    "export": ["export R/b --to car --checkpoint last -o exported.tar.gz --json"],
+    "export": ["export R/b --to car --checkpoint last -o exported.tar.gz --json", "export R/b --to onnx"],
     "car": [
         "car calibrate --circle-left 0.8 --circle-right 0.9 --servo 1.7,1.45,1.2 --speed 40=1.1 --slider 40"
         " --latency 0.05 -o car.json --json",

@@ -15,8 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from racecraft.errors import ConfigError, RunError
-from racecraft.run.atomic import write_file
+from racecraft.errors import ConfigError
 
 ENDING: Final = ".tar.gz"
 GRAPH: Final = "agent/model.pb"
@@ -44,12 +43,8 @@ def check_archive_name(path: Path) -> None:
         )
 
 
-def write_archive(path: Path, graph: bytes, metadata: Mapping[str, Any]) -> None:
-    """Write the archive.
-
-    Raises:
-        RunError: It cannot be written.
-    """
+def car_archive(graph: bytes, metadata: Mapping[str, Any]) -> bytes:
+    """The archive's content."""
     packed = io.BytesIO()
     with (
         gzip.GzipFile(filename="", fileobj=packed, mode="wb", compresslevel=1, mtime=0) as zipped,  # weights: noise
@@ -60,8 +55,4 @@ def write_archive(path: Path, graph: bytes, metadata: Mapping[str, Any]) -> None
             member = tarfile.TarInfo(name)
             member.size, member.mode = len(data), 0o644
             tar.addfile(member, io.BytesIO(data))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_file(path, packed.getvalue())
-    except OSError as error:
-        raise RunError(f"{path} cannot be written: {error.strerror or error}.") from error
+    return packed.getvalue()

@@ -50,7 +50,7 @@ def evaluate_as_car(
     def load(folder: RunFolder, *, checkpoint: str | int, num_threads: int) -> tuple[int, NetworkPolicy]:
         with tempfile.TemporaryDirectory(prefix="racecraft-car-") as place:
             exported = export_run(folder.path, output=Path(place) / "model.tar.gz", checkpoint=checkpoint)
-            policy = read_exported(exported.archive, num_threads=num_threads)
+            policy = read_exported(exported.file, num_threads=num_threads)
         drivers.append(CarPolicy(policy, car))
         return exported.step, drivers[0]
 

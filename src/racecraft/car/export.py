@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.agent.model_metadata import ModelMetadata
-from racecraft.car.archive import GRAPH, METADATA, archive_name, check_archive_name, write_archive
+from racecraft.car.archive import GRAPH, METADATA, archive_name, car_archive, check_archive_name
 from racecraft.car.metadata import car_metadata, car_notes
-from racecraft.car.policy_graph import policy_graph
+from racecraft.car.policy_graph import policy_graph, policy_onnx
 from racecraft.checks import check_choice
+from racecraft.errors import ConfigError, RunError
 from racecraft.importing.model_files import ModelFiles
 from racecraft.importing.source import open_source
 from racecraft.importing.weights import open_model, read_weights
@@ -21,9 +22,11 @@ from racecraft.json_file import parse_json_object
 from racecraft.learn import NetworkSpec, make_learner
 from racecraft.race.policy import NetworkPolicy, load_policy
 from racecraft.run import RunFolder
+from racecraft.run.atomic import write_file
 
-TARGETS: Final = ("car",)
+TARGETS: Final = ("car", "onnx")
 """What a run can become."""
+ONNX: Final = ".onnx"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,8 +37,8 @@ class ExportedModel:
     """The run folder."""
     step: int
     """Camera steps of training behind the checkpoint."""
-    archive: Path
-    """The file."""
+    file: Path
+    """What was written."""
     size: int
     """Bytes."""
     network: str
@@ -45,41 +48,57 @@ class ExportedModel:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
-        return {**asdict(self), "run": str(self.run), "archive": str(self.archive), "notes": list(self.notes)}
+        return {**asdict(self), "run": str(self.run), "file": str(self.file), "notes": list(self.notes)}
 
 
 def export_run(
     run: str | Path, *, to: str = "car", output: str | Path | None = None, checkpoint: str | int = "best"
 ) -> ExportedModel:
-    """Write the archive that a physical car takes.
+    """Write the archive that a physical car takes, or a policy's network alone as an ONNX model.
 
     Args:
         run: The run folder.
         to: What it is for, one of `TARGETS`.
-        output: The archive; by default it lies in the run folder and is called like the run.
+        output: The file; by default it lies in the run folder and is called like the run.
         checkpoint: ``best``, ``last`` or a number of steps.
 
     Raises:
-        RunError: There is no such run, or the archive cannot be written.
+        RunError: There is no such run, or the file cannot be written.
         CheckpointError: There is no such checkpoint, or it is damaged.
         ConfigError: The car has not what the policy needs, or would not take the archive's name.
     """
     check_choice("--to", to, TARGETS)
     folder = RunFolder.open(run)
-    archive = folder.path / archive_name(folder.name) if output is None else Path(output)
-    check_archive_name(archive)
+    name = archive_name(folder.name) if to == "car" else folder.name + ONNX
+    file = folder.path / name if output is None else Path(output)
+    if to == "car":
+        check_archive_name(file)
+    elif file.suffix != ONNX:
+        raise ConfigError(f"The model is to be called {file.name!r}; an ONNX model's name ends in {ONNX}.")
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=1)
-    metadata, spec = folder.read_model_metadata(), policy.learner.spec
-    document = car_metadata(metadata, spec)
-    write_archive(archive, policy_graph(policy.learner.weights(), spec, metadata.suite), document)
+    metadata, spec, weights = folder.read_model_metadata(), policy.learner.spec, policy.learner.weights()
+    notes: list[str] = []
+    if to == "car":
+        _write(file, car_archive(policy_graph(weights, spec, metadata.suite), car_metadata(metadata, spec)))
+        notes = car_notes(metadata, spec)
+    else:
+        _write(file, policy_onnx(weights, spec, metadata.suite))
     return ExportedModel(
         run=folder.path,
         step=step,
-        archive=archive,
-        size=archive.stat().st_size,
+        file=file,
+        size=file.stat().st_size,
         network=spec.name,
-        notes=tuple(car_notes(metadata, spec)),
+        notes=tuple(notes),
     )
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_file(path, data)
+    except OSError as error:
+        raise RunError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def read_exported(archive: str | Path, *, num_threads: int = 1) -> NetworkPolicy:

@@ -28,7 +28,7 @@ SHEET: Final[Color] = (250, 250, 247)
 INK: Final[Color] = (34, 38, 46)
 SOFT: Final[Color] = (205, 206, 202)
 DOT: Final[Color] = (226, 88, 34)
-MAX_DOTS: Final = 2000
+DOTS_ACROSS: Final = 220  # places of dots along a side: those of one place are one dot
 
 
 def draw_commands(chosen: Floats, resulting: Floats, space: ActionSpace, path: Path) -> Path:
@@ -45,20 +45,16 @@ def draw_commands(chosen: Floats, resulting: Floats, space: ActionSpace, path: P
     image = Image.new("RGB", (SIZE[0] * FINE, SIZE[1] * FINE), SHEET)
     draw = ImageDraw.Draw(image)
     degrees = np.array([180 / np.pi, 1.0])
-    pairs, counts = np.unique(
-        np.round(np.hstack([chosen * degrees, resulting * degrees]), 4), axis=0, return_counts=True
-    )
-    kept = np.argsort(-counts, kind="stable")[:MAX_DOTS]
-    pairs, counts = pairs[kept], counts[kept]
     listed = listed_choices(space) * degrees
     panels = (("steering angle, degrees, left positive", True), ("speed, m/s", False))
     for column, (title, is_signed) in enumerate(panels):
-        x, y = pairs[:, column], pairs[:, 2 + column]
-        most = max(np.abs(listed[:, column]).max(), np.abs(y).max())
-        low, high, ticks = _axis(most, is_signed=is_signed)
+        pairs = np.column_stack([chosen[:, column], resulting[:, column]]) * degrees[column]
+        low, high, ticks = _axis(max(np.abs(listed[:, column]).max(), np.abs(pairs[:, 1]).max()), is_signed=is_signed)
+        shares = (pairs - low) / (high - low)
+        cells, counts = np.unique(np.round(shares * DOTS_ACROSS), axis=0, return_counts=True)
         _panel(draw, LEFTS[column], title, low, high, ticks)
-        for at, came, count in zip(x, y, counts / counts.max(), strict=True):
-            _dot(draw, LEFTS[column], (at - low) / (high - low), (came - low) / (high - low), 4 + 12 * count**0.5)
+        for (x, y), share in zip(cells / DOTS_ACROSS, counts / len(pairs), strict=True):
+            _dot(draw, LEFTS[column], x, y, 3 + 20 * share**0.5)
     image.reduce(FINE).save(path)
     return path
 

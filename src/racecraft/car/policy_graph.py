@@ -1,4 +1,4 @@
-"""A policy's network as the frozen graph that AWS's trainer would have written of it.
+"""A policy's network as the frozen graph that AWS's trainer would have written of it, and the same as an ONNX model.
 
     camera: sky cut off, pooled, / 255, convolutions ─┬─ joined -> dense -> head -> policy
     LIDAR: dense ─────────────────────────────────────┘
@@ -15,6 +15,7 @@ import numpy as np
 
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.car.graph_writer import GraphWriter
+from racecraft.car.onnx_writer import OnnxWriter
 from racecraft.importing.policy_weights import layer_names, policy_head
 from racecraft.learn import NetworkSpec
 from racecraft.learn.learner import Weights
@@ -41,7 +42,16 @@ def policy_graph(weights: Weights, spec: NetworkSpec, sensors: SensorSuite) -> b
         spec: The network.
         sensors: Of the car, by AWS's names.
     """
-    return _PolicyGraph(weights, spec, sensors).write()
+    writer = GraphWriter()
+    _PolicyGraph(weights, spec, sensors, writer).write()
+    return writer.finish()
+
+
+def policy_onnx(weights: Weights, spec: NetworkSpec, sensors: SensorSuite) -> bytes:
+    """The same as the content of a ``.onnx`` file: inputs and output have the same names and shapes."""
+    writer = OnnxWriter()
+    _PolicyGraph(weights, spec, sensors, writer).write()
+    return writer.finish(policy_output(spec), spec.num_actions)
 
 
 def _online(spec: NetworkSpec) -> str:
@@ -56,12 +66,14 @@ def _scope(spec: NetworkSpec) -> str:
 class _PolicyGraph:
     """The graph while it is written."""
 
-    def __init__(self, weights: Weights, spec: NetworkSpec, sensors: SensorSuite) -> None:
+    def __init__(
+        self, weights: Weights, spec: NetworkSpec, sensors: SensorSuite, writer: GraphWriter | OnnxWriter
+    ) -> None:
         self.weights, self.spec, self.sensors = weights, spec, sensors
-        self.arch, self.scope, self.writer = architecture_of(spec), _scope(spec), GraphWriter()
+        self.arch, self.scope, self.writer = architecture_of(spec), _scope(spec), writer
         self.names = layer_names(spec, sensors, head=policy_head(spec))
 
-    def write(self) -> bytes:
+    def write(self) -> None:
         parts = [self._camera()]
         if self.spec.lidar_size:
             parts.insert(0 if self.sensors.lidar_is_first else 1, self._lidar())
@@ -71,7 +83,6 @@ class _PolicyGraph:
         x = self._dense("head", x)
         last = "Softmax" if self.spec.is_discrete else "Tanh" if self.spec.is_squashed else "Identity"
         self.writer.apply(policy_output(self.spec), last, x)
-        return self.writer.finish()
 
     def _camera(self) -> str:
         spec, writer, camera = self.spec, self.writer, self.sensors.camera_name

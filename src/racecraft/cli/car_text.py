@@ -20,7 +20,7 @@ def say_exported(exported: ExportedModel) -> None:
     for note in exported.notes:
         console.print(Text.assemble(("note: ", "bold"), note), soft_wrap=True)
     kind = f"{exported.network}, step {exported.step:,}, {exported.size / 1e6:.1f} MB"
-    console.print(Text.assemble("For the car: ", (str(exported.archive), "bold"), (f"  {kind}", "dim")), soft_wrap=True)
+    console.print(Text.assemble("Written: ", (str(exported.file), "bold"), (f"  {kind}", "dim")), soft_wrap=True)
 
 
 def say_calibrated(car: CarCalibration, path: Path) -> None:

@@ -13,14 +13,15 @@ from racecraft.cli.app import Json, app, print_json
 @app.command()
 def export(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
-    to: Annotated[str, typer.Option("--to", help="What for: car.")] = "car",
+    to: Annotated[str, typer.Option("--to", help="What for: car, or onnx.")] = "car",
     checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File to write; by default NAME.tar.gz in the run folder.")
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; by default it is called like the run and lies in it."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write the archive that a physical car takes."""
+    """Write the archive that a physical car takes, or an ONNX model."""
     from racecraft.car import export_run
     from racecraft.cli import car_text
 
