@@ -164,7 +164,7 @@ def draw(real: Iterations, ours: list[Iterations], path: Path) -> None:
     for values, color, thickness in curves:
         pen.line([at(*point) for point in enumerate(values)], fill=color, width=thickness * fine, joint="curve")
     for column, (text, color) in enumerate(
-        [(f"{len(ours)} seeds here", seed_color), ("their median", median_color), ("the original", real_color)]
+        [("each seed here", seed_color), ("their median", median_color), ("the original", real_color)]
     ):
         x = (left + 10 + 190 * column) * fine
         pen.line([(x, 25 * fine), (x + 30 * fine, 25 * fine)], fill=color, width=4 * fine)
