@@ -7,7 +7,6 @@ from racecraft.film.racing_line import (
     MISTAKE,
     SPEED_COLORS,
     draw_racing_line,
-    racing_line_image,
     speed_color,
     speed_range,
 )
@@ -39,19 +38,19 @@ def test_a_lap_lies_over_the_picture_of_the_track(tmp_path):
     assert share_of(drawn, MISTAKE) < 1e-3
 
 
-def test_mistakes_are_marked_and_lines_do_not_jump():
+def test_mistakes_are_marked_and_lines_do_not_jump(tmp_path):
     recording = record(lambda state: np.tile(np.float32([0, 1]), (len(state), 1)), laps=1, offtrack_penalty=1.0)
-    assert share_of(racing_line_image(recording, width_px=640), MISTAKE) > 1e-3
+    with Image.open(draw_racing_line(recording, tmp_path / "line.png", width_px=640)) as image:
+        assert share_of(image.convert("RGB"), MISTAKE) > 1e-3
 
 
-def test_two_steps_are_the_least():
+def test_two_steps_are_the_least(tmp_path):
     recording = record(Autopilot(), laps=1)
     few = Recording(recording.track, recording.rows[:1], recording.clock[:1], recording.actions[:1])
     with pytest.raises(ConfigError, match="two steps"):
-        racing_line_image(few)
-    racing_line_image(
-        Recording(recording.track, recording.rows[:2], recording.clock[:2], recording.actions[:2]), width_px=320
-    )
+        draw_racing_line(few, tmp_path / "line.png")
+    two = Recording(recording.track, recording.rows[:2], recording.clock[:2], recording.actions[:2])
+    assert draw_racing_line(two, tmp_path / "line.png", width_px=320).exists()
 
 
 def test_only_images_are_written(tmp_path):

@@ -113,12 +113,12 @@ def test_a_hang_is_ended(track, rows, body, line):
 
 
 def test_a_busy_loop_is_ended_by_the_time_it_had_a_core(track, rows, monkeypatch):
-    monkeypatch.setattr(worker_module, "PATIENCE", 1e4)
+    monkeypatch.setattr(worker_module, "PATIENCE", 200.0)  # by the wall it may take a minute
     monkeypatch.setattr(worker_module, "MOST_PATIENCE", 1e4)
     start = time.perf_counter()
     with running(function("while True: pass"), track, timeout_s=0.3) as worker, pytest.raises(RewardError):
         worker(rows)
-    assert time.perf_counter() - start < 60.0
+    assert time.perf_counter() - start < 45.0
 
 
 def test_a_worker_that_gets_no_core_is_waited_for(track, rows):

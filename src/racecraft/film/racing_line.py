@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from racecraft.race.recording import Recording
 from racecraft.race.rules import RESET_STATUSES
 from racecraft.track.canvas import Canvas, Color
 from racecraft.track.picture import TrackPicture, describe
-
-if TYPE_CHECKING:
-    from PIL import Image
 
 SPEED_COLORS: Final[tuple[Color, ...]] = (
     (88, 72, 226),
@@ -54,33 +51,6 @@ def draw_racing_line(
         ConfigError: The recording has fewer than two steps.
         TrackError: The width or the file's ending is not allowed.
     """
-    picture = _drawn(recording, title=title, subtitle=subtitle, width_px=width_px)
-    return picture.save(path)
-
-
-def racing_line_image(
-    recording: Recording, *, title: str = "", subtitle: str = "", width_px: int = 1600
-) -> Image.Image:
-    """The same picture, not written."""
-    return _drawn(recording, title=title, subtitle=subtitle, width_px=width_px).image()
-
-
-def speed_color(fraction: float) -> Color:
-    """Colour of a speed, by its place between the slowest (0) and the fastest (1)."""
-    place = min(max(fraction, 0.0), 1.0) * (len(SPEED_COLORS) - 1)
-    index = min(int(place), len(SPEED_COLORS) - 2)
-    low, high, weight = SPEED_COLORS[index], SPEED_COLORS[index + 1], place - index
-    red, green, blue = (round(a + weight * (b - a)) for a, b in zip(low, high, strict=True))
-    return red, green, blue
-
-
-def speed_range(speeds: NDArray[np.float64]) -> tuple[float, float]:
-    """Ends of the colour bar, m/s: whole tenths around the speeds, at least half a metre per second apart."""
-    low, high = np.floor(10 * speeds.min()) / 10, np.ceil(10 * speeds.max()) / 10
-    return float(low), float(max(high, low + 0.5))
-
-
-def _drawn(recording: Recording, *, title: str, subtitle: str, width_px: int) -> TrackPicture:
     if len(recording) < 2:
         raise ConfigError(f"A racing line needs at least two steps, this recording has {len(recording)}.")
     speeds = recording.column("actual_speed")
@@ -108,7 +78,22 @@ def _drawn(recording: Recording, *, title: str, subtitle: str, width_px: int) ->
     name, description = describe(recording.track)
     picture.caption(title=title or name, subtitle=subtitle or description, figures=_figures(recording))
     color_bar(picture.canvas, unit, low, high)
-    return picture
+    return picture.save(path)
+
+
+def speed_color(fraction: float) -> Color:
+    """Colour of a speed, by its place between the slowest (0) and the fastest (1)."""
+    place = min(max(fraction, 0.0), 1.0) * (len(SPEED_COLORS) - 1)
+    index = min(int(place), len(SPEED_COLORS) - 2)
+    low, high, weight = SPEED_COLORS[index], SPEED_COLORS[index + 1], place - index
+    red, green, blue = (round(a + weight * (b - a)) for a, b in zip(low, high, strict=True))
+    return red, green, blue
+
+
+def speed_range(speeds: NDArray[np.float64]) -> tuple[float, float]:
+    """Ends of the colour bar, m/s: whole tenths around the speeds, at least half a metre per second apart."""
+    low, high = np.floor(10 * speeds.min()) / 10, np.ceil(10 * speeds.max()) / 10
+    return float(low), float(max(high, low + 0.5))
 
 
 def _stretches(recording: Recording) -> list[NDArray[np.intp]]:

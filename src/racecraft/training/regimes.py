@@ -26,30 +26,20 @@ AlgorithmConfig = PPOConfig | SACConfig | DistillConfig | SB3Config
 
 @dataclass(frozen=True, kw_only=True)
 class Regime:
-    """One kind of training; what is left out is decided by the rows below."""
+    """One kind of training: what `racecraft.training.train` takes; what is left out is decided by the rows below."""
 
     reward: str = ""
-    """Preset of the reward."""
     actions: str = ""
-    """Preset of the action space."""
     sensors: tuple[str, ...] = ()
-    """AWS's names of what the policy sees through."""
     until: str = ""
-    """When to stop."""
     start: Start | None = None
-    """Where training episodes start."""
     critic: str = ""
-    """What the critic sees."""
     ppo: PPOConfig | None = None
-    """How PPO learns."""
     distill: DistillConfig | None = None
-    """How distillation does."""
+    evaluate_every: int = 0
+    evaluation_trials: int = 0
     most_envs: int = 0
     """Cars at once, at most."""
-    evaluate_every: int = 0
-    """Camera steps between two evaluations."""
-    evaluation_trials: int = 0
-    """Laps of each."""
     good: float = 0.0
     """Mean completion of an evaluation from which on the averaged weights drive."""
     only: Mapping[str, tuple[str, str]] = field(default_factory=dict)
@@ -159,11 +149,7 @@ def regime_of(**circumstances: Any) -> Regime:
 
 
 def check_regimes(chosen: Mapping[str, Any], **circumstances: Any) -> None:
-    """Refuse settings that do not go with a training's kind; the other arguments are those of `regimes_of`.
-
-    Raises:
-        ConfigError: Two settings exclude each other.
-    """
+    """ConfigError where settings do not go with a training's kind; the other arguments are those of `regimes_of`."""
     for regime in regimes_of(**circumstances):
         for name, (allowed, reason) in regime.only.items():
             if chosen[name] != allowed:

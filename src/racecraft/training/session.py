@@ -155,13 +155,7 @@ def open_session(
 ) -> Iterator[Session]:
     """Everything made, and brought to where the last checkpoint was; closed at the end, however that comes.
 
-    Args:
-        folder: The run.
-        settings: Of the run.
-        meter: Of the training.
-        aws_log: File for the log lines that AWS's tools read, ``-`` for stdout; none without it.
-        is_checked: The reward function has just been checked and tried.
-        note: Told what the user should know.
+    The arguments are those of `racecraft.training.job.Training`; `note` is told what the user should know.
 
     Raises:
         RacecraftError: The training cannot begin.
@@ -197,15 +191,21 @@ def open_session(
         worker = _open_worker(run, stack)
         since = _begin_stretch(run, note)
         logs = _open_logs(run, stack, aws_log=aws_log)
-        opponents = _open_opponents(run, simulation, learner)
-        environment = _make_environment(run, simulation, worker, logs, opponents, note)
+        environment = _make_environment(run, simulation, learner, worker, logs, note)
         session = Session(
             environment=environment,
-            algorithm=_make_algorithm(run, learner, environment, stack),
+            algorithm=make_algorithm(
+                settings,
+                learner,
+                environment,
+                open_teacher=lambda: teacher_environment(
+                    settings, run.source, run.tracks, metadata.action_space, stack, foreign=run.is_foreign
+                ),
+            ),
             evaluator=Evaluator(_policy(run, learner), run.tracks, settings),
             logs=logs,
             hyperparameters=run.hyperparameters,
-            opponents=opponents,
+            opponents=environment.opponents if isinstance(environment, TrainingEnvironment) else None,
             meter=meter,
             since=since,
         )
@@ -315,47 +315,31 @@ def _policy(run: _Run, learner: Learner) -> NetworkPolicy:
     return NetworkPolicy(learner, run.metadata.action_space, sensors=run.metadata.suite)
 
 
-def _open_opponents(run: _Run, simulation: Simulation | CudaSimulation, learner: Learner) -> OpponentPool | None:
-    settings = run.settings
-    if settings.opponents is None or not isinstance(simulation, Simulation):
-        return None
-    return OpponentPool(
-        settings.opponents,
-        simulation,
-        _policy(run, learner),
-        seed=settings.seed,
-        num_threads=settings.num_threads,
-    )
-
-
 def _make_environment(
     run: _Run,
     simulation: Simulation | CudaSimulation,
+    learner: Learner,
     worker: RewardWorker,
     logs: Logs,
-    opponents: OpponentPool | None,
     note: Note,
 ) -> Environment:
-    space = run.metadata.action_space
+    settings, metadata = run.settings, run.metadata
     if not isinstance(simulation, Simulation):
+        space = metadata.action_space
         return CudaTrainingEnvironment(simulation, worker, run.source, space, counter=logs.counter, note=note)
+    opponents = None
+    if settings.opponents is not None:
+        own, threads = _policy(run, learner), settings.num_threads
+        opponents = OpponentPool(settings.opponents, simulation, own, seed=settings.seed, num_threads=threads)
     return TrainingEnvironment(
         simulation,
         worker,
-        space,
+        metadata.action_space,
         counter=logs.counter,
-        sensors=run.metadata.suite,
+        sensors=metadata.suite,
         trace=logs.trace,
         prints=logs.prints,
         opponents=opponents,
-        goes_on=run.settings.algorithm == "distill" or opponents is not None,
-        tells_place=run.settings.critic == "lap",
+        goes_on=settings.algorithm == "distill" or opponents is not None,
+        tells_place=settings.critic == "lap",
     )
-
-
-def _make_algorithm(run: _Run, learner: Learner, environment: Environment, stack: ExitStack) -> Algorithm:
-    def open_teacher() -> TrainingEnvironment:
-        space = run.metadata.action_space
-        return teacher_environment(run.settings, run.source, run.tracks, space, stack, foreign=run.is_foreign)
-
-    return make_algorithm(run.settings, learner, environment, open_teacher=open_teacher)
