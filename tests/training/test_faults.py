@@ -113,7 +113,8 @@ def test_prints_are_kept_up_to_the_one_before_the_error(tiny: Train, tmp_path: P
 
     (run / "reward_function.py").write_text(PRINTS.format(last=-1))
     resume(run, until="512 steps", reporter=recorder)
-    assert "what the reward function remembered begins anew" in recorder.notes[0]
+    assert recorder.notes[0] == "From here on with other reward."
+    assert "what the reward function remembered begins anew" in recorder.notes[1]
     more = RunFolder.open(run).reward_log.read_text().splitlines()
     assert more[: len(lines)] == lines
     assert more[len(lines) : len(lines) + 9] == ["loaded"] * 8 + [more[len(lines) + 8]]
