@@ -9,6 +9,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 
 #include "dispatch.hpp"
@@ -384,6 +385,8 @@ void bind_replay(nb::module_& m) {
 
 NB_MODULE(_native, m) {
     m.doc() = "Racecraft's native core. Private: use racecraft.sim and racecraft.learn.";
+    if (const char* isa = std::getenv("RACECRAFT_ISA"); isa != nullptr && *isa != '\0')
+        racecraft::set_isa(isa);
     m.attr("ROW_COLUMNS") = racecraft::names_of(racecraft::kRowNames);
     m.attr("STATE_COLUMNS") = racecraft::names_of(racecraft::kStateNames);
     m.attr("OBJECT_HEADER") = racecraft::names_of(racecraft::kObjectHeaderNames);
@@ -409,6 +412,14 @@ NB_MODULE(_native, m) {
             return texts;
         },
         "values"_a, "`repr` of every number.");
+    m.def("compiler", [] {
+#if defined(__clang__)
+        return std::string(__VERSION__);
+#else
+        return std::string("GCC " __VERSION__);
+#endif
+    });
+    m.def("commit", [] { return std::string(RACECRAFT_COMMIT); }, "Of a wheel; empty in a checkout.");
     m.def("isa", [] { return std::string(racecraft::isa_name(racecraft::current_isa())); });
     m.def("available_isas", [] {
         std::vector<std::string> names;
@@ -416,6 +427,9 @@ NB_MODULE(_native, m) {
             names.push_back(racecraft::isa_name(isa));
         return names;
     });
+    m.def(
+        "best_isa", [] { return std::string(racecraft::isa_name(racecraft::best_isa())); },
+        "The best that this CPU could run, whether this build has it or not.");
     m.def("set_isa", &racecraft::set_isa, "name"_a);
     racecraft::bind_camera(m);
     racecraft::bind_views(m);

@@ -6,10 +6,13 @@
 
 namespace racecraft {
 
-enum class Isa { portable, avx2, avx512 };
+enum class Isa { portable, avx2, avx512 };  // slowest first
 
 // The one in force: the best this CPU has, or what set_isa() chose.
 Isa current_isa();
+
+// The best that this CPU could run, whether this build has it or not.
+Isa best_isa();
 
 // Those that this build and this CPU can run, slowest first.
 std::vector<Isa> available_isas();

@@ -31,8 +31,9 @@ std::string text_of(const LayerShape& shape) {
 std::vector<LayerTime> profile_layers(const NetworkSpec& spec, size_t samples, int repeats) {
     const Network network(spec);
     FloatBuffer weights(network.num_packed), transposed(network.num_transposed), gradient(network.num_packed);
-    std::fill_n(weights.data(), weights.size(), 0.01f);
-    std::fill_n(transposed.data(), transposed.size(), 0.01f);
+    // numbers whose products have all the bits that a product can have
+    std::fill_n(weights.data(), weights.size(), 0.07f);
+    std::fill_n(transposed.data(), transposed.size(), 0.07f);
     std::vector<LayerTime> times;
     for (const Tower* tower : {&network.policy, &network.critic}) {
         for (const Layer& layer : tower->layers) {
@@ -40,8 +41,8 @@ std::vector<LayerTime> profile_layers(const NetworkSpec& spec, size_t samples, i
             const LayerShape& shape = layer.shape;
             FloatBuffer in(samples * shape.in_size), grad_in(samples * shape.in_size);
             FloatBuffer out(samples * shape.out_size()), grad_out(samples * shape.out_size());
-            std::fill_n(in.data(), in.size(), 0.5f);
-            std::fill_n(grad_out.data(), grad_out.size(), 0.5f);
+            std::fill_n(in.data(), in.size(), 0.3f);
+            std::fill_n(grad_out.data(), grad_out.size(), 0.3f);
             const auto measure = [&](const char* pass, const auto& body) {
                 const double operations = 2.0 * static_cast<double>(shape.num_positions()) *
                                           static_cast<double>(shape.num_weights());
@@ -73,7 +74,7 @@ double peak_operations_per_second() {
     alignas(64) float out[kChannelMultiple] = {};
     double operations = 0.0;
     const double seconds = best_seconds(200, [&] {
-        std::fill_n(out, kChannelMultiple, 0.25f);
+        std::fill_n(out, kChannelMultiple, 0.3f);  // whose square has all the bits of a product
         operations = RC_DISPATCH(multiply_add_only, kSteps, out);
     });
     return operations / seconds;

@@ -4,8 +4,9 @@
 #include "network_kernel.hpp"
 
 #include <algorithm>
+#include <type_traits>
 
-#include "network_lanes.hpp"
+#include "network_sums.hpp"
 
 namespace racecraft::RC_ISA {
 namespace {
@@ -23,20 +24,37 @@ constexpr size_t kSegment =
     _Pragma("GCC unroll 16") for (int r = 0; r < kRows; ++r) \
         _Pragma("GCC unroll 2") for (int v = 0; v < kVectors; ++v)
 
+// Calls add(arithmetic, sums) with the fastest arithmetic that is exact: what it adds to depends on it alone.
+template <int kRows, int kVectors, typename Add>
+[[gnu::always_inline]] inline void sum_up(FloatLanes (&sums)[kRows][kVectors],
+                                          [[maybe_unused]] bool fits_doubled, const Add& add) {
+#if defined(RC_HAS_DOUBLED_SUMS)
+    if (fits_doubled) {
+        DoubledSums doubled;
+        DoubledSums::Lanes wide[kRows][kVectors];
+        RC_EACH_SUM wide[r][v] = doubled.lanes(sums[r][v]);
+        add(doubled, wide);
+        RC_EACH_SUM sums[r][v] = doubled.floats(wide[r][v]);
+        return;
+    }
+#endif
+    FusedSums fused;
+    add(fused, sums);
+}
+
 // sums[r] += rows[r][i] * weights[i], for i in [0, length).
-template <int kRows, int kVectors>
-[[gnu::always_inline]] inline void multiply(FloatLanes (&sums)[kRows][kVectors],
+template <int kRows, int kVectors, typename Sums>
+[[gnu::always_inline]] inline void multiply(Sums& arithmetic, typename Sums::Lanes (&sums)[kRows][kVectors],
                                             const float* const (&rows)[kRows], size_t offset,
                                             const float* weights, size_t width, size_t length) {
     for (size_t i = 0; i < length; ++i) {
-        FloatLanes w[kVectors];
+        typename Sums::Lanes w[kVectors];
 #pragma GCC unroll 2
-        for (int v = 0; v < kVectors; ++v) w[v] = load(weights + v * kLaneCount);
+        for (int v = 0; v < kVectors; ++v) w[v] = arithmetic.lanes(load(weights + v * kLaneCount));
 #pragma GCC unroll 16
         for (int r = 0; r < kRows; ++r) {
-            const FloatLanes x = splat(rows[r][offset + i]);
-#pragma GCC unroll 2
-            for (int v = 0; v < kVectors; ++v) sums[r][v] = fused_multiply_add(x, w[v], sums[r][v]);
+            const auto x = arithmetic.lanes(splat(rows[r][offset + i]));
+            arithmetic.add_products(x, w, sums[r]);
         }
         weights += width;
     }
@@ -84,6 +102,7 @@ struct ForwardTerms {
     float* out;            // at the lanes
     size_t segment;        // inputs per run
     bool is_first, is_last, is_relu;
+    bool fits_doubled;
 };
 
 template <int kVectors>
@@ -103,11 +122,14 @@ struct ForwardBody {
             sums[r][v] =
                 load((t.is_first ? t.bias : out + static_cast<size_t>(r) * channels) + v * kLaneCount);
         }
-        const float* weights = t.weights;
-        for (int run = 0; run < t.shape.num_runs; ++run) {
-            multiply(sums, rows, static_cast<size_t>(run) * t.shape.run_stride, weights, t.width, t.segment);
-            weights += t.segment * t.width;
-        }
+        sum_up(sums, t.fits_doubled, [&](auto& arithmetic, auto& to) {
+            const float* weights = t.weights;
+            for (int run = 0; run < t.shape.num_runs; ++run) {
+                multiply(arithmetic, to, rows, static_cast<size_t>(run) * t.shape.run_stride, weights,
+                         t.width, t.segment);
+                weights += t.segment * t.width;
+            }
+        });
         if (t.is_last && t.is_relu) RC_EACH_SUM sums[r][v] = relu(sums[r][v]);
         RC_EACH_SUM store(out + static_cast<size_t>(r) * channels + v * kLaneCount, sums[r][v]);
     }
@@ -125,6 +147,7 @@ struct InputGradientTerms {
     size_t width;             // of the panel
     const float* grad_out;
     float* grad_in;  // at the run and the lanes
+    bool fits_doubled;
 };
 
 template <int kVectors>
@@ -140,7 +163,9 @@ struct InputGradientBody {
         for (int r = 0; r < kRows; ++r) rows[r] = t.grad_out + (position + static_cast<size_t>(r)) * channels;
         FloatLanes sums[kRows][kVectors];
         RC_EACH_SUM sums[r][v] = splat(0.0f);
-        multiply(sums, rows, 0, t.transposed, t.width, channels);
+        sum_up(sums, t.fits_doubled, [&](auto& arithmetic, auto& to) {
+            multiply(arithmetic, to, rows, 0, t.transposed, t.width, channels);
+        });
         // neighbouring positions share inputs, so they are added one after the other
 #pragma GCC unroll 16
         for (int r = 0; r < kRows; ++r) {
@@ -166,40 +191,41 @@ struct Positions {
 };
 
 template <int kRows, int kVectors>
-void weight_gradient_tile(const Positions& p, size_t channels, const float* in, const float* grad,
-                          size_t width, float* gradient) {
+void weight_gradient_tile(const Positions& p, size_t channels, const float* in, const float* grad_out,
+                          bool fits_doubled, size_t width, float* gradient) {
     FloatLanes sums[kRows][kVectors];
     RC_EACH_SUM sums[r][v] = load(gradient + static_cast<size_t>(r) * width + v * kLaneCount);
-    for (size_t s = 0; s < p.samples; ++s) {
-        for (size_t y = 0; y < p.rows; ++y) {
-            const float* x = in + s * p.sample_step + y * p.row_step;
-            for (size_t column = 0; column < p.columns; ++column) {
-                FloatLanes g[kVectors];
+    sum_up(sums, fits_doubled, [&]<typename Sums>(Sums& arithmetic, auto& to) {
+        const float* grad = grad_out;
+        for (size_t s = 0; s < p.samples; ++s) {
+            for (size_t y = 0; y < p.rows; ++y) {
+                const float* x = in + s * p.sample_step + y * p.row_step;
+                for (size_t column = 0; column < p.columns; ++column) {
+                    typename Sums::Lanes g[kVectors];
 #pragma GCC unroll 2
-                for (int v = 0; v < kVectors; ++v) g[v] = load(grad + v * kLaneCount);
+                    for (int v = 0; v < kVectors; ++v) g[v] = arithmetic.lanes(load(grad + v * kLaneCount));
 #pragma GCC unroll 16
-                for (int r = 0; r < kRows; ++r) {
-                    const FloatLanes value = splat(x[r]);
-#pragma GCC unroll 2
-                    for (int v = 0; v < kVectors; ++v)
-                        sums[r][v] = fused_multiply_add(value, g[v], sums[r][v]);
+                    for (int r = 0; r < kRows; ++r) {
+                        const auto value = arithmetic.lanes(splat(x[r]));
+                        arithmetic.add_products(value, g, to[r]);
+                    }
+                    x += p.column_step;
+                    grad += channels;
                 }
-                x += p.column_step;
-                grad += channels;
             }
         }
-    }
+    });
     RC_EACH_SUM store(gradient + static_cast<size_t>(r) * width + v * kLaneCount, sums[r][v]);
 }
 
 // Inputs [first, last) of one run.
 template <int kVectors>
 void weight_gradient_lanes(const Positions& positions, size_t channels, const float* in, const float* grad,
-                           size_t width, size_t first, size_t last, float* gradient) {
+                           bool fits_doubled, size_t width, size_t first, size_t last, float* gradient) {
     size_t i = first;
     const auto step = [&](auto tile, size_t rows) {
         for (; i + rows <= last; i += rows)
-            tile(positions, channels, in + i, grad, width, gradient + i * width);
+            tile(positions, channels, in + i, grad, fits_doubled, width, gradient + i * width);
     };
     if constexpr (kTileRows * 2 > 8 && kVectors == 1) step(weight_gradient_tile<16, 1>, 16);
     step(weight_gradient_tile<kTileRows, kVectors>, kTileRows);
@@ -225,6 +251,29 @@ size_t panel_width(size_t panel, size_t channels) {
     return std::min<size_t>(kPanel, channels - panel * kPanel);
 }
 
+// Rows of numbers, each `stride` after the one before.
+struct Numbers {
+    const float* first;
+    size_t count, stride, rows;
+};
+
+// Whether DoubledSums may add products of these to sums that begin with those; where nothing has to ask,
+// false.
+bool fits_doubled_sums([[maybe_unused]] const Numbers& x, [[maybe_unused]] const Numbers& w,
+                       [[maybe_unused]] const Numbers& beginnings) {
+#if defined(RC_HAS_DOUBLED_SUMS)
+    const auto look = [](const Numbers& numbers) {
+        Magnitudes found;
+        for (size_t row = 0; row < numbers.rows; ++row)
+            found.look_at(numbers.first + row * numbers.stride, numbers.count);
+        return found;
+    };
+    return fit_doubled_sums(look(x), look(w), look(beginnings).sum());
+#else
+    return false;
+#endif
+}
+
 }  // namespace
 
 void layer_forward(const LayerShape& shape, Activation activation, const float* weights, const float* bias,
@@ -232,6 +281,8 @@ void layer_forward(const LayerShape& shape, Activation activation, const float* 
     const size_t channels = static_cast<size_t>(shape.out_channels);
     const size_t length = static_cast<size_t>(shape.run_length);
     const size_t segment = shape.num_runs == 1 ? std::min(kSegment, length) : length;
+    const bool fits_doubled = fits_doubled_sums({in, samples * shape.in_size, 0, 1},
+                                                {weights, shape.num_weights(), 0, 1}, {bias, channels, 0, 1});
     for (size_t panel = 0; panel * kPanel < channels; ++panel) {
         const size_t width = panel_width(panel, channels);
         const float* panel_weights = weights + panel * kPanel * shape.num_inputs();
@@ -243,7 +294,8 @@ void layer_forward(const LayerShape& shape, Activation activation, const float* 
                                          width,          bias + channel,
                                          in + first,     out + channel,
                                          last - first,   first == 0,
-                                         last == length, activation == Activation::relu};
+                                         last == length, activation == Activation::relu,
+                                         fits_doubled};
                 forward_lanes<kVectors>(terms, samples * shape.num_positions());
             });
         }
@@ -258,6 +310,8 @@ void layer_input_gradient(const LayerShape& shape, const float* transposed, cons
     // Neighbouring positions that share inputs within a panel would be added in an order that depends on the
     // width of vectors.
     const bool is_narrow = shape.num_positions() > 1 && shape.column_step < kPanel;
+    const bool fits_doubled = fits_doubled_sums({grad_out, samples * shape.out_size(), 0, 1},
+                                                {transposed, shape.num_weights(), 0, 1}, {});
     for (size_t run = 0; run < static_cast<size_t>(shape.num_runs); ++run) {
         for (size_t first = 0; first < length; first += kPanel) {
             const size_t width = std::min<size_t>(kPanel, length - first);
@@ -266,8 +320,12 @@ void layer_input_gradient(const LayerShape& shape, const float* transposed, cons
             for_each_vector_pair(
                 width,
                 [&]<int kVectors>(size_t lane) {
-                    const InputGradientTerms terms{shape, panel + lane, width, grad_out,
-                                                   grad_in + run * shape.run_stride + first + lane};
+                    const InputGradientTerms terms{shape,
+                                                   panel + lane,
+                                                   width,
+                                                   grad_out,
+                                                   grad_in + run * shape.run_stride + first + lane,
+                                                   fits_doubled};
                     input_gradient_lanes<kVectors>(terms, samples * shape.num_positions());
                 },
                 is_narrow);
@@ -288,31 +346,43 @@ void layer_weight_gradient(const LayerShape& shape, int panel, size_t first, siz
                         shape.row_step,
                         shape.column_step};
     if (shape.num_positions() == 1) positions = {1, 1, samples, 0, 0, shape.in_size};
+    float* panel_rows = gradient + first_channel * shape.num_inputs();
+    // of a dense layer only the inputs that are asked for: other tasks have the others
+    const Numbers inputs = shape.num_positions() == 1
+                               ? Numbers{in + first, last - first, shape.in_size, samples}
+                               : Numbers{in, samples * shape.in_size, 0, 1};
+    const bool fits_doubled = fits_doubled_sums(
+        inputs, {grad_out + first_channel, width, channels, samples * shape.num_positions()},
+        {panel_rows + first * width, (last - first) * width, 0, 1});
     for (size_t run = first / length; run * length < last; ++run) {
         const size_t from = std::max(first, run * length) - run * length;
         const size_t to = std::min(last, (run + 1) * length) - run * length;
-        float* rows = gradient + first_channel * shape.num_inputs() + run * length * width;
+        float* rows = panel_rows + run * length * width;
         for_each_vector_pair(width, [&]<int kVectors>(size_t lane) {
             weight_gradient_lanes<kVectors>(positions, channels, in + run * shape.run_stride,
-                                            grad_out + first_channel + lane, width, from, to, rows + lane);
+                                            grad_out + first_channel + lane, fits_doubled, width, from, to,
+                                            rows + lane);
         });
     }
 }
 
 double multiply_add_only(size_t steps, float* out) {
-    constexpr int kChains = 12;  // latency times throughput of any CPU, and they fit 16 registers
+    constexpr int kRows = 12;  // chains: latency times throughput of any CPU, and they fit 16 registers
+    constexpr int kVectors = 1;
     const FloatLanes factor = load(out);
-    FloatLanes sums[kChains];
+    FloatLanes sums[kRows][kVectors];
+    RC_EACH_SUM sums[r][v] = splat(static_cast<float>(r));
+    sum_up(sums, true, [&](auto& arithmetic, auto& to) {
+        const auto wide = arithmetic.lanes(factor);
+        const typename std::remove_cvref_t<decltype(arithmetic)>::Lanes factors[kVectors] = {wide};
+        for (size_t step = 0; step < steps; ++step) {
 #pragma GCC unroll 12
-    for (int i = 0; i < kChains; ++i) sums[i] = splat(static_cast<float>(i));
-    for (size_t step = 0; step < steps; ++step) {
-#pragma GCC unroll 12
-        for (int i = 0; i < kChains; ++i) sums[i] = fused_multiply_add(sums[i], factor, factor);
-    }
-#pragma GCC unroll 12
-    for (int i = 1; i < kChains; ++i) sums[0] = sums[0] + sums[i];
-    store(out, sums[0]);
-    return 2.0 * kChains * kLaneCount * static_cast<double>(steps);
+            for (int r = 0; r < kRows; ++r) arithmetic.add_products(wide, factors, to[r]);
+        }
+    });
+    for (int r = 1; r < kRows; ++r) sums[0][0] = sums[0][0] + sums[r][0];
+    store(out, sums[0][0]);
+    return 2.0 * kRows * kLaneCount * static_cast<double>(steps);
 }
 
 }  // namespace racecraft::RC_ISA

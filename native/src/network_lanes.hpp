@@ -1,5 +1,5 @@
 // Vectors of floats for the network's kernels, one definition per instruction set: 16 lanes with AVX-512, 8
-// with AVX2, 4 otherwise. Include only from *_kernel.cpp.
+// with AVX2, 4 with SSE2 or otherwise. Include only from *_kernel.cpp.
 //
 // Lanes never meet: every operation works on each lane by itself, in IEEE 754 arithmetic with an explicit
 // fused multiply-add, so the width of a vector cannot change a result.
@@ -11,6 +11,8 @@
 
 #if defined(__AVX2__)
 #include <immintrin.h>
+#elif defined(__SSE2__)
+#include <emmintrin.h>
 #endif
 
 #if defined(__GNUC__) && !defined(__clang__)
@@ -91,6 +93,78 @@ RC_HD FloatLanes relu(FloatLanes a) {
 }
 RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
     return {_mm256_and_ps(_mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GT_OQ), b.v)};
+}
+
+#elif defined(__SSE2__)
+
+struct FloatLanes {
+    static constexpr int kCount = 4;
+    __m128 v;
+};
+
+RC_HD FloatLanes splat(float value) {
+    return {_mm_set1_ps(value)};
+}
+RC_HD FloatLanes load(const float* from) {
+    return {_mm_loadu_ps(from)};
+}
+RC_HD void store(float* to, FloatLanes a) {
+    _mm_storeu_ps(to, a.v);
+}
+RC_HD FloatLanes operator+(FloatLanes a, FloatLanes b) {
+    return {_mm_add_ps(a.v, b.v)};
+}
+RC_HD FloatLanes operator-(FloatLanes a, FloatLanes b) {
+    return {_mm_sub_ps(a.v, b.v)};
+}
+RC_HD FloatLanes operator*(FloatLanes a, FloatLanes b) {
+    return {_mm_mul_ps(a.v, b.v)};
+}
+
+// Floats in pairs as doubles, which hold the product of two floats exactly.
+struct DoubleLanes {
+    __m128d low, high;
+};
+
+RC_HD DoubleLanes widen(FloatLanes a) {
+    return {_mm_cvtps_pd(a.v), _mm_cvtps_pd(_mm_movehl_ps(a.v, a.v))};
+}
+RC_HD FloatLanes narrow(DoubleLanes a) {
+    return {_mm_movelh_ps(_mm_cvtpd_ps(a.low), _mm_cvtpd_ps(a.high))};
+}
+
+// a + b rounded to odd: where it is inexact, the neighbour whose last bit is 1. A double keeps more than two
+// bits beyond a float, so rounding that to float is as if the exact sum had been rounded once (Boldo and
+// Melquiond, "Emulation of a FMA and correctly rounded sums", 2008). The error of the sum is Knuth's TwoSum.
+RC_HD __m128d add_rounding_to_odd(__m128d a, __m128d b) {
+    const __m128d sum = _mm_add_pd(a, b);
+    const __m128d b_part = _mm_sub_pd(sum, a);
+    const __m128d error = _mm_add_pd(_mm_sub_pd(a, _mm_sub_pd(sum, b_part)), _mm_sub_pd(b, b_part));
+    const __m128d zero = _mm_setzero_pd();
+    // false for NaN, which is the error of an infinite sum
+    const __m128d inexact = _mm_or_pd(_mm_cmplt_pd(error, zero), _mm_cmplt_pd(zero, error));
+    const __m128i bits = _mm_castpd_si128(sum);
+    const __m128i one = _mm_set1_epi64x(1);
+    const __m128i even =
+        _mm_shuffle_epi32(_mm_cmpeq_epi32(_mm_and_si128(bits, one), _mm_setzero_si128()), 0xA0);
+    const __m128i signs = _mm_srai_epi32(_mm_xor_si128(bits, _mm_castpd_si128(error)), 31);
+    const __m128i step = _mm_or_si128(_mm_shuffle_epi32(signs, 0xF5), one);  // away from zero 1, else -1
+    return _mm_castsi128_pd(
+        _mm_add_epi64(bits, _mm_and_si128(step, _mm_and_si128(even, _mm_castpd_si128(inexact)))));
+}
+
+RC_HD FloatLanes fused_multiply_add(DoubleLanes a, DoubleLanes b, DoubleLanes c) {
+    return narrow({add_rounding_to_odd(_mm_mul_pd(a.low, b.low), c.low),
+                   add_rounding_to_odd(_mm_mul_pd(a.high, b.high), c.high)});
+}
+RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
+    return fused_multiply_add(widen(a), widen(b), widen(c));
+}
+RC_HD FloatLanes relu(FloatLanes a) {
+    return {_mm_max_ps(_mm_setzero_ps(), a.v)};
+}
+RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
+    return {_mm_and_ps(_mm_cmpgt_ps(a.v, _mm_setzero_ps()), b.v)};
 }
 
 #else

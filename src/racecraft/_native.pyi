@@ -30,9 +30,17 @@ VEHICLE_PARAMETERS: tuple = ...
 def number_texts(values: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> list:
     """`repr` of every number."""
 
+def compiler() -> str: ...
+
+def commit() -> str:
+    """Of a wheel; empty in a checkout."""
+
 def isa() -> str: ...
 
 def available_isas() -> list[str]: ...
+
+def best_isa() -> str:
+    """The best that this CPU could run, whether this build has it or not."""
 
 def set_isa(name: str) -> None: ...
 

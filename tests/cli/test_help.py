@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from command_line import Run
 
-from racecraft import __version__, cli
+from racecraft import __version__, _native, cli
 from racecraft.training import settings as training_settings
 
 VERBS = (
@@ -49,6 +49,16 @@ def test_every_verb_explains_itself_in_80_columns(racecraft: Run, verb: str) -> 
 
 def test_the_version(racecraft: Run) -> None:
     assert racecraft("--version") == (0, f"{__version__}\n", "")
+
+
+def test_the_build(racecraft: Run) -> None:
+    build = racecraft("--version", "--json").document
+    assert build["version"] == __version__
+    assert build["instruction_sets"] == _native.available_isas()
+    assert build["instruction_set"] in build["instruction_sets"]
+    if (Path(__file__).parents[2] / ".git").exists():
+        assert re.fullmatch(r"[0-9a-f]{40}", build["commit"])
+    assert re.match(r"(GCC|.*[Cc]lang) \d", build["compiler"])
 
 
 def test_without_a_verb_it_shows_the_help(racecraft: Run) -> None:

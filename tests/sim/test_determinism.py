@@ -5,8 +5,11 @@ from __future__ import annotations
 import gc
 import hashlib
 import math
+import os
 import resource
+import subprocess
 import sys
+import tempfile
 import threading
 import time
 
@@ -78,6 +81,37 @@ def test_frames_do_not_depend_on_batch_threads_or_instruction_set(every_isa, cho
     for isa in every_isa:
         _native.set_isa(isa)
         assert drive(64, 7, choose, record, camera=SMALL) == expected
+
+
+def test_the_environment_chooses_the_instruction_set_and_a_training_says_so():
+    def train(isa):
+        verb = [
+            sys.executable,
+            "-m",
+            "racecraft",
+            "train",
+            "--track",
+            "oval",
+            "--num-envs",
+            "8",
+            "--until",
+            "128 steps",
+        ]
+        with tempfile.TemporaryDirectory() as folder:
+            return subprocess.run(
+                verb, env={**os.environ, "RACECRAFT_ISA": isa}, cwd=folder, capture_output=True, text=True, check=False
+            )
+
+    best = _native.best_isa()
+    if best != "portable":
+        told = train("portable")
+        assert told.returncode == 0
+        first = told.stderr.splitlines()[0]
+        assert first.startswith("The native core runs on the instruction set portable and not on this machine's")
+    assert "instruction set" not in train(_native.available_isas()[-1]).stderr
+    refused = train("sse9")
+    assert refused.returncode != 0
+    assert "'sse9' cannot run here" in refused.stderr
 
 
 def test_an_unknown_instruction_set_is_refused():

@@ -59,9 +59,17 @@ def _python() -> str:
 
 
 def _core() -> str:
-    from racecraft.sim import instruction_set
+    from racecraft.sim import instruction_set, slower_than_could_be
 
-    return f"native core loaded, instruction set {instruction_set()}"
+    isa = instruction_set()
+    text = f"native core loaded, instruction set {isa}"
+    if slower := slower_than_could_be():
+        raise Lacking(text, hint=f"{slower} Results are the same, a training takes longer.")
+    if isa == "portable" and platform.machine() in ("x86_64", "AMD64"):
+        raise Lacking(
+            text, hint="This CPU has no AVX2 and FMA: results are the same, a training takes several times as long."
+        )
+    return text
 
 
 def _simulator() -> str:

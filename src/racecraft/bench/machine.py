@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from racecraft import __version__
-from racecraft.sim import instruction_set
+from racecraft.sim import core_build, instruction_set
 
 COPY_BYTES = 1 << 27  # far beyond every cache
 
@@ -28,6 +29,12 @@ def describe_machine() -> dict[str, Any]:
         "numpy": np.__version__,
         "racecraft": __version__,
     }
+
+
+def describe_build() -> dict[str, Any]:
+    """Version, commit where it is known, compiler, and the instruction sets that this build and this machine have."""
+    build = core_build()
+    return {"version": __version__, **build, "commit": build["commit"] or _commit_of_checkout()}
 
 
 def copy_bandwidth() -> float:
@@ -54,6 +61,17 @@ def matrix_flops() -> float:
         np.matmul(left, right, out=product)
         seconds.append(time.perf_counter() - begun)
     return 2.0 * side**3 / min(seconds)
+
+
+def _commit_of_checkout() -> str | None:
+    root = Path(__file__).parents[3]
+    if not (root / "pyproject.toml").exists():
+        return None
+    try:
+        found = subprocess.run(["git", "-C", root, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
+    except OSError:
+        return None
+    return found.stdout.strip() or None
 
 
 def _processor() -> str:

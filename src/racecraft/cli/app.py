@@ -29,8 +29,14 @@ TrackOption = Annotated[str, typer.Option("--track", "-t", help="Name of a track
 def root(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the stack trace of an error.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="With --version: the build as one JSON object.")] = False,
 ) -> None:
     """Options of every verb."""
+    if version and as_json:
+        from racecraft.bench.machine import describe_build
+
+        print_json(describe_build())
+        raise typer.Exit
     if version:
         typer.echo(__version__)
         raise typer.Exit

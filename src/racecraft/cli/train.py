@@ -112,10 +112,13 @@ def train(
     if resume is not None:
         _refuse_beside_resume(context)
     from racecraft import training
+    from racecraft.sim import slower_than_could_be
     from racecraft.training.progress import SilentReporter
     from racecraft.training.regimes import regime_of
     from racecraft.training.terminal import TerminalReporter
 
+    if not is_quiet and (slower := slower_than_could_be()):
+        text().say_progress(slower)
     race, rivals = race_options.opponents_of(race, opponents=opponents, cars=cars)
     on_track = race_options.objects_of(race, context.params)
     reward = reward or regime_of(objects=on_track, opponents=rivals).reward

@@ -13,7 +13,15 @@ from racecraft.sim.objects import (
     objects_from_aws,
 )
 from racecraft.sim.randomization import CONDITIONS, Randomization, load_randomization
-from racecraft.sim.simulation import CONTROL_DT, MAX_STEERING, Simulation, Start, instruction_set
+from racecraft.sim.simulation import (
+    CONTROL_DT,
+    MAX_STEERING,
+    Simulation,
+    Start,
+    core_build,
+    instruction_set,
+    slower_than_could_be,
+)
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 
 __all__ = [
@@ -35,10 +43,12 @@ __all__ = [
     "Simulation",
     "Start",
     "Vehicle",
+    "core_build",
     "has_aws_meaning",
     "instruction_set",
     "load_randomization",
     "load_vehicle",
     "objects_for_race",
     "objects_from_aws",
+    "slower_than_could_be",
 ]

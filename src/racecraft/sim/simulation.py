@@ -13,7 +13,7 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -381,8 +381,31 @@ class Simulation:
 
 
 def instruction_set() -> str:
-    """What the core's kernels run on: ``avx512``, ``avx2`` or ``portable``; results are the same."""
+    """What the core's kernels run on: ``avx512``, ``avx2`` or ``portable``; results are the same.
+
+    The best that this build and this machine have, unless the variable ``RACECRAFT_ISA`` names another.
+    """
     return str(_native.isa())
+
+
+def core_build() -> dict[str, Any]:
+    """Of the native core: a wheel's commit (else empty), compiler, and the instruction sets it has for this machine."""
+    return {
+        "commit": _native.commit(),
+        "compiler": _native.compiler(),
+        "instruction_set": instruction_set(),
+        "instruction_sets": _native.available_isas(),
+    }
+
+
+def slower_than_could_be() -> str:
+    """Why the core does not run on the best instruction set of this machine, in a sentence; empty where it does."""
+    isa, best = _native.isa(), _native.best_isa()
+    if isa == best:
+        return ""
+    chosen = isa != _native.available_isas()[-1]
+    why = "RACECRAFT_ISA says so" if chosen else "this build of the core leaves the rest out"
+    return f"The native core runs on the instruction set {isa} and not on this machine's {best}: {why}."
 
 
 @functools.lru_cache(maxsize=8)
