@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from racecraft.race import load_driver
 from racecraft.replay import read_replay, verify
 from racecraft.run import read_simtrace
 from racecraft.sim import Randomization, Simulation
+from racecraft.sim.camera import CAMERAS as CAMERAS_BY_NAME
 from racecraft.sim.columns import ROW_COLUMNS
 
 MEASURED = CarCalibration(left_degrees=24.0, right_degrees=18.0, speeds=((20.0, 0.5), (60.0, 2.5)), slider_percent=40.0)
@@ -115,6 +117,12 @@ def test_the_evaluation_drives_what_the_car_makes_of_it_and_says_so(run: Path) -
     pairs = zip(trace["steer"][driven].tolist(), trace["throttle"][driven].tolist(), strict=True)
     assert list(pairs) == [pytest.approx(table[action], abs=1e-9) for action in trace["action"][driven].tolist()]
     assert verify(read_replay(outcome.files["replay"])).is_genuine
+
+
+def test_the_camera_has_the_look_that_the_run_was_trained_with(tmp_path: Path) -> None:
+    run = trained(tmp_path, name="later", camera="2026")
+    outcome = evaluate_as_car(run, laps=1, num_trials=1, max_resets=0, video=False, num_threads=1)
+    assert outcome.evaluation.conditions.camera == replace(CAMERAS_BY_NAME["2026"], width=640, height=480)
 
 
 def test_latency_is_the_randomisation_s(run: Path) -> None:

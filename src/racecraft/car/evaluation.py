@@ -18,6 +18,7 @@ from racecraft.car.export import export_run, read_exported
 from racecraft.car.picture import draw_commands
 from racecraft.errors import ConfigError
 from racecraft.judging.evaluation import RunEvaluation, evaluate_run
+from racecraft.judging.trained import trained_camera
 from racecraft.race.policy import NetworkPolicy
 from racecraft.run import RunFolder
 from racecraft.sim.randomization import Randomization, load_randomization
@@ -61,9 +62,11 @@ def evaluate_as_car(
         if randomize.latency != (0.0, 0.0):
             raise ConfigError("The car has a latency, and so has the randomisation.", hint="Leave one of them away.")
         randomize = replace(randomize, latency=(steps, steps))
-    space = RunFolder.open(run).read_model_metadata().action_space
+    folder = RunFolder.open(run)
+    space = folder.read_model_metadata().action_space
+    camera = replace(trained_camera(folder.read_info()), width=CAR_CAMERA.width, height=CAR_CAMERA.height)
     about = {"as_car": {**asdict(car), "slider_driven_percent": round(100 * car.slider(space), 1)}}
-    outcome = evaluate_run(run, load=load, camera=CAR_CAMERA, randomize=randomize, about=about, **settings)
+    outcome = evaluate_run(run, load=load, camera=camera, randomize=randomize, about=about, **settings)
     (driver,) = drivers
     picture = draw_commands(
         np.concatenate(driver.chosen),
