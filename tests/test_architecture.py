@@ -30,6 +30,7 @@ LAYERS = (
     "judging",
     "fidelity",
     "training",
+    "classic",
     "tuning",
     "importing",
     "car",

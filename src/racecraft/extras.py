@@ -20,9 +20,18 @@ EXTRAS: Final[dict[str, tuple[str, ...]]] = {
     "postgres": ("psycopg[binary]",),
     "s3": ("obstore",),
     "multi": ("pettingzoo", "openskill"),
+    "watch": ("pygame-ce",),
+    "atari": ("ale-py",),
 }
 """The extras of pyproject.toml and the packages that each brings; a test holds the two alike."""
-MODULES: Final = {"stable_baselines3": "sb3", "cuda": "cuda", "sse_starlette": "serve", "starlette": "serve"}
+MODULES: Final = {
+    "stable_baselines3": "sb3",
+    "cuda": "cuda",
+    "sse_starlette": "serve",
+    "starlette": "serve",
+    "pygame": "watch",
+    "ale_py": "atari",
+}
 """Modules that are not called like their packages, and the extra that brings them."""
 
 

@@ -31,6 +31,7 @@ VERBS = (
     "reward list",
     "reward show",
     "tune",
+    "learn",
     "replay",
     "calibrate",
     "serve",
@@ -93,6 +94,7 @@ HEAVY = ("torch", "gymnasium", "scipy", "shapely", "PIL", "av", "tensorboard")
     [
         (["--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
         (["train", "--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
+        (["learn", "--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
         (["tracks"], ("torch", "av", "PIL", "gymnasium", "scipy", "casadi")),
         (["reward", "check", "centerline"], ("torch", "av", "PIL", "gymnasium")),
     ],

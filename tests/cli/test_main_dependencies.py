@@ -90,6 +90,13 @@ COMMANDS: dict[str, list[str]] = {
         "tracks --json",
     ],
     "reward": ["reward list --json", "reward show racing --json", "reward check W -t oval --json"],
+    "learn": [
+        "learn --json",
+        "learn CliffWalking-v1 --algorithm sarsa --until 200steps --seed 1 --set gamma=0.9 --name c --runs R --json",
+        "learn Racecraft-v0 --algorithm q-table --until 640steps --make max_episode_steps=60 --name t --runs R --watch",
+        "learn --resume R/c --watch",
+        "learn ALE/Pong-v5 --algorithm dqn --until 200steps --runs R",
+    ],
     "tune": [
         "tune -t oval -r racing --search lr --for laps -m 1 --trials 1 --trial-steps 64 --actions continuous"
         " --hyperparameters H --from R/a -s 1 --num-threads 1 -n u --root U --json",
@@ -239,5 +246,7 @@ def test_what_needs_no_extra_works(told: dict[str, tuple[int, str]]) -> None:
         "tracks limit ",
         "tune ",
         "serve ",
+        "learn --resume R/c --watch",
+        "learn ALE/",
     )
     assert [line for line in failed if not any(part in line for part in needed)] == []

@@ -27,6 +27,7 @@ VERBS = (
     "tracks",
     "reward",
     "tune",
+    "learn",
     "logs",
     "serve",
     "machine",

@@ -1,0 +1,284 @@
+"""The job: seeds, ends, files, going on, hostile files, and every setting that is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from racecraft.classic import ALGORITHMS, RECIPES, Progress, learn, resume
+from racecraft.classic.saved import load
+from racecraft.classic.settings import Settings
+from racecraft.classic.until import Goal
+from racecraft.errors import ConfigError, RacecraftError, RunError, TrainingError
+
+CLASSIC = Path(__file__).parents[2] / "src" / "racecraft" / "classic"
+SHORT: dict[str, dict[str, Any]] = {
+    "q-table": {},
+    "sarsa": {},
+    "dqn": {"warm_up": 100},
+    "reinforce": {"episodes": 2},
+    "a2c": {"num_envs": 4},
+    "ppo": {"length": 16},
+    "sac": {"warm_up": 100, "batch": 16},
+}
+
+
+def short(algorithm: str, **more: Any) -> Any:
+    environment = "Pendulum-v1" if algorithm == "sac" else "CartPole-v1"
+    options = {"seed": 1, "until": "600 steps", "settings": SHORT[algorithm]}
+    return learn(environment, algorithm, **{**options, **more})
+
+
+def test_every_algorithm_is_a_page_that_can_be_read() -> None:
+    for module in ("q_table", "sarsa", "dqn", "reinforce", "a2c", "a3c", "ppo", "sac"):
+        text = (CLASSIC / f"{module}.py").read_text()
+        assert len(text.splitlines()) <= 200, module
+        assert "import torch" not in text
+
+
+@pytest.mark.parametrize("algorithm", list(SHORT))
+def test_the_same_seed_gives_the_same_bits_and_another_seed_others(algorithm: str) -> None:
+    first, same, other = short(algorithm), short(algorithm), short(algorithm, seed=2)
+    for name, array in first.policy.arrays.items():
+        assert (array == same.policy.arrays[name]).all()
+    assert any((array != other.policy.arrays[name]).any() for name, array in first.policy.arrays.items())
+    assert (first.returns, first.curve, first.mean_return) == (same.returns, same.curve, same.mean_return)
+    assert first.steps >= 600
+
+
+@pytest.mark.parametrize("algorithm", list(SHORT))
+def test_a_learning_rate_of_zero_changes_nothing(algorithm: str) -> None:
+    still = {"learning_rate": 0.0}
+    if algorithm == "reinforce":
+        still["critic_learning_rate"] = 0.0
+    if algorithm in ("q-table", "sarsa"):
+        still["final_learning_rate"] = 0.0
+    kept = short(algorithm, settings={**SHORT[algorithm], **still}).policy.arrays
+    begun = short(algorithm, settings={**SHORT[algorithm], **still}, until="1 steps").policy.arrays
+    moved = short(algorithm).policy.arrays
+    assert all((kept[name] == begun[name]).all() for name in kept)
+    assert any((moved[name] != begun[name]).any() for name in kept)
+
+
+@pytest.mark.parametrize("algorithm", list(SHORT))
+def test_what_was_learned_is_saved_and_goes_on(algorithm: str, tmp_path: Path) -> None:
+    seen: list[Progress] = []
+    learned = short(algorithm, root=tmp_path, name="a", on_progress=seen.append)
+    folder = tmp_path / "a"
+    assert sorted(path.name for path in folder.iterdir()) == ["curve.jsonl", "learned.json", "policy.safetensors"]
+    lesson, arrays, steps = load(folder)
+    assert (lesson, steps) == (learned.lesson, learned.steps)
+    assert all((arrays[name] == array).all() for name, array in learned.policy.arrays.items())
+    assert [(one.steps, one.mean_return) for one in seen] == learned.curve
+    document = json.loads((folder / "learned.json").read_text())
+    assert document["mean_return"] == learned.mean_return
+
+    again = resume(folder, until=f"{learned.steps} steps")  # nothing left to do: what was saved plays alike
+    assert all((again.policy.arrays[name] == array).all() for name, array in learned.policy.arrays.items())
+    more = resume(folder, until=f"{learned.steps + 400} steps")
+    assert more.steps >= learned.steps + 400
+    assert len(more.curve) == len(learned.curve) + 1
+    assert load(folder)[2] == more.steps
+
+
+def test_it_ends_when_it_should() -> None:
+    easy = short("q-table", until="5 return or 50000 steps", settings={})
+    assert (easy.reason, easy.steps) == ("return", 50_000) or easy.steps < 50_000
+    assert short("q-table", until="0.2 s or 10000000 steps").reason == "seconds"
+    assert short("q-table").reason == "steps"
+
+
+def test_an_interrupted_run_is_saved(tmp_path: Path) -> None:
+    def stop(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    learned = short("dqn", root=tmp_path, name="a", on_progress=stop)
+    assert learned.reason == "interrupted"
+    assert load(tmp_path / "a")[2] == learned.steps
+    assert json.loads((tmp_path / "a" / "learned.json").read_text())["reason"] == "interrupted"
+
+
+class Loud(gymnasium.Env[Any, Any]):
+    """Pays more than a number can hold."""
+
+    observation_space, action_space = spaces.Box(-1.0, 1.0, (1,)), spaces.Discrete(2)
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action: Any) -> Any:
+        return np.zeros(1, np.float32), 1e60, True, False, {}
+
+
+def test_numbers_that_leave_all_bounds_are_told() -> None:
+    gymnasium.register("Loud-v0", Loud)
+    try:
+        with pytest.raises(TrainingError, match="a2c has left all bounds") as told:
+            learn("Loud-v0", "a2c", until="500 steps")
+    finally:
+        del gymnasium.registry["Loud-v0"]
+    assert "learning_rate" in told.value.hint
+
+
+@pytest.mark.parametrize("environment", ["Blackjack-v1", "Taxi-v4", "MountainCarContinuous-v0"])
+def test_other_environments_are_learned_too(environment: str) -> None:
+    for algorithm in ("q-table", "ppo") if environment != "MountainCarContinuous-v0" else ("ppo", "sac"):
+        settings = {"bins": 2} if algorithm == "q-table" else {}
+        learned = learn(environment, algorithm, until="300 steps", settings=settings)
+        assert np.isfinite(learned.mean_return)
+
+
+@pytest.mark.parametrize(
+    ("environment", "algorithm", "says"),
+    [
+        ("Pendulum-v1", "dqn", "its actions are numbers, and reinforce, a2c, a3c, ppo, sac are made for them"),
+        ("Pendulum-v1", "q-table", "reinforce, a2c, a3c, ppo, sac are made for them"),
+        ("CartPole-v1", "sac", "its actions are choices, and q-table, sarsa, dqn, reinforce, a2c, a3c, ppo are made"),
+        ("Strange-v0", "ppo", "no algorithm here is made for them"),
+        ("CartPole-v1", "dqm", "algorithm is 'dqm'; allowed are q-table"),
+        ("CartPole-v1", "", "algorithm is ''"),
+    ],
+)
+def test_an_algorithm_that_does_not_fit_names_those_that_do(environment: str, algorithm: str, says: str) -> None:
+    class Strange(gymnasium.Env[Any, Any]):
+        observation_space, action_space = spaces.Discrete(2), spaces.MultiDiscrete([2, 2])
+
+        def reset(self, **_: Any) -> Any:
+            return 0, {}
+
+    gymnasium.register("Strange-v0", Strange)
+    try:
+        with pytest.raises(ConfigError, match=says):
+            learn(environment, algorithm)
+    finally:
+        del gymnasium.registry["Strange-v0"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"gama": 0.9}, "There is no setting 'gama'"),
+        ({"gamma": 1.5}, "gamma is 1.5; allowed is a number from 0 to 1"),
+        ({"gamma": float("nan")}, "gamma is nan"),
+        ({"gamma": "high"}, "gamma is 'high'"),
+        ({"gamma": True}, "gamma is True"),
+        ({"batch": 0}, "batch is 0"),
+        ({"batch": 2.5}, "batch is 2.5"),
+        ({"steps": -1}, "steps is -1"),
+        ({"num_envs": 10**6}, "num_envs is 1000000"),
+        ({"hidden": 64}, "hidden is 64"),
+        ({"hidden": [0]}, "hidden is 0"),
+        ({"hidden": [8] * 9}, "allowed is a list of units"),
+        ({"memory": 10**9 + 1}, "memory is"),
+    ],
+)
+def test_settings_that_are_not_allowed(settings: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        learn("CartPole-v1", "dqn", settings=settings)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "a", True])
+def test_seeds_that_are_not_allowed(seed: Any) -> None:
+    with pytest.raises(ConfigError, match="seed is"):
+        learn("CartPole-v1", "dqn", seed=seed)
+
+
+@pytest.mark.parametrize(
+    ("text", "goal"),
+    [
+        ("475 return", Goal(mean_return=475.0)),
+        ("return -110.5 or 2 minutes", Goal(mean_return=-110.5, seconds=120.0)),
+        ("20,000 steps or 90 s", Goal(steps=20_000, seconds=90.0)),
+    ],
+)
+def test_when_to_stop(text: str, goal: Goal) -> None:
+    assert Goal.parse(text) == goal
+
+
+@pytest.mark.parametrize(
+    "text", ["soon", "5 laps", "8 s lap", "1 return or 2 return", "", "or", "nan return", "x" * 500]
+)
+def test_ends_that_are_not_understood(text: str) -> None:
+    with pytest.raises(ConfigError, match="until is"):
+        Goal.parse(text)
+
+
+def test_recipes_name_what_exists() -> None:
+    for environment, algorithm in RECIPES:
+        assert algorithm in ALGORITHMS
+        assert environment in gymnasium.registry or environment == "Racecraft-v0"
+        assert isinstance(RECIPES[environment, algorithm].settings, ALGORITHMS[algorithm].settings)
+    for algorithm in ALGORITHMS.values():
+        assert isinstance(algorithm.settings(), Settings)
+
+
+@pytest.fixture
+def saved(tmp_path: Path) -> Path:
+    short("dqn", root=tmp_path, name="a")
+    return tmp_path / "a"
+
+
+def change(folder: Path, **values: Any) -> None:
+    document = json.loads((folder / "learned.json").read_text())
+    settings = values.pop("settings", {})
+    document |= values
+    document["settings"] |= settings
+    (folder / "learned.json").write_text(json.dumps(document))
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"format": 2}, "format 2"),
+        ({"algorithm": "pickle"}, "algorithm is 'pickle'"),
+        ({"algorithm": ["dqn"]}, "algorithm is"),
+        ({"environment": 7}, "environment is 7"),
+        ({"environment": "Nothing-v0"}, "There is no environment 'Nothing-v0'"),
+        ({"make": []}, "make is"),
+        ({"seed": "1"}, "seed is '1'"),
+        ({"steps": -5}, "steps is -5"),
+        ({"settings": {"batch": 0}}, "batch is 0"),
+        ({"settings": {"other": 0}}, "other"),
+        ({"settings": {"hidden": [8]}}, "do not fit"),
+        ({"algorithm": "ppo"}, "settings name"),
+        ({"environment": "Pendulum-v1"}, "dqn does not fit"),
+        ({"environment": "Acrobot-v1"}, "do not fit"),
+    ],
+)
+def test_a_changed_run_is_refused(saved: Path, values: dict[str, Any], says: str) -> None:
+    change(saved, **values)
+    with pytest.raises(RacecraftError, match=says):
+        resume(saved)
+
+
+def test_damaged_files_are_refused(saved: Path, tmp_path: Path) -> None:
+    from safetensors.numpy import save_file
+
+    for content in (b"", b"\x80\x04.", (saved / "policy.safetensors").read_bytes()[:-9]):
+        (saved / "policy.safetensors").write_bytes(content)
+        with pytest.raises(RunError, match="damaged"):
+            resume(saved)
+    size = short("dqn", until="1 steps").policy.arrays["network"].size
+    save_file({"network": np.full(size, np.nan, np.float32)}, saved / "policy.safetensors")
+    with pytest.raises(ConfigError, match="numbers that are none"):
+        resume(saved)
+    (saved / "policy.safetensors").unlink()
+    with pytest.raises(RunError, match="damaged"):
+        resume(saved)
+    (saved / "learned.json").write_text("{")
+    with pytest.raises(RunError, match="not valid JSON"):
+        resume(saved)
+    with pytest.raises(RunError, match=r"learned\.json is missing"):
+        resume(tmp_path / "nothing")
+
+
+def test_a_name_that_is_taken_or_not_allowed(saved: Path) -> None:
+    for name in ("a", "../x"):
+        with pytest.raises(RunError):
+            short("dqn", root=saved.parent, name=name)
