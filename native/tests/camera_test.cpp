@@ -6,6 +6,7 @@
 #include "../src/camera_model.hpp"
 #include "../src/dispatch.hpp"
 #include "check.hpp"
+#include "racecraft/camera_walk.hpp"
 #include "racecraft/random.hpp"
 #include "ray_cast.hpp"
 #include "tracks.hpp"
@@ -196,6 +197,37 @@ TEST(the_lens_is_where_the_car_carries_it) {
         CHECK_NEAR(lens.y, -0.3 + 0.15 * std::sin(heading) + 0.03 * std::cos(heading), 1e-6);
         CHECK_NEAR(lens.cosine, std::cos(heading + 0.2), 1e-6);
         CHECK_NEAR(lens.sine, std::sin(heading + 0.2), 1e-6);
+    }
+}
+
+TEST(where_walls_meet_a_pixel_shows_of_each_what_it_covers) {
+    WallSpan walls[2]{};
+    walls[0].wall = 2;
+    walls[1].wall = 1;
+    const int32_t shades[4] = {0, 6400, 640, 0};
+    for (const float edge : {80.0f, 80.25f, 100.75f, 159.5f}) {
+        walls[0].right = (edge - 80.0f) / 40.0f;
+        const WallEdge found = wall_edge(walls, 0, 40.0f, 160, shades);
+        CHECK_EQUAL(found.pixel, static_cast<int32_t>(edge));
+        const float left_part = edge - std::floor(edge);
+        CHECK_NEAR(found.mixture, left_part * 640.0f + (1.0f - left_part) * 6400.0f, 1.0);
+    }
+}
+
+TEST(the_lens_stays_inside_the_room_wherever_the_car_is) {
+    const GroundMap ground(octagon().view());
+    const GroundView& room = ground.view();
+    const CameraModel camera(CameraSpec{});
+    const float far[] = {-100.0f, -2e6f, 100.0f, 2e6f, NAN, INFINITY};
+    for (const float x : far) {
+        for (const float y : far) {
+            for (const float heading : {0.0f, 2.0f, 1e9f, NAN}) {
+                const LensPose lens = place_lens(camera.view(), room, x, y, heading);
+                CHECK(lens.x > room.min_x && lens.x < room.max_x);
+                CHECK(lens.y > room.min_y && lens.y < room.max_y);
+                CHECK_NEAR(lens.cosine * lens.cosine + lens.sine * lens.sine, 1.0, 1e-5);
+            }
+        }
     }
 }
 

@@ -28,6 +28,24 @@ ObjectsAround around(const std::vector<ObjectState>& objects) {
 
 }  // namespace
 
+TEST(a_place_comes_back_into_the_lap_and_stays_on_an_open_road) {
+    const TrackStore store = test::store_of(test::circuit());
+    const TrackGeometry& track = store.geometry();
+    for (const double place : {0.0, 1.0, track.length - 1e-9}) {
+        for (const double turns : {-2.0, 0.0, 3.0}) {
+            CHECK_NEAR(wrap_arc_length(track, place + turns * track.length), place, 1e-9);
+        }
+    }
+    for (const double end : {track.length, -track.length, -1e-18, -1e-300, 7.0 * track.length}) {
+        const double wrapped = wrap_arc_length(track, end);
+        CHECK(wrapped >= 0.0 && wrapped < track.length);  // rounding must not give the length itself
+    }
+    TrackGeometry road = track;
+    road.is_closed = 0;
+    CHECK_EQUAL(wrap_arc_length(road, -1.0), 0.0);
+    CHECK_EQUAL(wrap_arc_length(road, road.length + 1.0), road.length);
+}
+
 TEST(a_start_takes_the_lane_without_an_object_near_before_behind_and_across_the_line) {
     const TrackStore store = test::store_of(test::circuit());
     const TrackGeometry& track = store.geometry();

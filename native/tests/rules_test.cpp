@@ -153,6 +153,19 @@ TEST(fifteen_falling_steps_are_reversed_and_fourteen_are_not) {
     CHECK(car.status() == Status::reversed);
 }
 
+TEST(a_car_that_turns_back_behind_the_line_of_a_flying_lap_falls_from_where_it_was) {
+    Judge car(test::circuit(), {.laps = 2, .max_steps = 100000, .time_limit = 0.0});
+    const double length = car.track().length;
+    car.begin(car.pose_at(0.0));
+    for (int i = 1; i <= 100; ++i) car.judge_at(car.pose_at(0.01 * i * length + 0.2));
+    CHECK(car.status() == Status::lap_complete);
+    CHECK_NEAR(car.episode().progress * length, 0.2, 1e-4);
+    double s = 0.2;
+    for (int i = 0; i < 14; ++i) CHECK(!car.judge_at(car.pose_at(s -= 0.01)).terminated);
+    CHECK(car.judge_at(car.pose_at(s -= 0.01)).terminated);
+    CHECK(car.status() == Status::reversed);
+}
+
 TEST(backing_over_the_start_line_is_negative_progress_not_a_lap) {
     Judge car(test::circuit());
     car.begin(car.pose_at(0.03));
