@@ -400,6 +400,15 @@ def test_continuous_commands_stay_within_bounds(config):
     assert abs(ppo._rollout.actions).max() > 1.0  # the density is that of the unclipped action
 
 
+def test_without_a_seed_it_is_that_of_seed_0(config):
+    seeded = ppo_for(config)
+    plain = ppo_for(config)
+    plain = PPO(config, plain.learner, plain.environment)
+    seeded.iterate()
+    plain.iterate()
+    assert_same_weights(seeded, plain)
+
+
 @pytest.mark.parametrize(
     ("field", "value"),
     [

@@ -36,6 +36,14 @@ def test_iterations_in_a_rush_are_thinned(tmp_path: Path) -> None:
     assert len(read_history(tmp_path / "h")[0]) < 100
 
 
+def test_the_first_iteration_is_written_however_young_the_clock_is(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("racecraft.run.history.time.monotonic", lambda: 0.1)  # s since the machine began
+    with HistoryWriter(tmp_path / "h") as writer:
+        writer.add_iteration({"step": 1})
+        writer.add_iteration({"step": 2})
+    assert [point["step"] for point in read_history(tmp_path / "h")[0]] == [1]
+
+
 def test_a_resumed_run_drops_what_came_after_its_checkpoint(tmp_path: Path) -> None:
     path = tmp_path / "h"
     with HistoryWriter(path) as writer:
