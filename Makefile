@@ -17,7 +17,7 @@ WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/
 # Without bytecode kept, every process of a test compiles what it imports anew: most of the time of a server's start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help train console test test-fast mutants lint format bench setup build stub clean requirements
+.PHONY: help train console wheel test test-fast mutants lint format bench setup build stub clean requirements
 
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | awk -F'\t' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -27,6 +27,9 @@ train: $(VENV)/.built  ## set up if needed, then train a car from camera pixels 
 
 console: $(VENV)/.built $(VENV)/.serve $(PAGES)  ## set up if needed, build the console's pages, and open it in a browser
 	$(BIN)/racecraft serve
+
+wheel: $(VENV)/.train $(PAGES)  ## build dist/: an sdist, and a wheel for this Python and machine with the console's pages inside
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(UV) build -q --sdist --wheel --python $(BIN)/python --no-build-isolation --out-dir dist
 
 test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every test, on every core
 	$(PYTEST) --durations=40

@@ -35,7 +35,7 @@ JOBS = max(1, (os.cpu_count() or 1) // int(os.environ.get("PYTEST_XDIST_WORKER_C
 def release() -> Path:
     """The folder of the programs beside the installed core's own objects."""
     python = f"cp{sys.version_info.major}{sys.version_info.minor}"
-    folders = [path.parent for path in (ROOT / "build").glob(f"{python}-{python}-*/build.ninja")]
+    folders = [path.parent for path in (ROOT / "build").glob(f"{python}-*-*/build.ninja")]
     assert folders, "make build compiles the core"
     return compiled(folders[0])
 
