@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError, RunError
 from racecraft.run import RunFolder, RunInfo, list_runs
-from racecraft.run.folder import _checked, sanitize_name
+from racecraft.run.folder import checked_name, sanitize_name
 from racecraft.run.training_params import TrainingParams
 
 
@@ -66,7 +66,7 @@ def test_bad_names_are_refused(tmp_path, name):
 @given(st.text(max_size=100))
 def test_sanitized_names_are_allowed(text):
     name = sanitize_name(text)
-    assert _checked(name) == name
+    assert checked_name(name) == name
 
 
 def test_open_says_what_is_missing_and_guesses(tmp_path):

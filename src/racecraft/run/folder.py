@@ -86,7 +86,7 @@ class RunFolder:
         """
         root = Path(root)
         if name is not None:
-            names = [_checked(name)]
+            names = [checked_name(name)]
         else:
             stem = f"{sanitize_name(prefix)[:40]}-{time.strftime('%Y%m%d-%H%M%S')}"
             names = [stem, *(f"{stem}-{count}" for count in range(2, 1000))]
@@ -352,19 +352,24 @@ def dated_folder(root: Path, *, prefix: str = "") -> tuple[str, Path]:
             moment += timedelta(seconds=1)
 
 
-def sanitize_name(text: str) -> str:
-    """The nearest name a folder may have: ``Mein Auto #1`` becomes ``Mein-Auto-1``."""
-    name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-._")[:MAX_NAME].rstrip("-._")
-    return f"run-{name}".rstrip("-")[:MAX_NAME] if not name or _RESERVED.fullmatch(name) else name
+def checked_name(name: str) -> str:
+    """The name, where a run may have it.
 
-
-def _checked(name: str) -> str:
+    Raises:
+        RunError: It may not; the hint has one that is near.
+    """
     if len(name) > MAX_NAME or not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.endswith("."):
         raise RunError(
             f"Name {name!r} is not allowed: 1 to {MAX_NAME} letters, digits, dots, hyphens and underscores.",
             hint=f"Use '{sanitize_name(name)}'.",
         )
     return name
+
+
+def sanitize_name(text: str) -> str:
+    """The nearest name a folder may have: ``Mein Auto #1`` becomes ``Mein-Auto-1``."""
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-._")[:MAX_NAME].rstrip("-._")
+    return f"run-{name}".rstrip("-")[:MAX_NAME] if not name or _RESERVED.fullmatch(name) else name
 
 
 def _versions() -> dict[str, str]:

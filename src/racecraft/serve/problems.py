@@ -40,6 +40,8 @@ def install(app: FastAPI) -> None:
     async def not_valid(_: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"] if part not in ("body", "query", "path"))
+        if isinstance(told := first.get("ctx", {}).get("error"), RacecraftError):
+            return problem(422, "InvalidRequest", str(told), told.hint, field=field or None)
         text = f"{field or 'The request'}: {first['msg']}.".replace("..", ".")
         return problem(422, "InvalidRequest", text, field=field or None)
 
