@@ -48,6 +48,18 @@ PAGES: Final = Path(__file__).parent / "pages"
 """The built web client, part of the package."""
 KINDS: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".woff2": "font/woff2"}
 
+CODINGS: Final = {"br": ".br", "gzip": ".gz"}
+"""What the build compressed the pages with, the smaller first, by HTTP's name and the file's ending."""
+
+
+def accepts(header: str, coding: str) -> bool:
+    """Whether a browser that sent this ``Accept-Encoding`` takes a coding; ``q=0`` refuses it (RFC 9110, 12.5.3)."""
+    for part in header.split(","):
+        name, _, weight = part.partition(";")
+        if name.strip().lower() == coding:
+            return weight.strip().lower().removeprefix("q=").rstrip("0") not in ("", ".") or not weight.strip()
+    return False
+
 
 def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     """The application; `app.state.guard.ticket()` opens its door once.
@@ -115,13 +127,18 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         app.include_router(part.router)
 
     @app.get("/assets/{name}", include_in_schema=False)
-    def asset(name: str) -> Response:
+    def asset(name: str, request: Request) -> Response:
         path = PAGES / "assets" / name
         if "/" in name or path.suffix not in KINDS or not path.is_file():
             return problems.problem(404, "NotFound", f"There is no file {name[:80]!r}.")
-        return FileResponse(
-            path, media_type=KINDS[path.suffix], headers={"Cache-Control": "public, max-age=31536000, immutable"}
-        )
+        headers = {"Cache-Control": "public, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
+        for coding, ending in CODINGS.items():
+            small = path.with_name(name + ending)
+            if accepts(request.headers.get("accept-encoding", ""), coding) and small.is_file():
+                return FileResponse(
+                    small, media_type=KINDS[path.suffix], headers={**headers, "Content-Encoding": coding}
+                )
+        return FileResponse(path, media_type=KINDS[path.suffix], headers=headers)
 
     @app.get("/{path:path}", include_in_schema=False)
     def page(path: str, request: Request) -> Response:
