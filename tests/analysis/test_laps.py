@@ -118,3 +118,25 @@ def test_what_is_no_trace_is_told(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("a,b\n1,2\n")
     with pytest.raises(RunError):
         read_laps(tmp_path / "t.csv")
+
+
+def test_a_car_put_back_after_a_mistake_did_not_drive_there(tmp_path: Path, oval: Track) -> None:
+    """It leaves the road to the side at 1 m/s, is put back half a metre away, and stands for its penalty."""
+    path = tmp_path / "0-iteration.csv"
+    write_trace(path, oval, [(1.0, "off_track", 0.4)])
+    lines = path.read_text().splitlines()
+    head, rows = lines[0].split(","), [line.split(",") for line in lines[1:]]
+    y, status, time = (head.index(name) for name in ("Y", "episode_status", "tstamp"))
+    put = 40
+    for row in rows[put:]:
+        row[y] = str(float(row[y]) + 0.5)
+    rows[put][status] = "pause"
+    rows[put:put] = [list(rows[put]) for _ in range(5)]
+    for step, row in enumerate(rows):
+        row[time] = f"{step * DT:.3f}"
+    path.write_text("\n".join([lines[0], *(",".join(row) for row in rows)]) + "\n")
+    (lap,) = read_laps(path)
+    assert lap.puts == (put,)
+    assert lap.speed[put - 1] == pytest.approx(1.0, abs=0.1)
+    assert lap.speed[put] == 0.0
+    assert lap.speed.max() < 3.0  # the half metre in one step would be 7.5 m/s

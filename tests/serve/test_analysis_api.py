@@ -44,6 +44,31 @@ def test_laps_with_their_sectors(raced: tuple[RunningConsole, str, str]) -> None
         refused(console.client.get(f"/api/models/{name}/evaluations/{wrong}/laps"), 404)
 
 
+def test_laps_have_the_reward_of_their_own_training(raced: tuple[RunningConsole, str, str]) -> None:
+    """And not AWS's default for the centre line, which is all that an evaluation's files know."""
+    console, name, stamp = raced
+    client, path = console.client, f"/api/models/{name}/evaluations/{stamp}/laps"
+    before = client.get(path).json()
+    assert before["reward"] == {"stretch": 1, "stretches": 1, "is_afresh": False, "error": None}
+    x_pays = "def reward_function(params):\n    return 100 * params['x']\n"
+    steps = client.get(f"/api/models/{name}").json()["steps"]
+    job = client.post(f"/api/models/{name}/train", json={"reward": x_pays, "until": f"{steps + 1024} steps"}).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    after = client.get(path).json()
+    assert after["reward"] == {"stretch": 1, "stretches": 2, "is_afresh": False, "error": None}
+    assert [lap["reward"] for lap in after["laps"]] == [lap["reward"] for lap in before["laps"]]
+    request = {"laps": 1, "num_trials": 2, "rules": "first_lap", "checkpoint": "last"}
+    job = client.post(f"/api/models/{name}/evaluations", json=request).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    newest = client.get(f"/api/models/{name}/evaluations").json()[0]["stamp"]
+    found = client.get(f"/api/models/{name}/evaluations/{newest}/laps").json()
+    assert found["reward"]["stretch"] == 2
+    for lap in found["laps"]:
+        asked = [(x, paid) for x, paid in zip(lap["x"], lap["reward"], strict=True) if paid is not None]
+        assert len(asked) > 3
+        assert all(paid == pytest.approx(100 * x, abs=0.02) for x, paid in asked)
+
+
 def test_saliency_of_one_moment(raced: tuple[RunningConsole, str, str]) -> None:
     console, name, stamp = raced
     path = f"/api/models/{name}/evaluations/{stamp}/saliency"

@@ -11,6 +11,7 @@ import {
   poseAt,
   timeDelta,
   type EvaluationLaps,
+  drives,
   type LapTrace,
 } from "../src/lib/laps";
 import { fileName, toCsv } from "../src/lib/save";
@@ -35,6 +36,8 @@ function lap(number: number, speed: number, share = 1, length = 10): LapTrace {
     speed: row(() => speed),
     throttle: row(() => speed),
     steering: row(() => 0),
+    puts: [],
+    objects: [],
     reward: row(() => 1),
     passages: [
       { seconds: 5 / speed, entry_speed: speed, slowest: speed, exit_speed: speed },
@@ -42,6 +45,33 @@ function lap(number: number, speed: number, share = 1, length = 10): LapTrace {
     ],
   };
 }
+
+describe("laps with a mistake", () => {
+  const crashed: LapTrace = { ...lap(1, 1), puts: [5] };
+  crashed.y = crashed.y.map((_, row) => (row < 5 ? 0 : 0.5));
+  crashed.reward = crashed.reward.map((_, row) => (row === 5 ? null : row));
+
+  it("are drawn without a line to where the car was put", () => {
+    expect(drives(crashed)).toEqual([
+      [0, 5],
+      [5, crashed.x.length],
+    ]);
+    expect(poseAt(crashed, 0.45).y).toBe(0); // it does not glide there
+    expect(poseAt(crashed, 0.5).y).toBe(0.5);
+  });
+
+  it("have no reward where the function is not asked", () => {
+    const along = alongLap(crashed, crashed.reward);
+    expect(along[0]).toBe(0);
+    expect(along.every((value) => value === null || Number.isFinite(value))).toBe(true);
+    expect(
+      alongLap(
+        crashed,
+        crashed.reward.map(() => null),
+      ).every((value) => value === null),
+    ).toBe(true);
+  });
+});
 
 describe("laps", () => {
   const [fast, slow, part] = [lap(1, 2), lap(2, 1), lap(3, 4, 0.5)];
@@ -59,7 +89,7 @@ describe("laps", () => {
     expect(poseAt(fast, 2.5).share).toBeCloseTo(0.5);
   });
   it("do not glide where a car was put somewhere else", () => {
-    const jumped = { ...fast, x: fast.x.map((x, index) => (index > 10 ? x + 5 : x)) };
+    const jumped = { ...fast, puts: [11], x: fast.x.map((x, index) => (index > 10 ? x + 5 : x)) };
     expect(poseAt(jumped, 1.05).x).toBeCloseTo(2 - 0.14);
   });
   it("lie on one axis, up to where they ended", () => {

@@ -48,6 +48,8 @@ class TracedLap:
     reward: Floats
     penalty_seconds: float = 0.0
     """s that it stood for its mistakes."""
+    puts: tuple[int, ...] = ()
+    """Rows in which the car stands where it was put after a mistake: it did not drive there."""
 
     @property
     def is_complete(self) -> bool:
@@ -63,9 +65,11 @@ class TracedLap:
     def speed(self) -> Floats:
         """Driven speed, m/s, from the places of neighbouring steps; 0 where the car was put elsewhere  (R,)."""
         step = np.hypot(*np.diff(self.points, axis=0).T)
-        step[step > JUMP] = 0.0
         pace = step / np.maximum(np.diff(self.time), 0.5 * CONTROL_DT)
-        return np.asarray(0.5 * (np.concatenate([pace[:1], pace]) + np.concatenate([pace, pace[-1:]])))
+        before, after = np.concatenate([pace[:1], pace]), np.concatenate([pace, pace[-1:]])
+        for row in self.puts:
+            after[row - 1], before[row] = before[row - 1], 0.0
+        return np.asarray(0.5 * (before + after))
 
     def time_at(self, shares: Floats) -> Floats:
         """When it reached some shares of the lap, s."""
@@ -94,18 +98,22 @@ def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
             continue
         rows = slice(begin, end)
         time = columns["tstamp"][rows].astype(np.float64)
+        points = np.column_stack([columns["X"][rows], columns["Y"][rows]]).astype(np.float64)
+        is_paused = np.zeros(end - begin, bool) if statuses is None else statuses[rows] == "pause"
+        is_put = (is_paused[1:] & ~is_paused[:-1]) | (np.hypot(*np.diff(points, axis=0).T) > JUMP)
         laps.append(
             TracedLap(
                 number=int(episode[begin]) + 1,
                 status=str(statuses[end - 1]) if statuses is not None else "",
                 time=time - time[0],
                 share=np.maximum.accumulate(np.clip(columns["progress"][rows] / 100.0, 0.0, 1.0)),
-                points=np.column_stack([columns["X"][rows], columns["Y"][rows]]).astype(np.float64),
+                points=points,
                 heading=np.radians(columns["yaw"][rows]),
                 steering_angle=np.radians(columns["steer"][rows]),
                 throttle=columns["throttle"][rows].astype(np.float64),
                 reward=columns["reward"][rows].astype(np.float64),
-                penalty_seconds=0.0 if statuses is None else CONTROL_DT * int((statuses[rows] == "pause").sum()),
+                penalty_seconds=CONTROL_DT * int(is_paused.sum()),
+                puts=tuple((np.flatnonzero(is_put) + 1).tolist()),
             )
         )
     return laps

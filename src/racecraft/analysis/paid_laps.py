@@ -20,7 +20,7 @@ MAX_LAPS: Final = 6
 
 @dataclass(frozen=True, kw_only=True)
 class PaidLap:
-    """One lap, paid anew; R rows."""
+    """One lap, paid anew: R of its rows, those in which a reward function is called."""
 
     number: int
     """As in the trace, from 1."""
@@ -29,9 +29,19 @@ class PaidLap:
     """x, y in m  (R, 2)."""
     rewards: NDArray[np.float64]
     """(R,)"""
+    rows: NDArray[np.int64]
+    """Which ones of the lap's, from 0  (R,)."""
 
 
-def pay_laps(source: str, track: Track, trace: Path, *, timeout_s: float = 0.5, foreign: bool = False) -> list[PaidLap]:
+def pay_laps(
+    source: str,
+    track: Track,
+    trace: Path,
+    *,
+    timeout_s: float = 0.5,
+    foreign: bool = False,
+    most: int = MAX_LAPS,
+) -> list[PaidLap]:
     """Ask a reward function what it pays for the laps of a sim-trace, the last few of them, in the order driven.
 
     Objects on the track are left out: a trace does not say where they were.
@@ -42,6 +52,7 @@ def pay_laps(source: str, track: Track, trace: Path, *, timeout_s: float = 0.5, 
         trace: An evaluation's or a training's sim-trace.
         timeout_s: How long one call may take, s.
         foreign: The source is somebody else's; see `RewardWorker`.
+        most: Laps, at most.
 
     Raises:
         RewardError: The function fails.
@@ -53,7 +64,7 @@ def pay_laps(source: str, track: Track, trace: Path, *, timeout_s: float = 0.5, 
         for log in read_logs([trace], Faults()):
             judged = rules.judge(log)
             starts = log.starts.tolist()
-            for begin, end in list(pairwise(starts))[-MAX_LAPS:]:
+            for begin, end in list(pairwise(starts))[-most:]:
                 rows = _driven(log, begin, end)
                 if len(rows) > 1:
                     found.append(
@@ -62,9 +73,10 @@ def pay_laps(source: str, track: Track, trace: Path, *, timeout_s: float = 0.5, 
                             status=log.status[end - 1],
                             points=np.column_stack([log.x[rows], log.y[rows]]),
                             rewards=worker(judged[rows]),
+                            rows=rows - begin,
                         )
                     )
-    return found[-MAX_LAPS:]
+    return found[-most:]
 
 
 def _driven(log: Log, begin: int, end: int) -> NDArray[np.int64]:

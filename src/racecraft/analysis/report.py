@@ -94,7 +94,7 @@ def _race(folder: RunFolder, stamp: str, summary: dict[str, Any], trained_on: Tr
     best = whole[0] if whole else max(laps, key=lambda lap: lap.share[-1])
     sectors = sectors_of(driven)
     numbers = [(sector.apex, str(sector.number)) for sector in sectors if sector.turn]
-    hero = racing_line(driven, best.points, best.speed, numbers)
+    hero = racing_line(driven, best.points, best.speed, numbers, best.puts)
     parts = []
     if len(whole) > 1:
         parts.append(section("The two best laps, place by place", _telemetry(driven, whole[0], whole[1])))

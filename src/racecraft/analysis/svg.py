@@ -115,7 +115,13 @@ def line_chart(chart: Chart) -> str:
     )
 
 
-def racing_line(track: Track, points: Floats, speeds: Floats, numbers: Sequence[tuple[float, str]] = ()) -> str:
+def racing_line(
+    track: Track,
+    points: Floats,
+    speeds: Floats,
+    numbers: Sequence[tuple[float, str]] = (),
+    puts: Sequence[int] = (),
+) -> str:
     """A track with a line on it, coloured by speed, and labels beside places along the centre line.
 
     Args:
@@ -123,14 +129,14 @@ def racing_line(track: Track, points: Floats, speeds: Floats, numbers: Sequence[
         points: x, y  (R, 2).
         speeds: m/s  (R,).
         numbers: Place in m, and what stands there.
+        puts: Points that the car was put to, so that no line leads there.
     """
     view, unit = _frame(track)
     moving = speeds[speeds > 0.5 * np.median(speeds)] if len(speeds) and np.median(speeds) > 0 else speeds
     low, high = speed_range(moving) if len(moving) else (0.0, 1.0)
     parts = [_road(track, unit)]
-    gaps = np.hypot(*np.diff(points, axis=0).T) if len(points) > 1 else np.zeros(0)
     for index in range(len(points) - 1):
-        if gaps[index] > 1.0:
+        if index + 1 in puts:
             continue
         red, green, blue = speed_color((speeds[index] - low) / (high - low))
         (x0, y0), (x1, y1) = points[index].tolist(), points[index + 1].tolist()

@@ -17,20 +17,27 @@ export function before(list: number[], value: number): number {
   return low;
 }
 
+/** Runs of rows in which the car drove from one to the next, from the first of each to behind its last. */
+export function drives(lap: { puts: number[]; x: number[] }): [number, number][] {
+  const cuts = [0, ...lap.puts, lap.x.length];
+  return cuts.slice(1).map((end, index) => [cuts[index]!, end]);
+}
+
 /** Value of a column where another one, which never falls, has a value; straight in between. */
-export function interpolate(at: number, along: number[], values: number[]): number {
+export function interpolate(at: number, along: number[], values: number[] | ((row: number) => number)): number {
+  const value = typeof values === "function" ? values : (at: number) => values[at]!;
   const row = before(along, at);
   const next = Math.min(row + 1, along.length - 1);
   const width = along[next]! - along[row]!;
   const share = width > 0 ? Math.min(Math.max((at - along[row]!) / width, 0), 1) : 0;
-  return values[row]! + (values[next]! - values[row]!) * share;
+  return value(row) + (value(next) - value(row)) * share;
 }
 
 /** Where a lap's car is so many seconds after its start; it waits at the end. */
 export function poseAt(lap: LapTrace, seconds: number): { x: number; y: number; heading: number; share: number } {
   const row = before(lap.time, seconds);
   const next = Math.min(row + 1, lap.time.length - 1);
-  const jump = Math.hypot(lap.x[next]! - lap.x[row]!, lap.y[next]! - lap.y[row]!) > 1;
+  const jump = lap.puts.includes(next);
   const width = lap.time[next]! - lap.time[row]!;
   const share = jump || width <= 0 ? 0 : Math.min(Math.max((seconds - lap.time[row]!) / width, 0), 1);
   const turn = Math.atan2(
@@ -51,12 +58,26 @@ export function poseAt(lap: LapTrace, seconds: number): { x: number; y: number; 
   };
 }
 
+/** Boxes and other cars as they were so many seconds after a lap's start. */
+export function objectsAt(lap: LapTrace, seconds: number): { kind: string; x: number; y: number; heading: number }[] {
+  const row = before(lap.time, seconds);
+  return lap.objects.map(({ kind, x, y, heading }) => {
+    const at = Math.min(row, x.length - 1);
+    return { kind, x: x[at]!, y: y[at]!, heading: heading[at]! };
+  });
+}
+
 /** Values of a column at equal shares of the lap, null beyond where it ended. */
-export function alongLap(lap: LapTrace, values: number[]): (number | null)[] {
+export function alongLap(lap: LapTrace, values: (number | null)[]): (number | null)[] {
   const last = lap.share[lap.share.length - 1]!;
   return Array.from({ length: PLACES }, (_, index) => {
     const share = index / (PLACES - 1);
-    return share > last + 1e-6 ? null : interpolate(share, lap.share, values);
+    if (share > last + 1e-6) return null;
+    const row = before(lap.share, share);
+    const known = values[row] === null ? values[Math.min(row + 1, values.length - 1)] : values[row];
+    if (known === null || known === undefined) return null;
+    const [from, to] = [values[row] ?? known, values[Math.min(row + 1, values.length - 1)] ?? known];
+    return interpolate(share, lap.share, (at) => (at === row ? from : to));
   });
 }
 

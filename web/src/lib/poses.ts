@@ -3,6 +3,8 @@ export interface Look {
   step: number;
   poses: number[][]; // x, y, heading, speed, steering in mm and mrad, share of the lap in 1/1000
   steps: number[];
+  /** Around the car whose picture is shown: kind, x, y, heading in mm and mrad. */
+  objects?: [string, number, number, number][];
   policy: number[];
   is_discrete: boolean;
   frame: string;

@@ -3,7 +3,9 @@
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { TrackGeometry } from "../api/client";
+import { boxGeometry } from "./box";
 import { carGeometry } from "./car";
+import { standBack } from "./fit";
 import { fieldGeometry, RISE, roadGeometry } from "./ground";
 import { Paint, paintGround } from "./paint";
 import { between, halfway, type Look } from "./poses";
@@ -20,6 +22,14 @@ export interface PlacedCar {
   color: string;
 }
 
+/** Something on the road that does not learn: a box, or another car. */
+export interface PlacedObject {
+  kind: string;
+  x: number;
+  y: number;
+  heading: number;
+}
+
 /** A line on the ground with a colour at every point. */
 export interface Trail {
   points: number[][];
@@ -27,6 +37,9 @@ export interface Trail {
 }
 
 const MAX_CARS = 256;
+const MAX_OBJECTS = 40; // that may be around a car
+const BOT = new three.Color(0xd9dde3);
+const BOX = new three.Color(0xffffff);
 const COARSEST = 0.7; // pixels per CSS pixel, along a side
 const LATE = 1.4; // times the usual, after which the next look at the latest is expected
 const STILL = 400; // ms without a change, after which the picture is drawn as sharp as it can be
@@ -47,11 +60,15 @@ export class Scene {
   private readonly camera = new three.PerspectiveCamera(42, 1, 0.05, 300);
   private readonly controls: OrbitControls;
   private readonly cars: three.InstancedMesh;
+  private readonly boxes: three.InstancedMesh;
+  private readonly bots: three.InstancedMesh;
   private readonly field: three.Mesh;
   private readonly paints = new Paint();
   private readonly sharpness: Sharpness;
   private readonly middle = new three.Vector3();
   private readonly size: number;
+  private readonly edges: (readonly [number, number, number])[]; // of the road, from the middle
+  private isMoved = false; // the camera, by hand: it then stays where it is
   private readonly matrix = new three.Matrix4();
   private readonly watcher: ResizeObserver;
   private before: Look | undefined;
@@ -83,16 +100,26 @@ export class Scene {
     const [center, extent] = [box.getCenter(new three.Vector2()), box.getSize(new three.Vector2())];
     this.middle.set(center.x, center.y, 0);
     this.size = Math.max(extent.x, extent.y * 1.5);
+    this.edges = [...track.outer, ...track.inner].map(([x, y]) => [x! - center.x, y! - center.y, 0]);
 
     // drawn in this order: what is hidden by something nearer then costs no pixel
     this.cars = new three.InstancedMesh(carGeometry(), this.paints, MAX_CARS);
     this.cars.count = 0;
     this.cars.setColorAt(0, new three.Color());
     this.cars.instanceMatrix.setUsage(three.DynamicDrawUsage);
+    this.boxes = new three.InstancedMesh(boxGeometry(), this.paints, MAX_OBJECTS);
+    this.bots = new three.InstancedMesh(this.cars.geometry, this.paints, MAX_OBJECTS);
+    for (const [mesh, color] of [
+      [this.boxes, BOX],
+      [this.bots, BOT],
+    ] as const) {
+      mesh.count = 0;
+      for (let index = 0; index < MAX_OBJECTS; index++) mesh.setColorAt(index, color);
+    }
     const road = new three.Mesh(roadGeometry(track), this.paints);
     this.field = new three.Mesh(fieldGeometry(this.size * 5 + 10, 0x7f9a78), this.paints);
     this.field.position.copy(this.middle);
-    for (const [order, mesh] of [this.cars, road, this.field].entries()) {
+    for (const [order, mesh] of [this.cars, this.boxes, this.bots, road, this.field].entries()) {
       mesh.renderOrder = order;
       mesh.frustumCulled = false;
       this.scene.add(mesh);
@@ -101,6 +128,7 @@ export class Scene {
     this.scene.add(this.trails);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 1.5;
+    this.controls.addEventListener("start", () => (this.isMoved = true));
     this.controls.addEventListener("change", () => (this.isDirty = true));
     this.reset();
     this.watcher = new ResizeObserver(() => this.resize());
@@ -115,6 +143,33 @@ export class Scene {
     const from = this.now && halfway(this.before, this.now, this.share(time));
     if (this.now) this.interval += 0.2 * (Math.min(time - this.arrived, 1000) - this.interval);
     [this.before, this.now, this.arrived] = [from, look, time];
+    if (look.objects?.length || this.boxes.count || this.bots.count)
+      this.furnish(
+        (look.objects ?? []).map(([kind, x, y, heading]) => ({
+          kind,
+          x: x / 1000,
+          y: y / 1000,
+          heading: heading / 1000,
+        })),
+      );
+    this.isDirty = true;
+  }
+
+  /** What is on the road besides; how many of it the canvas says, too. */
+  furnish(objects: PlacedObject[]): void {
+    for (const [mesh, own] of [
+      [this.boxes, objects.filter((one) => one.kind === "box")],
+      [this.bots, objects.filter((one) => one.kind !== "box")],
+    ] as const) {
+      mesh.count = Math.min(own.length, MAX_OBJECTS);
+      own.slice(0, MAX_OBJECTS).forEach(({ x, y, heading }, index) => {
+        this.matrix.makeRotationZ(heading).setPosition(x, y, 2 * RISE);
+        mesh.setMatrixAt(index, this.matrix);
+      });
+      mesh.instanceMatrix.needsUpdate = true;
+    }
+    this.canvas.dataset["boxes"] = String(this.boxes.count);
+    this.canvas.dataset["bots"] = String(this.bots.count);
     this.isDirty = true;
   }
 
@@ -155,6 +210,7 @@ export class Scene {
   watch(view: View): void {
     this.view = view;
     this.controls.enabled = view === "orbit";
+    this.isMoved = false;
     this.reset();
   }
 
@@ -174,7 +230,7 @@ export class Scene {
     this.scene.traverse((thing) => {
       if (thing instanceof three.Mesh) (thing.geometry as three.BufferGeometry).dispose();
     });
-    this.cars.dispose();
+    for (const mesh of [this.cars, this.boxes, this.bots]) mesh.dispose();
     this.paints.dispose();
     this.renderer.dispose();
   }
@@ -182,8 +238,14 @@ export class Scene {
   private reset(): void {
     const { x, y } = this.middle;
     this.controls.target.copy(this.middle);
-    if (this.view === "top") this.camera.position.set(x, y - 0.001, this.size * 1.12);
-    else this.camera.position.set(x, y - this.size * 0.72, this.size * 0.62);
+    const back = (
+      this.view === "top" ? new three.Vector3(0, -0.001, 1) : new three.Vector3(0, -0.72, 0.62)
+    ).normalize();
+    const up = new three.Vector3(0, back.z, -back.y);
+    const tangent = Math.tan((this.camera.fov * Math.PI) / 360);
+    const view = { back: back.toArray(), right: [1, 0, 0], up: up.toArray() } as const;
+    const distance = standBack(this.edges, view, tangent, this.camera.aspect);
+    this.camera.position.set(x + distance * back.x, y + distance * back.y, distance * back.z);
     this.camera.lookAt(this.middle);
     this.isDirty = true;
   }
@@ -195,6 +257,7 @@ export class Scene {
     this.camera.aspect = width / height;
     this.camera.fov = Math.min(70, 42 * Math.max(1, 1.45 / this.camera.aspect));
     this.camera.updateProjectionMatrix();
+    if (!this.isMoved && (this.view === "orbit" || this.view === "top")) this.reset();
     this.isDirty = true;
   }
 

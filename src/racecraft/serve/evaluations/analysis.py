@@ -30,8 +30,11 @@ from racecraft.learn.saliency import grad_cam
 from racecraft.race.policy import WEIGHTS, load_policy
 from racecraft.run import RunFolder
 from racecraft.serve.context import Context, InContext
+from racecraft.serve.evaluations.objects import objects_of
+from racecraft.serve.evaluations.paid import rewards_of
 from racecraft.serve.evaluations.schemas import (
     EvaluationLaps,
+    LapObject,
     LapPassage,
     LapTrace,
     SaliencyPicture,
@@ -55,15 +58,28 @@ def get_laps(name: str, stamp: str, context: InContext) -> EvaluationLaps:
     """An evaluation's laps, step by step, and what each took for every sector of the track."""
     folder = context.garage.folder(name)
     track = evaluation_track(context, folder, stamp)
-    laps = read_laps(trace_of(folder, stamp))
+    trace = trace_of(folder, stamp)
+    laps = read_laps(trace)
     driven = driven_direction(track, laps)
     sectors = sectors_of(driven)
+    objects = objects_of(folder, stamp, laps)
+    reward, paid = rewards_of(folder, stamp, driven, trace, laps)
     return EvaluationLaps(
+        reward=reward,
         track=track.name,
         length=track.length,
         is_reversed=driven is not track,
         sectors=[TrackSector(number=s.number, start=s.start, end=s.end, apex=s.apex, turn=s.turn) for s in sectors],
-        laps=[_lap(driven, lap, [_passage(p) for p in passages(driven, lap, sectors)]) for lap in laps],
+        laps=[
+            _lap(
+                driven,
+                lap,
+                [_passage(p) for p in passages(driven, lap, sectors)],
+                paid.get(lap.number, [None] * len(lap.time)),
+                objects.get(lap.number, []),
+            )
+            for lap in laps
+        ],
     )
 
 
@@ -193,7 +209,9 @@ def _network(folder: RunFolder, step: Any) -> tuple[int, NetworkSpec, Weights]:
         raise NotFound(f"Model {folder.name!r} has no checkpoint that can be read ({WEIGHTS}).") from error
 
 
-def _lap(track: Track, lap: TracedLap, through: list[LapPassage | None]) -> LapTrace:
+def _lap(
+    track: Track, lap: TracedLap, through: list[LapPassage | None], paid: list[float | None], objects: list[LapObject]
+) -> LapTrace:
     return LapTrace(
         number=lap.number,
         status=lap.status,
@@ -209,7 +227,9 @@ def _lap(track: Track, lap: TracedLap, through: list[LapPassage | None]) -> LapT
         speed=lap.speed.round(4).tolist(),
         throttle=lap.throttle.round(4).tolist(),
         steering=lap.steering_angle.round(5).tolist(),
-        reward=lap.reward.round(5).tolist(),
+        puts=list(lap.puts),
+        reward=paid,
+        objects=objects,
         passages=through,
     )
 

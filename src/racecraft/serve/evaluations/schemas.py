@@ -65,9 +65,24 @@ class LapTrace(Message):
     """Asked for."""
     steering: list[float]
     """Asked for, radians, left positive."""
-    reward: list[float]
+    puts: list[int]
+    """Steps in which it stands where it was put after a mistake."""
+    reward: list[float | None]
+    """What the reward function of its training pays for every step; null where it is not asked, see `RewardOfLaps`."""
+    objects: list[LapObject]
+    """Boxes and other cars, as far as the replay beside the trace says."""
     passages: list[LapPassage | None]
     """Through every sector; null where it did not get through."""
+
+
+class LapObject(Message):
+    """Something on the road: lists have one entry where it stands, else one a control step."""
+
+    kind: str
+    """``box``, ``parked_car``, ``bot_car`` or another car of the race."""
+    x: list[float]
+    y: list[float]
+    heading: list[float]
 
 
 class LapPassage(Message):
@@ -89,8 +104,23 @@ class TrackSector(Message):
     turn: float
 
 
+class RewardOfLaps(Message):
+    """Whose rewards an evaluation's laps have."""
+
+    stretch: int
+    """Of the training, whose function was asked."""
+    stretches: int
+    """How many there are."""
+    is_afresh: bool
+    """The function remembers what happened before, and was called without the training's memory."""
+    error: str | None
+    """Why there are none."""
+
+
 class EvaluationLaps(Message):
     """All laps of an evaluation."""
+
+    reward: RewardOfLaps
 
     track: str
     length: float

@@ -10,7 +10,7 @@ Every step is one UPDATE whose WHERE says what it relies on, so two servers or w
 from __future__ import annotations
 
 import secrets
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Final, Literal
@@ -102,6 +102,15 @@ class JobQueue:
         query = sa.select(Job.id).where(Job.run == run, Job.state.in_(("queued", "running"))).limit(1)
         with self._database.transaction() as session:
             return session.scalar(query) is not None
+
+    def before(self, job: Job) -> Sequence[str]:
+        """Runs whose jobs have the places it waits for, or come first; nothing once it is no longer queued."""
+        if job.state != "queued":
+            return []
+        is_earlier = sa.or_(Job.state == "running", sa.and_(Job.state == "queued", Job.created < job.created))
+        query = sa.select(Job.run).where(Job.kind.in_(kinds_of(KINDS[job.kind].slot)), is_earlier).order_by(Job.created)
+        with self._database.transaction() as session:
+            return session.scalars(query).all()
 
     def num_running(self, kinds: tuple[str, ...]) -> int:
         """How many jobs of these kinds run, whoever started them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, Literal
 
@@ -22,8 +23,11 @@ class JobInfo(Message):
     finished: datetime | None
     result: dict[str, Any] | None
     error: dict[str, Any] | None
+    behind: list[str]
+    """Runs whose work comes before this, while it waits."""
 
 
-def job_info(job: Job) -> JobInfo:
+def job_info(job: Job, *, behind: Sequence[str] = ()) -> JobInfo:
     """A job as the browser sees it."""
-    return JobInfo.model_validate({name: getattr(job, name) for name in JobInfo.model_fields})
+    of_the_job = {name: getattr(job, name) for name in JobInfo.model_fields if name != "behind"}
+    return JobInfo.model_validate({**of_the_job, "behind": list(behind)})

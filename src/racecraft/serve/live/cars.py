@@ -3,9 +3,11 @@
 Poses, not video: the browser draws. A writer never waits for readers; a reader that catches it in the middle of a
 writing tries again (a sequence lock: the number is odd while something is written).
 
-    header   int64 (8)            sequence, step, time in ns, N cars, H, W, A actions, kind (0 discrete, 1 continuous)
+    header   int64 (9)            sequence, step, time in ns, N cars, H, W, A actions, K objects,
+                                  kind (0 discrete, 1 continuous)
     poses    float32 (N, 6)       x, y, heading, speed, steering (SI), share of the lap driven
     steps    int32 (N)            of the episode: smaller than before means the car was put at a new start
+    objects  float32 (K, 4)       around car 0: kind, x, y, heading
     policy   float32 (A)          of car 0: probabilities, or mean steering and speed from -1 to 1
     frame    uint8 (H, W)         what car 0 sees
 """
@@ -16,7 +18,7 @@ import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +32,11 @@ NAME: Final = ".live"
 SPACING: Final = 0.05  # s between two looks, at least
 MAX_CARS: Final = 256  # that are shown
 MAX_BYTES: Final = 1 << 20
-HEADER: Final = 8  # int64
+HEADER: Final = 9  # int64
 POSE: Final = 6
+OBJECT: Final = 4
 STALE: Final = 3.0  # s after which a training no longer counts as live
+_OBJECT_COLUMNS: Final = ("object_kind", "object_x", "object_y", "object_heading")
 _ROWS: Final = [ROW_COLUMNS.index(name) for name in ("progress", "steps")]
 
 
@@ -47,6 +51,8 @@ class Look:
     """(N, 6)"""
     steps: NDArray[np.int32]
     """(N,)"""
+    objects: NDArray[np.float32]
+    """Kind (index into `racecraft.sim.objects.OBJECT_KINDS`), x, y, heading of what is around car 0  (K, 4)."""
     policy: NDArray[np.float32]
     """(A,)"""
     is_discrete: bool
@@ -69,13 +75,15 @@ class LiveWriter:
         self._is_discrete = policy.learner.spec.is_discrete
         size = policy.learner.spec.num_actions
         height, width = simulation.frames.shape[-2:]
-        header = np.array([0, 0, 0, self._count, height, width, size, not self._is_discrete], np.int64)
+        sizes = [self._count, height, width, size, simulation.num_objects]
+        header = np.array([0, 0, 0, *sizes, not self._is_discrete], np.int64)
         fresh = folder / f"{NAME}.new"
-        length = _length(self._count, height, width, size)
+        length = _length(*sizes)
         np.memmap(fresh, np.uint8, "w+", shape=(length,))[: header.nbytes] = header.view(np.uint8)
         os.replace(fresh, folder / NAME)  # a reader of the old one keeps it
         self._memory = np.memmap(folder / NAME, np.uint8, "r+", shape=(length,))
-        self._header, self._poses, self._steps, self._outputs, self._frame = _parts(self._memory, header.tolist())
+        parts = _parts(self._memory, header.tolist())
+        self._header, self._poses, self._steps, self._objects, self._outputs, self._frame = parts
         self._next = 0.0
 
     def look(self, *, step: int) -> None:
@@ -90,6 +98,9 @@ class LiveWriter:
         self._poses[:, 4] = simulation.vehicles[6, :count]
         self._poses[:, 5] = simulation.rows[:count, _ROWS[0]]
         self._steps[:] = simulation.rows[:count, _ROWS[1]]
+        if simulation.num_objects:
+            for column, name in enumerate(_OBJECT_COLUMNS):
+                self._objects[:, column] = simulation.object_column(name)[0]
         self._outputs[:] = self._decide()
         frames = simulation.frames
         self._frame[:] = frames[0] if frames.ndim == 3 else frames[0, 0]  # of two lenses the left one
@@ -128,15 +139,16 @@ class LiveReader:
             if header[0] == after or (header[0] == 0) or time.time_ns() - header[2] > STALE * 1e9:
                 return None
             if header[0] % 2 == 0:
-                _, poses, steps, policy, frame = (part.copy() for part in _parts(memory, header))
+                _, poses, steps, objects, policy, frame = (part.copy() for part in _parts(memory, header))
                 if int(memory[:8].view(np.int64)[0]) == header[0]:
                     return Look(
                         sequence=header[0],
                         step=header[1],
                         poses=poses,
                         steps=steps,
+                        objects=objects,
                         policy=policy,
-                        is_discrete=not header[7],
+                        is_discrete=not header[8],
                         frame=frame,
                     )
             time.sleep(0.0005)
@@ -153,26 +165,32 @@ class LiveReader:
                 return None
             memory = np.memmap(self._path, np.uint8, "r")
             header = memory[: HEADER * 8].view(np.int64).tolist()
-            if min(header[3:7]) >= 0 and max(header[3:7]) <= MAX_BYTES and _length(*header[3:7]) == len(memory):
+            if min(header[3:8]) >= 0 and max(header[3:8]) <= MAX_BYTES and _length(*header[3:8]) == len(memory):
                 self._memory = memory
         except (OSError, ValueError):
             self._inode, self._memory = 0, None
         return self._memory
 
 
-def _length(count: int, height: int, width: int, size: int) -> int:
-    return HEADER * 8 + count * POSE * 4 + count * 4 + size * 4 + height * width
+def _length(*sizes: int) -> int:
+    return sum(_bytes(*sizes))
 
 
-def _parts(memory: NDArray[np.uint8], header: list[int]) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:  # type: ignore[type-arg]
-    """Header, poses, steps, policy and frame as views."""
-    count, height, width, size = header[3:7]
-    ends = np.cumsum([HEADER * 8, count * POSE * 4, count * 4, size * 4, height * width])
+def _bytes(count: int, height: int, width: int, size: int, objects: int) -> list[int]:
+    """Of header, poses, steps, objects, policy and frame."""
+    return [HEADER * 8, count * POSE * 4, count * 4, objects * OBJECT * 4, size * 4, height * width]
+
+
+def _parts(memory: NDArray[np.uint8], header: list[int]) -> tuple[NDArray[Any], ...]:
+    """Header, poses, steps, objects, policy and frame as views."""
+    count, height, width, _, objects = header[3:8]
+    ends = np.cumsum(_bytes(*header[3:8]))
     pieces = [memory[start:end] for start, end in zip([0, *ends[:-1]], ends, strict=True)]
     return (
         pieces[0].view(np.int64),
         pieces[1].view(np.float32).reshape(count, POSE),
         pieces[2].view(np.int32),
-        pieces[3].view(np.float32),
-        pieces[4].reshape(height, width),
+        pieces[3].view(np.float32).reshape(objects, OBJECT),
+        pieces[4].view(np.float32),
+        pieces[5].reshape(height, width),
     )

@@ -17,6 +17,7 @@ from racecraft.run.history import read_history
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.schemas import job_info
 from racecraft.serve.live.cars import STALE, LiveReader, Look
+from racecraft.sim.objects import OBJECT_KINDS
 
 FRESH: Final = 0.3  # s that a look at the jobs is good for
 MAX_MODELS: Final = 64  # that are remembered
@@ -93,7 +94,8 @@ class Hub:
 
     def _jobs(self, name: str) -> str:
         listed = self._queue.list(run=name, limit=5)
-        return json.dumps([job_info(job).model_dump(mode="json") for job in listed])
+        infos = [job_info(job, behind=self._queue.before(job)) for job in listed]
+        return json.dumps([info.model_dump(mode="json") for info in infos])
 
     def _of(self, name: str) -> _Seen:
         if name not in self._seen:
@@ -111,8 +113,18 @@ def _document(look: Look) -> dict[str, Any]:
         "step": look.step,
         "poses": poses.tolist(),
         "steps": look.steps.tolist(),
+        "objects": _objects(look),
         "policy": look.policy.round(4).tolist(),
         "is_discrete": look.is_discrete,
         "frame": base64.b64encode(look.frame.tobytes()).decode(),
         "frame_shape": list(look.frame.shape),
     }
+
+
+def _objects(look: Look) -> list[list[int | str]]:
+    """Name of its kind, and place, of what is on the road; cars that have left the race are not."""
+    return [
+        [OBJECT_KINDS[int(kind)], *(round(1000 * float(value)) for value in place)]
+        for kind, *place in look.objects
+        if OBJECT_KINDS[int(kind)] != "gone_racer"
+    ]

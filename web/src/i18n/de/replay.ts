@@ -2,6 +2,13 @@
 import type { replay as english } from "../en/replay";
 
 export const replay: Record<keyof typeof english, string> = {
+  reward_own: "Belohnung je Schritt",
+  reward_of_model:
+    "Was die eigene Belohnungsfunktion dieses Modells entlang der Runde zahlt; beim Geist ist es dessen eigene.",
+  reward_of_stretch:
+    "Was die Belohnung von Abschnitt {number}, der hier fuhr, entlang der Runde zahlt; beim Geist ist es dessen eigene.",
+  reward_afresh:
+    "Die Funktion merkt sich frühere Schritte; hier wurde sie neu aufgerufen, im Training kann sie anders gezahlt haben.",
   keep: "Als Datei behalten oder als Tabelle sehen",
   camera: "Kamera",
   camera_driver: "Fahrersicht",

@@ -1,5 +1,10 @@
 /** Replay and corner report. */
 export const replay = {
+  reward_own: "Reward per step",
+  reward_of_model: "What this model's own reward function pays along the lap; a ghost's is its own.",
+  reward_of_stretch: "What the reward of stretch {number}, which drove here, pays along the lap; a ghost's is its own.",
+  reward_afresh:
+    "The function remembers earlier steps; here it was called afresh, so training may have paid otherwise.",
   keep: "Keep as a file, or see the table",
   camera: "Camera",
   camera_driver: "Driver",

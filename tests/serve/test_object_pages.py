@@ -1,0 +1,59 @@
+"""Boxes and bot cars are in the picture of a training and of a race, where the simulator has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from browsers import Visit, needs_browser, needs_pages, visiting
+from running_consoles import running_console
+
+from racecraft.replay.replay import read_replay
+from racecraft.run import RunFolder
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+
+@pytest.fixture(scope="module")
+def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
+    with running_console(tmp_path_factory.mktemp("console") / "runs") as console, visiting(console) as tab:
+        yield tab
+        assert tab.complaints == []
+
+
+@pytest.mark.parametrize(
+    ("race", "count", "seen"),
+    [("object-avoidance", 3, ("3", "0")), ("head-to-bot", 2, ("0", "2"))],
+)
+def test_what_is_on_the_road_is_seen_live_and_again_in_the_replay(
+    visit: Visit, race: str, count: int, seen: tuple[str, str]
+) -> None:
+    console = visit.console
+    console.create(name=race, track="oval", race=race, objects=count, until="10 minutes", seed=1)
+    page = visit.open(f"/models/{race}/watch")
+    there = f"canvas[data-boxes='{seen[0]}'][data-bots='{seen[1]}']"
+    page.locator(there).wait_for()
+    job = console.client.get("/api/jobs", params={"run": race}).json()[0]
+    console.wait_for(lambda: console.client.get(f"/api/models/{race}").json()["steps"])
+    console.client.post(f"/api/models/{race}/stop")
+    console.wait_for(console.job_ended(job["id"]))
+
+    request = {"laps": 1, "num_trials": 2, "rules": "first_lap"}
+    job = console.client.post(f"/api/models/{race}/evaluations", json=request).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    page = visit.open(f"/models/{race}/race")
+    page.locator(there).wait_for()
+    stamp = console.client.get(f"/api/models/{race}/evaluations").json()[0]["stamp"]
+    laps = console.client.get(f"/api/models/{race}/evaluations/{stamp}/laps").json()["laps"]
+    replay = read_replay(RunFolder(console.runs / race).evaluation(stamp) / "evaluation.replay")
+    assert [len(lap["objects"]) for lap in laps] == [count] * len(laps) != []
+    for lap, car in zip(laps, replay.cars, strict=True):
+        table = car.recording.rows[:, len(ROW_COLUMNS) + len(OBJECT_HEADER) :]
+        table = table.reshape(len(table), count, len(OBJECT_COLUMNS))
+        for index, thing in enumerate(lap["objects"]):
+            where = np.column_stack([thing["x"], thing["y"]])
+            assert (len(where) == 1) == (race == "object-avoidance")
+            expected = table[:, index, 1:3] if len(where) > 1 else table[:1, index, 1:3]
+            np.testing.assert_allclose(where, expected, atol=1e-3)
