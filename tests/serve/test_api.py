@@ -243,6 +243,29 @@ def test_a_card_is_read_again_when_an_evaluation_has_ended(console: RunningConso
     assert card()["picture"] == "evaluation-20260101000000/racing-line.png"
 
 
+def test_one_best_lap_for_training_and_races(console: RunningConsole) -> None:
+    """The fastest of all, on the model's own track; and the card's picture is of the race that drove it."""
+    name = console.create(name="quick", train=False, track="oval")
+    run = console.runs / name
+    (run / "metrics").mkdir(exist_ok=True)
+    point = {"kind": "evaluation", "step": 9, "seconds": 1, "completions": [1.0], "lap_times": [10.47], "is_best": True}
+    (run / "metrics" / "history.jsonl").write_text(json.dumps(point) + "\n")
+
+    def race(stamp: str, lap: float, track: str = "oval") -> tuple[Any, Any]:
+        folder = run / f"evaluation-{stamp}"
+        folder.mkdir()
+        (folder / "racing-line.png").write_bytes(b"picture")
+        (folder / "evaluation.json").write_text(json.dumps({"track": track, "step": 9, "best_lap_seconds": lap}))
+        card = next(model for model in console.client.get("/api/models").json() if model["name"] == name)
+        assert console.client.get(f"/api/models/{name}").json()["best_lap"] == card["best_lap"]
+        return card["best_lap"], card["picture"]
+
+    assert race("20260101000000", 10.8)[0] == 10.47
+    assert race("20260101000001", 9.6) == (9.6, "evaluation-20260101000001/racing-line.png")
+    assert race("20260101000002", 10.0) == (9.6, "evaluation-20260101000001/racing-line.png")
+    assert race("20260101000003", 5.0, track="hairpin")[0] == 9.6
+
+
 def test_a_model_in_use_is_not_moved_away(console: RunningConsole) -> None:
     client = console.client
     name = console.create(name="busy", train=False)

@@ -53,6 +53,8 @@ def test_what_the_server_names_is_in_the_catalogue() -> None:
     catalogue = (WEB / "src" / "i18n" / "en" / "presets.ts").read_text()
     known = dict(re.findall(r'^  (\w+):\s+"(.*)",$', catalogue, re.MULTILINE))
     assert {f"preset_{reward.name}" for reward in list_rewards()} <= known.keys()
+    assert {f"preset_name_{reward.name}" for reward in list_rewards()} <= known.keys()
+    assert {f"space_name_{space.name}" for space in list_actions()} <= known.keys()
     assert {known[f"space_{space.name}"]: space.name for space in list_actions()} == {
         space.description: space.name for space in list_actions()
     }
@@ -73,6 +75,29 @@ def test_the_first_page_is_light_and_loads_nothing_from_elsewhere() -> None:
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")  # a namespace is not loaded
     sizes = [len(gzip.compress((BUILT.parent / name.lstrip("/")).read_bytes())) for name in scripts]
     assert sum(sizes) < 450_000
+
+
+@needs_pages
+def test_scripts_are_sent_as_small_as_the_build_made_them(console: RunningConsole) -> None:
+    import gzip
+
+    client = console.client
+    scripts = sorted((BUILT.parent / "assets").glob("*.js"), key=lambda path: path.stat().st_size)
+    for path in scripts[-3:]:
+        address, whole = f"/assets/{path.name}", path.read_bytes()
+        sizes = {}
+        for wanted, given in (("br, gzip", "br"), ("gzip;q=1.0, br;q=0", "gzip"), ("identity", None)):
+            with client.stream("GET", address, headers={"accept-encoding": wanted}) as reply:
+                data = b"".join(reply.iter_raw())
+            assert reply.headers.get("content-encoding") == given
+            assert reply.headers["content-type"].startswith("text/javascript")
+            assert reply.headers["vary"] == "Accept-Encoding"
+            sizes[given] = len(data)
+            if given == "gzip":
+                assert gzip.decompress(data) == whole
+        assert sizes["br"] < sizes["gzip"] < 0.45 * sizes[None]
+        assert sizes[None] == len(whole)
+    assert client.get(f"/assets/{scripts[0].name}.gz").status_code == 404
 
 
 @pytest.mark.slow

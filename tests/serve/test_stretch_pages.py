@@ -72,6 +72,16 @@ def test_the_curve_has_a_band_for_each_stretch(changed: Visit) -> None:
     ]
 
 
+def test_what_the_last_change_made_of_it_is_said_in_a_sentence(changed: Visit) -> None:
+    """Paid for standing still, it drives no faster and no further."""
+    page = changed.open("/models/heron/watch")
+    said = page.get_by_text("Since stretch 2 (reward):")
+    said.wait_for()
+    assert "faster" not in said.inner_text()
+    page.get_by_role("button", name="Lap time, s").click()
+    page.get_by_role("list", name="Stretches of the training").wait_for()
+
+
 def test_compare_credits_the_lap_to_the_reward_that_drove_it(changed: Visit) -> None:
     page = changed.open("/compare/heron/other")
     chosen = page.get_by_label("Stretch: heron")

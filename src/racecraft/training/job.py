@@ -80,7 +80,7 @@ class Training:
                     reason = self._train(session)
                 return self._result(reason, session)
             except RacecraftError as error:
-                error.hint = error.hint or self._way_on(error)
+                error.hint = error.hint or self.way_on(error)
                 raise
             except KeyboardInterrupt:
                 self.reporter.note(f"Stopped at once. Continue with: racecraft train --resume {self.folder.path}")
@@ -194,8 +194,8 @@ class Training:
         )
         self.meter.parts["checkpoint"] += time.perf_counter() - begun
 
-    def _way_on(self, error: RacecraftError) -> str:
-        """What to do after an error, as a hint."""
+    def way_on(self, error: RacecraftError) -> str:
+        """What to do after an error, as a hint for the command line; who trains otherwise says something else."""
         resume = f"racecraft train --resume {self.folder.path}"
         repair = f"Correct {self.folder.reward_function}, then: " if isinstance(error, RewardError) else ""
         with warnings.catch_warnings(), suppress(CheckpointError):

@@ -1,4 +1,6 @@
 /** The server's answers, typed by its own OpenAPI; every error is one `Problem`. */
+import { back, connection, found, lost } from "../lib/connection.svelte";
+import { t } from "../i18n/index.svelte";
 import type { components } from "./schema";
 
 type Schemas = components["schemas"];
@@ -38,25 +40,49 @@ export class Problem extends Error {
 }
 
 export const ask = <T>(method: string, path: string, body?: unknown): Promise<T> =>
-  body === undefined
-    ? send(method, path, null, undefined)
-    : send(method, path, JSON.stringify(body), "application/json");
+  method === "GET"
+    ? look(path)
+    : body === undefined
+      ? send(method, path, null, undefined)
+      : send(method, path, JSON.stringify(body), "application/json");
 
 /** The same with a file as it is. */
 export const askBytes = <T>(method: string, path: string, body: Blob): Promise<T> =>
   send(method, path, body, "application/octet-stream");
+
+const looking = new Map<string, Promise<unknown>>(); // what waits for the console to answer again, once each
+
+/** Ask for something; while nobody answers it waits, and comes when somebody does. */
+function look<T>(path: string): Promise<T> {
+  const answer = send<T>("GET", path, null, undefined);
+  return answer.catch((error: unknown) => {
+    if (!(error instanceof Problem && error.code === "Offline")) throw error;
+    let later = looking.get(path) as Promise<T> | undefined;
+    if (!later) {
+      later = back().then(() => {
+        looking.delete(path);
+        return look<T>(path);
+      });
+      looking.set(path, later);
+    }
+    return later;
+  });
+}
 
 async function send<T>(method: string, path: string, body: BodyInit | null, kind: string | undefined): Promise<T> {
   let reply: Response;
   try {
     reply = await fetch(`/api${path}`, { method, headers: kind === undefined ? {} : { "content-type": kind }, body });
   } catch {
-    throw new Problem("Offline", "The console does not answer.", "Is racecraft serve still running?", null, null);
+    lost();
+    throw new Problem("Offline", t("offline_refused"), "", null, null);
   }
+  found();
   if (reply.status === 204) return undefined as T;
   const document = await reply.json().catch(() => null);
   if (!reply.ok) {
     const error = document?.error ?? {};
+    if (error.code === "NotSignedIn") connection.isStranger = true;
     throw new Problem(
       error.code ?? "Bug",
       error.message ?? `The console answered ${reply.status}.`,
@@ -80,7 +106,12 @@ export const api = {
   clone: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/clone`, {}),
   remove: (run: string) => ask<void>("DELETE", `/models/${name(run)}`),
   restore: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/restore`),
-  importModel: (file: File) => askBytes<ImportedModel>("POST", `/models/import?filename=${name(file.name)}`, file),
+  importModel: (file: File, track?: string) =>
+    askBytes<ImportedModel>(
+      "POST",
+      `/models/import?filename=${name(file.name)}${track ? `&track=${name(track)}` : ""}`,
+      file,
+    ),
   train: (run: string, change: { until?: string; reward?: string }) =>
     ask<JobInfo>("POST", `/models/${name(run)}/train`, change),
   stop: (run: string) => ask<JobInfo>("POST", `/models/${name(run)}/stop`),

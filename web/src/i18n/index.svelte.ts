@@ -26,7 +26,11 @@ export function t(key: Key, values: Record<string, string | number> = {}): strin
 export const known = (key: Key | undefined, otherwise: string): string => (key ? t(key) : otherwise);
 
 /** What the server calls something, in the page's language where the catalogue knows it. */
-export function named(group: "preset" | "space" | "situation", name: string, otherwise: string): string {
+export function named(
+  group: "preset" | "preset_name" | "space" | "space_name" | "situation",
+  name: string,
+  otherwise: string,
+): string {
   const key = `${group}_${name.replaceAll(" ", "_")}`;
   return Object.hasOwn(en, key) ? t(key as Key) : otherwise;
 }

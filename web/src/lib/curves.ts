@@ -50,6 +50,12 @@ export const bestLapOf = (evaluation: Point): number | null => {
   return laps.length ? Math.min(...laps) : null;
 };
 
+/** The fastest lap of some evaluations and of what was known before. */
+export const fastestOf = (evaluations: Point[], before: number | null): number | null =>
+  evaluations
+    .map(bestLapOf)
+    .reduce((best, lap) => (lap !== null && (best === null || lap < best) ? lap : best), before);
+
 /** Mean of a value and its neighbours, so that a noisy curve shows its way; null where nothing is known. */
 export function smooth(values: (number | null)[], reach: number): (number | null)[] {
   if (reach <= 0) return values;

@@ -7,6 +7,8 @@ export interface Handlers {
   points: (points: Point[]) => void;
   live: (look: Look) => void;
   jobs: (jobs: JobInfo[]) => void;
+  /** The connection broke off. */
+  broken?: () => void;
 }
 
 export const RETRY = 2000; // ms
@@ -25,6 +27,7 @@ export function followModel(run: string, on: Handlers, open = (url: string) => n
     mine.addEventListener("live", (event) => on.live(JSON.parse(event.data) as Look));
     mine.addEventListener("jobs", (event) => on.jobs(JSON.parse(event.data) as JobInfo[]));
     mine.onerror = () => {
+      on.broken?.();
       // A broken connection is opened again by the browser, with Last-Event-ID; after an error reply it gives up.
       if (mine.readyState === 2) timer = setTimeout(connect, RETRY);
     };

@@ -1,7 +1,7 @@
 /** The parts of a training between two changes: which one a step belongs to, and where its band lies on a curve. */
 import type { TrainingStretch } from "../api/client";
 import type { Key } from "../i18n/en";
-import type { Point } from "./curves";
+import { completionOf, fastestOf, type Point } from "./curves";
 
 /** Told apart by all eyes beside each other, on light and dark. */
 const COLORS = ["#7f8a98", "#4ea8ff", "#e0a100", "#2fa37c", "#c655b8", "#e2662c"];
@@ -36,6 +36,32 @@ export function bandsOf(
     found.push({ from, to: at(own[own.length - 1]!), color: colorOf(stretch.number), label: label(stretch) });
   });
   return found;
+}
+
+const FEW = 3; // evaluations that are looked at on either side of a change
+
+export interface Turn<S> {
+  stretch: S;
+  /** s, the best of the last evaluations before the change, and of the last ones now; null where no lap was driven. */
+  laps: [number | null, number | null];
+  /** Mean completion of the same. */
+  completions: [number, number];
+}
+
+/** What the last change made of the model; undefined where there was none, or it was not judged yet. */
+export function lastTurn<S extends { step: number }>(stretches: S[], evaluations: Point[]): Turn<S> | undefined {
+  const last = evaluations[evaluations.length - 1];
+  if (!last || stretches.length < 2) return undefined;
+  const stretch = stretchAt(stretches, last.step);
+  const own = evaluations.filter((point) => stretchAt(stretches, point.step) === stretch).slice(-FEW);
+  const before = evaluations.filter((point) => point.step <= stretch.step).slice(-FEW);
+  if (!before.length) return undefined;
+  const mean = (points: Point[]) => points.reduce((sum, point) => sum + completionOf(point), 0) / points.length;
+  return {
+    stretch,
+    laps: [fastestOf(before, null), fastestOf(own, null)],
+    completions: [mean(before), mean(own)],
+  };
 }
 
 const CHANGES: Record<string, Key> = {

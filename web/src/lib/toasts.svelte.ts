@@ -19,14 +19,12 @@ export function say(text: string, action?: Toast["action"]): void {
 }
 
 export function fail(error: unknown): void {
+  if (error instanceof Problem && error.code === "NotSignedIn") return; // a page of its own says it
   const hint = error instanceof Problem ? error.hint : "";
-  toasts.push({
-    id: next++,
-    text: error instanceof Error ? error.message : String(error),
-    hint,
-    isError: true,
-    action: undefined,
-  });
+  const text = error instanceof Error ? error.message : String(error);
+  const same = toasts.find((toast) => toast.text === text && toast.hint === hint);
+  if (same) return; // once is enough
+  toasts.push({ id: next++, text, hint, isError: true, action: undefined });
 }
 
 export function close(id: number): void {

@@ -12,7 +12,7 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
-from racecraft.errors import RunError, SourceError
+from racecraft.errors import RunError, SourceError, TrackNotFound
 from racecraft.run import archive_chunks
 from racecraft.run.folder import sanitize_name
 from racecraft.serve.context import Context, InContext
@@ -78,7 +78,11 @@ def _import(context: Context, path: Path, name: str | None, track: str) -> Impor
     if name is None and path.stem != "reward_function":
         stem = path.name.removesuffix(next(ending for ending in ENDINGS if path.name.endswith(ending)))
         name = stem if stem == sanitize_name(stem) and not (context.garage.runs / stem).exists() else None
-    report = import_run(path, root=context.garage.runs, name=name, track=where)
+    try:
+        report = import_run(path, root=context.garage.runs, name=name, track=where)
+    except TrackNotFound as error:
+        error.hint = "Choose a track for it."
+        raise
     context.mirror.copy(report.run.name)
     return ImportedModel(
         model=context.garage.card(report.run.name),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Final
 
 from fastapi import APIRouter
@@ -9,9 +10,11 @@ from fastapi import APIRouter
 from racecraft.agent import Hyperparameters
 from racecraft.agent.hyperparameters import BATCH_SIZES
 from racecraft.agent.sensors import SENSOR_NAMES
+from racecraft.errors import RacecraftError
 from racecraft.learn import PPOConfig
 from racecraft.learn.networks import network_names
 from racecraft.serve.context import Context, InContext
+from racecraft.serve.models.garage import race_of
 from racecraft.serve.models.schemas import Choices, NumberChoice
 from racecraft.sim.objects import RACE_TYPES
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
@@ -42,7 +45,7 @@ def list_choices(context: InContext) -> Choices:
         hyperparameters=_numbers(),
         aws=Hyperparameters().to_dict(),
         fast={name: fast[name] for name in names},
-        pace=_pace(context),
+        paces=_paces(context),
     )
 
 
@@ -76,12 +79,15 @@ def _numbers() -> list[NumberChoice]:
     ]
 
 
-def _pace(context: Context) -> float:
-    """Camera steps a second of the latest training that ended."""
-    for job in context.queue.list(limit=40):
+def _paces(context: Context) -> dict[str, float]:
+    """Camera steps a second of the latest training of each type of race that ended."""
+    found: dict[str, float] = {}
+    for job in context.queue.list(kind="train", limit=40):
         result = job.result or {}
-        if job.kind == "train" and job.started and job.finished and result.get("steps"):
+        if job.started and job.finished and result.get("steps"):
             seconds = (job.finished - job.started).total_seconds()
-            if seconds > 1 and result["steps"] > 2000:
-                return float(round(result["steps"] / seconds, 1))
-    return 0.0
+            with suppress(RacecraftError):
+                race = race_of(context.garage.folder(job.run).read_info())
+                if seconds > 1 and result["steps"] > 2000 and race not in found:
+                    found[race] = float(round(result["steps"] / seconds, 1))
+    return found

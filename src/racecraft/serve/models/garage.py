@@ -19,18 +19,19 @@ from sqlalchemy.dialects import sqlite
 from sqlalchemy.orm import Session
 
 from racecraft.errors import RacecraftError, RunError
-from racecraft.run import RunFolder, Stretch, best_of, judged_laps, list_runs, read_stretches, stretch_at
+from racecraft.run import RunFolder, RunInfo, Stretch, best_of, judged_laps, list_runs, read_stretches, stretch_at
 from racecraft.run.history import read_history
 from racecraft.serve.models.schemas import Checkpoint, ModelCard, TrainingStretch
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Model, now
+from racecraft.sim.objects import RACE_TYPES, Objects
 
 TRASH: Final = "trash"  # inside the state folder
 PICTURE: Final = "racing-line.png"
 NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
 SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
-SUMMARY: Final = "2"
+SUMMARY: Final = "3"
 """Changes with what a summary says, so that those kept by an earlier version are made anew."""
 Status = Literal["training", "queued", "stopped", "finished", "failed", "new"]
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -250,6 +251,16 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def race_of(info: RunInfo) -> str:
+    """The type of race that a model is trained for."""
+    if info.settings.get("opponents") is not None:
+        return "head-to-head"
+    try:
+        return Objects.from_dict(info.settings["objects"]).race_type
+    except (RacecraftError, KeyError, TypeError, AttributeError):
+        return RACE_TYPES[0]
+
+
 def _fingerprint(folder: RunFolder) -> str:
     """Changes when a card may change: the settings, the checkpoints, an evaluation."""
     marks = [SUMMARY]
@@ -274,6 +285,7 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
     metrics = best.metrics if best is not None else {}
     return {
         "track": Path(info.track).stem,
+        "race": race_of(info),
         "created": created,
         "steps": last.step if last is not None else 0,
         "seconds": _seconds(folder),

@@ -68,6 +68,8 @@ class ModelCard(Message):
 
     name: str
     track: str
+    race: str
+    """``time-trial``, ``object-avoidance``, ``head-to-bot`` or ``head-to-head``."""
     created: datetime
     status: Literal["training", "queued", "stopped", "finished", "failed", "new"]
     tags: list[str]
@@ -207,5 +209,5 @@ class Choices(Message):
     """AWS's hyperparameters by default."""
     fast: dict[str, Any]
     """Racecraft's own, by the same names."""
-    pace: float
-    """Camera steps a second that this machine trains, from the latest training; 0 where none is known."""
+    paces: dict[str, float]
+    """Camera steps a second that this machine trains, by type of race, from the latest training of each."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from racecraft.errors import RacecraftError
 from racecraft.race.policy import NetworkPolicy
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.live.cars import LiveWriter
@@ -31,11 +32,19 @@ class LiveReporter(SilentReporter):
             self._writer.look(step=report.stats.total_steps)
 
 
+class ConsoleTraining(Training):
+    """A training whose errors are shown beside buttons."""
+
+    def way_on(self, error: RacecraftError) -> str:
+        """Nothing: the page has the way on."""
+        return ""
+
+
 def train(task: Task) -> dict[str, Any]:
     """Train, from the last checkpoint where there is one."""
     until = task.job.payload.get("until")
     folder = task.folder
-    training = Training(folder, until=Until.parse(until) if until else None, reporter=LiveReporter(folder.path))
+    training = ConsoleTraining(folder, until=Until.parse(until) if until else None, reporter=LiveReporter(folder.path))
     task.on_stop(training.stop)
     result: TrainResult = training.run()
     return result.to_dict()

@@ -13,6 +13,14 @@ export const garage: Record<keyof typeof english, string> = {
   sort_completion: "Geschafft",
   sort_name: "Name",
   nothing_found: "Nichts passt zur Suche.",
+  best_lap_is:
+    "Die schnellste ganze Runde samt Strafen aus allen Prüfungen auf ihrer Strecke: im Training und in Rennen gegen die Uhr danach.",
+  best_lap_race: "Beste Runde dieses Rennens",
+  best_lap_checkpoint: "In der Prüfung, mit der dieser Stand gespeichert wurde",
+  import_trackless: "{name} braucht eine Strecke",
+  import_trackless_lead:
+    "Auf einer anderen Strecke beginnt das Training mit frischen Gewichten; Belohnung, Aktionen und Zahlen werden übernommen.",
+  import_on_track: "Auf dieser Strecke importieren",
   best_lap: "Beste Runde",
   completion: "Geschafft",
   trained: "Trainiert",

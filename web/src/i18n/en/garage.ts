@@ -11,6 +11,14 @@ export const garage = {
   sort_completion: "Completion",
   sort_name: "Name",
   nothing_found: "Nothing fits the search.",
+  best_lap_is:
+    "The fastest whole lap, penalties included, of all evaluations on its track: during training and in races against the clock afterwards.",
+  best_lap_race: "Best lap of this race",
+  best_lap_checkpoint: "In the evaluation that this checkpoint was saved with",
+  import_trackless: "{name} needs a track",
+  import_trackless_lead:
+    "On another track training begins with fresh weights; reward, actions and numbers are taken over.",
+  import_on_track: "Import it on this track",
   best_lap: "Best lap",
   completion: "Completion",
   trained: "Trained",

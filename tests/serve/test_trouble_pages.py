@@ -1,0 +1,211 @@
+"""What the pages say when something is wrong: mistakes in code, a server that is gone, a browser that nobody knows."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsers import Visit, needs_browser, needs_pages, visiting
+from running_consoles import PATIENCE, running_console
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+
+@pytest.fixture(scope="module")
+def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
+    with running_console(tmp_path_factory.mktemp("console") / "runs") as console:
+        console.create(name="heron", track="oval", train=False)
+        with visiting(console) as tab:
+            yield tab
+
+
+def _fresh(visit: Visit, path: str) -> Any:
+    """A page for a new model in which nothing was typed."""
+    visit.open("/settings").evaluate("sessionStorage.clear()")
+    page = visit.open(path)
+    page.get_by_text("The function is fine.").wait_for()
+    return page
+
+
+def _write(page: Any, text: str) -> None:
+    page.locator(".cm-content").click()
+    page.keyboard.press("ControlOrMeta+a")
+    page.keyboard.press("Delete")
+    page.keyboard.insert_text(text)
+
+
+@pytest.mark.parametrize("path", ["/create", "/models/heron/setup"])
+def test_the_line_of_a_mistake_is_marked_and_cleared(visit: Visit, path: str) -> None:
+    page = _fresh(visit, path)
+    assert page.locator(".cm-lintRange-error, .cm-lintPoint-error").count() == 0
+    _write(page, "def reward_function(params):\n    return params['sped']\n")
+    page.locator(".cm-lintRange-error").first.wait_for()
+    marked = page.locator(".cm-line").filter(has=page.locator(".cm-lintRange-error"))
+    assert [line.strip() for line in marked.all_inner_texts()] == ["return params['sped']"]
+    _write(page, "def reward_function(params):\n    return params['speed']\n")
+    page.get_by_text("The function is fine.").wait_for()
+    assert page.locator(".cm-lintRange-error").count() == 0
+
+
+def test_an_endless_loop_does_not_leave_the_error_before_it_standing(visit: Visit) -> None:
+    page = _fresh(visit, "/create")
+    _write(page, "def reward_function(params):\n    return params['sped']\n")
+    page.get_by_text(re.compile("sped")).last.wait_for()
+    page.locator(".danger").wait_for()
+    _write(page, "def reward_function(params):\n    while True:\n        pass\n")
+    page.get_by_text("Checking").wait_for()
+    assert page.locator(".danger").count() == 0
+    page.locator(".danger").wait_for()
+    assert "sped" not in page.locator(".danger").inner_text()
+
+
+def test_what_was_typed_for_a_new_model_outlives_a_reload(visit: Visit) -> None:
+    page = _fresh(visit, "/create")
+    _write(page, "def reward_function(params):\n    return 7.0\n")
+    page.get_by_role("radio", name="Paperclip").click()
+    page.get_by_role("button", name="Head to bot").click()
+    page.get_by_text("The function is fine.").wait_for()
+    page.reload()
+    page.get_by_text("return 7.0").wait_for()
+    assert page.get_by_role("radio", name="Paperclip").get_attribute("aria-checked") == "true"
+    assert page.get_by_role("button", name="Head to bot").get_attribute("aria-pressed") == "true"
+
+
+def test_a_name_with_a_space_is_refused_in_a_sentence(visit: Visit) -> None:
+    client = visit.console.client
+    for reply in (
+        client.post("/api/models", json={"name": "my car", "train": False}),
+        client.patch("/api/models/heron", json={"name": "my car"}),
+    ):
+        error = reply.json()["error"]
+        assert (reply.status_code, error["field"], error["hint"]) == (422, "name", "Use 'my-car'.")
+        assert "^" not in error["message"]
+        assert "letters" in error["message"]
+
+
+FAILS_LATER = """import math
+
+
+def reward_function(params):
+    if params["steps"] == 7:
+        return 1 / 0
+    return 1.0
+"""
+
+
+def test_a_failed_training_shows_its_line_and_names_a_button(visit: Visit) -> None:
+    console = visit.console
+    console.create(name="trips", track="oval", reward=FAILS_LATER, until="3000 steps")
+    job = console.client.get("/api/jobs", params={"run": "trips"}).json()[0]
+    ended = console.wait_for(console.job_ended(job["id"]))
+    assert ended["state"] == "failed"
+    assert "--resume" not in json.dumps(ended["error"])
+    page = visit.open("/models/trips/watch")
+    told = page.get_by_role("alert").filter(has_text="The training failed")
+    told.wait_for()
+    assert "racecraft train" not in told.inner_text()
+    assert "6: return 1 / 0" in told.inner_text()
+    assert not told.get_by_text("waypoints").is_visible()  # params are folded away
+    told.get_by_text("What the reward function was called with").click()
+    told.get_by_text("waypoints").wait_for()
+    told.get_by_role("link", name="Correct the reward in the editor").click()
+    page.locator(".cm-lintRange-error").first.wait_for()
+    marked = page.locator(".cm-line").filter(has=page.locator(".cm-lintRange-error"))
+    assert [line.strip() for line in marked.all_inner_texts()] == ["return 1 / 0"]
+
+
+def test_an_import_without_a_track_is_offered_one(visit: Visit, tmp_path: Path) -> None:
+    (tmp_path / "model").mkdir()
+    (tmp_path / "model" / "reward_function.py").write_text("def reward_function(params):\n    return 1.0\n")
+    metadata: dict[str, Any] = {
+        "action_space": [{"steering_angle": a, "speed": 1.0, "index": i} for i, a in enumerate((-20, 0, 20))]
+    }
+    metadata |= {"sensor": ["FRONT_FACING_CAMERA"], "neural_network": "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"}
+    (tmp_path / "model" / "model_metadata.json").write_text(json.dumps({**metadata, "version": "4"}))
+    (tmp_path / "model" / "training_params.yaml").write_text("WORLD_NAME: nowhere_at_all\n")
+    archive = shutil.make_archive(str(tmp_path / "stray"), "gztar", tmp_path / "model")
+    page = visit.open("/")
+    page.get_by_label("File to import").set_input_files(archive)
+    told = page.get_by_role("alert").filter(has_text="needs a track")
+    told.get_by_text("nowhere_at_all").wait_for()
+    assert "--track" not in told.inner_text()
+    told.get_by_role("combobox").select_option("oval")
+    told.get_by_role("button", name="Import it on this track").click()
+    page.get_by_role("link", name="Open the model").click()
+    page.wait_for_url("**/models/stray*")
+    name = page.url.rsplit("/models/", 1)[1].split("/")[0]
+    assert visit.console.client.get(f"/api/models/{name}").json()["track"] == "oval"
+
+
+def test_a_waiting_model_says_what_it_waits_for(visit: Visit) -> None:
+    console = visit.console
+    console.create(name="first", track="oval", until="10 minutes")
+    console.create(name="second", track="oval", until="1000 steps")
+    page = visit.open("/models/second/watch")
+    page.get_by_text("Waiting until there is room: first first").wait_for()
+    assert page.get_by_text("Starting").count() == 0
+    for name in ("second", "first"):
+        console.client.post(f"/api/models/{name}/stop")
+        job = console.client.get("/api/jobs", params={"run": name}).json()[0]
+        console.wait_for(console.job_ended(job["id"]))
+
+
+def test_an_unknown_browser_is_told_how_to_get_in(visit: Visit) -> None:
+    browser = visit.page.context.browser
+    assert browser is not None
+    page = browser.new_context().new_page()
+    page.goto(f"{visit.console.client.base_url}/create")
+    page.get_by_role("heading", name="This browser is not known here").wait_for()
+    assert page.get_by_text("Loading").count() == 0
+    assert page.get_by_role("navigation").count() == 0
+    page.context.close()
+
+
+def test_a_lost_network_is_one_banner_and_everything_comes_back(visit: Visit) -> None:
+    visit.open("/settings").evaluate("sessionStorage.clear()")
+    page = visit.open("/settings")
+    page.context.set_offline(True)
+    page.get_by_role("link", name="Tracks").click()
+    page.get_by_role("link", name="New model").click()
+    page.get_by_role("alert").get_by_text("The console does not answer.").wait_for()
+    assert page.locator(".toast").count() == 0
+    assert page.get_by_role("radio").count() == 0
+    page.context.set_offline(False)
+    page.get_by_role("alert").wait_for(state="detached")
+    page.get_by_role("radio", name="Paperclip").wait_for()
+    page.get_by_text("The function is fine.").wait_for()
+    assert page.locator(".toast").count() == 0
+
+
+def test_a_server_that_is_gone_is_said_over_cars_that_look_frozen(
+    visit: Visit, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    browser = visit.page.context.browser
+    assert browser is not None
+    runs = tmp_path_factory.mktemp("gone") / "runs"
+    with running_console(runs) as console:
+        console.create(name="stork", track="oval", until="10 minutes", seed=1)
+        address = str(console.client.base_url).rstrip("/")
+        context = browser.new_context()
+        cookie = console.client.cookies["racecraft_session"]
+        context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": address}])
+        page = context.new_page()
+        page.set_default_timeout(1000 * PATIENCE)
+        page.goto(f"{address}/models/stork/watch")
+        page.get_by_text(re.compile(r"\d+ cars learning at once")).wait_for()
+        console.kill()
+        page.get_by_role("alert").get_by_text("The console does not answer.").wait_for()
+        assert page.get_by_text("cars learning at once").count() == 0
+        assert "grayscale" in page.locator("canvas").first.evaluate("canvas => getComputedStyle(canvas).filter")
+        with running_console(runs, "--port", address.rsplit(":", 1)[1]) as again:
+            page.get_by_role("alert").wait_for(state="detached")
+            page.get_by_text(re.compile(r"\d+ cars learning at once")).wait_for()
+            job = again.client.get("/api/jobs", params={"run": "stork"}).json()[0]
+            again.client.post("/api/models/stork/stop")
+            again.wait_for(again.job_ended(job["id"]))
+        context.close()

@@ -1,0 +1,55 @@
+/** The check of a reward function while it is typed: an answer counts for the text that it was asked about, and no longer. */
+import { api, Problem, type RewardVerdict } from "../api/client";
+
+const PAUSE = 400; // ms without typing, after which the text is checked
+
+export class RewardCheck {
+  #text = $state("");
+  #of = $state<string | undefined>();
+  #found = $state.raw<RewardVerdict | undefined>();
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  /** The last answer, for what may be looked at a little longer: the painting. */
+  get last(): RewardVerdict | undefined {
+    return this.#found;
+  }
+
+  /** The answer about the present text; undefined while it is not there. */
+  get verdict(): RewardVerdict | undefined {
+    return this.#of === this.#text ? this.#found : undefined;
+  }
+
+  get isChecking(): boolean {
+    return this.#text !== "" && this.#of !== this.#text;
+  }
+
+  get problems(): RewardVerdict["problems"] {
+    return this.verdict?.problems ?? [];
+  }
+
+  /** Check a text in a moment, unless another one comes. */
+  ask(text: string, track: string, run?: string): void {
+    this.#text = text;
+    clearTimeout(this.#timer);
+    if (!text) return;
+    this.#timer = setTimeout(() => void this.#check(text, track, run), PAUSE);
+  }
+
+  /** What the server said when the text was to be trained with. */
+  refuse(text: string, problem: Problem): void {
+    const { message, hint } = problem;
+    const mistake = { line: problem.line ?? 1, column: 1, severity: "error" as const, message, hint };
+    [this.#of, this.#found] = [text, { ok: false, problems: [mistake], situations: [], painting: null, laps: [] }];
+  }
+
+  async #check(text: string, track: string, run?: string) {
+    let answer: RewardVerdict | undefined;
+    try {
+      answer = await api.checkReward(text, track, run);
+    } catch (error) {
+      if (error instanceof Problem && text === this.#text) this.refuse(text, error);
+      return;
+    }
+    if (text === this.#text) [this.#of, this.#found] = [text, answer];
+  }
+}
