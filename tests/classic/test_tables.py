@@ -55,6 +55,33 @@ def test_the_optimum_is_what_the_literature_says() -> None:
     assert success(optimal("FrozenLake-v1", 0.99).argmax(axis=1)) == pytest.approx(0.744, abs=0.005)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_q_learning_crosses_the_frozen_lake(seed: int) -> None:
+    learned = learn("FrozenLake-v1", "q-table", seed=seed)
+    table: Any = learned.policy
+    assert learned.steps == 300_000
+    assert success(table.values.argmax(axis=1)) >= 0.70  # exactly; a hundred episodes are off by 0.04
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_beside_the_cliff_q_learning_walks_along_the_edge_and_sarsa_does_not(seed: int) -> None:
+    careful, bold = learn("CliffWalking-v1", "sarsa", seed=seed), learn("CliffWalking-v1", "q-table", seed=seed)
+    assert np.mean(careful.returns[-1000:]) == pytest.approx(-17.0, abs=2.0)
+    assert np.mean(bold.returns[-1000:]) == pytest.approx(-17.0, abs=2.0)
+    assert bold.mean_return == -13.0
+    assert -17.0 <= careful.mean_return < -13.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("environment", "algorithm"), [("FrozenLake-v1", "q-table"), ("CliffWalking-v1", "sarsa")])
+def test_without_learning_nothing_is_learned(environment: str, algorithm: str) -> None:
+    still = {"learning_rate": 0.0, "final_learning_rate": 0.0}
+    learned = learn(environment, algorithm, seed=1, settings=still, until="20000 steps")
+    assert learned.mean_return < (0.2 if environment == "FrozenLake-v1" else -90.0)
+
+
 class Corridor(gymnasium.Env[Any, Any]):
     """Cells 0 to 3; right leads on, left back; the end pays 1. A step limit may cut it off."""
 

@@ -72,7 +72,7 @@ RECIPES: Final[Mapping[tuple[str, str], Recipe]] = {
     ),
     ("CliffWalking-v1", "sarsa"): Recipe(
         settings=TableSettings(
-            steps=60_000, gamma=1.0, learning_rate=0.5, final_learning_rate=0.05, epsilon=0.1, final_epsilon=0.1
+            steps=60_000, gamma=1.0, learning_rate=0.5, final_learning_rate=0.05, epsilon=0.1, final_epsilon=0.03
         ),
         evaluate_every=10_000,
     ),
