@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from tensorflow_bundles import write_checkpoint
-from tensorflow_graphs import GraphWriter, bytes_field, number, shape_message
 
 from racecraft.importing.crc32c import crc32c
+from tensorflow_graphs import GraphWriter, bytes_field, number, shape_message
 
 SHALLOW = "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
 MIDDLE = "DEEP_CONVOLUTIONAL_NETWORK"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from tensorflow_graphs import FLOAT, bytes_field, number, shape_message, varint
 
 BLOCK_BYTES = 1000  # several blocks even of a small model

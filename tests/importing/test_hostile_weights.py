@@ -13,13 +13,13 @@ import models
 import numpy as np
 from aws_models import SHALLOW, AwsModel
 from tensorflow_bundles import table
-from tensorflow_graphs import VERSIONS, GraphWriter, attribute, bytes_field, number, shape_message
 
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.errors import SourceError
 from racecraft.importing.frozen_graph import open_frozen_graph
 from racecraft.importing.weights import read_weights
 from racecraft.learn import NetworkSpec
+from tensorflow_graphs import VERSIONS, GraphWriter, attribute, bytes_field, number, shape_message
 
 SECONDS, MEGABYTES = 2.0, 500
 

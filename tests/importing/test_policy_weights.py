@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from aws_models import DEEP, MIDDLE, SHALLOW, AwsModel
 from numpy.typing import NDArray
-from tensorflow_graphs import GraphWriter, run_graph
 
 from racecraft.agent import ModelMetadata
 from racecraft.errors import SourceError
@@ -19,6 +18,7 @@ from racecraft.importing.weights import read_weights
 from racecraft.learn import NetworkSpec, make_learner
 from racecraft.learn.learner import Weights
 from racecraft.learn.networks import weight_shapes
+from tensorflow_graphs import GraphWriter, run_graph
 
 MODELS = {
     "shallow": AwsModel(),

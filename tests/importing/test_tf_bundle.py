@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tensorflow_bundles import block, few_tensors, mask, slow_crc32c, table, write_checkpoint
-from tensorflow_graphs import bytes_field, number, shape_message, varint
 
 from racecraft.errors import SourceError
 from racecraft.importing.tf_bundle import TensorBundle
+from tensorflow_graphs import bytes_field, number, shape_message, varint
 
 HEADER = (b"", number(1, 1))
 
