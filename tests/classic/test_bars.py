@@ -5,9 +5,17 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
+from typing import Any
+
+import gymnasium
+import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 
 from racecraft.classic import find_recipe, learn
+from racecraft.classic.evaluation import play
+from racecraft.classic.job import JUDGE, view_of, worlds_of
 
 SEEDS = (1, 2, 3)
 BARS = {
@@ -30,6 +38,53 @@ def test_the_plain_command_reaches_the_bar(environment: str, algorithm: str, see
     assert learned.steps <= find_recipe(environment, algorithm).settings.steps * 1.01
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_asynchronous_processes_learn_as_well() -> None:
+    alone = learn("Acrobot-v1", "a2c", seed=1).mean_return
+    for seed in SEEDS:
+        together = learn("Acrobot-v1", "a3c", seed=seed)
+        assert together.mean_return >= -100.0
+        assert together.mean_return == pytest.approx(alone, abs=10.0)
+        assert together.returns
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_table_drives_the_oval(seed: int) -> None:
+    learned = learn("Racecraft-v0", "q-table", seed=seed)
+    assert learned.steps <= 40_000 + 64
+    assert laps(learned) == 20
+
+
+def laps(learned: Any) -> int:
+    """Of 20 greedy episodes, each from its own place on the oval, those that complete the lap."""
+    make = {"num_envs": 20, "autoreset_mode": AutoresetMode.DISABLED, **learned.lesson.make}
+    cars: Any = gymnasium.make_vec("racecraft:Racecraft-v0", **make)
+    seen, _ = cars.reset(seed=1000)
+    view = view_of(learned.lesson)(cars.single_observation_space)
+    complete = over = np.zeros(20, np.bool_)
+    for _ in range(3000):
+        seen, _, terminated, truncated, infos = cars.step(learned.policy.act(view(seen)))
+        complete = complete | (~over & (infos["status"] == "lap_complete"))
+        over = over | terminated | truncated
+        if over.all():
+            break
+        if (terminated | truncated).any():
+            seen, _ = cars.reset(options={"reset_mask": terminated | truncated})
+    cars.close()
+    return int(complete.sum())
+
+
+class ByLot(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Pays by lot, whatever is done."""
+
+    def step(self, action: Any) -> Any:
+        seen, _, terminated, truncated, info = self.env.step(action)
+        return seen, float(self.np_random.choice((-1.0, 1.0))), terminated, truncated, info
+
+
 CONTROLS = {
     ("CartPole-v1", "reinforce"): 20_000,
     ("CartPole-v1", "ppo"): 20_000,
@@ -47,3 +102,23 @@ def test_without_a_learning_rate_nothing_reaches_the_bar(environment: str, algor
     still = {"learning_rate": 0.0, **({"critic_learning_rate": 0.0} if algorithm == "reinforce" else {})}
     until = f"{CONTROLS[environment, algorithm]} steps"
     assert learn(environment, algorithm, seed=1, settings=still, until=until).mean_return < BARS[environment, algorithm]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(("environment", "algorithm"), list(CONTROLS))
+def test_rewards_by_lot_teach_nothing(environment: str, algorithm: str) -> None:
+    gymnasium.register("ByLot-v0", lambda **make: ByLot(gymnasium.make(environment, **make)))
+    settings = find_recipe(environment, algorithm).settings
+    try:
+        learned = learn(
+            "ByLot-v0",
+            algorithm,
+            seed=1,
+            settings={name: value for name, value in asdict(settings).items() if name != "steps"},
+            until=f"{CONTROLS[environment, algorithm]} steps",
+        )
+    finally:
+        del gymnasium.registry["ByLot-v0"]
+    judged = worlds_of(replace(learned.lesson, environment=environment), num_envs=50, purpose=JUDGE)
+    assert play(judged, learned.policy).mean() < BARS[environment, algorithm]
