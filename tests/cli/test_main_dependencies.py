@@ -92,9 +92,9 @@ COMMANDS: dict[str, list[str]] = {
     "reward": ["reward list --json", "reward show racing --json", "reward check W -t oval --json"],
     "learn": [
         "learn --json",
-        "learn CliffWalking-v1 --algorithm sarsa --until 200steps --seed 1 --set gamma=0.9 --name c --runs R --json",
+        "learn CliffWalking-v1 --algorithm sarsa --until 200steps --seed 1 --set gamma=0.9 --name w --runs R --json",
         "learn Racecraft-v0 --algorithm q-table --until 640steps --make max_episode_steps=60 --name t --runs R --watch",
-        "learn --resume R/c --watch",
+        "learn --resume R/w --watch",
         "learn ALE/Pong-v5 --algorithm dqn --until 200steps --runs R",
     ],
     "tune": [
@@ -246,7 +246,7 @@ def test_what_needs_no_extra_works(told: dict[str, tuple[int, str]]) -> None:
         "tracks limit ",
         "tune ",
         "serve ",
-        "learn --resume R/c --watch",
+        "learn --resume R/w --watch",
         "learn ALE/",
     )
     assert [line for line in failed if not any(part in line for part in needed)] == []
