@@ -25,6 +25,11 @@ def _arithmetic_stays_as_it_was() -> Iterator[None]:
     assert np.float64(5e-324) * np.float64(1.0) != 0.0, "something left this thread without subnormal numbers"
 
 
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """No case is named by its bytes: what a compressor wrote holds the time, and two sides would differ."""
+    return f"{len(val)}-bytes" if isinstance(val, bytes) and len(val) > 16 else None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Side by side, files that take long come first, so that no side is left with one of them at the end."""
     if "PYTEST_XDIST_WORKER" in os.environ:
