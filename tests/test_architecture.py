@@ -35,6 +35,7 @@ LAYERS = (
     "importing",
     "car",
     "analysis",
+    "course",
     "serve",
     "bench",
     "cli",

@@ -22,6 +22,7 @@ EXTRAS: Final[dict[str, tuple[str, ...]]] = {
     "multi": ("pettingzoo", "openskill"),
     "watch": ("pygame-ce",),
     "atari": ("ale-py",),
+    "lessons": ("jupyterlab", "ipykernel"),
 }
 """The extras of pyproject.toml and the packages that each brings; a test holds the two alike."""
 MODULES: Final = {

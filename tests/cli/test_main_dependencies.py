@@ -97,6 +97,13 @@ COMMANDS: dict[str, list[str]] = {
         "learn --resume R/w --watch",
         "learn ALE/Pong-v5 --algorithm dqn --until 200steps --runs R",
     ],
+    "lessons": [
+        "lessons --language de --json",
+        "lessons quiz 1 --answers babb --language en --json",
+        "lessons open 1 --folder N --no-browser --no-start --json",
+        "lessons open 1 --folder N --no-browser",
+        "lessons run 1 --json",
+    ],
     "tune": [
         "tune -t oval -r racing --search lr --for laps -m 1 --trials 1 --trial-steps 64 --actions continuous"
         " --hyperparameters H --from R/a -s 1 --num-threads 1 -n u --root U --json",
@@ -248,5 +255,6 @@ def test_what_needs_no_extra_works(told: dict[str, tuple[int, str]]) -> None:
         "serve ",
         "learn --resume R/w --watch",
         "learn ALE/",
+        "lessons open 1 --folder N --no-browser",
     )
     assert [line for line in failed if not any(part in line for part in needed)] == []

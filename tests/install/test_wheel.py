@@ -78,6 +78,9 @@ def test_a_wheel_trains_evaluates_and_serves_without_a_compiler(installed: Path,
     build = json.loads(run(installed / "racecraft", "--version", "--json", path=path, cwd=tmp_path))
     assert build["instruction_sets"] == _native.available_isas()
     assert build["commit"] is None
+    listed = json.loads(run(installed / "racecraft", "lessons", "--json", path=path, cwd=tmp_path))["lessons"]
+    assert [Path(one["path"]).name for one in listed] == [path.name for path in sorted(ROOT.glob("lessons/*.py"))]
+    assert not [one for one in listed if ROOT in Path(one["path"]).parents]
     options = ("--until", "5 laps", "--seed", "1", "--name", "first", "--json")
     trained = json.loads(run(installed / "racecraft", "train", *options, path=path, cwd=tmp_path))
     assert trained["reason"] == "laps"

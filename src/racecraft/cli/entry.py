@@ -28,6 +28,7 @@ VERBS = (
     "reward",
     "tune",
     "learn",
+    "lessons",
     "logs",
     "serve",
     "machine",

@@ -1,0 +1,72 @@
+"""What `racecraft lessons` shows: the list, and a quiz."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from racecraft.course import Lesson
+    from racecraft.course.progress import Progress
+    from racecraft.course.quiz import Question
+
+
+def say_lessons(lessons: Sequence[Lesson], progress: Progress, language: str) -> None:
+    """A line for each lesson."""
+    from racecraft.course import checks_of
+
+    console = Console()
+    table = Table(header_style="bold", box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("", justify="right", style="bold")
+    table.add_column("lesson")
+    for heading in ("runs", "exercises", "quiz"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for lesson in lessons:
+        facts = lesson.facts
+        names = {f"{lesson.number}.{name}" for name in checks_of(lesson.number)}
+        solved = len(names & progress.exercises)
+        share = progress.quizzes.get(lesson.number)
+        table.add_row(
+            str(lesson.number),
+            Text.assemble((facts.title[language], "bold"), "\n", (facts.goal[language], "dim")),
+            f"{facts.seconds:.0f} s",
+            Text(f"{solved} of {len(names)}", "green" if solved == len(names) else ""),
+            Text("–" if share is None else f"{100 * share:.0f} %", "green" if share == 1.0 else ""),
+        )
+    console.print(table)
+    line = Text.assemble("Begin with ", ("racecraft lessons open 1", "bold"), ", or without notebooks ")
+    line.append("racecraft lessons run 1", "bold")
+    console.print(line, soft_wrap=True)
+
+
+def ask(question: Question, place: int, count: int, language: str) -> int:
+    """Put a question; the index of the choice."""
+    console = Console()
+    console.print(Text(f"\n{place + 1} of {count}  {question.text[language]}", "bold"))
+    letters = [chr(ord("a") + index) for index in range(len(question.choices))]
+    for letter, choice in zip(letters, question.choices, strict=True):
+        console.print(Text(f"  {letter})  {choice.text[language]}"))
+    while (given := typer.prompt(f"{letters[0]} to {letters[-1]}").strip().lower()) not in letters:
+        console.print(Text(f"A letter from {letters[0]} to {letters[-1]}, please."))
+    return letters.index(given)
+
+
+def say_answered(question: Question, index: int, language: str) -> None:
+    """Whether a choice was right, and why."""
+    console, choice = Console(), question.choices[index]
+    mark = ("✓ ", "bold green") if choice.right else ("✗ ", "bold red")
+    console.print(Text.assemble(mark, choice.text[language], " ", (choice.why[language], "dim")))
+    if not choice.right:
+        best = question.choices[question.answer]
+        console.print(Text.assemble("  ", (best.text[language], "bold"), " ", (best.why[language], "dim")))
+
+
+def say_score(right: int, count: int) -> None:
+    """The end of a quiz."""
+    Console().print(Text(f"{right} of {count} right.", "bold green" if right == count else "bold"))

@@ -1,0 +1,71 @@
+"""What a learner has solved: a small JSON file in the user's own folder of data."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from racecraft.errors import ConfigError
+from racecraft.run.atomic import write_file
+
+
+class Progress(BaseModel):
+    """Exercises and quizzes that were solved."""
+
+    model_config = ConfigDict(extra="forbid", validate_assignment=True)
+
+    exercises: set[str] = Field(default_factory=set)
+    """Such as ``1.inside``."""
+    quizzes: dict[int, float] = Field(default_factory=dict)
+    """Best share of right answers, by lesson."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        quizzes = {str(number): share for number, share in sorted(self.quizzes.items())}
+        return {"exercises": sorted(self.exercises), "quizzes": quizzes}
+
+
+def progress_path() -> Path:
+    """``racecraft/lessons.json`` in ``XDG_DATA_HOME``, or in ``~/.local/share``."""
+    base = os.environ.get("XDG_DATA_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "share") / "racecraft" / "lessons.json"
+
+
+def read_progress() -> Progress:
+    """What was solved so far.
+
+    Raises:
+        ConfigError: The file is damaged.
+    """
+    path = progress_path()
+    try:
+        return Progress.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return Progress()
+    except (ValidationError, ValueError) as error:
+        raise ConfigError(f"{path} holds no progress that can be read.", hint="Delete it to begin anew.") from error
+
+
+def record_exercise(name: str) -> None:
+    """An exercise is solved."""
+    progress = read_progress()
+    if name not in progress.exercises:
+        progress.exercises.add(name)
+        _write(progress)
+
+
+def record_quiz(number: int, share: float) -> None:
+    """A lesson's quiz was answered; the best share is kept."""
+    progress = read_progress()
+    progress.quizzes[number] = max(share, progress.quizzes.get(number, 0.0))
+    _write(progress)
+
+
+def _write(progress: Progress) -> None:
+    path = progress_path()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, json.dumps(progress.to_dict(), indent=1).encode() + b"\n", durable=False)
