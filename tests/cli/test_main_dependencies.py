@@ -102,7 +102,7 @@ COMMANDS: dict[str, list[str]] = {
         "lessons quiz 1 --answers babb --language en --json",
         "lessons open 1 --folder N --no-browser --no-start --json",
         "lessons open 1 --folder N --no-browser",
-        "lessons run 1 --json",
+        "lessons run 3 --json",
     ],
     "tune": [
         "tune -t oval -r racing --search lr --for laps -m 1 --trials 1 --trial-steps 64 --actions continuous"

@@ -45,15 +45,23 @@ class Axes:
         return np.stack([left + (right - left) * across, bottom - (bottom - top) * up], axis=-1)
 
 
-def draw_axes(sheet: Sheet, axes: Axes, *, x_label: str = "", y_label: str = "", has_x_grid: bool = False) -> None:
-    """The field, its lines and its numbers."""
+def draw_axes(
+    sheet: Sheet,
+    axes: Axes,
+    *,
+    x_label: str = "",
+    y_label: str = "",
+    has_x_grid: bool = False,
+    ticks: tuple[int, int] = (8, 5),
+) -> None:
+    """The field, its lines and its numbers, about so many to the right and upwards."""
     left, top, right, bottom = axes.box
     sheet.box(axes.box, WHITE)
-    for tick in nice_ticks(*axes.y, 5):
+    for tick in nice_ticks(*axes.y, ticks[1]):
         y = float(axes.pixels(axes.x[0], tick)[1])
         sheet.box((left, y - 0.7, right, y + 0.7), GRID)
         sheet.text((left - 12, y), _number(tick), color=SOFT_INK, size=16, anchor="rm")
-    for tick in nice_ticks(*axes.x, 8):
+    for tick in nice_ticks(*axes.x, ticks[0]):
         x = float(axes.pixels(tick, axes.y[0])[0])
         if has_x_grid:
             sheet.box((x - 0.7, top, x + 0.7, bottom), GRID)
