@@ -20,7 +20,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from outcomes import FOLDER
-from plant_python import copy_tree
 
 TREE = FOLDER / "native-tree"
 CLEAN = FOLDER / "native-build"
@@ -113,8 +112,7 @@ class Build:
 
 
 def make_build(programs: list[str]) -> Build:
-    """Copy the tree and build it: hardly optimised, one instruction set, the programs and the module."""
-    copy_tree(TREE)
+    """Build the copied tree: hardly optimised, one instruction set, the programs and the module."""
     CLEAN.mkdir(exist_ok=True)
     nanobind = _must([sys.executable, "-m", "nanobind", "--cmake_dir"]).strip()
     settings = {

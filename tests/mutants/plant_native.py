@@ -5,6 +5,7 @@
     .venv/bin/python tests/mutants/plant_native.py [--sample 100] [--only objects.hpp] [--again]
 
 Tests of behaviour alone, no golden hashes: programs of native/tests first, then those in Python, until one notices.
+The plan, too, is read from the copy: what is worked on meanwhile changes no run.
 Every outcome is a line of `build/mutants/native.jsonl`; a run goes on where the last one stopped, planting anew what
 changed, or survived tests that have changed since.
 """
@@ -17,14 +18,13 @@ import resource
 import shutil
 import sys
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from native_build import CHANGED, CLEAN, MODULE, TREE, Build, DoesNotCompileError, make_build, run
-from outcomes import ROOT, Log, Outcome, digest, report
-from plant_python import environment
+from outcomes import Log, Outcome, digest, report
+from plant_python import copy_tree, environment
 
-TABLES = Path(__file__).parent / "native"
 SEED = "2026"
 # Large networks take minutes in a core that is hardly optimised.
 OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", "-k", "not golden and not DEEP_CONVOLUTIONAL")
@@ -34,6 +34,8 @@ OPTIONS = ("-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", "-k", "not go
 class Fault:
     """One change of a file of the core."""
 
+    tree: Path
+    """What it is planted in."""
     file: str
     """Below native/."""
     original: str
@@ -43,6 +45,8 @@ class Fault:
     """What is then wrong."""
     tests: tuple[str, ...]
     """Programs of native/tests and files of tests/ that cover it, cheap ones first."""
+    source: str = field(repr=False)
+    """Of the file, without the fault."""
 
     @property
     def programs(self) -> list[str]:
@@ -53,11 +57,6 @@ class Fault:
     def files(self) -> list[str]:
         """The tests in Python."""
         return [test for test in self.tests if "/" in test]
-
-    @property
-    def source(self) -> str:
-        """Of the file, without the fault."""
-        return (ROOT / "native" / self.file).read_text(encoding="utf-8")
 
     @property
     def can_be_planted(self) -> bool:
@@ -95,7 +94,8 @@ class Fault:
     @property
     def covered_by(self) -> str:
         """Changes with the tests."""
-        paths = [ROOT / test if "/" in test else ROOT / "native" / "tests" / f"{test}.cpp" for test in self.tests]
+        programs = self.tree / "native" / "tests"
+        paths = [self.tree / test if "/" in test else programs / f"{test}.cpp" for test in self.tests]
         return digest(self.tests, [path.read_bytes() for path in paths])
 
 
@@ -103,14 +103,15 @@ def _begins(line: str) -> bool:
     return bool(line) and line[0] not in " }/#"
 
 
-def load_faults() -> list[Fault]:
-    """Every fault of the tables, file by file."""
+def load_faults(tree: Path) -> list[Fault]:
+    """Every fault of a tree's tables, file by file."""
     found = []
-    for path in sorted(TABLES.glob("*.toml")):
+    for path in sorted((tree / "tests" / "mutants" / "native").glob("*.toml")):
         table = tomllib.loads(path.read_text(encoding="utf-8"))
         for entry in table["mutant"]:
             tests = tuple(entry.pop("tests", table["tests"][entry["file"]]))
-            found.append(Fault(**entry, tests=tests))
+            source = (tree / "native" / entry["file"]).read_text(encoding="utf-8")
+            found.append(Fault(tree, **entry, tests=tests, source=source))
     return found
 
 
@@ -195,7 +196,8 @@ def main() -> None:
     log = Log("native")
     if given.again:
         log.forget()
-    faults = [fault for fault in load_faults() if given.only in fault.file]
+    copy_tree(TREE)
+    faults = [fault for fault in load_faults(TREE) if given.only in fault.file]
     gone = [fault for fault in faults if not fault.can_be_planted]
     faults = drawn([fault for fault in faults if fault not in gone], given.sample)
     todo = [fault for fault in faults if log.find(fault.key, fault.covered_by) is None]

@@ -4,6 +4,7 @@
 
     .venv/bin/python tests/mutants/plant_python.py --jobs 2 [--only race/] [--again]
 
+The plan is read from the copy: what is worked on meanwhile changes no run.
 Every outcome is a line of `build/mutants/python.jsonl`; a run goes on where the last one stopped. It plants a fault
 anew when its module has changed, and one that nobody noticed when its tests have. What others wrote is imported once.
 """
@@ -135,13 +136,13 @@ class Step:
     """Changes with the tests."""
 
 
-def planned(only: str) -> list[Step]:
-    """Every fault to plant."""
+def planned(tree: Path, only: str) -> list[Step]:
+    """Every fault to plant in a tree."""
     found = []
     for module, (number, tests) in COVERING.items():
         if module.startswith(only):
-            source = (ROOT / "src" / "racecraft" / module).read_text(encoding="utf-8")
-            files = [ROOT / test.partition("::")[0] for test in tests if "/" in test]
+            source = (tree / "src" / "racecraft" / module).read_text(encoding="utf-8")
+            files = [tree / test.partition("::")[0] for test in tests if "/" in test]
             texts = [path.read_text(encoding="utf-8") for path in files]
             for index, fault in enumerate(sample(source, number, seed=f"{SEED} {module}")):
                 found.append(Step(module, tests, fault, digest(SEED, source, index), digest(tests, texts)))
@@ -149,8 +150,7 @@ def planned(only: str) -> list[Step]:
 
 
 def work(tree: Path, plan: list[Step], log: Log) -> None:
-    """Plant what is planned, one fault after the other."""
-    copy_tree(tree)
+    """Plant what is planned in a tree, one fault after the other."""
     sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
     for name in [name for name in sys.modules if name.partition(".")[0] == "racecraft"]:
         del sys.modules[name]
@@ -183,16 +183,21 @@ def main() -> None:
     log = Log("python")
     if given.again:
         log.forget()
-    plan = planned(given.only)
+    trees = [FOLDER / f"tree-{job}" for job in range(given.jobs)]
+    copy_tree(trees[0])
+    plan = planned(trees[0], given.only)
     todo = [step for step in plan if log.find(step.key, step.covered_by) is None]
     print(f"{len(plan)} faults in Python, {len(plan) - len(todo)} of them planted before")
     for name in PRELOADED if todo else ():
         with suppress(ImportError):
             importlib.import_module(name)
     children = []
-    for job in range(given.jobs if todo else 0):
+    for tree in trees[1:] if todo else ():
+        shutil.rmtree(tree, ignore_errors=True)
+        shutil.copytree(trees[0], tree)
+    for job, tree in enumerate(trees if todo else ()):
         if (child := os.fork()) == 0:
-            work(FOLDER / f"tree-{job}", todo[job :: given.jobs], log)
+            work(tree, todo[job :: given.jobs], log)
             os._exit(0)
         children.append(child)
     failed = [child for child in children if os.waitpid(child, 0)[1] != 0]
