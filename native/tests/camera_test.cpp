@@ -282,6 +282,7 @@ TEST(walls_meet_where_a_pinhole_sees_their_corner) {
     for (int32_t row = 0; row < spec.height; ++row) {
         const int32_t count = view.row_begin[row + 1] - view.row_begin[row];
         CHECK(count == 1 || count == 2 || count == 4 || count == 8);
+        std::vector<double> shifts;  // of the samples, pixels to the right of a pixel's middle
         for (int32_t k = 0; k < count; ++k) {
             const int32_t sample = view.row_begin[row] + k;
             if (view.kind[sample] != kSampleGround) continue;
@@ -290,9 +291,16 @@ TEST(walls_meet_where_a_pinhole_sees_their_corner) {
             const double reach = spec.above / fall;
             CHECK_NEAR(view.distance[sample], reach * (std::cos(0.3) - b * std::sin(0.3)), 1e-3 * reach);
             CHECK_NEAR(view.step[sample], reach / focal, 1e-5 * reach);
-            // Pixel 0 is half of the picture to the left, give or take half a pixel of shift.
-            CHECK_NEAR(view.start[sample] / view.step[sample], -0.5 * spec.width + 0.5, 0.5);
+            shifts.push_back(view.start[sample] / view.step[sample] + 0.5 * spec.width - 0.5);
+            // Of the pyramid, what is nearest to what the sample blurs: within a factor of the root of two.
+            const double texels = 256.0 / view.sharpness[sample] / (0.01 * std::exp2(view.exponent[sample]));
+            if (view.exponent[sample] > -8 && view.exponent[sample] < 8)
+                CHECK(texels > 0.70710 && texels < 1.41422);
         }
+        // Pixel 0 is half of the picture to the left, its samples spread evenly over it.
+        std::sort(shifts.begin(), shifts.end());
+        for (size_t k = 0; k < shifts.size() && shifts.size() == static_cast<size_t>(count); ++k)
+            CHECK_NEAR(shifts[k], (static_cast<double>(k) + 0.5) / count - 0.5, 1e-4);
     }
 }
 
@@ -329,16 +337,21 @@ TEST(palette_reaches_every_part_of_a_frame) {
     const GroundMap ground(road.view());
     CameraSpec level;
     level.pitch = 0.0f;
-    const CameraModel camera(level);
     GreyPalette palette{};
     for (uint8_t* shades : {palette.ground, palette.wall}) {
         for (int i = 0; i < 4; ++i) shades[i] = 255;
     }
     palette.sky = 255;
+    palette.outside = 255;
     std::vector<uint8_t> pixels(size_t(level.width) * level.height);
-    for (const Pose& p : kPoses) {
-        render_grey(camera, ground, palette, {}, p.x, p.y, p.heading, pixels.data());
-        for (const uint8_t pixel : pixels) CHECK_EQUAL(int(pixel), 255);
+    CameraSpec above = level;  // sees over the walls
+    above.above = 6.0f;
+    above.pitch = 0.8f;
+    for (const CameraModel& model : {CameraModel(level), CameraModel(above)}) {
+        for (const Pose& p : kPoses) {
+            render_grey(model, ground, palette, {}, p.x, p.y, p.heading, pixels.data());
+            for (const uint8_t pixel : pixels) CHECK_EQUAL(int(pixel), 255);
+        }
     }
 }
 

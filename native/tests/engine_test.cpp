@@ -3,6 +3,7 @@
 #include "engine.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
 #include <stdexcept>
 
@@ -221,6 +222,41 @@ TEST(a_damaged_state_is_refused_and_changes_nothing) {
     }
     CHECK(refused > 500);
     CHECK(engine->save() == good);
+}
+
+TEST(a_saved_status_that_does_not_exist_is_refused) {
+    const auto engine = make_engine({.num_envs = 3});
+    const std::vector<uint8_t> good = engine->save();
+    const size_t numbers = 3 * (7 + kNumVehicleParameters + kNumStateColumns);
+    const size_t episodes = numbers * sizeof(float) + 3 * kNumRowColumns * sizeof(double);
+    for (int32_t status = -1; status <= static_cast<int32_t>(Status::park) + 1; ++status) {
+        const bool exists = status >= 0 && status <= static_cast<int32_t>(Status::park);
+        std::vector<uint8_t> changed = good;
+        std::memcpy(&changed[episodes + sizeof(Episode) + offsetof(Episode, status)], &status,
+                    sizeof(status));
+        std::string refusal;
+        try {
+            engine->load(changed.data(), changed.size());
+        } catch (const std::invalid_argument& error) {
+            refusal = error.what();
+        }
+        CHECK_EQUAL(refusal, exists ? "" : "Saved simulation state holds a status that does not exist.");
+    }
+}
+
+TEST(a_loaded_engine_draws_the_next_episodes_of_the_saved_one) {
+    const auto engine = make_engine({.num_envs = 3});
+    const auto other = make_engine({.num_envs = 3});
+    const std::vector<uint64_t> seeds = {7, 7, 8};
+    engine->reset(nullptr, seeds.data());
+    const std::vector<uint8_t> saved = engine->save();
+    other->load(saved.data(), saved.size());
+    for (int episode = 0; episode < 3; ++episode) {
+        engine->reset(nullptr);
+        other->reset(nullptr);
+        CHECK(std::memcmp(engine->vehicles(), other->vehicles(), 3 * 7 * sizeof(float)) == 0);
+        for (size_t k = 0; k < 7; ++k) CHECK_EQUAL(engine->vehicles()[3 * k], engine->vehicles()[3 * k + 1]);
+    }
 }
 
 TEST(a_state_whose_car_is_nowhere_is_refused_whatever_number_of_it_is_wrong) {

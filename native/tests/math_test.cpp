@@ -143,6 +143,16 @@ TEST(clamp_bounds_everything_and_passes_no_nan) {
     CHECK_EQUAL(clamp(std::numeric_limits<float>::infinity(), -1.0f, 1.0f), 1.0f);
 }
 
+TEST(logarithm_stays_within_2e7_of_libm) {
+    const auto check = [](float value) {
+        const double exact = std::log(static_cast<double>(value));
+        CHECK_NEAR(static_cast<double>(log_of(value)), exact, 2e-7 * std::max(1.0, std::abs(exact)));
+    };
+    for_floats(1e-30f, 1e30f, check);
+    for (float value = 0.25f; value < 4.0f; value += 1e-5f) check(value);  // where it changes its sign
+    CHECK_EQUAL(log_of(1.0f), 0.0f);
+}
+
 TEST(square_root_is_correctly_rounded) {
     for_floats(0.0f, 1e9f, [](float value) {
         CHECK_EQUAL(sqrt_of(value), static_cast<float>(std::sqrt(static_cast<double>(value))));

@@ -3,6 +3,8 @@
 #include "racecraft/objects.hpp"
 
 #include "check.hpp"
+#include "object_rule.hpp"
+#include "racecraft/collision.hpp"
 #include "racecraft/grid.hpp"
 #include "tracks.hpp"
 
@@ -94,6 +96,33 @@ TEST(a_bot_drifts_to_the_other_lane_every_time_it_changes) {
     CHECK(changes > 15);
 }
 
+TEST(a_saved_object_of_no_kind_is_refused) {
+    const TrackStore store = test::store_of(test::circuit());
+    for (int32_t kind = -1; kind <= kNumObjectKinds; ++kind) {
+        std::vector<ObjectState> objects(2, box_at(store.geometry(), 1.0, 1.0f));
+        objects[1].kind = static_cast<ObjectKind>(kind);
+        CHECK_EQUAL(find_fault(objects) == nullptr, kind >= 0 && kind < kNumObjectKinds);
+    }
+}
+
+TEST(a_saved_object_that_is_nowhere_is_refused) {
+    const TrackStore store = test::store_of(test::circuit());
+    const auto is_fine = [&](auto change) {
+        std::vector<ObjectState> objects(2, box_at(store.geometry(), 1.0, 1.0f));
+        change(objects[1]);
+        return find_fault(objects) == nullptr;
+    };
+    for (const double value : {std::nan(""), 1e7, -1e7}) {
+        CHECK(!is_fine([&](ObjectState& object) { object.arc_length = value; }));
+        CHECK(!is_fine([&](ObjectState& object) { object.offset = value; }));
+        CHECK(!is_fine([&](ObjectState& object) { object.distance = value; }));
+        CHECK(!is_fine([&](ObjectState& object) { object.x = static_cast<float>(value); }));
+        CHECK(!is_fine([&](ObjectState& object) { object.stay = static_cast<float>(value); }));
+    }
+    CHECK(is_fine([](ObjectState& object) { object.offset = -0.5; }));
+    CHECK(!is_fine([](ObjectState& object) { object.distance = -0.5; }));
+}
+
 TEST(stays_are_drawn_anew_and_fill_their_range) {
     const BotRule bot{.shortest_stay = 3.0f, .longest_stay = 5.0f};
     double low = 1e300, high = 0.0, mean = 0.0;
@@ -108,6 +137,21 @@ TEST(stays_are_drawn_anew_and_fill_their_range) {
     }
     CHECK(low >= 3.0 && low < 3.02 && high > 4.98 && high <= 5.0);
     CHECK_NEAR(mean, 4.0, 0.06);
+}
+
+TEST(two_touch_when_a_corner_of_either_is_in_the_other) {
+    const Footprint across = car_footprint(1.0f, 2.0f, 1.0f, 0.0f);
+    for (const float side : {-1.0f, 1.0f}) {
+        // Its nose in the middle of the other's side, where none of the other's corners is.
+        const auto touch = [&](float apart) {
+            const Footprint nose = car_footprint(1.0f + side * apart, 2.0f, 0.0f, 1.0f);
+            CHECK_EQUAL(do_touch(nose, across), do_touch(across, nose));
+            return do_touch(nose, across);
+        };
+        const float reach = 0.5f * (kCarLength + kCarWidth);
+        CHECK(touch(reach - 0.01f));
+        CHECK(!touch(reach + 0.01f));
+    }
 }
 
 TEST(a_critic_is_told_of_what_comes_next_also_beyond_the_line) {
@@ -173,6 +217,17 @@ TEST(lanes_are_half_of_the_way_to_the_borders_and_the_lap_closes) {
             const Projection at = project(track, point.x, point.y);
             CHECK_NEAR(at.offset, 0.2 * static_cast<double>(lane), 0.01);
             CHECK_NEAR(lap_difference(track, at.arc_length / track.length, s / track.length), 0.0, 0.003);
+        }
+    }
+    // Half of the way to its own border, where one is farther away than the other.
+    test::Outline wide = test::circuit();
+    for (size_t i = 0; i < wide.outer.size(); ++i)
+        wide.outer[i] = wide.center[i] + 2.0 * (wide.outer[i] - wide.center[i]);
+    const TrackStore uneven = test::store_of(wide);
+    for (const double s : {0.0, 1.03, 7.5}) {
+        for (const auto& [lane, offset] : {std::pair{-1.0f, -0.4}, std::pair{1.0f, 0.2}}) {
+            const LanePoint point = lane_point(uneven.geometry(), s, lane);
+            CHECK_NEAR(project(uneven.geometry(), point.x, point.y).offset, offset, 0.01);
         }
     }
     CHECK_EQUAL(wrap_arc_length(track, track.length), 0.0);

@@ -1,6 +1,7 @@
 // The rules of an episode, pose by pose, each at its exact threshold.
 #include "racecraft/rules.hpp"
 
+#include <algorithm>
 #include <functional>
 
 #include "check.hpp"
@@ -221,6 +222,38 @@ TEST(a_car_is_off_track_only_when_no_wheel_is_on_it) {
     }
 }
 
+TEST(wheels_are_where_the_car_carries_them_whichever_way_road_and_car_point) {
+    for (const double road : {0.0, 0.7, 1.6, 2.5}) {
+        const double ux = std::cos(road), uy = std::sin(road);
+        Judge car(test::road_along([&](double t) { return test::Point{10.0 * t * ux, 10.0 * t * uy}; }, 50,
+                                   0.4, false));
+        for (const double turn : {0.0, 0.5, -0.9, 1.6, 3.0}) {
+            double highest = -1e9, lowest = 1e9;  // m to the left of the car, across the road
+            for (const auto& [along, half] :
+                 {std::pair{kRearAxleX, kRearHalfTrack}, {kFrontAxleX, kFrontHalfTrack}}) {
+                for (const double side : {-1.0, 1.0}) {
+                    const double across = static_cast<double>(along) * std::sin(turn) +
+                                          side * static_cast<double>(half) * std::cos(turn);
+                    highest = std::max(highest, across);
+                    lowest = std::min(lowest, across);
+                }
+            }
+            const auto wheels_at = [&](double across) {
+                VehicleState pose{};
+                pose.x = static_cast<float>(5.0 * ux - across * uy);
+                pose.y = static_cast<float>(5.0 * uy + across * ux);
+                pose.heading = static_cast<float>(road + turn);
+                car.begin(pose);
+                return wheels_on_road(car.track(), pose, car.episode());
+            };
+            CHECK_EQUAL(wheels_at(0.399 - highest), 4);
+            CHECK(wheels_at(0.401 - highest) < 4);
+            CHECK(wheels_at(0.399 - lowest) > 0);
+            CHECK_EQUAL(wheels_at(0.401 - lowest), 0);
+        }
+    }
+}
+
 TEST(a_lap_comes_before_off_track_and_off_track_before_standing) {
     Judge car(test::circuit());
     const double length = car.track().length;
@@ -305,6 +338,22 @@ TEST(the_state_for_a_critic_is_what_its_columns_say) {
     CHECK_NEAR(state[kState_cos_heading_error], std::cos(static_cast<double>(pose.heading - along)), 1e-2);
     CHECK_NEAR(state[kState_half_width], 0.4, 1e-6);
     CHECK_NEAR(state[kState_offset], car.episode().projection.offset / 0.4, 1e-6);
+}
+
+TEST(a_critic_is_told_how_the_road_bends_here_and_ahead) {
+    const Outline road = test::circuit();
+    constexpr float per_metre = 4.0f;
+    std::vector<float> curvatures(200);  // of sample i: i / 100
+    for (size_t i = 0; i < curvatures.size(); ++i) curvatures[i] = 0.01f * static_cast<float>(i);
+    const TrackStore store(road.view(), std::vector<float>(200, 0.8f), curvatures, per_metre);
+    Judge car(road);
+    Episode episode{};
+    float state[kNumStateColumns];
+    observe(store.geometry(), car.pose_at(2.0), episode, state);
+    for (int i = 0; i < kNumCurvatures; ++i) {
+        const double place = 2.0 + static_cast<double>(kCurvatureAhead[i]);
+        CHECK_NEAR(state[kState_curvature_0 + i], 0.01 * place * static_cast<double>(per_metre), 1e-5);
+    }
 }
 
 }  // namespace racecraft

@@ -81,6 +81,34 @@ TEST(chase_camera_has_its_car_in_the_middle) {
     CHECK_NEAR(change.row, 119.5 + 252.4 * std::tan(0.588 - 0.31416), 12.0);
 }
 
+// From above: their front ends swing to the side to which they steer.
+TEST(front_wheels_point_to_where_they_steer) {
+    const test::Outline road = test::circuit();
+    const GroundMap ground(road.view());
+    CameraSpec above;
+    above.above = 0.9f;
+    above.pitch = 1.5707f;
+    above.forward = 0.0f;
+    const CameraModel camera(above);
+    const auto picture = [&](float steering) {
+        CarPicture car = car_at(1.0f, -2.0f, 0.0f);
+        car.steering = steering;
+        return frame(camera, ground, 1.0f, -2.0f, 0.0f, {car});
+    };
+    const double focal = 80.0 / std::tan(0.5 * above.hfov);
+    const int hub = static_cast<int>(60.0 - focal * 0.08231 / 0.87);  // row of the front wheels' middle
+    const auto straight = picture(0.0f);
+    double swing[2] = {};  // of what is darker than with straight wheels, to the right
+    for (const int side : {0, 1}) {
+        const auto turned = picture(side == 0 ? 0.5f : -0.5f);
+        for (int i = 0; i < 160 * hub; ++i) {
+            const size_t at = 3 * static_cast<size_t>(i);
+            swing[side] += (grey_of(&straight[at]) - grey_of(&turned[at])) * (i % 160 - 79.5);
+        }
+    }
+    CHECK(swing[0] < 0.0 && swing[1] > 0.0);
+}
+
 TEST(top_down_camera_shows_the_whole_track) {
     for (const test::Outline& road : {test::circuit(), test::open_bend()}) {
         const GroundMap ground(road.view());

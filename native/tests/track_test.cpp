@@ -154,6 +154,22 @@ TEST(a_waypoint_belongs_to_the_segment_that_starts_there) {
     CHECK_EQUAL(end.arc_length, open.length);
 }
 
+TEST(a_lap_begins_where_it_ends) {
+    for (const Outline& road : {test::circuit(), test::circuit(12)}) {
+        const TrackStore store = test::store_of(road);
+        const TrackGeometry& track = store.geometry();
+        const Segment& last = track.segments[track.num_segments - 1];
+        for (double before = 1e-18; before < 1e-12;
+             before *= 1.01) {  // so little that the lap may round to whole
+            const double share = before * last.inverse_length;
+            const Projection at =
+                project(track, track.segments[0].x - share * last.dx, track.segments[0].y - share * last.dy);
+            CHECK(at.arc_length >= 0.0 && at.arc_length < track.length);
+            CHECK_EQUAL(at.segment, at.arc_length < 1.0 ? 0 : track.num_segments - 1);
+        }
+    }
+}
+
 TEST(the_width_is_that_between_the_nearest_places_of_both_borders) {
     // Where two places are equally near either may be meant, and the width has two values; else it has one.
     std::vector<Outline> some = roads();

@@ -3,6 +3,7 @@
 
 #include <iterator>
 #include <random>
+#include <string>
 
 #include "check.hpp"
 #include "vehicle_kernel.hpp"
@@ -180,6 +181,20 @@ TEST(a_heading_is_told_within_a_turn) {
         CHECK(std::abs(turned) > 50.0);
         CHECK_NEAR(std::remainder(turned - static_cast<double>(state.heading), 2.0 * M_PI), 0.0, 1e-2);
     }
+}
+
+TEST(a_late_command_acts_from_its_substep_on_and_those_before_it_in_their_order) {
+    const auto acting = [](int32_t delay) {
+        std::string text;
+        for (int32_t substep = 0; substep < 4; ++substep)
+            text += static_cast<char>(acting_command(substep, 4, delay, 'n', 'b', 'e'));
+        return text;
+    };
+    CHECK_EQUAL(acting(0), "nnnn");
+    CHECK_EQUAL(acting(1), "bnnn");
+    CHECK_EQUAL(acting(4), "bbbb");
+    CHECK_EQUAL(acting(5), "ebbb");
+    CHECK_EQUAL(acting(8), "eeee");
 }
 
 TEST(steering_follows_its_command_with_the_time_constant_and_the_rate) {

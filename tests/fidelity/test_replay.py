@@ -308,7 +308,6 @@ def test_the_verbs(lines, tmp_path, monkeypatch):
     assert json.loads((tmp_path / "car.json").read_text())["mass"] == 7.5
 
 
-@pytest.mark.slow
 def test_episodes_are_handed_on_whole(lines, tmp_path, monkeypatch):
     monkeypatch.setattr("racecraft.fidelity.logs.BATCH_ROWS", 100)
     logs = list(read_logs([write(tmp_path / "a.csv", lines)], Faults()))

@@ -58,6 +58,17 @@ def test_normal_numbers_are_normal():
     np.testing.assert_allclose(shares, [0.31731, 0.04550, 0.00270], atol=0.004)
 
 
+@pytest.mark.parametrize("ends", [0.0, 1.0 - 2.0**-53])
+def test_normal_numbers_are_finite_at_the_ends_of_the_uniform_ones(ends):
+    class Ends:
+        def random(self, size):
+            return np.full(size, ends)
+
+    noise = distributions.noise_for(4, num_actions=1, is_discrete=False, rng=Ends())
+    assert np.isfinite(noise).all()
+    assert abs(noise).max() == pytest.approx(np.sqrt(-2.0 * np.log1p(-ends)))
+
+
 def test_moments_are_numpys():
     values = np.random.default_rng(0).normal(3, 2, (7, 11)).astype(np.float32)
     mean, spread = distributions.moments(values)

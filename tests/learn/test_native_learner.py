@@ -324,6 +324,16 @@ def test_gradient_norm_is_clipped():
         np.testing.assert_allclose(moments[f"moment1/{name}"] / 0.1, array / 4, rtol=1e-4, atol=1e-9)
 
 
+def test_an_update_says_how_many_ratios_were_clipped():
+    learner = NativeLearner(SMALL)
+    batch = minibatch_for(learner, 8)
+    shifts = np.float32([0.0, 0.1, -0.1, 0.15, 0.5, -0.5, 1.0, -1.0])  # of log ratios; a clip range of 0.2
+    moved = dataclasses.replace(batch, log_probs=batch.log_probs + shifts)
+    objective = dataclasses.replace(OBJECTIVE, clip_coef=0.2, learning_rate=0.0)
+    assert learner.update(batch, objective).clip_fraction == 0.0
+    assert learner.update(moved, objective).clip_fraction == 0.5
+
+
 @pytest.mark.parametrize("other", [NativeLearner, TorchLearner])
 def test_saved_and_loaded_learner_continues(other):
     spec = NetworkSpec(num_actions=3, is_discrete=False, state_size=6)
@@ -344,6 +354,15 @@ def test_saved_and_loaded_learner_continues(other):
         assert_same_bits(resumed.optimizer_state(), straight.optimizer_state())
     for name, array in straight.weights().items():
         np.testing.assert_allclose(resumed.weights()[name], array, atol=1e-3)
+
+
+def test_a_gradient_flows_through_the_weights_that_were_loaded_last():
+    learner, fresh = NativeLearner(SMALL, seed=1), NativeLearner(SMALL, seed=2)
+    batch = minibatch_for(learner, 8)
+    # A step that is not taken leaves the weights, and what was made of them for the way back.
+    learner.update(dataclasses.replace(batch, advantages=np.full(8, np.nan, np.float32)), OBJECTIVE)
+    learner.load_weights(fresh.weights())
+    assert_same_bits(gradient_of(learner, batch, OBJECTIVE)[1], gradient_of(fresh, batch, OBJECTIVE)[1])
 
 
 @pytest.mark.parametrize("name", ["RACECRAFT_SMALL", "DEEP_CONVOLUTIONAL_NETWORK_DEEP"])

@@ -18,8 +18,11 @@ QUEUE: Final[Tests] = (
     "-k",
     "not a_stopped_server and not a_killed_server and not postgresql",
 )
+POOL: Final = "tests/training/test_self_play.py::test_the_pool_spans_the_training_evenly"
 PRINTS: Final = "tests/training/test_faults.py::test_prints_are_kept_up_to_the_one_before_the_error"
 ENVIRONMENT: Final[Tests] = ("tests/training/test_teacher.py", "tests/training/test_many_tracks.py", PRINTS)
+LESSONS: Final = "tests/classic/test_learn.py"
+NUMBERS: Final = "tests/classic/test_network.py"
 WAYS: Final[Tests] = ("tests/training/test_algorithms.py", "tests/training/test_lap_place.py")
 
 COVERING: Final[dict[str, tuple[int, Tests]]] = {
@@ -61,7 +64,15 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "training/environment.py": (4, (*ENVIRONMENT, "tests/training/test_job.py")),
     "training/stop.py": (3, ("tests/training/test_stop.py", "tests/training/test_job.py")),
     "training/progress.py": (3, ("tests/training/test_progress.py", "tests/training/test_stop.py")),
-    "training/job.py": (6, ("tests/training/test_job.py", *WAYS, "tests/training/test_resume.py")),
+    "training/job.py": (6, ("tests/training/test_job.py", *WAYS, POOL, "tests/training/test_resume.py")),
+    "training/session.py": (
+        6,
+        ("tests/training/test_stretches.py", "tests/training/test_resume.py", "tests/training/test_many_tracks.py"),
+    ),
+    "training/regimes.py": (6, ("tests/training/test_regimes.py", "tests/training/test_training_settings.py")),
+    "run/stretches.py": (5, ("tests/training/test_stretches.py", "tests/training/test_aws_tools.py")),
+    "run/judged.py": (4, ("tests/run/test_judged.py",)),
+    "run/closing.py": (1, ("tests/run/test_events.py", "tests/run/test_simtrace.py", "tests/run/test_print_log.py")),
     "run/episodes.py": (4, ("tests/run/test_episodes.py",)),
     "run/checkpoint.py": (6, ("tests/run/test_checkpoint.py", "-k", "not kill")),
     "run/simtrace.py": (5, ("tests/run/test_simtrace.py",)),
@@ -75,7 +86,36 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "agent/lidar.py": (3, ("tests/agent/test_observe_lidar.py", "tests/agent/test_sensors.py")),
     "agent/hyperparameters.py": (3, ("tests/agent/test_hyperparameters.py",)),
     "limits/road.py": (4, ("tests/limits/test_limits.py",)),
-    "limits/limit.py": (3, ("tests/limits/test_limits.py",)),
+    "limits/limit.py": (3, ("tests/limits/test_limits.py", "-m", "")),  # what computes a limit is slow
+    # the physical car
+    "car/archive.py": (2, ("tests/car/test_export.py",)),
+    "car/calibration.py": (5, ("tests/car/test_calibration.py",)),
+    "car/command.py": (3, ("tests/car/test_driving.py", "tests/car/test_car_metadata.py")),
+    "car/driving.py": (3, ("tests/car/test_driving.py",)),
+    "car/evaluation.py": (2, ("tests/car/test_driving.py",)),
+    "car/export.py": (2, ("tests/car/test_export.py", "tests/car/test_onnx.py")),
+    "car/graph_writer.py": (2, ("tests/car/test_policy_graph.py",)),
+    "car/metadata.py": (3, ("tests/car/test_car_metadata.py",)),
+    "car/onnx_writer.py": (2, ("tests/car/test_onnx.py",)),
+    "car/policy_graph.py": (3, ("tests/car/test_policy_graph.py", "tests/car/test_onnx.py")),
+    # what is learned with a page of code
+    "classic/a2c.py": (2, (NUMBERS, LESSONS)),
+    "classic/distributions.py": (3, (NUMBERS,)),
+    "classic/dqn.py": (3, (LESSONS,)),
+    "classic/job.py": (4, (LESSONS,)),
+    "classic/network.py": (4, (NUMBERS,)),
+    "classic/policy.py": (3, (NUMBERS, "tests/classic/test_tables.py", LESSONS)),
+    "classic/ppo.py": (3, (NUMBERS, LESSONS)),
+    "classic/q_table.py": (3, ("tests/classic/test_tables.py",)),
+    "classic/reinforce.py": (3, (NUMBERS, LESSONS)),
+    "classic/replay.py": (2, (NUMBERS, LESSONS)),
+    "classic/rollout.py": (3, (NUMBERS, LESSONS)),
+    "classic/sac.py": (4, (NUMBERS, LESSONS)),
+    "classic/sarsa.py": (2, ("tests/classic/test_tables.py",)),
+    "classic/saved.py": (2, (LESSONS,)),
+    "classic/until.py": (2, (LESSONS,)),
+    "classic/views.py": (4, ("tests/classic/test_worlds.py",)),
+    "classic/worlds.py": (4, ("tests/classic/test_worlds.py",)),
     # what comes from outside, what is shown
     "importing/archive_guard.py": (5, ("tests/importing/test_archive.py",)),
     "importing/tar_reader.py": (4, ("tests/importing/test_archive.py",)),

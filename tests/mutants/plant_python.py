@@ -19,6 +19,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 import time
 import traceback
 from contextlib import suppress
@@ -74,9 +75,9 @@ def copy_tree(folder: Path) -> None:
             shutil.copy2(ROOT / name, folder / name)
     (folder / "site").mkdir()
     (folder / "site" / "sitecustomize.py").write_text(SITE, encoding="utf-8")
-    from racecraft import _native
-
-    shutil.copy2(_native.__file__, folder / "src" / "racecraft")
+    # not imported: the tree's own could not bind the same types beside it
+    (native,) = Path(sysconfig.get_paths()["platlib"], "racecraft").glob("_native*.so")
+    shutil.copy2(native, folder / "src" / "racecraft")
     if (ROOT.parent / "shared").is_dir():
         with suppress(FileExistsError):
             (folder.parent / "shared").symlink_to(ROOT.parent / "shared")

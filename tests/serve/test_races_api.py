@@ -193,6 +193,13 @@ def test_an_average_is_of_laps_in_a_row(stewards: Stewards) -> None:
     assert (card.leader, card.leader_score, card.models) == ("wild", 9.5, 2)
 
 
+def test_only_an_average_needs_as_many_laps_as_it_is_over(stewards: Stewards) -> None:
+    with pytest.raises(ConfigError, match="An average over 3 laps cannot be had from 2"):
+        stewards.race(ranking="average", laps=2, minimum_laps=3)
+    stewards.race(ranking="average", laps=3, minimum_laps=3)
+    stewards.race(ranking="total", laps=2, minimum_laps=3)
+
+
 def test_a_failed_entry_is_not_ranked_but_shown(stewards: Stewards) -> None:
     race = stewards.race()
     entry = stewards.drive(race, "unlucky", [])

@@ -24,15 +24,17 @@ HALF = np.array([0.2, 0.15, 0.125])  # m, half of a box
 SUBPIXELS = 4
 
 
-def cast(boxes: list[tuple[float, float, float]], pose: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+def cast(
+    boxes: list[tuple[float, float, float]], pose: tuple[float, float, float], camera: CameraSpec = CAMERA
+) -> tuple[np.ndarray, np.ndarray]:
     """Coverage by boxes and their brightness for every pixel, by SUBPIXELS x SUBPIXELS rays each."""
     x, y, heading = pose
-    width, height, n = CAMERA.width, CAMERA.height, SUBPIXELS
-    focal = 0.5 * width / math.tan(0.5 * CAMERA.horizontal_fov)
+    width, height, n = camera.width, camera.height, SUBPIXELS
+    focal = 0.5 * width / math.tan(0.5 * camera.horizontal_fov)
     column = ((np.arange(width * n) + 0.5) / n - 0.5 * width) / focal
     row = ((np.arange(height * n) + 0.5) / n - 0.5 * height) / focal
     right, down = np.meshgrid(column, row)
-    sine, cosine = math.sin(CAMERA.pitch), math.cos(CAMERA.pitch)
+    sine, cosine = math.sin(camera.pitch), math.cos(camera.pitch)
     ahead, up = cosine - down * sine, -sine - down * cosine
     rays = np.stack(
         [
@@ -43,7 +45,7 @@ def cast(boxes: list[tuple[float, float, float]], pose: tuple[float, float, floa
         axis=-1,
     )
     lens = np.array(
-        [x + CAMERA.forward * math.cos(heading), y + CAMERA.forward * math.sin(heading), CAMERA.above_ground]
+        [x + camera.forward * math.cos(heading), y + camera.forward * math.sin(heading), camera.above_ground]
     )
     nearest = np.full(right.shape, np.inf)
     bright = np.zeros(right.shape)
@@ -99,6 +101,27 @@ def test_boxes_are_where_rays_meet_them():
     assert tape > 50
 
 
+@pytest.mark.parametrize("turn", [0.0, 2.4])
+def test_every_face_is_as_bright_as_the_sun_shines_on_it(turn):
+    to_world = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    x = np.linspace(0.0, 10.0, 11)
+    road = Track("wide", *(np.column_stack([x, np.full(11, y)]) @ to_world.T for y in (0.0, 8.0, -8.0)))
+    camera = CameraSpec(above_ground=0.9, pitch=0.25)  # sees the top, too
+    box = Objects(obstacles=Obstacles(count=1, placement="fixed", positions=((0.5, 1),)))
+    simulation = Simulation(road, num_envs=4, objects=box, camera=camera, start=Start(mode="fixed"))
+    place = tuple(float(simulation.object_column(f"object_{name}")[0, 0]) for name in ("x", "y", "heading"))
+    for env, side in enumerate((0.8, 2.4, 4.0, 5.5)):  # two faces at a time, from so far that no tape is drawn
+        away = turn + side
+        pose = (place[0] + 3.3 * math.cos(away), place[1] + 3.3 * math.sin(away), away + math.pi)
+        simulation.set_pose(env, *pose)
+        share, bright = cast([place], pose, camera)
+        shades, counts = np.unique(bright[share == 1], return_counts=True)
+        faces = shades[counts > 20]  # between them pixels show two
+        assert len(faces) == 3
+        for shade in faces:
+            assert np.median(np.abs(simulation.frames[env].astype(int) - shade)[(share == 1) & (bright == shade)]) <= 1
+
+
 @pytest.mark.parametrize("kind", ["box", "car"])
 def test_a_mirrored_world_is_the_mirrored_picture(kind):
     one, other = (world((0.4, lane), (0.6, -lane), kind=kind, num_envs=6) for lane in (1, -1))
@@ -116,6 +139,21 @@ def test_a_mirrored_world_is_the_mirrored_picture(kind):
         mirrored = (other.frames[env] != bare.frames[env])[:, ::-1]
         assert drawn.sum() > 20 or env >= 3
         assert (drawn != mirrored).mean() < 0.01
+
+
+def test_what_is_near_hides_what_is_far():
+    for near, far in ((0.5, 0.55), (0.55, 0.6)):
+        boxes = Obstacles(count=1, placement="fixed", positions=((near, 1),))
+        bots = Bots(count=1, placement="fixed", positions=((far, 1),), speed=0.0)
+        box, both, bot = (
+            Simulation(ROAD, objects=objects, start=Start(mode="fixed"))
+            for objects in (Objects(obstacles=boxes), Objects(obstacles=boxes, bots=bots), Objects(bots=bots))
+        )
+        for x, is_hidden in ((10 * near - 1.0, True), (10 * far + 1.0, False)):
+            for simulation in (box, both, bot):
+                simulation.set_pose(0, x, 0.25, 0.0 if is_hidden else math.pi)
+            assert np.array_equal(both.frames, box.frames) == is_hidden
+            assert not np.array_equal(both.frames, bot.frames)
 
 
 def test_a_car_is_smaller_than_a_box_and_darker_below():

@@ -15,6 +15,7 @@ from racecraft.sim import (
     OBJECT_HEADER,
     STATUS_NAMES,
     Bots,
+    CameraSpec,
     Objects,
     Obstacles,
     Simulation,
@@ -197,8 +198,10 @@ def test_a_car_that_stands_as_a_penalty_cannot_be_hit():
     for _ in range(3):
         simulation.step(STAND)
         assert status(simulation) == "pause"
+        assert simulation.object_column("crashed_object")[0] == -1
     simulation.step(STAND)
     assert status(simulation) == "crashed"
+    assert simulation.object_column("crashed_object")[0] == 0
     assert simulation.terminated[0]
 
 
@@ -297,6 +300,29 @@ def test_an_object_is_in_camera_when_it_is_within_the_lens_opening():
         simulation.set_pose(env, x, 0.0, heading)
     simulation.step(np.zeros((4, 2)))
     assert simulation.object_column("object_in_camera").tolist() == [1.0, 0.0, 1.0, 0.0]
+
+
+def test_the_lens_looks_from_where_the_car_carries_it_whichever_way_it_points():
+    camera = CameraSpec(forward=0.3, left=0.1)
+    simulation = world(boxes((0.5, 1)), STRAIGHT, num_envs=400, camera=camera)
+    x, y = (float(simulation.object_column(f"object_{axis}")[0, 0]) for axis in "xy")
+    rng = np.random.default_rng(8)
+    poses = np.column_stack([x + rng.uniform(-2, 2, 400), y + rng.uniform(-2, 2, 400), rng.uniform(-3.1, 3.1, 400)])
+    for env, pose in enumerate(poses):
+        simulation.set_pose(env, *pose.tolist())
+    simulation.step(np.zeros((400, 2)))
+    seen = np.zeros((400, 2), dtype=bool)  # through an opening a little too narrow and a little too wide
+    slope = math.tan(0.5 * camera.horizontal_fov)
+    cosine, sine = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    lens = poses[:, :2] + np.column_stack([0.3 * cosine - 0.1 * sine, 0.3 * sine + 0.1 * cosine])
+    for dx, dy in ((0, 0), (0.2, 0.15), (0.2, -0.15), (-0.2, 0.15), (-0.2, -0.15)):
+        ahead = (x + dx - lens[:, 0]) * cosine + (y + dy - lens[:, 1]) * sine
+        aside = np.abs((y + dy - lens[:, 1]) * cosine - (x + dx - lens[:, 0]) * sine)
+        seen |= (ahead > 0)[:, None] & (aside[:, None] < slope * ahead[:, None] + [-1e-4, 1e-4])
+    found = simulation.object_column("object_in_camera") == 1.0
+    assert (found >= seen[:, 0]).all()
+    assert (found <= seen[:, 1]).all()
+    assert 40 < found.sum() < 360
 
 
 def test_the_state_tells_of_the_next_two_objects():

@@ -36,6 +36,18 @@ def test_a_shuffled_grid_draws_who_starts_where():
     assert fronts.min() > 15
 
 
+def test_a_new_race_starts_together_wherever_it_starts():
+    simulation = duel(8, 4, track=OVAL, start=Start(mode="random"))
+    fronts = []
+    for _ in range(3):
+        places = simulation.column("projection_distance").reshape(2, 4) % OVAL.length
+        behind = (places[:, :1] - places) % OVAL.length
+        np.testing.assert_allclose(behind, np.broadcast_to(0.75 * np.arange(4), (2, 4)), atol=0.05)
+        fronts += places[:, 0].tolist()
+        simulation.reset()
+    assert len({round(front, 3) for front in fronts}) == 6
+
+
 def test_on_an_open_road_the_last_one_starts_at_its_beginning():
     simulation = duel(4, 4)
     assert simulation.vehicles[0].tolist() == pytest.approx([2.25, 1.5, 0.75, 0.0], abs=1e-5)
@@ -85,6 +97,7 @@ def test_races_of_many_tracks_share_theirs():
     for _ in range(10):
         index = simulation.column("track_index").reshape(4, 3)
         assert (index == index[:, :1]).all()
+        assert (simulation.track_choice.reshape(4, 3) == index).all()
         simulation.reset()
     assert len(np.unique(index)) == 2
 

@@ -196,6 +196,16 @@ def test_latency_may_be_a_fraction_of_a_step():
     assert travelled[0] - travelled[1] == pytest.approx(0.5 * whole, rel=0.1)
 
 
+def test_a_latency_is_rounded_to_the_nearest_substep():
+    ends = []
+    for latency in (0.49, 0.5, 0.51, 0.43, 0.57):  # of a step, which has 8 substeps
+        simulation = one(camera=None, latency=latency)
+        drive(simulation, 3, np.float32([0.3, 2.0]))
+        ends.append(simulation.vehicles[:, 0].tolist())
+    assert ends[0] == ends[1] == ends[2]
+    assert ends[3] != ends[1] != ends[4]
+
+
 def test_no_command_is_remembered_beyond_a_reset_or_a_new_place():
     simulation = one(camera=None, latency=2.0)
     drive(simulation, 10, np.float32([0.5, 4.0]))

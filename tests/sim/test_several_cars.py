@@ -71,6 +71,14 @@ def test_a_car_whose_episode_is_over_is_neither_seen_nor_hit():
     assert simulation.object_column("object_in_camera")[0] == 0.0
     assert simulation.state[0, -6:].tolist() == [0.0] * 6
     assert simulation.object_column("object_x")[0, 0] < -50.0
+    assert simulation.object_column("object_y")[0, 0] < -50.0
+    assert simulation.object_column("object_offset")[0, 0] > 50.0
+    for each in (simulation, alone):  # looks to where it is parked
+        each.set_pose(0, 0.0, 0.0, -0.75 * np.pi)
+    np.testing.assert_array_equal(simulation.frames[0], alone.frames[0])
+    stand(simulation)
+    assert simulation.object_column("object_in_camera")[0] == 0.0
+    simulation.set_pose(0, 5.8, 0.55, 0.0)
     simulation.set_pose(1, 6.0, 0.55, 0.0)
     stand(simulation)
     assert kinds(simulation, 0) == ["racer"]
@@ -85,6 +93,29 @@ def test_what_is_done_to_a_car_between_steps_is_seen_at_once():
     assert (simulation.frames[0] != before).any()
     simulation.set_pose(1, 2.0, 0.0, 0.0)
     np.testing.assert_array_equal(simulation.frames[0], before)
+
+
+def test_a_car_that_stands_as_a_penalty_sees_the_others_drive_on():
+    simulation = duel(2, camera=CameraSpec())
+    simulation.set_pose(0, 5.0, 0.0, 0.0)
+    simulation.set_pose(1, 5.5, 0.0, 0.0, speed=2.0)
+    simulation.freeze(0, 3)
+    for _ in range(3):
+        before = simulation.frames[0].copy()
+        simulation.step([[0.0, 2.0]] * 2)
+        assert status(simulation, 0) == "pause"
+        assert (simulation.frames[0] != before).any()
+
+
+def test_whose_episode_is_over_sees_nothing_more():
+    simulation = duel(2, camera=CameraSpec())
+    simulation.set_pose(0, 6.0, 0.0, 0.0)
+    simulation.set_pose(1, 5.0, 0.7, 0.0)  # off the track
+    stand(simulation)
+    assert status(simulation, 1) == "off_track"
+    last = simulation.frames[1].copy()
+    simulation.set_pose(0, 5.5, 0.6, 0.0)
+    np.testing.assert_array_equal(simulation.frames[1], last)
 
 
 # --- at fault

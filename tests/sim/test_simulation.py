@@ -116,6 +116,21 @@ def test_jitter_stays_in_its_bounds_and_fills_them(road):
     assert abs(np.corrcoef(offset, heading)[0, 1]) < 0.2
 
 
+def test_jitter_is_across_the_road_whichever_way_it_points():
+    offsets = []
+    for fraction in (0.0, 0.2, 0.45, 0.8):
+        start = Start(mode="fixed", offset=fraction, lateral_jitter=0.3)
+        simulation = Simulation(OVAL, num_envs=100, camera=None, start=start)
+        straight = Simulation(OVAL, camera=None, start=Start(mode="fixed", offset=fraction))
+        apart = simulation.vehicles[:2].T.astype(float) - straight.vehicles[:2, 0].astype(float)
+        heading = float(straight.vehicles[2, 0])
+        np.testing.assert_allclose(apart @ [np.cos(heading), np.sin(heading)], 0.0, atol=1e-5)
+        offsets.append(apart @ [-np.sin(heading), np.cos(heading)])
+        assert offsets[-1].min() < -0.25
+        assert offsets[-1].max() > 0.25
+    np.testing.assert_allclose(offsets, np.broadcast_to(offsets[0], np.shape(offsets)), atol=1e-5)
+
+
 def test_an_open_road_always_starts_at_its_beginning(road):
     simulation = Simulation(road, num_envs=3, camera=None, start=Start(mode="random", spread=True, offset=0.5))
     for _ in range(3):

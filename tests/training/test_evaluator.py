@@ -117,6 +117,29 @@ def test_trials_are_told_as_episodes_on_the_runs_clock(judged: Evaluator) -> Non
     assert counter.number == 17
 
 
+@pytest.mark.parametrize("direction", ["forward", "alternate"])
+def test_of_many_tracks_as_many_are_driven_as_there_are_trials(monkeypatch: pytest.MonkeyPatch, direction: Any) -> None:
+    tracks = [load_track(name) for name in ("oval", "bowtie", "hairpin")]
+    opened: list[Any] = []
+    simulate = evaluator.trial_simulation
+
+    def remember(driven: Any, **settings: Any) -> Any:
+        opened.append((driven, simulate(driven, **settings)))
+        return opened[-1][1]
+
+    monkeypatch.setattr(evaluator, "trial_simulation", remember)
+    settings = replace(SETTINGS, direction=direction, evaluation_trials=5)
+    learner = make_learner(NetworkSpec(num_actions=5), num_threads=1)
+    Evaluator(NetworkPolicy(learner, action_space("default")), tracks, settings)
+    ((driven, simulation),) = opened
+    assert [track.name for track in driven] == ["oval", "oval", "bowtie", "bowtie", "hairpin"]
+    for trial, track in enumerate(driven):
+        forward = next(each for each in tracks if each.name == track.name)
+        is_reversed = direction == "alternate" and trial % 2 == 1
+        np.testing.assert_array_equal(track.centerline, (forward.reversed() if is_reversed else forward).centerline)
+        assert simulation.column("track_length")[trial] == pytest.approx(forward.length)
+
+
 def test_what_a_resumed_run_is_told_goes_on_where_the_first_was(judge: Judge, judged: Evaluator) -> None:
     judge(14.0, 13.0, step=64)
     judge(0.5, 0.5, step=128)

@@ -5,10 +5,14 @@ from __future__ import annotations
 import pytest
 from tiny_runs import TINY, Train, assert_same
 
+from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.errors import ConfigError
 from racecraft.run import RunFolder
 from racecraft.sim import Randomization
-from racecraft.training import resume
+from racecraft.track import load_track
+from racecraft.training import Until, resume
+from racecraft.training.environment import open_simulation
+from racecraft.training.settings import TrainSettings
 
 MANY = {
     "track": ["oval", "generated:0..3"],
@@ -35,6 +39,19 @@ def test_it_drives_all_tracks_both_ways(tiny: Train):
     assert settings.settings["randomize"]["latency"] == [0.0, 1.0]
     text = "".join(path.read_text() for path in (run / "training-simtrace").iterdir())
     assert "nan" not in text.lower()
+
+
+@pytest.mark.parametrize("names", [("oval",), ("oval", "bowtie")])
+def test_of_several_tracks_a_car_draws_one_for_every_episode(names):
+    tracks = [load_track(name) for name in names]
+    settings = TrainSettings(track=" + ".join(names), until=Until(steps=1000), num_threads=1)
+    cars = open_simulation(settings, tracks, SensorSuite(("FRONT_FACING_CAMERA",)))
+    drawn = [cars.column("track_index").tolist()]
+    for _ in range(3):
+        cars.reset()
+        drawn.append(cars.column("track_index").tolist())
+    assert len({tuple(indices) for indices in drawn}) == (1 if len(names) == 1 else 4)
+    assert {index for indices in drawn for index in indices} == set(range(len(names)))
 
 
 def test_a_track_that_changed_is_refused(tmp_path, tiny: Train):

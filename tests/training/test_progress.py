@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from racecraft.learn import IterationStats, UpdateStats
 from racecraft.learn.ledger import Ended
-from racecraft.training import EvaluationReport, IterationReport
+from racecraft.training import EvaluationReport, IterationReport, TrainResult
 from racecraft.training.progress import SilentReporter
 
 LOSSES: dict[str, float] = {
@@ -33,6 +35,8 @@ def test_an_evaluations_point_has_milliseconds_and_hundredths_of_a_per_cent() ->
         "is_best": True,
     }
     assert (report.completion, report.laps_completed, report.best_lap) == (pytest.approx(0.561728), 1, 9.87654)
+    assert replace(report, lap_times=(12.0, 11.0, 13.0)).best_lap == 11.0
+    assert replace(report, lap_times=()).best_lap is None
 
 
 def test_an_iterations_point_by_hand() -> None:
@@ -65,6 +69,29 @@ def test_an_iterations_point_by_hand() -> None:
         "remaining": 9.5,
         **{name: LOSSES[name] for name in ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction")},
         "explained_variance": 0.7,
+    }
+
+
+def test_a_result_has_milliseconds(tmp_path: Path) -> None:
+    result = TrainResult(
+        run=tmp_path,
+        reason="laps",
+        wall_seconds=1.23456,
+        steps=640,
+        laps_completed=2,
+        evaluation_trials=3,
+        best_lap_seconds=9.87654,
+        parts={"learner": 0.98765},
+    )
+    assert result.to_dict() == {
+        "run": str(tmp_path),
+        "reason": "laps",
+        "wall_seconds": 1.235,
+        "steps": 640,
+        "laps_completed": 2,
+        "evaluation_trials": 3,
+        "best_lap_seconds": 9.87654,
+        "parts": {"learner": 0.988},
     }
 
 
