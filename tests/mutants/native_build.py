@@ -84,10 +84,11 @@ class Build:
         found = [part for part in self.links[target] if part in self.commands and file in self.includes[part]]
         if lines is None:
             return found
-        # Of what a test computes from constants only the result is left: its own object always counts.
-        return [
-            part for part in found if "/tests/" in part or not self.lines[part].get(file.name, set()).isdisjoint(lines)
-        ]
+        # Of what a test computes from constants only the result is left: its own object always counts. And of what
+        # only hands on to other functions no line may be left anywhere.
+        own = [part for part in self.lines if "/tests/" in part]
+        holding = [part for part, held in self.lines.items() if not held.get(file.name, set()).isdisjoint(lines)]
+        return [part for part in found if part in own or part in holding or set(holding) <= set(own)]
 
     def compile(self, objects: list[str]) -> None:
         """Compile the tree as it is into a folder of its own."""
