@@ -46,8 +46,9 @@ CONSOLE = (
     "schemas",
     "problems",
     "store",
-    "jobs",
     "live",
+    "jobs",
+    "streams",
     "door",
     "tracks",
     "evaluations",
@@ -60,6 +61,7 @@ CONSOLE = (
     "context",
     "app",
     "server",
+    "station",
     "openapi",
 )
 """Rooms of serve/, lowest first; a room's routes see the context, which is made of what all rooms know."""

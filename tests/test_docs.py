@@ -38,7 +38,7 @@ def run(command: list[str], folder: Path) -> None:
 def test_known_languages_only() -> None:
     for page in PAGES:
         for match in BLOCK.finditer(page.read_text(encoding="utf-8")):
-            assert match[1] in {"bash", "python", "text", "json"}, f"{page.name}: ```{match[1]} is not tested"
+            assert match[1] in {"bash", "python", "text", "json", "sql"}, f"{page.name}: ```{match[1]} is not tested"
 
 
 @pytest.mark.slow

@@ -110,7 +110,14 @@ COMMANDS: dict[str, list[str]] = {
         "tune --model-metadata M",
         "tune --resume U/u",
     ],
-    "serve": ["serve --runs R -p 0 --database sqlite:///D.db --artifacts file:///tmp/none --no-browser --json"],
+    "serve": [
+        "serve --runs R -p 0 --database sqlite:///D.db --artifacts file:///tmp/none --trainings 1 --others 1"
+        " --no-browser --json"
+    ],
+    "worker": [
+        "worker --runs W --database sqlite:///D.db --artifacts file:///tmp/none --trainings 1 --others 1 --machine w"
+        " --json"
+    ],
     "bench": ["bench --only reward --seconds 0.1 --seeds 1 --json"],
     "doctor": ["doctor --json"],
 }
@@ -253,6 +260,7 @@ def test_what_needs_no_extra_works(told: dict[str, tuple[int, str]]) -> None:
         "tracks limit ",
         "tune ",
         "serve ",
+        "worker ",
         "learn --resume R/w --watch",
         "learn ALE/",
         "lessons open 1 --folder N --no-browser",

@@ -108,7 +108,8 @@ def test_a_run_comes_back_as_it_was(tmp_path: Path, url: str) -> None:
     assert store.names() == ["a"]
     assert store.is_current(folder)
     (tmp_path / "elsewhere").mkdir()
-    back = Artifacts(url).fetch("a", tmp_path / "elsewhere", incoming=tmp_path / "incoming")
+    assert Artifacts(url).bring("a", tmp_path / "elsewhere", incoming=tmp_path / "incoming")
+    back = RunFolder(tmp_path / "elsewhere" / "a")
     assert contents(back.path) == contents(folder.path)
     np.testing.assert_array_equal(back.checkpoints.load().arrays["w"], np.arange(1000.0))
     assert store.is_current(back)
@@ -123,12 +124,77 @@ def test_only_what_changed_is_copied_and_what_is_gone_is_removed(tmp_path: Path,
     shutil.rmtree(folder.path / "mp4")
     assert not store.is_current(folder)
     assert store.keep(folder) == 1
-    back = store.fetch("a", tmp_path, incoming=tmp_path / "incoming")
-    assert contents(back.path) == contents(folder.path)
+    assert store.bring("a", tmp_path, incoming=tmp_path / "incoming")
+    assert contents(tmp_path / "a") == contents(folder.path)
     store.forget("a")
     assert store.names() == []
     with pytest.raises(RunError, match="no run 'a'"):
-        store.fetch("a", tmp_path / "runs", incoming=tmp_path / "incoming")
+        store.bring("a", tmp_path / "runs", incoming=tmp_path / "incoming")
+
+
+def test_two_machines_take_turns(tmp_path: Path, url: str) -> None:
+    store, here, incoming = Artifacts(url), make_run(tmp_path / "here"), tmp_path / "incoming"
+    store.keep(here)
+    (tmp_path / "there").mkdir()
+    store.bring("a", tmp_path / "there", incoming=incoming)
+    there = RunFolder(tmp_path / "there" / "a")
+    assert not store.bring("a", tmp_path / "there", incoming=incoming)  # as new as the copy
+    there.checkpoints.save(200, {"w": np.arange(3.0)})
+    (there.path / "mp4" / "camera-pip" / "0-video.mp4").unlink()
+    (there.path / ".live").write_text("of this machine")
+    store.keep(there)
+    (here.path / "metrics" / "history.jsonl").write_text("of one who was away")
+    with pytest.raises(RunError, match="changed by another machine"):
+        store.keep(here)
+    assert store.bring("a", tmp_path / "here", incoming=incoming)
+    assert contents(here.path) == contents(there.path)
+    assert (here.path / ".live").read_text() == "not kept"
+    assert here.checkpoints.load().step == 200
+    (here.path / "metrics" / "history.jsonl").write_text("its turn")
+    assert store.keep(here) == 1
+    assert store.bring("a", tmp_path / "there", incoming=incoming)
+    assert contents(there.path) == contents(here.path)
+    assert not list(incoming.iterdir())
+
+
+def test_a_copy_taken_while_checkpoints_are_saved_holds_those_of_one_moment(tmp_path: Path) -> None:
+    folder = make_run(tmp_path / "runs")
+    store, is_ended = Artifacts(f"file://{tmp_path}/store"), threading.Event()
+
+    def train() -> None:
+        step = 200
+        while not is_ended.is_set():
+            with (folder.path / "metrics" / "history.jsonl").open("a") as history:
+                history.write(json.dumps({"step": step}) + "\n")
+            folder.checkpoints.save(step, {"w": np.full(1000, float(step))})
+            step += 1
+
+    training = threading.Thread(target=train)
+    training.start()
+    try:
+        for turn in range(20):
+            store.keep(folder)
+            elsewhere = tmp_path / f"elsewhere-{turn}"
+            elsewhere.mkdir()
+            store.bring("a", elsewhere, incoming=tmp_path / "incoming")
+            back = RunFolder(elsewhere / "a")
+            listed = {entry.file for entry in back.checkpoints.entries()}
+            assert listed <= {path.name for path in (back.path / "checkpoints").glob("*.safetensors")}
+            last = back.checkpoints.load("last")  # warnings are errors: none was passed over
+            steps = [json.loads(line)["step"] for line in back.history.read_text().splitlines()]
+            assert last.step <= steps[-1] or last.step == 100
+    finally:
+        is_ended.set()
+        training.join()
+
+
+def test_a_run_from_before_copies_were_counted_is_neither_replaced_nor_refused(tmp_path: Path) -> None:
+    store, folder = Artifacts(f"file://{tmp_path}/store"), make_run(tmp_path / "runs")
+    store.keep(folder)
+    (folder.path / ".copy").unlink()
+    (folder.path / "reward_function.py").write_text("changed")
+    assert not store.bring("a", tmp_path / "runs", incoming=tmp_path / "incoming")
+    assert store.keep(folder) == 1
 
 
 def test_a_damaged_copy_is_refused_whole(tmp_path: Path) -> None:
@@ -139,7 +205,7 @@ def test_a_damaged_copy_is_refused_whole(tmp_path: Path) -> None:
     for damage in (REWARD.replace("1.0", "2.0"), REWARD + "#" * 1000, REWARD[:-1]):
         stored.write_text(damage)
         with pytest.raises(RunError, match=r"reward_function.py of run 'a' is damaged"):
-            store.fetch("a", tmp_path, incoming=tmp_path / "incoming")
+            store.bring("a", tmp_path, incoming=tmp_path / "incoming")
         assert not (tmp_path / "a").exists()
 
 
@@ -164,10 +230,10 @@ def test_a_hostile_list_of_files_is_refused(tmp_path: Path, files: Any) -> None:
     index.parent.mkdir()
     index.write_text(json.dumps({"format": 1, "files": files}))
     with pytest.raises(RunError, match="not one of Racecraft's"):
-        store.fetch("a", tmp_path, incoming=tmp_path / "incoming")
+        store.bring("a", tmp_path, incoming=tmp_path / "incoming")
     index.write_text("{")
     with pytest.raises(RunError, match="damaged"):
-        store.fetch("a", tmp_path, incoming=tmp_path / "incoming")
+        store.bring("a", tmp_path, incoming=tmp_path / "incoming")
     assert not (tmp_path / "up").exists()
 
 
@@ -195,7 +261,7 @@ def test_a_store_that_did_not_answer_at_first_is_asked_again(
     queue = JobQueue(database)
     settings = ServeSettings(runs=there)
     supervisor = Supervisor(settings, database, queue)
-    keeper = mirror.Mirror(store, runs=there, state=settings.state, queue=queue, supervisor=supervisor)
+    keeper = mirror.Mirror(store, settings=settings, queue=queue, supervisor=supervisor)
     thread = threading.Thread(target=keeper.start)
     thread.start()
     deadline = time.monotonic() + 60

@@ -10,8 +10,8 @@ from typing import Any, cast
 import pytest
 
 from racecraft.serve.jobs.queue import JobQueue
-from racecraft.serve.live import hub as hub_module
-from racecraft.serve.live.hub import Hub
+from racecraft.serve.streams import hub as hub_module
+from racecraft.serve.streams.hub import Hub
 
 
 @pytest.fixture

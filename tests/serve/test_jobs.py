@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from running_consoles import running_console
 
 from racecraft.errors import RunError
-from racecraft.serve.jobs.queue import KINDS, MAX_LOSSES, JobQueue, kinds_of
+from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, MAX_LOSSES, JobQueue, kinds_of
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job, Table, now
 
@@ -102,13 +102,13 @@ def test_many_workers_never_own_a_job_together(database: Database) -> None:
 def test_a_job_whose_worker_is_gone_is_another_s(database: Database, queue: JobQueue) -> None:
     job = queue.add("train", "a", {})
     queue.claim(("train",), owner="first")
-    assert queue.heartbeat(job.id, owner="first") == "go on"
+    assert queue.heartbeat(job.id, owner="first").word == "go on"
     queue.take_back_expired()
     assert state(queue, job.id) == "running"
     expire(database)
     queue.take_back_expired()
     assert queue.claim(("train",), owner="second") is not None
-    assert queue.heartbeat(job.id, owner="first") == "lost"
+    assert queue.heartbeat(job.id, owner="first").word == "lost"
     assert not queue.finish(job.id, owner="first", state="done", result={})
     assert queue.finish(job.id, owner="second", state="done", result={"x": 1})
     assert queue.get(job.id).result == {"x": 1}  # type: ignore[union-attr]
@@ -132,6 +132,21 @@ def test_a_job_that_gets_further_each_time_is_not_given_up(queue: JobQueue) -> N
     assert state(queue, job.id) == "queued"
 
 
+def test_a_job_that_is_lost_with_its_machine_is_given_up_later(queue: JobQueue, database: Database) -> None:
+    job = queue.add("train", "a", {})
+    for attempt in range(MAX_DEATHS):
+        assert queue.claim(("train",), owner=str(attempt)) is not None
+        if attempt % 2:
+            queue.release(str(attempt), limit=MAX_DEATHS)  # as found by the next server
+        else:
+            expire(database)
+            queue.take_back_expired()
+    assert state(queue, job.id) == "failed"
+    ended = queue.get(job.id)
+    assert ended is not None
+    assert f"died {MAX_DEATHS} times" in (ended.error or {})["message"]
+
+
 def test_servers_that_are_stopped_do_not_count_as_losses(queue: JobQueue) -> None:
     job = queue.add("train", "a", {})
     for attempt in range(3 * MAX_LOSSES):
@@ -143,11 +158,11 @@ def test_servers_that_are_stopped_do_not_count_as_losses(queue: JobQueue) -> Non
 def test_what_runs_is_counted_by_kind(queue: JobQueue) -> None:
     for kind in ("train", "train", "evaluate"):
         queue.add(kind, "a", {})
-    assert queue.num_running(("train", "evaluate")) == 0
+    assert queue.num_running(("train", "evaluate"), machine="") == 0
     queue.claim(("train",), owner="x")
     queue.claim(("evaluate",), owner="y")
-    assert queue.num_running(("train",)) == 1
-    assert queue.num_running(("train", "evaluate")) == 2
+    assert queue.num_running(("train",), machine="") == 1
+    assert queue.num_running(("train", "evaluate"), machine="") == 2
 
 
 def test_every_kind_of_job_has_a_function() -> None:
@@ -163,7 +178,7 @@ def test_cancelling(queue: JobQueue) -> None:
     assert state(queue, waiting.id) == "cancelled"
     queue.claim(("evaluate",), owner="x")
     queue.cancel(running.id)
-    assert queue.heartbeat(running.id, owner="x") == "stop"
+    assert queue.heartbeat(running.id, owner="x").word == "stop"
     queue.release("x")
     assert state(queue, running.id) == "cancelled"  # not started again
 

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from postgres_servers import PostgresServer
 from running_consoles import RunningConsole, running_console
+from running_workers import processes_on
 
 from racecraft.run import RunFolder
 from racecraft.training.job import Training
@@ -24,17 +25,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reas
 
 KILLS = 20
 UNTIL = "24000 steps"
-
-
-def workers_of(runs: Path) -> list[int]:
-    """The processes that work for a console."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        with suppress(OSError):
-            command = (entry / "cmdline").read_bytes().split(b"\0") if entry.name.isdigit() else []
-            if b"racecraft.serve.jobs" in command and os.fsencode(runs) in command:
-                found.append(int(entry.name))
-    return found
 
 
 def test_a_server_killed_twenty_times(tmp_path: Path) -> None:
@@ -52,7 +42,7 @@ def test_a_server_killed_twenty_times(tmp_path: Path) -> None:
                 assert reply.status_code == 202
                 raced.append(reply.json()["id"])
             time.sleep(dice.uniform(0.0, 1.5))
-            victims = workers_of(runs) if kill % 5 == 2 else []
+            victims = processes_on(runs) if kill % 5 == 2 else []
             console.kill()
             for process in victims:
                 with suppress(ProcessLookupError):
@@ -63,8 +53,8 @@ def test_a_server_killed_twenty_times(tmp_path: Path) -> None:
         assert {job["state"] for job in ended.values()} == {"done"}, ended
         assert sorted(job["kind"] for job in ended.values()) == [*["evaluate"] * len(raced), "train"]
         cards = console.client.get("/api/models/calm/evaluations").json()
-        assert len(workers_of(runs)) <= 1  # the one that waits for a job
-    assert not workers_of(runs)
+        assert len(processes_on(runs)) <= 1  # the one that waits for a job
+    assert not processes_on(runs)
     done = [json.loads(path.read_text())["job"] for path in (runs / "calm").glob("evaluation-*/evaluation.json")]
     assert sorted(done) == sorted(raced)
     assert len(cards) == len(raced)

@@ -10,25 +10,34 @@ import typer
 from racecraft.cli.app import Json, app, print_json
 from racecraft.extras import needed_for
 
+Database = Annotated[
+    str,
+    typer.Option(
+        "--database",
+        envvar="RACECRAFT_DATABASE",
+        help="The console's: postgresql+psycopg://… instead of SQLite in its runs folder.",
+    ),
+]
+Artifacts = Annotated[
+    str,
+    typer.Option(
+        "--artifacts", envvar="RACECRAFT_ARTIFACTS", help="s3://BUCKET/PREFIX or file:///FOLDER to copy runs to."
+    ),
+]
+Trainings = Annotated[
+    int, typer.Option("--trainings", help="At the same time on this machine; 0 leaves them to workers elsewhere.")
+]
+Others = Annotated[int, typer.Option("--others", help="The same for evaluations and other short jobs.")]
+
 
 @app.command()
 def serve(
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
     port: Annotated[int, typer.Option("--port", "-p", help="Of 127.0.0.1; 0 takes a free one.")] = 8321,
-    database: Annotated[
-        str,
-        typer.Option(
-            "--database",
-            envvar="RACECRAFT_DATABASE",
-            help="postgresql+psycopg://… instead of SQLite in the runs folder.",
-        ),
-    ] = "",
-    artifacts: Annotated[
-        str,
-        typer.Option(
-            "--artifacts", envvar="RACECRAFT_ARTIFACTS", help="s3://BUCKET/PREFIX or file:///FOLDER to copy runs to."
-        ),
-    ] = "",
+    database: Database = "",
+    artifacts: Artifacts = "",
+    trainings: Trainings = 1,
+    others: Others = 1,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the link in a browser.")] = True,
     as_json: Json = False,
 ) -> None:
@@ -49,4 +58,51 @@ def serve(
 
             webbrowser.open(link)
 
-    run_server(ServeSettings(runs=runs, port=port, database=database, artifacts=artifacts), on_ready=ready)
+    settings = ServeSettings(
+        runs=runs,
+        port=port,
+        database=database,
+        artifacts=artifacts,
+        training_slots=trainings,
+        other_slots=others,
+    )
+    run_server(settings, on_ready=ready)
+
+
+@app.command()
+def worker(
+    runs: Annotated[
+        Path, typer.Option("--runs", help="Folder for the runs that are worked on; not the console's own.")
+    ] = Path("worker-runs"),
+    database: Database = "",
+    artifacts: Artifacts = "",
+    trainings: Trainings = 1,
+    others: Others = 1,
+    machine: Annotated[
+        str, typer.Option("--machine", help="Name of this one; made from the host's name by default.")
+    ] = "",
+    as_json: Json = False,
+) -> None:
+    """Work for a console that runs on another machine: trainings and evaluations, until Ctrl-C."""
+    from racecraft.serve.quick import loading
+
+    with needed_for("A worker"), loading():
+        from racecraft.serve.settings import ServeSettings
+        from racecraft.serve.station import work_for
+
+    settings = ServeSettings(
+        runs=runs,
+        database=database,
+        artifacts=artifacts,
+        training_slots=trainings,
+        other_slots=others,
+        machine=machine,
+    )
+
+    def ready() -> None:
+        if as_json:
+            print_json({"machine": settings.machine})
+        else:
+            typer.echo(f"{settings.machine} works for the console. Ctrl-C saves what is under way and stops.")
+
+    work_for(settings, on_ready=ready)

@@ -23,10 +23,9 @@ from racecraft.serve.driving.ghosts import Ghosts
 from racecraft.serve.evaluations import analysis
 from racecraft.serve.evaluations import routes as evaluations
 from racecraft.serve.jobs import routes as jobs
+from racecraft.serve.jobs.follower import Follower
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
-from racecraft.serve.live import routes as events
-from racecraft.serve.live.hub import Hub
 from racecraft.serve.machine import routes as console
 from racecraft.serve.models import archives, choices
 from racecraft.serve.models import routes as models
@@ -39,6 +38,8 @@ from racecraft.serve.schemas import ProblemReply
 from racecraft.serve.settings import ServeSettings, version
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
+from racecraft.serve.streams import routes as events
+from racecraft.serve.streams.hub import Hub
 from racecraft.serve.tracks import routes as tracks
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning import routes as tunings
@@ -80,6 +81,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     garage, courses = Garage(settings.runs, settings.state, database), Courses(settings.tracks)
     supervisor = Supervisor(settings, database, queue)
     artifacts = Artifacts(settings.artifacts) if settings.artifacts else None
+    follower = Follower(artifacts, settings=settings, queue=queue)
     context = Context(
         settings=settings,
         database=database,
@@ -87,20 +89,23 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         garage=garage,
         courses=courses,
         supervisor=supervisor,
+        follower=follower,
         drives=Drives(),
         ghosts=Ghosts(settings.runs, database),
         races=Races(database, queue, garage, courses),
         tunings=Tunings(settings.state, queue, garage),
-        mirror=Mirror(artifacts, runs=settings.runs, state=settings.state, queue=queue, supervisor=supervisor),
-        hub=Hub(settings.runs, queue),
+        mirror=Mirror(artifacts, settings=settings, queue=queue, supervisor=supervisor),
+        hub=Hub(settings.runs, queue, see=follower.see),
     )
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         tending = asyncio.create_task(context.supervisor.run())
-        threading.Thread(target=context.mirror.start, name="mirror", daemon=True).start()
+        for name, work in (("mirror", context.mirror.start), ("follower", follower.run)):
+            threading.Thread(target=work, name=name, daemon=True).start()
         yield
         context.mirror.end()
+        follower.end()
         tending.cancel()
         with suppress(asyncio.CancelledError):
             await tending

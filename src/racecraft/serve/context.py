@@ -9,14 +9,15 @@ from fastapi import Depends, Request
 
 from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
+from racecraft.serve.jobs.follower import Follower
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
-from racecraft.serve.live.hub import Hub
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.races.races import Races
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.database import Database
+from racecraft.serve.streams.hub import Hub
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning.tunings import Tunings
 
@@ -31,6 +32,7 @@ class Context:
     garage: Garage
     courses: Courses
     supervisor: Supervisor
+    follower: Follower
     drives: Drives
     ghosts: Ghosts
     races: Races

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import socket
 from dataclasses import dataclass
+from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
 from typing import Final
@@ -16,8 +18,13 @@ DATABASE: Final = "RACECRAFT_DATABASE"
 """Environment variable that may hold the database's URL: others can read a command line, and a password in it."""
 WORKERS: Final = "workers"
 """Inside the state folder: a file for each process that does a job, locked as long as it lives."""
+INCOMING: Final = "incoming"
+"""Inside the state folder: what comes out of the object store is put together there."""
 ARTIFACTS: Final = "RACECRAFT_ARTIFACTS"
 """The same for where runs are copied to."""
+
+MAX_MACHINE: Final = 64
+"""Characters of a machine's name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,15 +40,22 @@ class ServeSettings:
     artifacts: str = ""
     """``s3://BUCKET/PREFIX`` or ``file:///FOLDER`` where runs are copied to; empty for nowhere."""
     training_slots: int = 1
-    """Trainings at the same time."""
+    """Trainings at the same time on this machine; 0 leaves them to other machines."""
     other_slots: int = 1
-    """Other jobs, such as evaluations, at the same time."""
+    """Other jobs, such as evaluations, at the same time; they may need files that only the console's machine has."""
+    machine: str = ""
+    """Name of this machine among those that work on one queue; made from the host's name and the folder if empty."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "runs", self.runs.absolute())
         require("port", self.port, 0 <= self.port <= 65535, "0 to 65535, where 0 takes a free one")
         for name in ("training_slots", "other_slots"):
-            check_whole(name, getattr(self, name), 1, 64)
+            check_whole(name, getattr(self, name), 0, 64)
+        if not self.machine:
+            mark = sha256(str(self.runs).encode()).hexdigest()[:6]
+            object.__setattr__(self, "machine", f"{socket.gethostname()[: MAX_MACHINE - 7]}-{mark}")
+        is_name = len(self.machine) <= MAX_MACHINE and self.machine.isprintable()
+        require("machine", self.machine, is_name, f"at most {MAX_MACHINE} printable characters")
         if self.artifacts and not self.artifacts.startswith(("s3://", "file:///")):
             raise ConfigError(
                 f"artifacts is {self.artifacts.split('://')[0]!r}; allowed are s3://BUCKET/PREFIX and file:///FOLDER."
@@ -56,6 +70,11 @@ class ServeSettings:
     def state(self) -> Path:
         """Folder of the console's own files."""
         return self.runs / STATE_FOLDER
+
+    @property
+    def incoming(self) -> Path:
+        """Folder where what comes out of the object store is put together."""
+        return self.state / INCOMING
 
     @property
     def tracks(self) -> Path:

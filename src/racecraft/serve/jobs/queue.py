@@ -2,7 +2,7 @@
 
     queued ──claim──▶ running ──finish──▶ done | failed | cancelled
        ▲                 │ lease ran out (killed, machine off), or handed back (the server is stopped)
-       └─────────────────┘ again, unless it was lost `MAX_LOSSES` times in a row without having got any further
+       └─────────────────┘ again, unless it was lost too often in a row without having got any further
 
 Every step is one UPDATE whose WHERE says what it relies on, so two servers or workers never own a job together.
 """
@@ -16,6 +16,7 @@ from datetime import timedelta
 from typing import Any, Final, Literal
 
 import sqlalchemy as sa
+from sqlalchemy.orm import aliased
 
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job, now
@@ -34,16 +35,18 @@ class JobKind:
 
     A job may be started again at any moment, so the function goes on where it was, or finds that all is done.
     """
+    travels: bool = False
+    """Whether a machine that has nothing but the run can do it."""
     progress: str = "{run}/checkpoints/manifest.json"
     """File below the runs folder that changes whenever something is kept for good."""
 
 
 KINDS: Final[Mapping[str, JobKind]] = {
-    "train": JobKind(slot="training", work="racecraft.serve.models.tasks:train"),
+    "train": JobKind(slot="training", work="racecraft.serve.models.tasks:train", travels=True),
     "tune": JobKind(
         slot="training", work="racecraft.serve.tuning.tasks:tune", progress=".racecraft/tunings/{tuning}/result.json"
     ),
-    "evaluate": JobKind(slot="other", work="racecraft.serve.evaluations.tasks:evaluate"),
+    "evaluate": JobKind(slot="other", work="racecraft.serve.evaluations.tasks:evaluate", travels=True),
     "race": JobKind(slot="other", work="racecraft.serve.races.tasks:race"),
     "store": JobKind(slot="other", work="racecraft.serve.models.tasks:store"),
 }
@@ -55,12 +58,30 @@ FIRST_LEASE: Final = timedelta(seconds=180)
 """The same before the first heartbeat: a busy machine takes its time to start a process; a dead one is seen anyway."""
 MAX_LOSSES: Final = 5
 """How often a job's process may die before it is given up: it may be what kills it. Progress makes up for losses."""
+MAX_DEATHS: Final = 20
+"""The same where all else on its machine died with it: rarely the job's doing."""
 ENDED: Final = ("done", "failed", "cancelled")
 
 
-def new_job(kind: str, run: str, payload: Mapping[str, Any]) -> Job:
+WATCHED: Final = timedelta(seconds=5)
+"""How long a look at a training on another machine makes that show its cars."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the owner of a job is told."""
+
+    word: Literal["go on", "stop", "lost"]
+    """``stop`` when somebody cancelled it; ``lost`` when it is another's now."""
+    is_watched: bool = False
+    """Whether somebody elsewhere wants to see it."""
+
+
+def new_job(kind: str, run: str, payload: Mapping[str, Any], *, travels: bool = False) -> Job:
     """A job that is at the end of the queue once a session adds it."""
-    return Job(id=secrets.token_hex(8), kind=kind, run=run, payload=dict(payload))
+    return Job(
+        id=secrets.token_hex(8), kind=kind, run=run, payload=dict(payload), travels=travels and KINDS[kind].travels
+    )
 
 
 class JobQueue:
@@ -69,9 +90,9 @@ class JobQueue:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, kind: str, run: str, payload: Mapping[str, Any]) -> Job:
-        """Put a job at the end of the queue."""
-        job = new_job(kind, run, payload)
+    def add(self, kind: str, run: str, payload: Mapping[str, Any], *, travels: bool = False) -> Job:
+        """Put a job at the end of the queue; any machine may do one that travels, its run being in the store."""
+        job = new_job(kind, run, payload, travels=travels)
         with self._database.transaction() as session:
             session.add(job)
         return job
@@ -112,24 +133,46 @@ class JobQueue:
         with self._database.transaction() as session:
             return session.scalars(query).all()
 
-    def num_running(self, kinds: tuple[str, ...]) -> int:
-        """How many jobs of these kinds run, whoever started them."""
-        query = sa.select(sa.func.count()).where(Job.state == "running", Job.kind.in_(kinds))
+    def elsewhere(self, machine: str) -> Sequence[Job]:
+        """What other machines are doing."""
+        query = sa.select(Job).where(Job.state == "running", Job.travels, Job.machine != machine)
+        with self._database.transaction() as session:
+            return session.scalars(query).all()
+
+    def watch(self, job_id: str) -> None:
+        """Have the machine that does a job show its cars, for a moment."""
+        with self._database.transaction() as session:
+            until = self._database.moment(session) + WATCHED
+            session.execute(sa.update(Job).where(Job.id == job_id).values(watched_until=until))
+
+    def num_running(self, kinds: tuple[str, ...], *, machine: str) -> int:
+        """How many jobs of these kinds run on a machine, whoever started them."""
+        query = sa.select(sa.func.count()).where(Job.state == "running", Job.kind.in_(kinds), Job.machine == machine)
         with self._database.transaction() as session:
             return session.scalar(query) or 0
 
-    def claim(self, kinds: tuple[str, ...], *, owner: str) -> Job | None:
-        """Take the oldest queued job of these kinds, or None."""
-        oldest = (
-            sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds)).order_by(Job.created, Job.id).limit(1)
+    def claim(self, kinds: tuple[str, ...], *, owner: str, machine: str = "", is_home: bool = True) -> Job | None:
+        """Take the oldest queued job of these kinds, or None; away from home one that travels.
+
+        A run is worked on by one machine at a time, which has its newest files.
+        """
+        other = aliased(Job)
+        is_away = sa.exists().where(
+            other.run == Job.run, other.state == "running", other.machine != machine, other.travels
         )
-        moment = now()
+        oldest = sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds), ~is_away)
+        if not is_home:
+            oldest = oldest.where(Job.travels)
+        # of two that ask at once the second gets the next one; SQLite has one writer at a time
+        oldest = oldest.order_by(Job.created, Job.id).limit(1).with_for_update(skip_locked=True)
         with self._database.transaction() as session:
+            moment = self._database.moment(session)
             job_id = session.scalar(oldest)
             taken = sa.update(Job).where(Job.id == job_id, Job.state == "queued")
             taken = taken.values(
                 state="running",
                 owner=owner,
+                machine=machine,
                 attempts=Job.attempts + 1,
                 lease_until=moment + FIRST_LEASE,
                 started=sa.func.coalesce(Job.started, moment),
@@ -139,14 +182,17 @@ class JobQueue:
             session.expire_all()
             return session.get_one(Job, job_id)
 
-    def heartbeat(self, job_id: str, *, owner: str, has_progressed: bool = False) -> str:
-        """Keep a job: ``go on``, ``stop`` when somebody cancelled it, or ``lost`` when it is another's now."""
+    def heartbeat(self, job_id: str, *, owner: str, has_progressed: bool = False) -> Answer:
+        """Keep a job, and hear whether to go on."""
         kept = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
-        kept = kept.values(lease_until=now() + LEASE, **({"losses": 0} if has_progressed else {}))
+        told = sa.select(Job.is_cancelled, Job.watched_until).where(Job.id == job_id)
         with self._database.transaction() as session:
+            moment = self._database.moment(session)
+            kept = kept.values(lease_until=moment + LEASE, **({"losses": 0} if has_progressed else {}))
             if session.execute(kept).rowcount != 1:  # type: ignore[attr-defined]
-                return "lost"
-            return "stop" if session.scalar(sa.select(Job.is_cancelled).where(Job.id == job_id)) else "go on"
+                return Answer("lost")
+            is_cancelled, watched_until = session.execute(told).one()
+            return Answer("stop" if is_cancelled else "go on", watched_until is not None and watched_until > moment)
 
     def finish(
         self,
@@ -178,25 +224,27 @@ class JobQueue:
 
     def hand_back(self, owner: str) -> None:
         """Put back what an owner was asked to let go of; that is no fault of the job's."""
-        self._take_back(Job.owner == owner, is_lost=False)
-
-    def release(self, owner: str) -> None:
-        """Put back what an owner holds that has ended without a word."""
         self._take_back(Job.owner == owner)
+
+    def release(self, owner: str, *, limit: int = MAX_LOSSES) -> None:
+        """Put back what an owner holds that has ended without a word; given up after so many losses."""
+        self._take_back(Job.owner == owner, limit=limit)
 
     def take_back_expired(self) -> None:
         """Put back what nobody keeps alive."""
-        self._take_back(Job.lease_until < now())
+        with self._database.transaction() as session:
+            moment = self._database.moment(session)
+        self._take_back(Job.lease_until < moment, limit=MAX_DEATHS)
 
-    def _take_back(self, condition: sa.ColumnElement[bool], *, is_lost: bool = True) -> None:
+    def _take_back(self, condition: sa.ColumnElement[bool], *, limit: int = 0) -> None:
         held = sa.update(Job).where(Job.state == "running", condition)
-        gone = {"code": "WorkerLost", "message": f"The job's process died {MAX_LOSSES} times.", "hint": ""}
+        gone = {"code": "WorkerLost", "message": f"The job's process died {limit} times.", "hint": ""}
         with self._database.transaction() as session:
             session.execute(held.where(Job.is_cancelled).values(state="cancelled", finished=now(), lease_until=None))
-            if is_lost:
-                tired = held.where(Job.losses >= MAX_LOSSES - 1)
+            if limit:
+                tired = held.where(Job.losses >= limit - 1)
                 session.execute(tired.values(state="failed", error=gone, finished=now(), lease_until=None))
-            session.execute(held.values(state="queued", owner="", lease_until=None, losses=Job.losses + int(is_lost)))
+            session.execute(held.values(state="queued", owner="", lease_until=None, losses=Job.losses + int(limit > 0)))
 
 
 def kinds_of(slot: Slot) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ __all__ = ["job_info", "router"]
 @router.get("")
 def list_jobs(context: InContext, run: str | None = None) -> list[JobInfo]:
     """Jobs, newest first."""
-    return [job_info(job) for job in context.queue.list(run=run)]
+    return [job_info(context.follower.see(job)) for job in context.queue.list(run=run)]
 
 
 @router.get("/{job_id}")
@@ -24,7 +24,7 @@ def get_job(job_id: str, context: InContext) -> JobInfo:
     job = context.queue.get(job_id)
     if job is None:
         raise NotFound(f"There is no job {job_id[:40]!r}.")
-    return job_info(job)
+    return job_info(context.follower.see(job))
 
 
 @router.post("/{job_id}/cancel", status_code=202)

@@ -23,7 +23,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.errors import RunError
 from racecraft.run.lock import exclusive_lock
-from racecraft.serve.jobs.queue import JobQueue, Slot, kinds_of
+from racecraft.serve.jobs.queue import MAX_DEATHS, JobQueue, Slot, kinds_of
 from racecraft.serve.settings import ARTIFACTS, DATABASE, WORKERS, ServeSettings
 from racecraft.serve.store.database import Database
 
@@ -33,16 +33,18 @@ CALM: Final = 5.0  # s after the start of a job before the next worker loads: th
 
 
 class Supervisor:
-    """One per server.
+    """One per machine.
 
     Args:
         settings: Of the console.
         database: Handed to the children by its URL.
         queue: Of jobs.
+        is_home: Whether this is the console's own machine, where all runs, tracks and files are; others take jobs that
+            travel.
     """
 
-    def __init__(self, settings: ServeSettings, database: Database, queue: JobQueue) -> None:
-        self._settings, self._database, self._queue = settings, database, queue
+    def __init__(self, settings: ServeSettings, database: Database, queue: JobQueue, *, is_home: bool = True) -> None:
+        self._settings, self._database, self._queue, self._is_home = settings, database, queue, is_home
         self._children: dict[str, subprocess.Popen[bytes]] = {}  # by owner
         self._awake = asyncio.Event()
         self._is_stopping = False
@@ -95,15 +97,18 @@ class Supervisor:
         places: dict[Slot, int] = {"training": self._settings.training_slots, "other": self._settings.other_slots}
         for slot, count in places.items():
             kinds = kinds_of(slot)
-            while not self._is_stopping and self._queue.num_running(kinds) < count and self._start(kinds):
+            while not self._is_stopping and self._num_running(kinds) < count and self._start(kinds):
                 pass
         if not self._is_stopping and time.monotonic() - self._started > CALM:
             self._standby.prepare()
 
+    def _num_running(self, kinds: tuple[str, ...]) -> int:
+        return self._queue.num_running(kinds, machine=self._settings.machine)
+
     def _start(self, kinds: tuple[str, ...]) -> bool:
         """Start the oldest job of these kinds; False when there is none."""
         owner = self._standby.name()
-        job = self._queue.claim(kinds, owner=owner)
+        job = self._queue.claim(kinds, owner=owner, machine=self._settings.machine, is_home=self._is_home)
         if job is None:
             return False
         self._children[owner] = self._standby.start(job.id)
@@ -123,7 +128,7 @@ class Supervisor:
         for path in self._workers.iterdir():
             if path.name not in self._children:
                 with suppress(RunError), exclusive_lock(path):  # a living one holds it
-                    self._queue.release(path.name)
+                    self._queue.release(path.name, limit=MAX_DEATHS)
                     path.unlink(missing_ok=True)
 
 

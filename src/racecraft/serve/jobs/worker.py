@@ -19,8 +19,11 @@ from typing import Any, Final
 from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.errors import RacecraftError, RunError
-from racecraft.serve.jobs.queue import KINDS, LEASE, JobKind, JobQueue
+from racecraft.run import RunFolder
+from racecraft.serve.jobs.courier import Courier
+from racecraft.serve.jobs.queue import KINDS, LEASE, Answer, JobKind, JobQueue
 from racecraft.serve.jobs.task import Task
+from racecraft.serve.settings import INCOMING, STATE_FOLDER
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
@@ -37,7 +40,7 @@ def work(task: Task) -> dict[str, Any]:
     if task.job.kind not in KINDS:
         raise RunError(f"Jobs of kind {task.job.kind!r} are not known here.", hint="Update Racecraft.")
     result: dict[str, Any] = _function(KINDS[task.job.kind])(task)
-    if task.artifacts is not None and task.job.run:
+    if task.artifacts is not None and task.job.run and not task.job.travels:
         try:
             task.artifacts.keep(task.folder)
         except RunError as error:  # what was done is done; the next server copies what is missing
@@ -81,6 +84,10 @@ class Worker:
         kind = KINDS.get(job.kind, KINDS["train"])
         self._kept = runs / kind.progress.format(run=job.run, tuning=job.payload.get("tuning", ""))
         self._task = Task(job=job, runs=runs, database=database, artifacts=artifacts, on_stop=self._stops.append)
+        self._courier: Courier | None = None
+        if artifacts is not None and job.travels:
+            incoming = runs / STATE_FOLDER / INCOMING
+            self._courier = Courier(artifacts, RunFolder(runs / job.run), incoming=incoming, kept=self._kept)
 
     def run(self) -> None:
         """Do it, and say how it ended."""
@@ -88,7 +95,11 @@ class Worker:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which then tells us
         threading.Thread(target=self._keep, name="heartbeat", daemon=True).start()
         try:
+            if self._courier is not None:
+                self._courier.fetch()
             result = work(self._task)
+            if self._courier is not None:
+                self._courier.deliver()
         except Exception as error:
             described = _described(error)
             self._report(lambda: self._finish("failed", error=described))
@@ -108,12 +119,14 @@ class Worker:
                 )
                 kept = time.monotonic()
             except SQLAlchemyError:  # the database is being restarted, say
-                answer = "go on"
-            if answer == "lost" or time.monotonic() - kept > LEASE.total_seconds():
+                answer = Answer("go on")
+            if self._courier is not None:
+                self._courier.is_watched = answer.is_watched
+            if answer.word == "lost" or time.monotonic() - kept > LEASE.total_seconds():
                 os._exit(3)  # it is another's now: touch nothing
-            if answer == "stop":
+            if answer.word == "stop":
                 self._is_cancelled = True
-            if answer == "stop" or self._leaving.is_set():
+            if answer.word == "stop" or self._leaving.is_set():
                 self._stop()
             self._leaving.wait(HEARTBEAT)
             if self._leaving.is_set():

@@ -1,1 +1,1 @@
-"""What tabs see while a model learns."""
+"""The cars of a training as they drive."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import logging
+import os
 import threading
-from pathlib import Path
 from typing import Final
 
 from racecraft.errors import RunError
-from racecraft.run import list_runs
+from racecraft.run import RunFolder, list_runs
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
+from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.artifacts import Artifacts
 
 _LOG = logging.getLogger("racecraft.serve")
@@ -23,16 +24,15 @@ class Mirror:
 
     Args:
         artifacts: The store, or None.
-        runs: Folder of the runs.
-        state: The console's own folder.
+        settings: Of the console.
         queue: Of jobs.
         supervisor: Is woken for a new job.
     """
 
     def __init__(
-        self, artifacts: Artifacts | None, *, runs: Path, state: Path, queue: JobQueue, supervisor: Supervisor
+        self, artifacts: Artifacts | None, *, settings: ServeSettings, queue: JobQueue, supervisor: Supervisor
     ) -> None:
-        self._artifacts, self._runs, self._state = artifacts, runs, state
+        self._artifacts, self._runs, self._incoming = artifacts, settings.runs, settings.incoming
         self._queue, self._supervisor = queue, supervisor
         self._is_ended = threading.Event()
 
@@ -48,15 +48,15 @@ class Mirror:
         self._is_ended.set()
 
     def _align(self) -> bool:
-        """Fetch the runs that are only in the store, and copy those that changed since; False to try again."""
+        """Bring what is newer in the store, and copy the runs that changed since; False to try again."""
         if self._artifacts is None:
             return True
         is_whole = True
         try:
             here = {folder.name for folder in list_runs(self._runs)}
             for name in self._artifacts.names():
-                if name not in here and not (self._runs / name).exists():
-                    is_whole &= self._fetch(self._artifacts, name)
+                if name in here or not (self._runs / name).exists():
+                    is_whole &= self._bring(self._artifacts, name)
             for folder in list_runs(self._runs):
                 if folder.name in here and not self._artifacts.is_current(folder):
                     self.copy(folder.name)
@@ -64,6 +64,26 @@ class Mirror:
             _LOG.error("%s %s", error, getattr(error, "hint", ""))
             return False
         return is_whole
+
+    def share(self, folder: RunFolder, *, track: str = "") -> bool:
+        """Have the store hold a run before there is a job about it; whether any machine can do that with what it holds.
+
+        Args:
+            folder: The run.
+            track: Where it is to drive, if not on its own track.
+        """
+        if self._artifacts is None:
+            return False
+        info = folder.read_info()
+        if any(os.sep in name for name in (info.track, track)) or info.settings.get("opponents"):
+            return False  # files that only this machine has
+        if not self._queue.is_busy(folder.name):  # else who works on it copies it
+            try:
+                self._artifacts.keep(folder)
+            except RunError as error:
+                _LOG.error("%s %s", error, error.hint)
+                return False
+        return True
 
     def copy(self, name: str) -> None:
         """A run is new or has changed, and there is no other job that copies it at its end."""
@@ -79,10 +99,10 @@ class Mirror:
             except RunError as error:
                 _LOG.error("%s stays in the store: %s", name, error)
 
-    def _fetch(self, artifacts: Artifacts, name: str) -> bool:
+    def _bring(self, artifacts: Artifacts, name: str) -> bool:
         """Whether it is here now; the others are fetched all the same."""
         try:
-            artifacts.fetch(name, self._runs, incoming=self._state / "incoming")
+            artifacts.bring(name, self._runs, incoming=self._incoming)
         except (RunError, OSError) as error:
             _LOG.error("%s cannot be fetched: %s", name, error)
             return False

@@ -1,7 +1,12 @@
-"""Copies of runs in an object store, so that a server with an empty folder has them again.
+"""Copies of runs in an object store: a server with an empty folder has them again, and any machine can go on with one.
 
-    runs/NAME.json      path, size and SHA-256 of each file; written last, so a copy is whole, or the one before
+    runs/NAME.json      path, size and SHA-256 of each file, and which copy it is, counted from 1; written last, so a
+                        copy is whole, or the one before
     runs/NAME/SHA256    a file's content
+    live/NAME           its cars as they drive, while somebody looks
+
+A run folder remembers which copy it was last alike to. So whoever has an older one brings the newer, and nobody who was
+away writes over it.
 
 The store is S3 (``s3://bucket/prefix``; keys, region and endpoint from AWS's environment variables) or a folder
 (``file:///…``), both through obstore. What comes back is not believed: names, sizes and checksums are checked first.
@@ -14,13 +19,17 @@ import json
 import os
 import re
 import shutil
+import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.extras import needed_for
 from racecraft.run import RunFolder
+from racecraft.run.atomic import write_file
 
 T = TypeVar("T")
 FORMAT: Final = 1
@@ -30,6 +39,23 @@ MAX_FILES: Final = 200_000
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}(/[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}){0,20}")
 """Paths of runs: no odd characters, nothing hidden, nothing that leads elsewhere."""
 SCHEMES: Final = ("s3://", "file:///")
+MARK: Final = ".copy"
+"""In a run folder: the number of the copy that it was last alike to."""
+MANIFEST: Final = "checkpoints/manifest.json"
+SNAPSHOTS: Final = 10
+"""How often the checkpoints are looked at again because a training saved one meanwhile."""
+FETCHES: Final = 3
+"""The same for a copy that was made anew while it was brought."""
+MAX_LIVE_BYTES: Final = 1 << 20
+
+
+@dataclass(frozen=True)
+class Copy:
+    """What the store has of a run."""
+
+    number: int = 0
+    files: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Size, time and SHA-256 by path."""
 
 
 class Artifacts:
@@ -82,38 +108,47 @@ class Artifacts:
         return self._tried(listed)
 
     def keep(self, folder: RunFolder) -> int:
-        """Copy what changed of a run; the number of files that were.
+        """Copy what changed of a run, also while it is being trained; the number of files that were.
+
+        Checkpoints come first: what is copied after them is at least as far, and a training that goes on from a copy
+        cuts off what is behind its checkpoint.
 
         Raises:
-            RunError: The store cannot be reached; what it has is as good as before.
+            RunError: The store cannot be reached, what it has is as good as before; or somebody else went on with it.
         """
 
         def copied() -> int:
-            before = self._index(folder.name) or {}
-            known = {(line["size"], line["time"], path): line["sha256"] for path, line in before.items()}
-            there = {line["sha256"] for line in before.values()}
-            index: dict[str, dict[str, Any]] = {}
+            before = self._copy(folder.name) or Copy()
+            if before.number > _mark(folder.path, before.number):
+                raise RunError(
+                    f"Run {folder.name!r} was changed by another machine, so its copy is newer than {folder.path}."
+                )
+            known = {(line["size"], line["time"], path): line["sha256"] for path, line in before.files.items()}
+            there = {line["sha256"] for line in before.files.values()}
             count = 0
-            for path, file in _files(folder.path):
-                try:
-                    status = file.stat()
-                    digest = known.get((status.st_size, status.st_mtime_ns, path))
-                    if digest is None:
-                        data = file.read_bytes()
-                        digest = hashlib.sha256(data).hexdigest()
-                        if digest not in there:
-                            self._api.put(self._store, f"runs/{folder.name}/{digest}", data)
-                            there.add(digest)
-                            count += 1
-                        index[path] = {"size": len(data), "time": status.st_mtime_ns, "sha256": digest}
-                    else:
-                        index[path] = {"size": status.st_size, "time": status.st_mtime_ns, "sha256": digest}
-                except FileNotFoundError:
-                    continue  # an old checkpoint that was removed meanwhile
-            if index != before:
-                document = {"format": FORMAT, "files": index}
+
+            def put(path: str, file: Path) -> dict[str, Any]:
+                nonlocal count
+                status = file.stat()
+                digest = known.get((status.st_size, status.st_mtime_ns, path))
+                size = status.st_size
+                if digest is None:
+                    data = file.read_bytes()
+                    digest, size = hashlib.sha256(data).hexdigest(), len(data)
+                    if digest not in there:
+                        self._api.put(self._store, f"runs/{folder.name}/{digest}", data)
+                        there.add(digest)
+                        count += 1
+                return {"size": size, "time": status.st_mtime_ns, "sha256": digest}
+
+            files = _snapshot(folder.path, put)
+            number = before.number
+            if files != before.files:
+                number += 1
+                document = {"format": FORMAT, "number": number, "files": files}
                 self._api.put(self._store, f"runs/{folder.name}.json", json.dumps(document).encode())
-            gone = {line["sha256"] for line in before.values()} - {line["sha256"] for line in index.values()}
+            _remember(folder.path, number)
+            gone = {line["sha256"] for line in before.files.values()} - {line["sha256"] for line in files.values()}
             self._delete(f"runs/{folder.name}/{digest}" for digest in gone)
             return count
 
@@ -125,49 +160,93 @@ class Artifacts:
         Raises:
             RunError: The store cannot be reached.
         """
-        index = self._tried(lambda: self._index(folder.name)) or {}
+        copy = self._tried(lambda: self._copy(folder.name)) or Copy()
         found = {path: (file.stat().st_size, file.stat().st_mtime_ns) for path, file in _files(folder.path)}
-        return found == {path: (line["size"], line["time"]) for path, line in index.items()}
+        return found == {path: (line["size"], line["time"]) for path, line in copy.files.items()}
 
-    def fetch(self, name: str, runs: Path, *, incoming: Path) -> RunFolder:
-        """Bring a run back into the folder of the runs, whole or not at all.
+    def bring(self, name: str, runs: Path, *, incoming: Path) -> bool:
+        """Have a run here as it is in the store, unless what is here is as new; whether anything was brought.
+
+        Nothing changes before all of it is here and checked. Then files are replaced one by one, the list of
+        checkpoints after the checkpoints, so that who reads meanwhile finds whole files.
 
         Args:
             name: Of the run.
-            runs: Where it is to lie.
+            runs: Where it lies, or is to lie.
             incoming: Folder on the same disk where it is put together.
 
         Raises:
             RunError: It is not there, damaged, or the store cannot be reached.
         """
-        target = incoming / name
-
-        def fetched() -> RunFolder:
-            index = self._index(name)
-            if index is None:
+        folder = runs / name
+        incoming.mkdir(parents=True, exist_ok=True)
+        for attempt in range(1, FETCHES + 1):
+            copy = self._tried(lambda: self._copy(name))
+            if copy is None:
                 raise RunError(f"The store has no run {name[:80]!r}.")
-            shutil.rmtree(target, ignore_errors=True)
-            for path, line in index.items():
-                file = target / path
-                file.parent.mkdir(parents=True, exist_ok=True)
-                digest, size = hashlib.sha256(), 0
-                with file.open("xb") as out:
-                    for chunk in self._api.get(self._store, f"runs/{name}/{line['sha256']}").stream():
-                        size += len(chunk)
-                        if size > line["size"]:
-                            break
-                        digest.update(chunk)
-                        out.write(chunk)
-                if size != line["size"] or digest.hexdigest() != line["sha256"]:
-                    raise RunError(f"{path} of run {name!r} is damaged in the store.")
-                os.utime(file, ns=(line["time"], line["time"]))
-            os.rename(target, runs / name)
-            return RunFolder(runs / name)
+            is_here = folder.exists()
+            if is_here and copy.number <= _mark(folder, copy.number):
+                return False
+            target = Path(tempfile.mkdtemp(dir=incoming, prefix=f"{name}-"))
+            target.chmod(0o755)
+            try:
+                wanted = {
+                    path: line for path, line in copy.files.items() if not is_here or not _is_alike(folder / path, line)
+                }
+                self._tried(lambda: self._download(name, wanted, target))  # noqa: B023 - called here and now
+                _remember(target, copy.number)
+                if not is_here:
+                    os.rename(target, folder)
+                else:
+                    _replace(folder, target, wanted, copy)
+                return True
+            except RunError:
+                latest = self._tried(lambda: self._copy(name))
+                if attempt == FETCHES or latest is None or latest.number == copy.number:
+                    raise
+            finally:
+                shutil.rmtree(target, ignore_errors=True)
+        return False
 
-        try:
-            return self._tried(fetched)
-        finally:
-            shutil.rmtree(target, ignore_errors=True)
+    def _download(self, name: str, files: dict[str, dict[str, Any]], target: Path) -> None:
+        for path, line in files.items():
+            file = target / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            digest, size = hashlib.sha256(), 0
+            with file.open("xb") as out:
+                for chunk in self._api.get(self._store, f"runs/{name}/{line['sha256']}").stream():
+                    size += len(chunk)
+                    if size > line["size"]:
+                        break
+                    digest.update(chunk)
+                    out.write(chunk)
+            if size != line["size"] or digest.hexdigest() != line["sha256"]:
+                raise RunError(f"{path} of run {name!r} is damaged in the store.")
+            os.utime(file, ns=(line["time"], line["time"]))
+
+    def show(self, name: str, live: bytes) -> None:
+        """Let others see a run's cars as they are now.
+
+        Raises:
+            RunError: The store cannot be reached.
+        """
+        self._tried(lambda: self._api.put(self._store, f"live/{name}", live))
+
+    def shown(self, name: str) -> bytes:
+        """What was shown last of a run's cars; nothing where nothing was, or too much.
+
+        Raises:
+            RunError: The store cannot be reached.
+        """
+
+        def read() -> bytes:
+            try:
+                reply = self._api.get(self._store, f"live/{name}")
+            except self._missing:
+                return b""
+            return b"" if reply.meta["size"] > MAX_LIVE_BYTES else bytes(reply.bytes())
+
+        return self._tried(read)
 
     def forget(self, name: str) -> None:
         """Remove a run's copy.
@@ -177,14 +256,14 @@ class Artifacts:
         """
 
         def forgotten() -> None:
-            self._delete([f"runs/{name}.json"])
+            self._delete([f"runs/{name}.json", f"live/{name}"])
             for page in self._api.list(self._store, f"runs/{name}"):
                 self._delete(entry["path"] for entry in page)
 
         self._tried(forgotten)
 
-    def _index(self, name: str) -> dict[str, dict[str, Any]] | None:
-        """What a run's copy holds, checked; None when there is none."""
+    def _copy(self, name: str) -> Copy | None:
+        """What the store has of a run, checked; None when there is nothing."""
         try:
             reply = self._api.get(self._store, f"runs/{name}.json")
             if reply.meta["size"] > MAX_INDEX_BYTES:
@@ -197,7 +276,7 @@ class Artifacts:
         try:
             if document["format"] != FORMAT or len(document["files"]) > MAX_FILES:
                 raise ValueError("format")
-            index = {}
+            files = {}
             for path, line in document["files"].items():
                 size, moment, digest = int(line["size"]), int(line["time"]), str(line["sha256"])
                 is_digest = len(digest) == 64 and set(digest) <= set("0123456789abcdef")
@@ -208,8 +287,11 @@ class Artifacts:
                     or not is_digest
                 ):
                     raise ValueError("name or size")
-                index[path] = {"size": size, "time": moment, "sha256": digest}
-            return index
+                files[path] = {"size": size, "time": moment, "sha256": digest}
+            number = int(document.get("number", 0))  # copies of earlier versions are not counted
+            if not 0 <= number < 2**62:
+                raise ValueError("number")
+            return Copy(number, files)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise RunError(f"The list of files of run {name!r} is not one of Racecraft's.") from error
 
@@ -239,6 +321,66 @@ def _files(root: Path) -> Iterator[tuple[str, Path]]:
             path = file.relative_to(root).as_posix()
             if _PLAIN.fullmatch(path) and not file.is_symlink():
                 yield path, file
+
+
+def _snapshot(root: Path, put: Callable[[str, Path], dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """The files of a run by path, as `put` has copied them; the checkpoints all of one moment."""
+    files: dict[str, dict[str, Any]] = {}
+
+    def add(is_wanted: Callable[[str], bool]) -> None:
+        for path, file in _files(root):
+            if is_wanted(path):
+                with suppress(FileNotFoundError):  # an old checkpoint that was removed meanwhile
+                    files[path] = put(path, file)
+
+    for _ in range(SNAPSHOTS):
+        files.clear()
+        listed = _moment(root / MANIFEST)
+        add(lambda path: path.startswith("checkpoints/"))
+        if _moment(root / MANIFEST) == listed:
+            break
+    add(lambda path: not path.startswith("checkpoints/"))
+    return dict(sorted(files.items()))
+
+
+def _replace(folder: Path, fresh: Path, wanted: dict[str, dict[str, Any]], copy: Copy) -> None:
+    """Put what was brought in its place, and remove what the copy has not."""
+    for path in sorted(wanted, key=lambda path: path == MANIFEST):
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        os.replace(fresh / path, folder / path)
+    for path, file in _files(folder):
+        if path not in copy.files:
+            file.unlink(missing_ok=True)
+    os.replace(fresh / MARK, folder / MARK)
+
+
+def _is_alike(file: Path, line: dict[str, Any]) -> bool:
+    """Whether a file is the one of the copy, by its size and time, which a copy keeps."""
+    try:
+        status = file.stat()
+    except OSError:
+        return False
+    return (status.st_size, status.st_mtime_ns) == (line["size"], line["time"])
+
+
+def _mark(folder: Path, otherwise: int) -> int:
+    """Which copy a run folder was last alike to; runs from before copies were counted are taken for up to date."""
+    try:
+        return int((folder / MARK).read_text(encoding="ascii")[:20])
+    except (OSError, ValueError):
+        return otherwise
+
+
+def _remember(folder: Path, number: int) -> None:
+    write_file(folder / MARK, str(number).encode())
+
+
+def _moment(path: Path) -> tuple[int, int]:
+    try:
+        status = path.stat()
+    except OSError:
+        return 0, 0
+    return status.st_mtime_ns, status.st_ino
 
 
 def _first_line(error: BaseException) -> str:

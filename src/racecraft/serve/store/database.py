@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session, sessionmaker
 
 from racecraft.errors import RunError
-from racecraft.serve.store.tables import Table, User
+from racecraft.serve.store.tables import Table, User, now
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 LOCAL_USER = "you"  # of a console of one's own
@@ -48,8 +49,26 @@ class Database:
                 if session.scalar(sa.select(User.id).limit(1)) is None:
                     session.add(User(name=LOCAL_USER))
         except SQLAlchemyError as error:
-            reason = str(getattr(error, "orig", None) or error).splitlines()[0]
-            raise RunError(f"The console's database cannot be opened: {reason}.") from error
+            raise RunError(f"The console's database cannot be opened: {_reason(error)}.") from error
+
+    def require_current(self) -> None:
+        """Refuse a database that another version of Racecraft made; nothing is changed.
+
+        Raises:
+            RunError: It is one, or it cannot be opened.
+        """
+        try:
+            with self.engine.connect() as connection:
+                version = connection.scalar(sa.text("SELECT version_num FROM alembic_version"))
+        except SQLAlchemyError as error:
+            raise RunError(
+                f"The console's database cannot be opened: {_reason(error)}.", hint="Start the console first."
+            ) from error
+        if version != _newest():
+            raise RunError(
+                f"The console's database is of version {version}, this worker's is {_newest()}.",
+                hint="Install the same version of Racecraft on both machines.",
+            )
 
     def _version(self) -> str:
         """Of the tables; empty for a fresh database."""
@@ -81,9 +100,20 @@ class Database:
         with self._sessions.begin() as session:
             yield session
 
+    def moment(self, session: Session) -> datetime:
+        """Now by the database's clock, which all machines share; SQLite's is this machine's."""
+        if self.url.startswith("sqlite"):
+            return now()
+        found: datetime = session.execute(sa.select(sa.func.now())).scalar_one()
+        return found
+
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+def _reason(error: SQLAlchemyError) -> str:
+    return str(getattr(error, "orig", None) or error).splitlines()[0]
 
 
 def _newest() -> str:

@@ -89,6 +89,12 @@ class Job(Table):
     owner: Mapped[str] = mapped_column(String(32), default="")
     lease_until: Mapped[datetime | None]
     is_cancelled: Mapped[bool] = mapped_column(default=False)
+    travels: Mapped[bool] = mapped_column(default=False)
+    """Whether what it needs is in the object store, so that any machine may do it."""
+    machine: Mapped[str] = mapped_column(String(64), default="")
+    """Where it runs, or ran last."""
+    watched_until: Mapped[datetime | None]
+    """Until when the machine that does it is to show its cars in the object store."""
     result: Mapped[dict[str, Any] | None] = mapped_column(JSON)
     error: Mapped[dict[str, Any] | None] = mapped_column(JSON)
     created: Mapped[datetime] = mapped_column(default=now)

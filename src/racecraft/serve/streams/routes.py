@@ -44,6 +44,7 @@ async def _stream(context: Context, name: str, offset: int) -> AsyncIterator[Ser
             if (jobs := await context.hub.jobs(name)) != jobs_seen:
                 jobs_seen = jobs
                 yield ServerSentEvent(jobs, event="jobs")
+        context.follower.look_at(name)
         look = context.hub.live(name, after=sequence)
         if look is not None:
             sequence, event = look

@@ -7,6 +7,7 @@ import base64
 import json
 import time
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +18,7 @@ from racecraft.run.history import read_history
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.schemas import job_info
 from racecraft.serve.live.cars import STALE, LiveReader, Look
+from racecraft.serve.store.tables import Job
 from racecraft.sim.objects import OBJECT_KINDS
 
 FRESH: Final = 0.3  # s that a look at the jobs is good for
@@ -47,10 +49,11 @@ class Hub:
     Args:
         runs: Folder of the runs.
         queue: Of jobs.
+        see: Is given each job before tabs hear of it.
     """
 
-    def __init__(self, runs: Path, queue: JobQueue) -> None:
-        self._runs, self._queue = runs, queue
+    def __init__(self, runs: Path, queue: JobQueue, *, see: Callable[[Job], Job] = lambda job: job) -> None:
+        self._runs, self._queue, self._see = runs, queue, see
         self._seen: OrderedDict[str, _Seen] = OrderedDict()
 
     def live(self, name: str, *, after: int) -> tuple[int, bytes] | None:
@@ -93,7 +96,7 @@ class Hub:
         return seen.jobs
 
     def _jobs(self, name: str) -> str:
-        listed = self._queue.list(run=name, limit=5)
+        listed = [self._see(job) for job in self._queue.list(run=name, limit=5)]
         infos = [job_info(job, behind=self._queue.before(job)) for job in listed]
         return json.dumps([info.model_dump(mode="json") for info in infos])
 

@@ -1,0 +1,1 @@
+"""What tabs are sent while a model learns."""

@@ -1,0 +1,62 @@
+"""Real workers in processes of their own, as on other machines: a folder each, and only database and store shared."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+PATIENCE = 120.0  # s; the machine may be busy
+
+
+@dataclass
+class RunningWorker:
+    """A worker's process."""
+
+    process: subprocess.Popen[str]
+    machine: str
+    runs: Path
+
+    def kill(self) -> None:
+        """As a machine that is switched off: the worker and what it started, at once."""
+        for process in (self.process.pid, *processes_on(self.runs)):
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+        self.process.wait()
+
+
+@contextmanager
+def running_worker(runs: Path, *, database: str, artifacts: str) -> Iterator[RunningWorker]:
+    command = [sys.executable, "-m", "racecraft", "worker", "--json", "--runs", str(runs), "--machine", runs.name]
+    environment = {**os.environ, "RACECRAFT_DATABASE": database, "RACECRAFT_ARTIFACTS": artifacts}
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        yield RunningWorker(process, json.loads(process.stdout.readline())["machine"], runs)
+    finally:
+        if process.poll() is None:
+            process.terminate()
+            try:
+                process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        assert process.stdout is not None
+        process.stdout.close()
+
+
+def processes_on(runs: Path) -> list[int]:
+    """The processes that do jobs in a folder of runs."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError):
+            command = (entry / "cmdline").read_bytes().split(b"\0") if entry.name.isdigit() else []
+            if b"racecraft.serve.jobs" in command and os.fsencode(runs) in command:
+                found.append(int(entry.name))
+    return found

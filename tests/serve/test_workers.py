@@ -1,0 +1,229 @@
+"""Workers on other machines: the console shows what they do as if it were done here, and nothing is lost with them."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from postgres_servers import USER, PostgresServer
+from running_consoles import RunningConsole, running_console
+from running_workers import RunningWorker, running_worker
+
+pytest.importorskip("obstore")
+pytest.importorskip("psycopg")
+from racecraft.errors import ConfigError, RunError
+from racecraft.run import RunFolder
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.settings import ServeSettings
+from racecraft.serve.station import work_for
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Job
+from racecraft.training.job import Training
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
+
+UNTIL = "20000 steps"
+KILLS = 10  # at most; the trainings are over before on a fast machine
+
+
+class Place:
+    """A console that leaves all work to others, and what they share with it."""
+
+    def __init__(self, console: RunningConsole, database: str, artifacts: str, folder: Path) -> None:
+        self.console, self.database, self.artifacts, self.folder = console, database, artifacts, folder
+
+    def worker(self, name: str) -> Any:
+        return running_worker(self.folder / name, database=self.database, artifacts=self.artifacts)
+
+    def done(self, job: str) -> dict[str, Any]:
+        ended: dict[str, Any] = self.console.wait_for(self.console.job_ended(job))
+        assert ended["state"] == "done", ended["error"]
+        return ended
+
+
+@pytest.fixture(scope="module")
+def place(postgres: PostgresServer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    folder = tmp_path_factory.mktemp("machines")
+    database, artifacts = postgres.new_database(), f"file://{folder}/store"
+    options = ("--database", database, "--artifacts", artifacts, "--trainings", "0", "--others", "1")
+    with running_console(folder / "console", *options) as console:
+        yield Place(console, database, artifacts, folder)
+
+
+def weights(folder: RunFolder) -> dict[str, Any]:
+    arrays = folder.checkpoints.load("last").arrays
+    return {name: value for name, value in arrays.items() if name != "recent_episodes"}  # holds wall-clock times
+
+
+def test_a_training_elsewhere_is_seen_as_if_it_were_here(place: Place) -> None:
+    console = place.console
+    name = console.create(name="away", until="20 minutes", track="oval", seed=2)
+    (job,) = console.client.get("/api/jobs", params={"run": name}).json()
+    time.sleep(1.0)
+    assert console.client.get(f"/api/jobs/{job['id']}").json()["state"] == "queued"  # nobody is there yet
+    with place.worker("lab-1"):
+        with console.client.stream("GET", f"/api/events/{name}") as stream:
+            looks = [line for line, _ in zip(filter(_is_look, stream.iter_lines()), range(3), strict=False)]
+        assert len({look.split('"step":')[1].split(",")[0] for look in looks}) == 3  # they move
+        console.wait_for(lambda: console.client.get(f"/api/models/{name}").json()["checkpoints"])
+        assert console.client.get(f"/api/models/{name}/history").json()["points"]
+        assert console.client.get(f"/api/models/{name}").json()["status"] == "training"
+        console.client.post(f"/api/models/{name}/stop")
+        ended = place.done(job["id"])
+        there, here = (RunFolder(place.folder / where / name) for where in ("lab-1", "console"))
+        assert ended["result"]["steps"] == here.checkpoints.load("last").step  # it is here when its end is told
+        assert here.history.read_bytes() == there.history.read_bytes()
+
+        evaluated = console.client.post(f"/api/models/{name}/evaluations", json={"laps": 1, "num_trials": 1}).json()
+        place.done(evaluated["id"])
+        (card,) = console.client.get(f"/api/models/{name}/evaluations").json()
+        picture = console.client.get(f"/api/models/{name}/files/evaluation-{card['stamp']}/racing-line.png")
+        assert picture.content.startswith(b"\x89PNG")
+
+
+def _is_look(line: str) -> bool:
+    return line.startswith("data: ") and '"poses"' in line
+
+
+def test_what_only_this_machine_has_is_done_here(place: Place) -> None:
+    console = place.console
+    sketch = console.client.get("/api/tracks/oval/sketch").json()
+    made = console.client.put("/api/tracks/own", json=sketch)
+    assert made.status_code in (200, 201), made.text
+    name = console.create(name="homely", train=False, track="own", until="512 steps")
+    with place.worker("lab-2"):
+        job = console.client.post(f"/api/models/{name}/train", json={}).json()["id"]
+        other = console.create(name="passer-by", track="oval", until="512 steps")
+        (passing,) = console.client.get("/api/jobs", params={"run": other}).json()
+        place.done(passing["id"])
+        assert console.client.get(f"/api/jobs/{job}").json()["state"] == "queued"
+    console.client.post(f"/api/models/{name}/stop")
+
+
+def test_a_worker_needs_no_more_rights_than_it_is_said_to(place: Place, postgres: PostgresServer) -> None:
+    import psycopg
+
+    database = place.database.split("@/")[1].split("?")[0]
+    with psycopg.connect(f"user={USER} host={postgres.folder} dbname={database}", autocommit=True) as owner:
+        for grant in RIGHTS:
+            owner.execute(grant)
+    limited = place.database.replace(f"{USER}@", "pupil@")
+    name = place.console.create(name="limited", track="oval", until="512 steps")
+    (job,) = place.console.client.get("/api/jobs", params={"run": name}).json()
+    with running_worker(place.folder / "lab-3", database=limited, artifacts=place.artifacts):
+        place.done(job["id"])
+    with psycopg.connect(f"user=pupil host={postgres.folder} dbname={database}") as pupil:
+        for table in ("users", "sessions", "races"):
+            with pytest.raises(psycopg.errors.InsufficientPrivilege), pupil.transaction():
+                pupil.execute(f"SELECT * FROM {table}")
+
+
+def _rights() -> list[str]:
+    """The lines of SQL in the docs."""
+    text = (Path(__file__).parents[2] / "docs" / "workers.md").read_text()
+    return [line for line in text.split("```sql\n")[1].split("```")[0].splitlines() if line]
+
+
+RIGHTS = _rights()
+
+
+def test_two_machines_never_work_on_one_run(postgres: PostgresServer) -> None:
+    database = Database(postgres.new_database())
+    database.migrate()
+    queue = JobQueue(database)
+    first = queue.add("evaluate", "a", {}, travels=True)
+    second = queue.add("evaluate", "a", {}, travels=True)
+    third = queue.add("evaluate", "b", {}, travels=True)
+    home = queue.add("evaluate", "c", {})
+    kinds = ("evaluate",)
+
+    def claimed(machine: str, *, is_home: bool = False) -> Job | None:
+        return queue.claim(kinds, owner=machine, machine=machine, is_home=is_home)
+
+    def ids(*jobs: Job | None) -> list[str | None]:
+        return [None if job is None else job.id for job in jobs]
+
+    assert ids(claimed("x"), claimed("y"), claimed("y"), claimed("x"), claimed("x")) == ids(
+        first, third, None, second, None
+    )
+    assert ids(claimed("console", is_home=True)) == [home.id]
+    assert queue.num_running(kinds, machine="x") == 2
+    assert queue.num_running(kinds, machine="console") == 1
+    assert {job.id for job in queue.elsewhere("x")} == {third.id}
+    database.close()
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"database": "", "artifacts": "file:///tmp/x"}, "needs the console's database"),
+        ({"database": "sqlite:///x.db", "artifacts": ""}, "needs the console's database"),
+        ({"database": "sqlite:////nowhere/x.db", "artifacts": "file:///tmp/x"}, "cannot be opened"),
+    ],
+)
+def test_a_worker_that_cannot_work_says_why(tmp_path: Path, settings: dict[str, str], says: str) -> None:
+    with pytest.raises((ConfigError, RunError), match=says):
+        work_for(ServeSettings(runs=tmp_path, **settings), on_ready=pytest.fail)
+
+
+def test_a_worker_of_another_version_changes_nothing(tmp_path: Path) -> None:
+    import sqlalchemy as sa
+
+    database = Database(f"sqlite:///{tmp_path / 'console.db'}")
+    database.migrate()
+    with database.engine.begin() as connection:
+        connection.execute(sa.text("UPDATE alembic_version SET version_num = '0001'"))
+    settings = ServeSettings(runs=tmp_path / "runs", database=database.url, artifacts=f"file://{tmp_path}/store")
+    with pytest.raises(RunError, match="of version 0001") as told:
+        work_for(settings, on_ready=pytest.fail)
+    assert "same version" in told.value.hint
+    assert database._version() == "0001"
+    database.close()
+
+
+@pytest.mark.slow
+def test_workers_killed_again_and_again_end_in_the_bits_of_an_undisturbed_run(place: Place) -> None:
+    console, dice = place.console, random.Random(20)
+    names = [f"tough-{seed}" for seed in range(2)]
+    for seed, name in enumerate(names):
+        console.create(name=name, train=False, track="oval", seed=seed, until=UNTIL)
+        shutil.copytree(console.runs / name, place.folder / "calm" / name)
+        Training(RunFolder(place.folder / "calm" / name)).run()
+    with ExitStack() as stack:
+        machines = [f"killed-{number}" for number in range(3)]
+        workers: dict[str, RunningWorker] = {one: stack.enter_context(place.worker(one)) for one in machines}
+        jobs = {name: console.client.post(f"/api/models/{name}/train", json={}).json()["id"] for name in names}
+
+        def is_ended(job: str) -> bool:
+            return console.job_ended(job)() is not None
+
+        database = Database(place.database)
+        stack.callback(database.close)
+        queue, kills = JobQueue(database), 0
+        console.wait_for(lambda: len(queue.elsewhere("")) == len(names))
+        while kills < KILLS and (working := [job.machine for job in queue.elsewhere("")]):
+            time.sleep(dice.uniform(0.0, 1.5))
+            victim = dice.choice(working)
+            workers[victim].kill()
+            workers[victim] = stack.enter_context(place.worker(victim))
+            kills += 1
+            console.wait_for(lambda: queue.elsewhere("") or all(is_ended(job) for job in jobs.values()))
+        attempts = 0
+        for name, job in jobs.items():
+            attempts += place.done(job)["attempts"]
+            calm, tough = RunFolder(place.folder / "calm" / name), RunFolder(console.runs / name)
+            assert tough.checkpoints.load("last").step == calm.checkpoints.load("last").step
+            expected, found = weights(calm), weights(tough)
+            assert set(found) == set(expected)
+            for array, value in expected.items():
+                np.testing.assert_array_equal(found[array], value, err_msg=f"{name} {array}")
+    assert kills >= 3
+    assert attempts >= len(names) + kills // 2  # kills that met a training
