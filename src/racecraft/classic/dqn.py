@@ -53,6 +53,8 @@ class DQNSettings(Settings):
     """Share of all steps over which it falls evenly."""
     hold: int = 1
     """Most steps that an action by lot is kept, so that exploration gets somewhere (Dabney et al. 2021)."""
+    reward_scale: float = 1.0
+    """Rewards are multiplied by this, so that values are of the size of surprises that Huber's loss still squares."""
     max_norm: float = 10.0
     """A longer gradient is cut to this length."""
 
@@ -92,7 +94,7 @@ def learn(worlds: Worlds, policy: Values, settings: DQNSettings, rng: np.random.
             best = np.argmax(network(successors), axis=1)
             future = np.where(terminated, 0.0, target(successors)[rows, best])
             values = network(states)
-            surprise = rewards + settings.gamma * future - values[rows, acted]
+            surprise = settings.reward_scale * rewards + settings.gamma * future - values[rows, acted]
 
             gradient = np.zeros_like(values)
             gradient[rows, acted] = -np.clip(surprise, -1.0, 1.0) / settings.batch  # of Huber's loss

@@ -78,23 +78,29 @@ RECIPES: Final[Mapping[tuple[str, str], Recipe]] = {
     ),
     (ENV_ID, "q-table"): Recipe(
         settings=TableSettings(
-            steps=40_000, num_envs=64, gamma=0.8, learning_rate=0.3, final_learning_rate=0.05, cuts=CAR_IN_A_TABLE
+            steps=40_000, num_envs=64, gamma=0.7, learning_rate=0.3, final_learning_rate=0.02, cuts=CAR_IN_A_TABLE
         ),
         make={"reward": "centerline"},
         evaluate_every=40_000,
     ),
-    ("CartPole-v1", "dqn"): Recipe(settings=DQNSettings(steps=80_000), goal=490.0, evaluate_every=2_500),
+    ("CartPole-v1", "dqn"): Recipe(
+        settings=DQNSettings(steps=80_000, steps_per_update=2, target_every=50, reward_scale=0.02),
+        goal=490.0,
+        evaluate_every=2_500,
+    ),
     ("MountainCar-v0", "dqn"): Recipe(
         settings=DQNSettings(
             steps=300_000,
             hidden=(64, 64),
+            gamma=0.98,
             learning_rate=2e-3,
+            reward_scale=0.05,
             target_every=300,
             exploration=0.3,
             final_epsilon=0.02,
             hold=30,
         ),
-        goal=-106.0,
+        goal=-105.0,
     ),
     ("CartPole-v1", "reinforce"): Recipe(settings=ReinforceSettings(steps=300_000), goal=490.0),
     ("Acrobot-v1", "a2c"): Recipe(
