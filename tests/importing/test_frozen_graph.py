@@ -99,3 +99,16 @@ def test_a_hostile_graph_is_one_sentence(data: bytes, says: str, tmp_path: Path)
         pass
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.skipif(not AWS_MODEL.is_dir(), reason="the models are not in the repository")
+def test_awss_networks_began_with_glorot_weights() -> None:
+    """After thirty iterations most weights are about where they began; orthogonal ones of conv1 are six times those."""
+    metadata = ModelMetadata.load(AWS_MODEL / "model_metadata.json")
+    spec = NetworkSpec(name=metadata.neural_network, num_actions=metadata.action_space.size)
+    with open_frozen_graph(AWS_MODEL / "model_30.pb") as graph:
+        trained = policy_weights(graph, spec, metadata.suite)
+    begun = make_learner(spec, seed=3, initial_weights="glorot", num_threads=1).weights()
+    for name in (f"policy.{layer}.weight" for layer in ("conv1", "conv2", "conv3", "dense1", "head")):
+        theirs, ours = (np.quantile(abs(weights[name]), (0.25, 0.5, 0.75)) for weights in (trained, begun))
+        np.testing.assert_allclose(ours, theirs, rtol=0.1, err_msg=name)

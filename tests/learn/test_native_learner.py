@@ -205,6 +205,20 @@ def test_fifty_steps_stay_close_to_torch(is_discrete, state_size, limit):
     assert max(abs(ours[name] - theirs[name]).max() for name in ours) < limit
 
 
+def test_eps_hat_is_added_before_the_correction_as_in_tensorflow():
+    objective = dataclasses.replace(OBJECTIVE, adam_eps=1e-3, is_eps_hat=True, max_grad_norm=0.0)
+    for learner in (NativeLearner(SMALL, num_threads=1), TorchLearner(SMALL, precision="float32", num_threads=1)):
+        for step in (1, 2, 3):
+            before = learner.weights()
+            learner.update(minibatch_for(learner, 32, seed=step), objective)
+            moments, after = learner.optimizer_state(), learner.weights()
+            rate = objective.learning_rate * (1 - 0.999**step) ** 0.5 / (1 - 0.9**step)
+            for name, array in before.items():
+                moment1, moment2 = moments[f"moment1/{name}"], moments[f"moment2/{name}"]
+                expected = rate * moment1 / (np.sqrt(moment2) + 1e-3)
+                np.testing.assert_allclose(array - after[name], expected, rtol=1e-3, atol=1e-7, err_msg=name)
+
+
 @pytest.mark.parametrize("spec", [SMALL, NetworkSpec(num_actions=2, is_discrete=False)])
 def test_same_bits_for_any_number_of_threads(spec):
     results = []

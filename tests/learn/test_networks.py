@@ -5,7 +5,7 @@ import pytest
 
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.learn import NetworkSpec, networks
-from racecraft.learn.networks import initial_weights, network_names, parameter_count, weight_shapes
+from racecraft.learn.networks import glorot_weights, initial_weights, network_names, parameter_count, weight_shapes
 
 SHALLOW = "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
 
@@ -105,6 +105,30 @@ def test_initial_weights_are_orthogonal_and_repeatable():
     matrix = weights["policy.conv2.weight"].reshape(32, -1)
     np.testing.assert_allclose(matrix @ matrix.T, 2 * np.eye(32), atol=1e-5)
     assert abs(weights["policy.head.weight"]).max() < 0.011
+
+
+@pytest.mark.parametrize("is_discrete", [True, False])
+def test_glorot_weights_are_uniform_within_their_limits_and_repeatable(is_discrete):
+    spec = NetworkSpec(num_actions=6, is_discrete=is_discrete)
+    weights, again, other = (glorot_weights(spec, seed=seed) for seed in (4, 4, 5))
+    assert list(weights) == list(weight_shapes(spec))
+    for name, array in weights.items():
+        assert array.shape == weight_shapes(spec)[name]
+        assert array.dtype == np.float32
+        np.testing.assert_array_equal(array, again[name])
+    assert not np.array_equal(weights["policy.conv1.weight"], other["policy.conv1.weight"])
+    assert not any(array.any() for name, array in weights.items() if name.endswith(".bias"))
+    layers = {"conv2": 16 * (16 + 32), "dense1": 128 + weights["policy.dense1.weight"].shape[1]}
+    for layer, inputs_and_outputs in layers.items():
+        array, limit = weights[f"policy.{layer}.weight"], (6 / inputs_and_outputs) ** 0.5
+        assert 0.99 * limit < abs(array).max() <= limit
+        assert array.std() == pytest.approx(limit / 3**0.5, rel=0.02)
+    head, value = weights["policy.head.weight"], weights["critic.head.weight"]
+    assert np.linalg.norm(value) == pytest.approx(1.0)
+    if is_discrete:
+        assert 0.95 * (6 / (128 + 6)) ** 0.5 < abs(head).max() <= (6 / (128 + 6)) ** 0.5
+    else:
+        np.testing.assert_allclose(np.linalg.norm(head, axis=1), 0.01, rtol=1e-5)
 
 
 def test_too_small_frames_are_refused():

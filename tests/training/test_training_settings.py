@@ -171,6 +171,21 @@ def test_aws_hyperparameters_become_ppo() -> None:
     assert make_settings(metadata=DISCRETE, hyperparameters=hyperparameters, num_envs=3).ppo.num_envs == 3
 
 
+@pytest.mark.parametrize(("loss_type", "vf_coef"), [("huber", 1.0), ("mean squared error", 2.0)])
+def test_with_awss_critic_ppo_is_exactly_awss(loss_type: str, vf_coef: float) -> None:
+    hyperparameters = Hyperparameters(loss_type=loss_type)
+    ours, awss = (
+        make_settings(metadata=DISCRETE, hyperparameters=hyperparameters, critic=critic)
+        for critic in ("privileged", "camera")
+    )
+    exactly = {"initial_weights": "glorot", "is_eps_hat": True, "normalize_returns": False, "vf_coef": vf_coef}
+    assert awss.ppo == replace(ours.ppo, **exactly)
+    assert (ours.initial_weights, awss.initial_weights) == ("orthogonal", "glorot")
+    assert (awss.ppo.objective.is_eps_hat, ours.ppo.objective.is_eps_hat) == (True, False)
+    assert make_settings(metadata=DISCRETE, critic="camera").ppo == make_settings(metadata=DISCRETE).ppo
+    assert replace(awss, algorithm="distill").initial_weights == "orthogonal"
+
+
 @pytest.mark.parametrize("episodes", [1, 100])
 def test_cars_follow_the_episodes_between_training(episodes: int) -> None:
     hyperparameters = Hyperparameters(num_episodes_between_training=episodes)

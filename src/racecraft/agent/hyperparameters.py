@@ -120,12 +120,21 @@ class Hyperparameters:
             episodes = self.num_episodes_between_training
             raise ConfigError(f"num_episodes_between_training is {episodes}; allowed is 1 with 'sac'.")
 
-    def to_ppo(self) -> dict[str, float | int | str]:
+    def to_ppo(self, *, is_exact: bool = False) -> dict[str, float | int | str]:
         """The same settings under the names of our PPO.
 
-        AWS's PPO does not clip gradients, hence the norm of 0, which means never. Its value tower shares
-        nothing with the policy and Adam does not see the scale of a loss, so ``vf_coef`` has no effect on it.
+        AWS's PPO does not clip gradients, hence the norm of 0, which means never.
+
+        Args:
+            is_exact: Also what AWS's learner does less well than ours: its networks begin with Glorot's weights, its
+                critic predicts in units of reward and its squared error is not halved, its Adam is TensorFlow's.
         """
+        exactly: dict[str, float | int | str] = {
+            "initial_weights": "glorot",
+            "is_eps_hat": True,
+            "normalize_returns": False,
+            "vf_coef": 1.0 if self.loss_type == "huber" else 2.0,
+        }
         return {
             "learning_rate": self.lr,
             "gamma": self.discount_factor,
@@ -143,6 +152,7 @@ class Hyperparameters:
             "epsilon_start": 1.0,
             "epsilon_end": self.e_greedy_value,
             "epsilon_steps": self.epsilon_steps,
+            **(exactly if is_exact else {}),
         }
 
     def to_sac(self) -> dict[str, float | int | bool]:

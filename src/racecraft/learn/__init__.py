@@ -10,26 +10,45 @@ from racecraft.extras import needed_for
 from racecraft.learn.algorithm import Algorithm
 from racecraft.learn.distill import Distill, DistillConfig
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats
-from racecraft.learn.networks import forward_operations, initial_weights, network_names, parameter_count
+from racecraft.learn.networks import (
+    INITIAL_WEIGHTS,
+    forward_operations,
+    glorot_weights,
+    initial_weights,
+    network_names,
+    parameter_count,
+)
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 from racecraft.learn.sac import SAC, SACConfig
 
 
 def make_learner(
-    spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0, backend: str = "auto", device: str = "cpu"
+    spec: NetworkSpec,
+    *,
+    seed: int | None = 0,
+    initial_weights: str = "orthogonal",
+    num_threads: int = 0,
+    backend: str = "auto",
+    device: str = "cpu",
 ) -> Learner:
     """The learner for this machine.
 
     Args:
         spec: The network.
         seed: Decides the initial weights; None leaves them zero, for others to be loaded.
+        initial_weights: Of which kind they are, one of `racecraft.learn.networks.INITIAL_WEIGHTS`.
         num_threads: Threads for forward and backward passes; 0 takes every core the process may use.
         backend: ``"native"``, ``"torch"`` (the reference, needs the extra ``torch``), or ``"auto"``: native.
         device: ``"cpu"``, or a GPU such as ``"cuda"``, which needs the extra ``cuda``.
 
     Raises:
-        ConfigError: There is no such backend, or torch is not installed.
+        ConfigError: There is no such backend or kind of weights, or torch is not installed.
     """
+    check_choice("initial_weights", initial_weights, INITIAL_WEIGHTS)
+    if initial_weights == "glorot" and seed is not None:
+        learner = make_learner(spec, seed=None, num_threads=num_threads, backend=backend, device=device)
+        learner.load_weights(glorot_weights(spec, seed=seed))
+        return learner
     if device != "cpu":
         with needed_for(f"Device {device!r}"):
             from racecraft.learn.torch_cuda_learner import CudaLearner  # takes seconds

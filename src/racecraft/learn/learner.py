@@ -21,6 +21,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+ADAM_BETA2 = 0.999
+"""Decay of Adam's second moment in every backend."""
+
 Weights = dict[str, NDArray[np.float32]]
 """Parameters by name, as listed by ``racecraft.learn.networks.weight_shapes``."""
 
@@ -70,6 +73,20 @@ class Objective:
     """Global gradient norm above which the gradient is scaled down; 0 leaves it alone."""
     adam_eps: float = 1e-5
     """Adam's epsilon; 1e-5 as in AWS's trainer and CleanRL."""
+    is_eps_hat: bool = False
+    """``adam_eps`` is the ε̂ of https://arxiv.org/abs/1412.6980, section 2, added to the root of the second moment
+    before that is corrected, as TensorFlow does and so AWS: the first steps on small gradients are shorter."""
+
+    def eps_at(self, step: int) -> float:
+        """What is added to the root of the corrected second moment in the `step`-th step, counted from 1."""
+        if not self.is_eps_hat:
+            return self.adam_eps
+        power, factor = 1.0, ADAM_BETA2  # of factors, as the bits of `**` are those of a machine's library
+        while step:
+            step, is_odd = divmod(step, 2)
+            power *= factor if is_odd else 1.0
+            factor *= factor
+        return self.adam_eps / math.sqrt(1.0 - power)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,7 +44,8 @@ class NativeLearner:
             self._native = self._make(spec, num_threads)
         except ValueError as error:
             raise ConfigError(str(error)) from None
-        self._objective: tuple[Objective | None, Any] = (None, None)  # the last one, and as the core knows it
+        # the last one, Adam's epsilon in it, and as the core knows both
+        self._objective: tuple[Objective | None, float, Any] = (None, 0.0, None)
         if seed is not None:
             self.load_weights(networks.initial_weights(spec, seed=seed, orthonormalize=_native.orthonormalize))
 
@@ -104,8 +105,9 @@ class NativeLearner:
                 )
         else:
             actions = self._column("actions", minibatch.actions, (size, spec.num_actions))
-        if objective is not self._objective[0]:
-            self._objective = objective, _native_objective(objective)
+        eps = objective.eps_at(self._native.num_updates + 1)
+        if objective is not self._objective[0] or eps != self._objective[1]:
+            self._objective = objective, eps, _native_objective(objective, eps)
         terms = self._native.update(
             *self._sensed(minibatch, size),
             indices,
@@ -114,7 +116,7 @@ class NativeLearner:
             self._column("advantages", minibatch.advantages, (size,)),
             self._column("returns", minibatch.returns, (size,)),
             rows,
-            self._objective[1],
+            self._objective[2],
         )
         return UpdateStats.of(terms)
 
@@ -166,7 +168,7 @@ def _flat(array: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return array.reshape(len(array), int(np.prod(array.shape[1:])))
 
 
-def _native_objective(objective: Objective) -> Any:
+def _native_objective(objective: Objective, eps: float) -> Any:
     return _native.Objective(
         learning_rate=objective.learning_rate,
         clip_coef=objective.clip_coef,
@@ -174,5 +176,5 @@ def _native_objective(objective: Objective) -> Any:
         vf_coef=objective.vf_coef,
         is_huber=objective.value_loss == "huber",
         max_grad_norm=objective.max_grad_norm,
-        adam_eps=objective.adam_eps,
+        adam_eps=eps,
     )

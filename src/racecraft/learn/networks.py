@@ -14,6 +14,7 @@ A backend needs nothing but this file.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -78,6 +79,8 @@ STEREO: dict[str, Architecture] = {
 """What AWS builds under these names for a stereo camera; the others are the same for both."""
 SAC_HEAD = 256
 """Units of one more dense layer that AWS's policies have before the head when SAC trains them."""
+INITIAL_WEIGHTS = ("orthogonal", "glorot")
+"""What an untrained network can begin with."""
 CRITIC_UNITS = (64, 64)
 """Dense layers (tanh) of the critic that sees the privileged state."""
 TEACHER = "TEACHER"
@@ -291,10 +294,7 @@ def initial_weights(
     weights: Weights = {}
     for name, shape in weight_shapes(spec).items():
         if not name.endswith(".weight"):
-            begin = 0.0
-            if name == "policy.log_std":
-                begin = TEACHER_LOG_STD if spec.name == TEACHER else architecture_of(spec).log_std
-            weights[name] = np.full(shape, begin, np.float32)
+            weights[name] = _initial_bias(spec, name, shape)
             continue
         gain = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}.get(name, 2.0**0.5)
         rows, columns = shape[0], int(np.prod(shape[1:]))
@@ -303,6 +303,39 @@ def initial_weights(
         matrix = vectors if rows < columns else vectors.T
         weights[name] = (gain * matrix).reshape(shape).astype(np.float32)
     return weights
+
+
+def glorot_weights(spec: NetworkSpec, *, seed: int) -> Weights:
+    """The weights AWS's networks begin with: Glorot's uniform ones, biases zero.
+
+    ±√(6 / (inputs + outputs)), a kernel's places counted (https://proceedings.mlr.press/v9/glorot10a.html); what comes
+    before the value has length 1, and before each mean of a continuous policy 0.01.
+
+    Args:
+        spec: The network.
+        seed: Decides the weights.
+    """
+    rng = np.random.default_rng([seed, 0x6E6574])
+    lengths = {"critic.head.weight": 1.0} | ({} if spec.is_discrete else {"policy.head.weight": 0.01})
+    weights: Weights = {}
+    for name, shape in weight_shapes(spec).items():
+        if not name.endswith(".weight"):
+            weights[name] = _initial_bias(spec, name, shape)
+        elif name in lengths:
+            rows = normals(rng, int(np.prod(shape))).reshape(shape)
+            norms = [math.sqrt(math.fsum(row**2)) for row in rows]
+            weights[name] = (lengths[name] / np.array(norms)[:, None] * rows).astype(np.float32)
+        else:
+            limit = math.sqrt(6.0 / (sum(shape[:2]) * math.prod(shape[2:])))
+            weights[name] = ((2.0 * rng.random(shape) - 1.0) * limit).astype(np.float32)
+    return weights
+
+
+def _initial_bias(spec: NetworkSpec, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    begin = 0.0
+    if name == "policy.log_std":
+        begin = TEACHER_LOG_STD if spec.name == TEACHER else architecture_of(spec).log_std
+    return np.full(shape, begin, np.float32)
 
 
 def parameter_count(spec: NetworkSpec, *, tower: str = "") -> int:

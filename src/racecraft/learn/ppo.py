@@ -24,6 +24,7 @@ from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
 from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights, holding
 from racecraft.learn.ledger import Ended, EpisodeLedger
+from racecraft.learn.networks import INITIAL_WEIGHTS
 from racecraft.learn.rollout import Rollout
 
 _VALUE_BATCH = 4096  # observations whose values are computed at once
@@ -63,11 +64,16 @@ class PPOConfig:
     """``"mse"`` or ``"huber"``."""
     max_grad_norm: float = 0.5
     """Global gradient norm is scaled down to this; 0 leaves it alone, as AWS does."""
+    is_eps_hat: bool = False
+    """Adam's epsilon is added before the second moment is corrected, as TensorFlow does."""
+    initial_weights: str = "orthogonal"
+    """What an untrained network begins with: ``"orthogonal"``, or ``"glorot"`` as AWS's."""
     average_share: float = 0.06
     """About which share of the training so far the weights are averaged over that drive evaluations and are saved;
     0 takes the last weights, as AWS does."""
     normalize_returns: bool = True
-    """Let the critic predict in units of the returns' running spread, so that rewards may have any scale."""
+    """Let the critic predict in units of the returns' running spread, so that rewards may have any scale; AWS's
+    predicts in units of reward."""
     exploration: str = "categorical"
     """``"categorical"`` samples the policy; ``"e-greedy"`` takes the best action, or any by chance."""
     epsilon_start: float = 1.0
@@ -96,6 +102,7 @@ class PPOConfig:
             check_number(name, getattr(self, name), 0.0, is_plain=True)
         require("clip_coef", self.clip_coef, 0.0 < self.clip_coef < 1.0, "a number above 0 and below 1")
         check_choice("value_loss", self.value_loss, ("mse", "huber"))
+        check_choice("initial_weights", self.initial_weights, INITIAL_WEIGHTS)
         check_choice("exploration", self.exploration, ("categorical", "e-greedy"))
 
     @property

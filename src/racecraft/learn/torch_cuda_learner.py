@@ -129,7 +129,8 @@ class CudaLearner(FlatNetwork):
         moment1 = torch.lerp(self._moment1, gradient, 1 - BETA1)
         moment2 = (self._moment2 * BETA2).addcmul_(gradient, gradient, value=1 - BETA2)
         correction1, correction2 = 1 - BETA1**step, 1 - BETA2**step
-        scale = (moment2 / correction2).sqrt_().add_(objective.adam_eps)
+        eps = objective.adam_eps / correction2.sqrt() if objective.is_eps_hat else objective.adam_eps
+        scale = (moment2 / correction2).sqrt_().add_(eps)
         flat = self._flat - objective.learning_rate / correction1 * moment1 / scale
         for kept, new in (
             (self._flat, flat),

@@ -14,10 +14,10 @@ from racecraft.checks import check_choice
 from racecraft.errors import CheckpointError
 from racecraft.learn import networks, torch_networks
 from racecraft.learn.flat_weights import join_weights, split_weights
-from racecraft.learn.learner import NetworkSpec, Objective, Weights, below
+from racecraft.learn.learner import ADAM_BETA2, NetworkSpec, Objective, Weights, below
 from racecraft.learn.torch_losses import Samples, ppo_loss
 
-BETA1, BETA2 = 0.9, 0.999
+BETA1, BETA2 = 0.9, ADAM_BETA2
 """Of Adam (https://arxiv.org/abs/1412.6980)."""
 
 

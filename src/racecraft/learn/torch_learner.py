@@ -106,7 +106,7 @@ class TorchLearner(FlatNetwork):
         self._moment1.lerp_(gradient, 1 - BETA1)
         self._moment2.mul_(BETA2).addcmul_(gradient, gradient, value=1 - BETA2)
         correction1, correction2 = 1 - BETA1**step, 1 - BETA2**step
-        scale = (self._moment2 / correction2).sqrt_().add_(objective.adam_eps)
+        scale = (self._moment2 / correction2).sqrt_().add_(objective.eps_at(step))
         self._flat.addcdiv_(self._moment1, scale, value=-objective.learning_rate / correction1)
 
     def _in_chunks(self, forward: Callable[[slice], Tensor], size: int) -> NDArray[np.float32]:

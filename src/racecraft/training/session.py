@@ -168,7 +168,12 @@ def open_session(
     with ThreadPoolExecutor(1) as pool:
         spec = settings.network_spec(metadata)
         future = pool.submit(
-            make_learner, spec, seed=settings.seed, num_threads=settings.num_threads, device=settings.device
+            make_learner,
+            spec,
+            seed=settings.seed,
+            initial_weights=settings.initial_weights,
+            num_threads=settings.num_threads,
+            device=settings.device,
         )
         run = _Run(
             folder=folder,

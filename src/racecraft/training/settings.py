@@ -141,6 +141,11 @@ class TrainSettings:
         )
 
     @property
+    def initial_weights(self) -> str:
+        """What an untrained network begins with, one of `racecraft.learn.networks.INITIAL_WEIGHTS`."""
+        return self.ppo.initial_weights if self.algorithm == "ppo" else "orthogonal"
+
+    @property
     def cars_per_race(self) -> int:
         """Cars that share a track."""
         return 1 if self.opponents is None else self.opponents.cars
@@ -205,7 +210,8 @@ def make_settings(
     """Settings from AWS's files and what the user says beyond them.
 
     Without hyperparameters the defaults are Racecraft's own, tuned for speed. With them training follows AWS:
-    whole episodes per iteration, its batch size, epochs, losses and exploration.
+    whole episodes per iteration, its batch size, epochs, losses and exploration; exactly if the critic is its own, too,
+    the ``camera``.
 
     Args:
         metadata: Its network and version are used where `network` and `vehicle` are not given.
@@ -261,7 +267,7 @@ def make_settings(
     if hyperparameters is not None:
         if ppo is not None:
             raise ConfigError("ppo and hyperparameters both say how the policy improves; give one of them.")
-        learning: dict[str, Any] = hyperparameters.to_ppo()
+        learning: dict[str, Any] = hyperparameters.to_ppo(is_exact=critic == "camera")
         ppo = PPOConfig(**learning, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
     elif ppo is None:
         assert regime.ppo is not None
