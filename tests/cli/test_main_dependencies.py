@@ -28,7 +28,7 @@ SHORT = "-t oval --until 64steps --num-envs 8 --num-threads 1 --evaluate-every 3
 COMMANDS: dict[str, list[str]] = {
     "train": [
         f"train {SHORT} -n a -r racing --actions continuous --network RACECRAFT_SMALL --critic camera --vehicle v4"
-        " --direction reverse --randomize light -s 2 --json --video --aws-log L",
+        " --camera 2026 --direction reverse --randomize light -s 2 --json --video --aws-log L",
         f"train {SHORT} -n b --model-metadata M --hyperparameters H --device cpu --sensors STEREO_CAMERAS",
         f"train {SHORT} -n c --race object-avoidance {BOXES}",
         f"train {SHORT} -n l --race head-to-bot {BOTS}",

@@ -10,6 +10,7 @@ import pytest
 
 from racecraft import evaluate, train
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
+from racecraft.film.replay_film import film_replay
 from racecraft.learn import PPOConfig
 from racecraft.run import RunFolder
 from racecraft.sim import CameraSpec, Vehicle
@@ -38,7 +39,9 @@ def test_it_evaluates_as_it_was_trained(tmp_path: Path) -> None:
     assert best[0] == found.to_dict()["mean_completion"]
 
 
-def test_a_run_learns_and_is_evaluated_with_its_camera(tmp_path: Path) -> None:
+def test_a_run_learns_and_is_evaluated_and_filmed_with_its_camera(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     class Seen(SilentReporter):
         def begin(self, simulation: Any, policy: Any) -> None:
             cameras.append(simulation.camera)
@@ -46,7 +49,12 @@ def test_a_run_learns_and_is_evaluated_with_its_camera(tmp_path: Path) -> None:
     cameras: list[CameraSpec] = []
     run = trained(tmp_path, camera="2026", reporter=Seen())
     assert cameras == [CAMERAS["2026"]]
-    assert evaluate(run, **QUICK).evaluation.conditions.camera == CAMERAS["2026"]
+    palettes: list[str] = []
+    for module in ("judging.evaluation", "film.replay_film"):
+        monkeypatch.setattr(f"racecraft.{module}.film", lambda *_, palette, **__: palettes.append(palette) or run)
+    found = evaluate(run, **{**QUICK, "video": True})
+    film_replay(found.files["replay"])
+    assert (found.evaluation.conditions.camera, palettes) == (CAMERAS["2026"], ["2026", "2026"])
     document = json.loads((run / "run.json").read_text())
     assert document["settings"].pop("camera") == "2026"
     (run / "run.json").write_text(json.dumps(document))  # as runs of earlier versions are

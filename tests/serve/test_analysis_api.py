@@ -6,6 +6,7 @@ import base64
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from running_consoles import RunningConsole
 
@@ -83,6 +84,14 @@ def test_saliency_of_one_moment(raced: tuple[RunningConsole, str, str]) -> None:
     assert seen["target"] == max(range(len(seen["policy"])), key=seen["policy"].__getitem__)
     other = console.client.get(path, params={"lap": 1, "row": 3, "target": 0}).json()
     assert other["target"] == 0
+    document = (console.runs / name / "run.json").read_text()
+    (console.runs / name / "run.json").write_text(document.replace('"camera": "2018"', '"camera": "2026"'))
+    try:
+        in_2026 = console.client.get(path, params={"lap": 1, "row": 3}).json()
+    finally:
+        (console.runs / name / "run.json").write_text(document)
+    looks = [np.frombuffer(pixels, np.uint8).astype(int) for pixels in (frame, base64.b64decode(in_2026["frame"]))]
+    assert np.abs(looks[0] - looks[1]).mean() > 4.0  # of 255
     refused(console.client.get(path, params={"lap": 9, "row": 3}), 404, "no step 3 in lap 9")
     refused(console.client.get(path, params={"lap": 1, "row": 10**6}), 404)
     refused(console.client.get(path, params={"lap": 1, "row": 3, "target": 50}), 404, "no output 50")

@@ -66,6 +66,9 @@ def train(
         str, typer.Option("--critic", help="What the critic sees: privileged, lap (head to head) or camera.")
     ] = "",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
+    camera: Annotated[
+        str, typer.Option("--camera", help="What the car sees with: the original's camera of 2018, 2020 or 2026.")
+    ] = "2018",
     direction: Annotated[str, typer.Option("--direction", help="forward, reverse or alternate.")] = "forward",
     randomize: Annotated[
         str,
@@ -148,6 +151,7 @@ def train(
                 "network": network,
                 "critic": critic,
                 "vehicle": vehicle,
+                "camera": camera,
                 "direction": direction,
                 "randomize": randomize,
                 "objects": on_track,

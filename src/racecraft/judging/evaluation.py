@@ -275,6 +275,7 @@ def _write(
             path,
             laps=evaluation.rules.laps,
             name=folder.name,
+            palette=evaluation.conditions.palette,
             ghosts=ghosts,
             sensors=policy.sensors,
         )

@@ -24,6 +24,7 @@ from racecraft.analysis import (
 )
 from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
+from racecraft.judging.trained import trained_camera
 from racecraft.learn import NetworkSpec
 from racecraft.learn.learner import Weights
 from racecraft.learn.saliency import grad_cam
@@ -103,7 +104,7 @@ def get_saliency(
     heading = float(found.heading[row])
     origin = found.points[row] - AHEAD * np.array([math.cos(heading), math.sin(heading)])
     driven = driven_direction(track, [found])
-    frame = driver_frames(driven, [[*origin.tolist(), heading]])[0]
+    frame = driver_frames(driven, [[*origin.tolist(), heading]], trained_camera(folder.read_info()))[0]
     if target is not None and target >= spec.num_actions:
         raise NotFound(f"The policy of {name!r} has no output {target}; allowed are 0 to {spec.num_actions - 1}.")
     seen = grad_cam(spec, weights, frame, target=target)
