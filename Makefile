@@ -6,8 +6,9 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command 
 VENV := .venv
 BIN := $(VENV)/bin
 UV := $(BIN)/uv
-# A file of tests stays on one core, with what its tests share; tests/conftest.py puts the long files first.
-PYTEST := $(BIN)/python -m pytest -n auto --dist loadscope --no-loadscope-reorder
+# A file of tests stays in one process, with what its tests share; tests/conftest.py puts the long files first. One process
+# more than there are cores: tests wait for servers, browsers and deadlines a third of their time.
+PYTEST = $(BIN)/python -m pytest -n $$($(BIN)/python -c 'import os; print(len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else "auto")') --dist loadscope --no-loadscope-reorder
 NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/* native/gpu/*)
 
 PAGES := src/racecraft/serve/pages/index.html

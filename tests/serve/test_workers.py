@@ -19,14 +19,21 @@ from running_workers import RunningWorker, running_worker
 
 pytest.importorskip("obstore")
 pytest.importorskip("psycopg")
+from racecraft.agent import ModelMetadata, action_space
 from racecraft.errors import ConfigError, RunError
+from racecraft.reward import load_preset
 from racecraft.run import RunFolder
 from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.supervisor import Supervisor
+from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.station import work_for
+from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
 from racecraft.training.job import Training
+from racecraft.training.settings import make_settings
+from racecraft.training.start import start_run
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
 
@@ -186,6 +193,23 @@ def test_a_worker_of_another_version_changes_nothing(tmp_path: Path) -> None:
         work_for(settings, on_ready=pytest.fail)
     assert "same version" in told.value.hint
     assert database._version() == "0001"
+    database.close()
+
+
+def test_a_run_whose_copy_waits_behind_others_is_shared_all_the_same(tmp_path: Path) -> None:
+    database = Database(f"sqlite:///{tmp_path / 'console.db'}")
+    database.migrate()
+    store, queue = Artifacts(f"file://{tmp_path}/store"), JobQueue(database)
+    settings = ServeSettings(runs=tmp_path / "runs")
+    mirror = Mirror(store, settings=settings, queue=queue, supervisor=Supervisor(settings, database, queue))
+    metadata = ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
+    oval = make_settings(metadata=metadata, hyperparameters=None, track="oval")
+    folder = start_run(oval, reward=load_preset("racing"), metadata=metadata, root=settings.runs, name="fresh")
+    mirror.copy("fresh")  # a job that nobody does here
+    assert store.names() == []
+    assert mirror.share(folder)
+    assert store.names() == ["fresh"]
+    assert not mirror.share(folder, track=str(tmp_path / "own.npy"))
     database.close()
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import uvicorn
 
+from racecraft.checks import check_whole
 from racecraft.errors import ConfigError
 from racecraft.serve.app import create_app
 from racecraft.serve.settings import ServeSettings
@@ -25,6 +26,7 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
         ConfigError: The port is taken.
         RunError: A folder or the database cannot be opened.
     """
+    check_whole("others", settings.other_slots, 1, 64)  # races and copies of runs are made here and nowhere else
     listener = socket.socket()
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

@@ -124,6 +124,12 @@ class JobQueue:
         with self._database.transaction() as session:
             return session.scalar(query) is not None
 
+    def is_travelling(self, run: str) -> bool:
+        """Whether some machine works on this run and takes it to the store."""
+        query = sa.select(Job.id).where(Job.run == run, Job.state == "running", Job.travels).limit(1)
+        with self._database.transaction() as session:
+            return session.scalar(query) is not None
+
     def before(self, job: Job) -> Sequence[str]:
         """Runs whose jobs have the places it waits for, or come first; nothing once it is no longer queued."""
         if job.state != "queued":

@@ -77,7 +77,7 @@ class Mirror:
         info = folder.read_info()
         if any(os.sep in name for name in (info.track, track)) or info.settings.get("opponents"):
             return False  # files that only this machine has
-        if not self._queue.is_busy(folder.name):  # else who works on it copies it
+        if not self._queue.is_travelling(folder.name):  # else who works on it copies it
             try:
                 self._artifacts.keep(folder)
             except RunError as error:

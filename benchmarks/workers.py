@@ -1,0 +1,117 @@
+"""What it costs to have a training done by a worker elsewhere, beside the console's own machine; on a quiet machine.
+
+python benchmarks/workers.py [--rounds 5] [--until "40000 steps"] [--json]
+
+Both run here, in turns, with folders of their own and one store; so what is measured is the work of fetching, copying
+and telling, not of a line. Needs racecraft[serve], racecraft[s3] and httpx.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import httpx
+
+MAX_SECONDS = 0.5  # more than at home
+MAX_CPU = 0.03  # of the CPU time at home
+TICK = 0.02  # s between two looks at a job
+HERTZ = os.sysconf("SC_CLK_TCK")
+
+
+@contextmanager
+def running(*arguments: str) -> Iterator[str]:
+    """A verb that prints one line of JSON when it is ready."""
+    process = subprocess.Popen([sys.executable, "-m", "racecraft", *arguments], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        yield process.stdout.readline()
+    finally:
+        process.terminate()
+        process.wait(60)
+        process.stdout.close()
+
+
+def job_processes(runs: Path) -> dict[int, float]:
+    """CPU seconds of the processes that do jobs in a folder, with what they started."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0") if entry.name.isdigit() else []
+            if b"racecraft.serve.jobs" in words and os.fsencode(runs) in words:
+                fields = (entry / "stat").read_text().rsplit(")", 1)[1].split()
+                found[int(entry.name)] = sum(map(int, fields[11:15])) / HERTZ
+        except OSError:
+            continue
+    return found
+
+
+def train(client: httpx.Client, name: str, runs: Path, until: str) -> tuple[float, float]:
+    """Seconds from the click to the told end, and the CPU seconds meanwhile of the processes that do jobs there."""
+    settings = {"name": name, "track": "oval", "seed": 1, "until": until, "train": False}
+    client.post("/api/models", json=settings).raise_for_status()
+    time.sleep(6.0)  # until a process waits for the job, as it does for somebody who reads before the click
+    before = job_processes(runs)
+    after = dict(before)
+    begun = time.perf_counter()
+    job = client.post(f"/api/models/{name}/train", json={}).json()["id"]
+    while (state := client.get(f"/api/jobs/{job}").json()["state"]) in ("queued", "running"):
+        after |= job_processes(runs)
+        time.sleep(TICK)
+    if state != "done":
+        raise SystemExit(f"The training {state}.")
+    return time.perf_counter() - begun, sum(used - before.get(process, 0.0) for process, used in after.items())
+
+
+def measure(rounds: int, until: str) -> dict[str, list[tuple[float, float]]]:
+    """Wall and CPU seconds at home and away, in turns."""
+    found: dict[str, list[tuple[float, float]]] = {"home": [], "away": []}
+    with tempfile.TemporaryDirectory() as folder:
+        base = Path(folder)
+        shared = ["--artifacts", f"file://{base}/store", "--database", f"sqlite:///{base}/console.db"]
+        for number in range(rounds):
+            for place in found:
+                runs = base / place
+                with ExitStack() as stack:
+                    options = ["--runs", str(base / "home"), "--no-browser", "--port", "0", *shared, "--json"]
+                    slots = [] if place == "home" else ["--trainings", "0"]
+                    link = json.loads(stack.enter_context(running("serve", *options, *slots)))["link"]
+                    client = stack.enter_context(httpx.Client(base_url=link.split("/?")[0], timeout=120))
+                    client.get(link)
+                    if place == "away":
+                        stack.enter_context(running("worker", "--runs", str(runs), *shared, "--json"))
+                    found[place].append(train(client, f"{place}-{number}", runs, until))
+    return found
+
+
+def main() -> int:
+    """Print the table; the exit status is 1 when a bar is missed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--until", default="40000 steps")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    found = measure(options.rounds, options.until)
+    medians = {place: [statistics.median(one) for one in zip(*values, strict=True)] for place, values in found.items()}
+    seconds = medians["away"][0] - medians["home"][0]
+    cpu = medians["away"][1] / medians["home"][1] - 1.0
+    if options.json:
+        print(json.dumps({**found, "more_seconds": seconds, "more_cpu": cpu}))
+    else:
+        for place, (wall, used) in medians.items():
+            print(f"{place:5} {wall:7.2f} s from click to end  {used:7.2f} s of CPU")
+        print(f"away: {seconds:+.2f} s (bar {MAX_SECONDS}), {100 * cpu:+.1f} % of CPU (bar {100 * MAX_CPU:.0f} %)")
+    return int(seconds > MAX_SECONDS or cpu > MAX_CPU)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
