@@ -59,7 +59,7 @@ class Drives:
 
 def drive(
     driver: Driver | Learned,
-    track: str | Track = "oval",
+    track: str | Track | None = None,
     *,
     cars: int = 12,
     seconds: float = 30.0,
@@ -71,7 +71,7 @@ def drive(
 
     Args:
         driver: What `racecraft.classic.learn` returned for a car, or a function from states to commands.
-        track: Where; what was learned drives on its own.
+        track: Where; by default where it learned, or the oval.
         cars: N.
         seconds: After which a lap is given up.
         seed: Of the places.
@@ -82,9 +82,11 @@ def drive(
     commands: Any = driver
     if isinstance(driver, Learned):
         made = dict(driver.lesson.make)
-        track = made.pop("track", track)
+        own = made.pop("track", None)
+        track = track or own
         settings = {**made, **settings}
-    task = DrivingTask(track, num_envs=cars, num_threads=1, observation="state", **_without(settings, "observation"))
+    settings.pop("observation", None)
+    task = DrivingTask(track or "oval", num_envs=cars, num_threads=1, observation="state", **settings)
     if isinstance(driver, Learned):
         commands = _commands_of(driver, task)
     simulation = task.simulation
@@ -124,7 +126,3 @@ def _commands_of(learned: Learned, task: DrivingTask) -> Driver:
         return task.action_space.to_commands(learned.policy.act(view(states)))  # type: ignore[arg-type]
 
     return commands
-
-
-def _without(settings: dict[str, Any], name: str) -> dict[str, Any]:
-    return {key: value for key, value in settings.items() if key != name}
