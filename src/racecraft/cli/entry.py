@@ -21,6 +21,7 @@ VERBS = (
     "imports",
     "evaluate",
     "races",
+    "league",
     "report",
     "export",
     "car",

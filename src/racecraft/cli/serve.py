@@ -38,6 +38,16 @@ def serve(
     artifacts: Artifacts = "",
     trainings: Trainings = 1,
     others: Others = 1,
+    league: Annotated[bool, typer.Option("--league", help="Let others have accounts; you are their admin.")] = False,
+    host: Annotated[str, typer.Option("--host", help="Address to listen at; another one than this in a league.")] = (
+        "127.0.0.1"
+    ),
+    address: Annotated[
+        str, typer.Option("--address", help="https://NAME or http://NAME:PORT by which others call the league.")
+    ] = "",
+    plain_http: Annotated[
+        bool, typer.Option("--plain-http", help="Let passwords and cards cross the network unencrypted.")
+    ] = False,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the link in a browser.")] = True,
     as_json: Json = False,
 ) -> None:
@@ -65,6 +75,10 @@ def serve(
         artifacts=artifacts,
         training_slots=trainings,
         other_slots=others,
+        league=league,
+        host=host,
+        address=address,
+        plain_http=plain_http,
     )
     run_server(settings, on_ready=ready)
 
@@ -83,7 +97,7 @@ def worker(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Work for a console that runs on another machine: trainings and evaluations, until Ctrl-C."""
+    """Work for a console on another machine, until Ctrl-C."""
     from racecraft.serve.quick import loading
 
     with needed_for("A worker"), loading():

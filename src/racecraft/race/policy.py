@@ -67,13 +67,21 @@ def load_policy(run: RunFolder, *, checkpoint: str | int = "best", num_threads: 
             its network's.
         ConfigError: The run's action space or sensors are not allowed.
     """
-    metadata = run.read_model_metadata()
     saved = run.checkpoints.find(checkpoint)
-    spec = _spec_of(saved, metadata)
+    return saved.step, policy_of(saved, run.read_model_metadata(), num_threads=num_threads)
+
+
+def policy_of(saved: StoredCheckpoint, metadata: ModelMetadata, *, num_threads: int = 0) -> NetworkPolicy:
+    """The policy that a file holds, with the action space and the sensors that it was made for.
+
+    Raises:
+        CheckpointError: It does not fit its description, or holds what is not its network's.
+    """
+    spec = network_of(saved, metadata)
     learner = make_learner(spec, seed=None, num_threads=num_threads)
     critic = {name: array for name, array in learner.weights().items() if name.startswith("critic.")}
-    learner.load_weights(_driving_weights(saved, spec) | critic)
-    return saved.step, NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite)
+    learner.load_weights(driving_weights(saved, spec) | critic)
+    return NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite)
 
 
 def load_driver(run: str | Path, *, checkpoint: str | int = "best") -> NetworkPolicy:
@@ -90,7 +98,7 @@ def load_driver(run: str | Path, *, checkpoint: str | int = "best") -> NetworkPo
     return load_policy(RunFolder.open(run), checkpoint=checkpoint, num_threads=1)[1]
 
 
-def _spec_of(saved: StoredCheckpoint, metadata: ModelMetadata) -> NetworkSpec:
+def network_of(saved: StoredCheckpoint, metadata: ModelMetadata) -> NetworkSpec:
     """The network that a checkpoint describes: one that we know, of this action space and these sensors."""
     described = saved.metadata.get("network")
     if not isinstance(described, Mapping):
@@ -132,7 +140,7 @@ def _spec_of(saved: StoredCheckpoint, metadata: ModelMetadata) -> NetworkSpec:
     )
 
 
-def _driving_weights(saved: StoredCheckpoint, spec: NetworkSpec) -> dict[str, NDArray[Any]]:
+def driving_weights(saved: StoredCheckpoint, spec: NetworkSpec) -> dict[str, NDArray[Any]]:
     """The policy's weights, after their names, types and shapes were found to be exactly the network's."""
     kinds = {name.removeprefix(WEIGHTS): kind for name, kind in saved.kinds.items() if name.startswith(WEIGHTS)}
     shapes = weight_shapes(spec)

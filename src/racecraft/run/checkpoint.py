@@ -36,7 +36,7 @@ MAX_MANIFEST_BYTES = 1 << 22
 MANIFEST = "manifest.json"
 _NAME = re.compile(r"(\d{9,18})-([0-9a-f]{8})\.safetensors")
 _STEP = re.compile(r"[0-9]{1,18}")  # as many digits as a file's name has; int() also reads other scripts' digits
-_HEADER_KEY = "racecraft"  # the one entry of the safetensors header's metadata: a JSON text
+HEADER_KEY = "racecraft"  # the one entry of the safetensors header's metadata: a JSON text
 
 
 class CheckpointWarning(UserWarning):
@@ -299,7 +299,7 @@ class CheckpointStore:
                     digest = hashlib.file_digest(file, "sha256").hexdigest()
                 if digest[:8] != name[2]:
                     continue
-                header = {**_header_of(path)[0], "file": path.name, "size": size, "sha256": digest}
+                header = {**header_of(path)[0], "file": path.name, "size": size, "sha256": digest}
                 entries.append(_entry(header))
         return sorted(entries, key=lambda entry: entry.time_stamp)
 
@@ -320,7 +320,7 @@ class CheckpointStore:
         if digest != entry.sha256:
             raise CheckpointError(f"{path} is damaged: its checksum is wrong.")
         try:
-            header, kinds = _header_of(path)
+            header, kinds = header_of(path)
             metadata = dict(header["metadata"])
         except (ValueError, KeyError, TypeError) as error:
             raise CheckpointError(f"{path} is not a checkpoint of Racecraft: {error}.") from error
@@ -380,7 +380,7 @@ def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> li
         text = json.dumps(header, allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:
         raise CheckpointError(f"metadata of a checkpoint must be JSON: {error}.") from error
-    return list(tensor_file(plain, {_HEADER_KEY: text}))
+    return list(tensor_file(plain, {HEADER_KEY: text}))
 
 
 def _digest(pieces: Iterable[memoryview]) -> str:
@@ -396,13 +396,13 @@ def _plain(value: object) -> object:
     raise TypeError(f"{type(value).__name__} {value!r} has no JSON form")
 
 
-def _header_of(path: Path) -> tuple[dict[str, Any], dict[str, tuple[str, tuple[int, ...]]]]:
+def header_of(path: Path) -> tuple[dict[str, Any], dict[str, tuple[str, tuple[int, ...]]]]:
     """What a file says of itself, and the type and shape of its arrays by name."""
     from safetensors import SafetensorError, safe_open
 
     try:
         with safe_open(path, framework="numpy") as file:
-            header = json.loads((file.metadata() or {})[_HEADER_KEY])
+            header = json.loads((file.metadata() or {})[HEADER_KEY])
             names: list[str] = file.keys()
             slices = {name: file.get_slice(name) for name in names}
             kinds = {name: (str(one.get_dtype()), tuple(one.get_shape())) for name, one in slices.items()}

@@ -15,13 +15,15 @@ from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
 
 from racecraft.serve import problems
-from racecraft.serve.context import Context
+from racecraft.serve.context import Consoles, Context
+from racecraft.serve.door import routes as door
 from racecraft.serve.door.guard import Guard, content_policy
 from racecraft.serve.driving import routes as drives
 from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
 from racecraft.serve.evaluations import analysis
 from racecraft.serve.evaluations import routes as evaluations
+from racecraft.serve.groups import routes as groups
 from racecraft.serve.jobs import routes as jobs
 from racecraft.serve.jobs.follower import Follower
 from racecraft.serve.jobs.queue import JobQueue
@@ -31,6 +33,8 @@ from racecraft.serve.models import archives, choices
 from racecraft.serve.models import routes as models
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
+from racecraft.serve.people import routes as account
+from racecraft.serve.people.keys import Keys
 from racecraft.serve.races import routes as races
 from racecraft.serve.races.races import Races
 from racecraft.serve.rewards import routes as rewards
@@ -40,6 +44,7 @@ from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
 from racecraft.serve.streams import routes as events
 from racecraft.serve.streams.hub import Hub
+from racecraft.serve.submissions import routes as league
 from racecraft.serve.tracks import routes as tracks
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning import routes as tunings
@@ -123,11 +128,13 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.context = context
-    app.state.guard = guard = Guard(database, hosts)
+    keys = Keys(database)
+    app.state.consoles = Consoles(context, keys)
+    app.state.guard = guard = Guard(keys, settings, hosts)
     app.add_middleware(guard.middleware)
     problems.install(app)
     parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, races]
-    parts += [jobs, events]
+    parts += [jobs, events, door, account, groups, league]
     for part in parts:
         app.include_router(part.router)
 

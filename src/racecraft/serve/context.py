@@ -1,25 +1,35 @@
-"""What every route works with; one per application."""
+"""What every route works with: the parts of a console, in a league one console for each person."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated
+import threading
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Final
 
 from fastapi import Depends, Request
 
 from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
+from racecraft.serve.groups.groups import Groups
 from racecraft.serve.jobs.follower import Follower
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
+from racecraft.serve.people.keys import Keys
+from racecraft.serve.people.people import People, Person
+from racecraft.serve.people.tries import Tries
+from racecraft.serve.problems import NotFound
 from racecraft.serve.races.races import Races
-from racecraft.serve.settings import ServeSettings
+from racecraft.serve.settings import OWNER, ServeSettings
 from racecraft.serve.store.database import Database
 from racecraft.serve.streams.hub import Hub
+from racecraft.serve.submissions.league import League
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning.tunings import Tunings
+
+SAFE: Final = ("GET", "HEAD")
 
 
 @dataclass(frozen=True)
@@ -41,9 +51,66 @@ class Context:
     hub: Hub
 
 
-def _context(request: Request) -> Context:
-    context: Context = request.app.state.context
-    return context
+class Consoles:
+    """A console for each person: the same rooms over folders and jobs of their own.
+
+    Args:
+        owner: Of who started the server.
+        keys: What opens the door.
+    """
+
+    def __init__(self, owner: Context, keys: Keys) -> None:
+        self.owner, self.keys = owner, keys
+        self.people, self.groups = People(owner.database), Groups(owner.database)
+        self.league = League(owner.database, owner.settings.state, self._courses)
+        self._others: dict[int, Context] = {}
+        self._lock = threading.Lock()
+
+    def of(self, user_id: int) -> Context:
+        """Somebody's console."""
+        if user_id == OWNER:
+            return self.owner
+        with self._lock:
+            if user_id not in self._others:
+                self._others[user_id] = _console(self.owner, user_id)
+            return self._others[user_id]
+
+    @cached_property
+    def tries(self) -> Tries:
+        """How often somebody may try to get in."""
+        return Tries()
+
+    def _courses(self, user_id: int) -> Courses:
+        return self.of(user_id).courses
+
+    def forget(self, user_id: int) -> None:
+        """Somebody is gone."""
+        with self._lock:
+            self._others.pop(user_id, None)
+
+
+def _console(owner: Context, user_id: int) -> Context:
+    settings, database, queue = owner.settings.of(user_id), owner.database, owner.queue.of(user_id)
+    settings.tracks.mkdir(parents=True, exist_ok=True)
+    garage = Garage(settings.runs, settings.state, database, user_id=user_id)
+    courses = Courses(settings.tracks)
+    return replace(
+        owner,
+        settings=settings,
+        queue=queue,
+        garage=garage,
+        courses=courses,
+        ghosts=Ghosts(settings.runs, database),
+        races=Races(database, queue, garage, courses, user_id=user_id),
+        tunings=Tunings(settings.state, queue, garage),
+        mirror=Mirror(None, settings=settings, queue=queue, supervisor=owner.supervisor),
+        hub=Hub(settings.runs, queue),
+    )
+
+
+def _consoles(request: Request) -> Consoles:
+    consoles: Consoles = request.app.state.consoles
+    return consoles
 
 
 def _user(request: Request) -> int:
@@ -51,8 +118,49 @@ def _user(request: Request) -> int:
     return user
 
 
-InContext = Annotated[Context, Depends(_context)]
-"""A route's parameter of this type is given the console's parts."""
+InConsoles = Annotated[Consoles, Depends(_consoles)]
+"""A route's parameter of this type is given everybody's consoles."""
 
 InUser = Annotated[int, Depends(_user)]
 """A route's parameter of this type is given the id of who asks."""
+
+
+def _context(request: Request, consoles: InConsoles, user: InUser) -> Context:
+    """The console of who asks; with ``?of=NUMBER`` an organiser looks, and only looks, at that of a group's member."""
+    of = request.query_params.get("of")
+    if of is None or not consoles.owner.settings.league:
+        return consoles.of(user)
+    member = int(of) if of.isascii() and of.isdigit() and len(of) < 10 else 0
+    if request.method not in SAFE or not (member == user or consoles.groups.may_look(user, member)):
+        raise NotFound(f"There is nobody with the number {of[:10]} whom you may look at.")
+    return consoles.of(member)
+
+
+def _league(consoles: InConsoles) -> Consoles:
+    if not consoles.owner.settings.league:
+        raise NotFound("This console is one person's; accounts begin with racecraft serve --league.")
+    return consoles
+
+
+InLeague = Annotated[Consoles, Depends(_league)]
+"""The same, only in a league."""
+
+
+def _person(consoles: InLeague, user: InUser) -> Person:
+    return consoles.people.get(user)
+
+
+def _admin(consoles: InConsoles, user: InUser) -> None:
+    if consoles.people.get(user).role != "admin":
+        raise NotFound("Only whoever holds the league sees this.")
+
+
+OnlyAdmin = Depends(_admin)
+"""A route with this dependency exists for admins only; alone at the console everybody is one."""
+
+
+InContext = Annotated[Context, Depends(_context)]
+"""A route's parameter of this type is given the parts of a console: one's own."""
+
+InPerson = Annotated[Person, Depends(_person)]
+"""A route's parameter of this type is given who asks; only in a league."""

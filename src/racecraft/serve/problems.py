@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
+from typing import Any, Final
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -23,6 +23,18 @@ class Conflict(RunError):
     """It exists already, or is in use; 409."""
 
 
+class NotLetIn(RunError):
+    """A password, a card or a code that is not good; 401."""
+
+
+class TooMany(RunError):
+    """Too many failures; 429."""
+
+
+STATUS: Final = {NotFound: 404, TrackNotFound: 404, Conflict: 409, NotLetIn: 401, TooMany: 429}
+"""Of errors that are not simply something wrong with the request, which is 422."""
+
+
 def problem(status: int, code: str, message: str, hint: str = "", **more: Any) -> JSONResponse:
     """An error reply."""
     return JSONResponse({"error": {"code": code, "message": message, "hint": hint, **more}}, status_code=status)
@@ -33,7 +45,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(RacecraftError)
     async def told(_: Request, error: RacecraftError) -> JSONResponse:
-        status = 404 if isinstance(error, NotFound | TrackNotFound) else 409 if isinstance(error, Conflict) else 422
+        status = next((status for kind, status in STATUS.items() if isinstance(error, kind)), 422)
         return problem(status, type(error).__name__, str(error), error.hint, line=getattr(error, "line", None))
 
     @app.exception_handler(RequestValidationError)

@@ -30,14 +30,15 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
     listener = socket.socket()
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listener.bind((ADDRESS, settings.port))
+        listener.bind((settings.host, settings.port))
     except OSError as error:
         listener.close()
         raise ConfigError(
-            f"Port {settings.port} of {ADDRESS} cannot be used: {error.strerror}.", hint="Choose another with --port."
+            f"Port {settings.port} of {settings.host} cannot be used: {error.strerror}.",
+            hint="Choose another with --port.",
         ) from error
     port = listener.getsockname()[1]
-    app = create_app(settings, hosts={f"{name}:{port}" for name in (ADDRESS, "localhost")})
+    app = create_app(settings, hosts={f"{name}:{port}" for name in (ADDRESS, "localhost", settings.host)})
     config = uvicorn.Config(
         app, log_level="warning", access_log=False, server_header=False, timeout_graceful_shutdown=2
     )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import socket
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
 from typing import Final
+from urllib.parse import urlsplit
 
 from racecraft.checks import check_whole, require
 from racecraft.errors import ConfigError
@@ -22,6 +23,11 @@ INCOMING: Final = "incoming"
 """Inside the state folder: what comes out of the object store is put together there."""
 ARTIFACTS: Final = "RACECRAFT_ARTIFACTS"
 """The same for where runs are copied to."""
+OWNER: Final = 1
+"""The user to whom the runs of the command line belong: whoever starts the server."""
+PEOPLE: Final = "people"
+"""Inside the state folder: a folder for each other person of a league, by number, that is like the runs folder."""
+LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 
 MAX_MACHINE: Final = 64
 """Characters of a machine's name."""
@@ -45,6 +51,14 @@ class ServeSettings:
     """Other jobs, such as evaluations, at the same time; they may need files that only the console's machine has."""
     machine: str = ""
     """Name of this machine among those that work on one queue; made from the host's name and the folder if empty."""
+    league: bool = False
+    """Whether others may have accounts."""
+    host: str = "127.0.0.1"
+    """Address that is listened at; another one only in a league."""
+    address: str = ""
+    """``https://NAME`` or ``http://NAME:PORT`` by which others call a league; by default where it listens."""
+    plain_http: bool = False
+    """Whether passwords and cards may cross a network unencrypted."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "runs", self.runs.absolute())
@@ -60,11 +74,33 @@ class ServeSettings:
             raise ConfigError(
                 f"artifacts is {self.artifacts.split('://')[0]!r}; allowed are s3://BUCKET/PREFIX and file:///FOLDER."
             )
+        self._check_address()
         if self.database and not self.database.startswith(("sqlite", "postgresql+psycopg://")):
             raise ConfigError(
                 f"database is {self.database.split('://')[0]!r}; allowed are sqlite:///FILE and "
                 "postgresql+psycopg://USER@HOST/NAME."
             )
+
+    def _check_address(self) -> None:
+        """Refuse what would show secrets to a network, unless that was said twice."""
+        parts = urlsplit(self.address)
+        is_plain = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.path in ("", "/")
+        if self.address and (not is_plain or parts.query or parts.fragment or parts.username):
+            raise ConfigError(f"address is {self.address[:80]!r}; allowed are https://NAME and http://NAME:PORT.")
+        is_outside = self.host not in LOOPBACK or (bool(self.address) and parts.hostname not in LOOPBACK)
+        if is_outside and not self.league:
+            raise ConfigError("A console of one person answers only on 127.0.0.1.", hint="Add --league for accounts.")
+        if is_outside and parts.scheme != "https" and not self.plain_http:
+            raise ConfigError(
+                "Passwords and cards would cross the network unencrypted.",
+                hint="Give --address https://NAME of a proxy, or say --plain-http in a network that you trust.",
+            )
+
+    def of(self, user_id: int) -> ServeSettings:
+        """The same for another person: a folder of runs of their own, on the same database, without copies."""
+        if user_id == OWNER:
+            return self
+        return replace(self, runs=runs_of(self.runs, user_id), database=self.database_url, artifacts="")
 
     @property
     def state(self) -> Path:
@@ -85,6 +121,11 @@ class ServeSettings:
     def database_url(self) -> str:
         """The database in use."""
         return self.database or f"sqlite:///{self.state / 'console.db'}"
+
+
+def runs_of(runs: Path, user_id: int) -> Path:
+    """The folder of somebody's runs, where `runs` is the owner's."""
+    return runs if user_id == OWNER else runs / STATE_FOLDER / PEOPLE / str(user_id)
 
 
 def version() -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -148,16 +149,24 @@ def read_settings(folder: RunFolder) -> TrainSettings:
     return TrainSettings.from_dict({**info.settings, "seed": info.seed, "track": info.track})
 
 
-def replace_reward(folder: RunFolder, source: str) -> None:
+def replace_reward(folder: RunFolder, source: str, *, foreign: bool = False) -> None:
     """Give a run another reward function, from its next step on.
+
+    Args:
+        folder: The run's.
+        source: Of the function.
+        foreign: It is somebody else's; what a run has once is so for good.
 
     Raises:
         RewardError: The function has a mistake that can be seen before training.
         RunError: The run is in use, or cannot be read or written.
     """
     info = folder.read_info()
-    require_valid_reward(source, load_tracks(info.track)[0], foreign=info.foreign)
+    is_foreign = foreign or info.foreign
+    require_valid_reward(source, load_tracks(info.track)[0], foreign=is_foreign)
     with folder.lock():
+        if is_foreign != info.foreign:
+            folder.write_info(replace(info, foreign=True))
         change_reward(folder, source)
 
 

@@ -1,30 +1,42 @@
 """Who may talk to the console: a browser that came with the one-time link, from the console's own pages.
 
-Other pages in the same browser, other names for this machine (DNS rebinding) and other users' programs are refused.
+Other pages in the same browser, other names for this machine (DNS rebinding) and other users' programs are refused. In
+a league people come with a session that `racecraft.serve.door.routes` gave them, and programs with a token.
 """
 
 from __future__ import annotations
 
-import hashlib
+import asyncio
+import re
 import secrets
+from collections.abc import Callable
 from typing import Final
+from urllib.parse import urlsplit
 
-import sqlalchemy as sa
 from fastapi import Request, Response
 from fastapi.responses import RedirectResponse
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from racecraft.serve.people.keys import Keys
 from racecraft.serve.problems import problem
-from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Session, User
+from racecraft.serve.settings import OWNER, ServeSettings
 
 COOKIE: Final = "racecraft_session"
 MAX_BODY: Final = 8 << 20  # bytes
+MAX_SUBMISSION: Final = 32 << 20
 LARGE: Final = {"/api/models/import": 1 << 30}
 """Addresses that take more, as much as an archive may have; they write to disk what comes, as it comes."""
 SAFE: Final = ("GET", "HEAD", "OPTIONS")
+OPEN: Final = ("/api/door", "/api/door/sign-in", "/api/door/card", "/api/door/join")
+"""What a league answers to strangers, beside the boards of public races."""
+BOARDS: Final = "/api/boards/"
+STREAMS: Final = "/api/events/"
+SUBMIT: Final = re.compile(r"/api/league/races/[0-9]{1,10}/submissions")
+"""Where programs send what they submit."""
+LOOK: Final = 0.5  # s between two looks whether who follows a stream still may
+COOKIE_S: Final = 30 * 86400
 HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -43,18 +55,30 @@ def content_policy(nonce: str) -> str:
     )
 
 
+def most_bytes(path: str) -> int:
+    """How much a request to an address may hold."""
+    return MAX_SUBMISSION if SUBMIT.fullmatch(path) else LARGE.get(path, MAX_BODY)
+
+
 class Guard:
     """Lets the right browsers in.
 
     Args:
-        database: Holds the sessions.
-        hosts: Names with ports that the console may be called by.
+        keys: What opens the door.
+        settings: Of the console.
+        hosts: Names with ports that the console may be called by, beside the league's address.
     """
 
-    def __init__(self, database: Database, hosts: set[str]) -> None:
-        self._database, self._hosts = database, hosts
+    def __init__(self, keys: Keys, settings: ServeSettings, hosts: set[str]) -> None:
+        self._keys, self._is_league = keys, settings.league
+        address = urlsplit(settings.address)
+        self._hosts = hosts | ({address.netloc} if address.netloc else set())
+        self._origins = {f"http://{host}" for host in hosts}
+        if address.netloc:
+            self._origins.add(f"{address.scheme}://{address.netloc}")
+        self.is_secure = address.scheme == "https"
         self._tickets: set[str] = set()
-        self._known: dict[str, int] = {}
+        self._known: set[str] = set()
 
     def ticket(self) -> str:
         """A secret that opens the console once."""
@@ -70,7 +94,7 @@ class Guard:
                 await app(scope, receive, send)
                 return
             is_api = scope["path"].startswith("/api/")
-            most = LARGE.get(scope["path"], MAX_BODY)
+            most = most_bytes(scope["path"])
             taken = 0
 
             async def send_with_headers(message: Message) -> None:
@@ -92,7 +116,13 @@ class Guard:
                 return message
 
             answer = self._refuse(Request(scope)) or app
-            await answer(scope, receive_so_much, send_with_headers)
+            if self._is_league and scope["path"].startswith(STREAMS) and answer is app:
+                stream = Listening(Request(scope), receive_so_much, may_stay=self._user)
+                await app(scope, stream.receive, send_with_headers)
+                if stream.has_left:
+                    await send({"type": "http.response.body", "body": b"", "more_body": False})
+            else:
+                await answer(scope, receive_so_much, send_with_headers)
 
         return guarded
 
@@ -100,49 +130,104 @@ class Guard:
         if request.headers.get("host", "") not in self._hosts:
             return problem(421, "Refused", "The console answers only at the address that it printed.")
         origin = request.headers.get("origin")
-        if origin is not None and origin not in {f"http://{host}" for host in self._hosts}:
+        if origin is not None and origin not in self._origins:
             return problem(403, "Refused", "Another site's pages may not use the console.")
         if request.headers.get("sec-fetch-site", "same-origin") == "cross-site" and request.method not in SAFE:
             return problem(403, "Refused", "Another site's pages may not use the console.")
         length = request.headers.get("content-length") or "0"
-        most = LARGE.get(request.url.path, MAX_BODY)
+        most = most_bytes(request.url.path)
         if not (length.isascii() and length.isdigit() and len(length) < 16) or int(length) > most:
             return problem(413, "TooLarge", f"A request may have at most {most >> 20} MB.")
         if request.url.path == "/" and (ticket := request.query_params.get("ticket")):
             return self._let_in(request, ticket)
-        if request.url.path.startswith("/api/") and self._user(request) is None:
+        if request.url.path.startswith("/api/"):
+            return self._refuse_stranger(request)
+        return None
+
+    def _refuse_stranger(self, request: Request) -> Response | None:
+        path = request.url.path
+        if self._user(request) is None:
+            if self._is_league and (path in OPEN or (path.startswith(BOARDS) and request.method in SAFE)):
+                request.state.user_id = None
+                return None
+            if self._is_league:
+                return problem(401, "NotSignedIn", "You are not signed in.", "Sign in, or show your card.")
             return problem(
                 401, "NotSignedIn", "This browser is not known.", "Open the link that racecraft serve prints."
             )
+        if request.state.scopes is not None:
+            may_read = "read" in request.state.scopes and request.method in SAFE and not path.startswith("/api/account")
+            may_submit = "submit" in request.state.scopes and request.method == "POST" and SUBMIT.fullmatch(path)
+            if not may_read and not may_submit:
+                return problem(403, "Refused", "This token is not for that.", "Make one with the scope that it needs.")
         return None
 
     def _let_in(self, request: Request, ticket: str) -> Response:
         """Exchange a ticket for a cookie; a browser that has one already just goes on."""
+        response = RedirectResponse("/", status_code=303)
         if ticket in self._tickets:
             self._tickets.discard(ticket)
-            secret = secrets.token_urlsafe(32)
-            with self._database.transaction() as session:
-                user = session.scalar(sa.select(User.id).order_by(User.id).limit(1))
-                session.add(Session(digest=_digest(secret), user_id=user))
-            response = RedirectResponse("/", status_code=303)
-            response.set_cookie(COOKIE, secret, httponly=True, samesite="strict", path="/", max_age=30 * 86400)
-            return response
-        return RedirectResponse("/", status_code=303)
+            days = COOKIE_S // 86400 if self._is_league else None
+            self.give_cookie(response, self._keys.open_session(OWNER, days=days))
+        return response
+
+    def give_cookie(self, response: Response, secret: str) -> None:
+        """Have a browser keep its session."""
+        response.set_cookie(
+            COOKIE, secret, httponly=True, samesite="strict", path="/", max_age=COOKIE_S, secure=self.is_secure
+        )
 
     def _user(self, request: Request) -> int | None:
+        """Who asks; of a league's people it is looked up every time, so that they are out as soon as they are."""
+        request.state.scopes = None
+        if self._is_league and (bearer := request.headers.get("authorization", "")).startswith("Bearer "):
+            found = self._keys.token_user(bearer.removeprefix("Bearer "))
+            if found is not None:
+                request.state.user_id, request.state.scopes = found
+                return found[0]
+            return None
         secret = request.cookies.get(COOKIE)
         if not secret:
             return None
-        digest = _digest(secret)
-        if digest not in self._known:
-            with self._database.transaction() as session:
-                user = session.scalar(sa.select(Session.user_id).where(Session.digest == digest))
-            if user is None:
+        if not self._is_league and secret in self._known:
+            user: int | None = OWNER
+        else:
+            user = self._keys.session_user(secret)
+            if not self._is_league and user != OWNER:  # of a time when there were others
                 return None
-            self._known[digest] = user
-        request.state.user_id = self._known[digest]
-        return self._known[digest]
+            if user is not None and not self._is_league:
+                self._known.add(secret)
+        request.state.user_id = user
+        return user
 
 
-def _digest(secret: str) -> str:
-    return hashlib.sha256(secret.encode()).hexdigest()
+class Listening:
+    """Somebody who follows a stream, until their session ends: to have it open is no way to stay.
+
+    Args:
+        request: By which they do.
+        receive: What the browser says.
+        may_stay: Who a request is from; None once it is nobody's.
+    """
+
+    def __init__(self, request: Request, receive: Receive, *, may_stay: Callable[[Request], int | None]) -> None:
+        self._request, self._receive, self._may_stay = request, receive, may_stay
+        self.has_left = False
+
+    async def receive(self) -> Message:
+        """What the browser says next, or that it is gone."""
+        coming = asyncio.ensure_future(self._receive())
+        try:
+            while not coming.done():
+                await asyncio.wait([coming], timeout=LOOK)
+                if not coming.done() and await asyncio.to_thread(self._may_stay, self._request) is None:
+                    self.has_left = True
+                    return {"type": "http.disconnect"}
+            return coming.result()
+        finally:
+            coming.cancel()
+
+
+def caller(request: Request) -> str:
+    """The address that a request comes from."""
+    return request.client.host if request.client is not None else ""

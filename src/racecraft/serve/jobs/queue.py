@@ -18,6 +18,7 @@ from typing import Any, Final, Literal
 import sqlalchemy as sa
 from sqlalchemy.orm import aliased
 
+from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job, now
 
@@ -48,6 +49,7 @@ KINDS: Final[Mapping[str, JobKind]] = {
     ),
     "evaluate": JobKind(slot="other", work="racecraft.serve.evaluations.tasks:evaluate", travels=True),
     "race": JobKind(slot="other", work="racecraft.serve.races.tasks:race"),
+    "judge": JobKind(slot="other", work="racecraft.serve.submissions.tasks:judge"),
     "store": JobKind(slot="other", work="racecraft.serve.models.tasks:store"),
 }
 
@@ -77,34 +79,49 @@ class Answer:
     """Whether somebody elsewhere wants to see it."""
 
 
-def new_job(kind: str, run: str, payload: Mapping[str, Any], *, travels: bool = False) -> Job:
+def new_job(kind: str, run: str, payload: Mapping[str, Any], *, travels: bool = False, user_id: int = OWNER) -> Job:
     """A job that is at the end of the queue once a session adds it."""
     return Job(
-        id=secrets.token_hex(8), kind=kind, run=run, payload=dict(payload), travels=travels and KINDS[kind].travels
+        id=secrets.token_hex(8),
+        kind=kind,
+        run=run,
+        payload=dict(payload),
+        user_id=user_id,
+        travels=travels and KINDS[kind].travels,
     )
 
 
 class JobQueue:
-    """The jobs of a console's database."""
+    """The jobs of a console's database; what is asked about runs and jobs is about one person's.
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    Args:
+        database: Where they are.
+        user_id: The person.
+    """
+
+    def __init__(self, database: Database, *, user_id: int = OWNER) -> None:
+        self._database, self._user_id = database, user_id
+
+    def of(self, user_id: int) -> JobQueue:
+        """The same for another person."""
+        return JobQueue(self._database, user_id=user_id)
 
     def add(self, kind: str, run: str, payload: Mapping[str, Any], *, travels: bool = False) -> Job:
         """Put a job at the end of the queue; any machine may do one that travels, its run being in the store."""
-        job = new_job(kind, run, payload, travels=travels)
+        job = new_job(kind, run, payload, travels=travels, user_id=self._user_id)
         with self._database.transaction() as session:
             session.add(job)
         return job
 
     def get(self, job_id: str) -> Job | None:
-        """A job by its id."""
+        """A job by its id; None for another's, too."""
         with self._database.transaction() as session:
-            return session.get(Job, job_id)
+            job = session.get(Job, job_id)
+        return job if job is not None and job.user_id == self._user_id else None
 
     def list(self, *, run: str | None = None, kind: str | None = None, limit: int = 200) -> list[Job]:
         """Jobs, newest first."""
-        query = sa.select(Job).order_by(Job.created.desc()).limit(limit)
+        query = sa.select(Job).where(Job.user_id == self._user_id).order_by(Job.created.desc()).limit(limit)
         if kind is not None:
             query = query.where(Job.kind == kind)
         if run is not None:
@@ -114,28 +131,35 @@ class JobQueue:
 
     def active(self, run: str) -> Job | None:
         """The training of a run that is queued or running."""
-        query = sa.select(Job).where(Job.run == run, Job.kind == "train", Job.state.in_(("queued", "running")))
+        query = sa.select(Job).where(self._about(run), Job.kind == "train", Job.state.in_(("queued", "running")))
         with self._database.transaction() as session:
             return session.scalars(query).first()
 
     def is_busy(self, run: str) -> bool:
         """Whether a job about this run is queued or running."""
-        query = sa.select(Job.id).where(Job.run == run, Job.state.in_(("queued", "running"))).limit(1)
+        query = sa.select(Job.id).where(self._about(run), Job.state.in_(("queued", "running"))).limit(1)
         with self._database.transaction() as session:
             return session.scalar(query) is not None
 
     def is_travelling(self, run: str) -> bool:
         """Whether some machine works on this run and takes it to the store."""
-        query = sa.select(Job.id).where(Job.run == run, Job.state == "running", Job.travels).limit(1)
+        query = sa.select(Job.id).where(self._about(run), Job.state == "running", Job.travels).limit(1)
         with self._database.transaction() as session:
             return session.scalar(query) is not None
 
+    def _about(self, run: str) -> sa.ColumnElement[bool]:
+        return sa.and_(Job.user_id == self._user_id, Job.run == run)
+
     def before(self, job: Job) -> Sequence[str]:
-        """Runs whose jobs have the places it waits for, or come first; nothing once it is no longer queued."""
+        """Runs whose jobs have the places it waits for, or come first; nothing once it is no longer queued.
+
+        Another's run has no name here.
+        """
         if job.state != "queued":
             return []
         is_earlier = sa.or_(Job.state == "running", sa.and_(Job.state == "queued", Job.created < job.created))
-        query = sa.select(Job.run).where(Job.kind.in_(kinds_of(KINDS[job.kind].slot)), is_earlier).order_by(Job.created)
+        shown = sa.case((Job.user_id == self._user_id, Job.run), else_="…")
+        query = sa.select(shown).where(Job.kind.in_(kinds_of(KINDS[job.kind].slot)), is_earlier).order_by(Job.created)
         with self._database.transaction() as session:
             return session.scalars(query).all()
 
@@ -164,7 +188,11 @@ class JobQueue:
         """
         other = aliased(Job)
         is_away = sa.exists().where(
-            other.run == Job.run, other.state == "running", other.machine != machine, other.travels
+            other.user_id == Job.user_id,
+            other.run == Job.run,
+            other.state == "running",
+            other.machine != machine,
+            other.travels,
         )
         oldest = sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds), ~is_away)
         if not is_home:

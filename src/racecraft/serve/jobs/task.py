@@ -18,7 +18,9 @@ class Task:
 
     job: Job
     runs: Path
-    """Folder of the runs."""
+    """Folder of the runs of whose job it is."""
+    home: Path
+    """Folder of the owner's runs, in whose state folder lies what is nobody's own."""
     database: Database
     artifacts: Artifacts | None
     """Where runs are copied to."""

@@ -23,7 +23,7 @@ from racecraft.run import RunFolder
 from racecraft.serve.jobs.courier import Courier
 from racecraft.serve.jobs.queue import KINDS, LEASE, Answer, JobKind, JobQueue
 from racecraft.serve.jobs.task import Task
-from racecraft.serve.settings import INCOMING, STATE_FOLDER
+from racecraft.serve.settings import INCOMING, OWNER, STATE_FOLDER, runs_of
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
@@ -69,7 +69,7 @@ class Worker:
         database: Where the job is.
         job: Claimed by `owner`.
         owner: This process, by the name that it was started under.
-        runs: Folder of the runs.
+        runs: Folder of the owner's runs; those of others lie within.
         artifacts: Where runs are copied to.
     """
 
@@ -82,8 +82,11 @@ class Worker:
         self._is_cancelled = False  # by the user
         self._leaving = threading.Event()  # the server is going down
         kind = KINDS.get(job.kind, KINDS["train"])
+        home, runs = runs, runs_of(runs, job.user_id)
         self._kept = runs / kind.progress.format(run=job.run, tuning=job.payload.get("tuning", ""))
-        self._task = Task(job=job, runs=runs, database=database, artifacts=artifacts, on_stop=self._stops.append)
+        self._task = Task(
+            job=job, runs=runs, home=home, database=database, artifacts=artifacts, on_stop=self._stops.append
+        )
         self._courier: Courier | None = None
         if artifacts is not None and job.travels:
             incoming = runs / STATE_FOLDER / INCOMING
@@ -176,7 +179,8 @@ def _described(error: Exception) -> dict[str, Any]:
 def do_job(job_id: str, *, owner: str, runs: Path, database_url: str, artifacts_url: str) -> None:
     """Do a job that was claimed by `owner`, if it still is."""
     database = Database(database_url)
-    job = JobQueue(database).get(job_id)
+    with database.transaction() as session:
+        job = session.get(Job, job_id)
     if job is not None and job.owner == owner:  # else it was taken for dead before it was there
-        artifacts = Artifacts(artifacts_url) if artifacts_url else None
+        artifacts = Artifacts(artifacts_url) if artifacts_url and job.user_id == OWNER else None
         Worker(database, job, owner=owner, runs=runs, artifacts=artifacts).run()

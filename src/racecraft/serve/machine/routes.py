@@ -6,21 +6,21 @@ import os
 
 from fastapi import APIRouter
 
-from racecraft.serve.context import InContext
+from racecraft.serve.context import InConsoles, InContext, InUser, OnlyAdmin
 from racecraft.serve.machine.machine import Console, Machine, describe_machine
-from racecraft.serve.settings import version
-from racecraft.serve.store.database import LOCAL_USER
+from racecraft.serve.settings import OWNER, version
 
 router = APIRouter(prefix="/api/console", tags=["console"])
 
 
 @router.get("")
-def get_console(context: InContext) -> Console:
-    """What this console is."""
-    return Console(version=version(), runs=str(context.settings.runs), cores=os.cpu_count() or 1, user=LOCAL_USER)
+def get_console(context: InContext, consoles: InConsoles, user: InUser) -> Console:
+    """What this console is; where it lies on the disk is for who runs it."""
+    runs = str(context.settings.runs) if user == OWNER else ""
+    return Console(version=version(), runs=runs, cores=os.cpu_count() or 1, user=consoles.people.get(user).name)
 
 
-@router.get("/machine")
+@router.get("/machine", dependencies=[OnlyAdmin])
 def get_machine(context: InContext) -> Machine:
     """Where its work is done and kept."""
     return describe_machine(context.settings)

@@ -23,6 +23,7 @@ from racecraft.run import RunFolder, RunInfo, Stretch, best_of, judged_laps, lis
 from racecraft.run.history import read_history
 from racecraft.serve.models.schemas import Checkpoint, ModelCard, TrainingStretch
 from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Model, now
 from racecraft.sim.objects import RACE_TYPES, Objects
@@ -44,10 +45,11 @@ class Garage:
         runs: Folder of the run folders.
         state: The console's own folder.
         database: Tags, summaries and jobs.
+        user_id: Whose models they are.
     """
 
-    def __init__(self, runs: Path, state: Path, database: Database) -> None:
-        self._runs, self._trash, self._database = runs, state / TRASH, database
+    def __init__(self, runs: Path, state: Path, database: Database, *, user_id: int = OWNER) -> None:
+        self._runs, self._trash, self._database, self._user_id = runs, state / TRASH, database, user_id
 
     @property
     def runs(self) -> Path:
@@ -65,7 +67,13 @@ class Garage:
         raise NotFound(f"There is no model {name[:80]!r}.")
 
     def is_foreign(self, reward: str) -> bool:
-        """Whether this text is, to the letter, the reward function of a model that came from somebody else."""
+        """Whether this text comes from somebody else than who runs the server.
+
+        All of a guest's do; of the owner's, those that are to the letter the reward function of a model that came from
+        elsewhere.
+        """
+        if self._user_id != OWNER:
+            return True
         for folder in list_runs(self._runs):
             with suppress(RacecraftError):
                 if folder.read_info().foreign and folder.read_reward_function() == reward:
@@ -86,7 +94,9 @@ class Garage:
         """Cards of these folders; what changed is read while nobody waits for the database."""
         only = [folders[0].name] if len(folders) == 1 else None
         with self._database.transaction() as session:
-            known = {row.name: (row.fingerprint, row.summary, row.deleted is not None) for row in _rows(session, only)}
+            known = {
+                row.name: (row.fingerprint, row.summary, row.deleted is not None) for row in self._rows(session, only)
+            }
         renewed: dict[str, tuple[str, dict[str, Any]]] = {}
         for folder in folders:
             mark = _fingerprint(folder)
@@ -95,14 +105,14 @@ class Garage:
                 renewed[folder.name] = (mark if is_settled else "", summary)
         with self._database.transaction() as session:
             if fresh := [name for name in renewed if name not in known]:
-                session.execute(_insert(session), [{"name": name, "owner_id": 1} for name in fresh])
+                session.execute(_insert(session), [{"name": name, "owner_id": self._user_id} for name in fresh])
             for name, (mark, summary) in renewed.items():
                 change: dict[str, Any] = {"fingerprint": mark, "summary": summary}
                 if name in known and known[name][2]:  # a new one by the name of one in the trash
                     change |= {"deleted": None, "tags": []}
-                session.execute(sa.update(Model).where(Model.name == name).values(change))
-            tags = {row.name: (row.tags, row.summary) for row in _rows(session, only)}
-            trainings = _latest_trainings(session, only)
+                session.execute(sa.update(Model).where(self._named(name)).values(change))
+            tags = {row.name: (row.tags, row.summary) for row in self._rows(session, only)}
+            trainings = self._latest_trainings(session, only)
         cards = []
         for name, (words, summary) in ((folder.name, tags[folder.name]) for folder in folders if folder.name in tags):
             if summary:
@@ -165,7 +175,7 @@ class Garage:
         """Replace a model's tags."""
         self.card(name)
         with self._database.transaction() as session:
-            session.execute(sa.update(Model).where(Model.name == name).values(tags=list(dict.fromkeys(tags))))
+            session.execute(sa.update(Model).where(self._named(name)).values(tags=list(dict.fromkeys(tags))))
 
     def rename(self, old: str, new: str) -> None:
         """Give a model another name.
@@ -178,10 +188,11 @@ class Garage:
         with self._free(folder):
             folder.path.rename(self._runs / new)
         with self._database.transaction() as session:
-            session.execute(sa.delete(Model).where(Model.name == new))
-            session.execute(sa.update(Model).where(Model.name == old).values(name=new))
+            session.execute(sa.delete(Model).where(self._named(new)))
+            session.execute(sa.update(Model).where(self._named(old)).values(name=new))
             for table in (Job, Entry):
-                session.execute(sa.update(table).where(table.run == old).values(run=new))
+                of_it = sa.and_(table.user_id == self._user_id, table.run == old)
+                session.execute(sa.update(table).where(of_it).values(run=new))
 
     def remove(self, name: str) -> None:
         """Put a model into the trash, from where `restore` brings it back.
@@ -195,7 +206,7 @@ class Garage:
             shutil.rmtree(self._trash / name, ignore_errors=True)
             folder.path.rename(self._trash / name)
         with self._database.transaction() as session:
-            session.execute(sa.update(Model).where(Model.name == name).values(deleted=now()))
+            session.execute(sa.update(Model).where(self._named(name)).values(deleted=now()))
 
     def restore(self, name: str) -> None:
         """Bring a removed model back.
@@ -210,13 +221,29 @@ class Garage:
             raise Conflict(f"There is a model {name!r} again.", hint="Rename that one first.")
         (self._trash / name).rename(self._runs / name)
         with self._database.transaction() as session:
-            session.execute(sa.update(Model).where(Model.name == name).values(deleted=None))
+            session.execute(sa.update(Model).where(self._named(name)).values(deleted=None))
+
+    def _named(self, name: str) -> sa.ColumnElement[bool]:
+        return sa.and_(Model.owner_id == self._user_id, Model.name == name)
+
+    def _rows(self, session: Session, only: list[str] | None) -> list[Model]:
+        query = sa.select(Model).where(Model.owner_id == self._user_id)
+        return list(session.scalars(query if only is None else query.where(Model.name.in_(only))))
+
+    def _latest_trainings(self, session: Session, only: list[str] | None) -> dict[str, tuple[str, str]]:
+        """State and reason of the end of each run's newest training."""
+        query = sa.select(Job.run, Job.state, Job.result["reason"].as_string())
+        query = query.where(Job.kind == "train", Job.user_id == self._user_id)
+        if only is not None:
+            query = query.where(Job.run.in_(only))
+        return {run: (state, reason or "") for run, state, reason in session.execute(query.order_by(Job.created))}
 
     @contextmanager
     def _free(self, folder: RunFolder) -> Iterator[None]:
         """Hold the run's lock; Conflict when it is in use, or soon will be."""
         with self._database.transaction() as session:
-            waiting = sa.select(Job.kind).where(Job.run == folder.name, Job.state.in_(("queued", "running")))
+            is_its = sa.and_(Job.user_id == self._user_id, Job.run == folder.name)
+            waiting = sa.select(Job.kind).where(is_its, Job.state.in_(("queued", "running")))
             kind = session.scalar(waiting.limit(1))
         if kind is not None:
             hint = "Stop it first." if kind in ("train", "tune") else "Wait until it has ended."
@@ -323,11 +350,6 @@ def _seconds(folder: RunFolder) -> float:
     return max((float(point.get("seconds") or 0.0) for point in points), default=0.0)
 
 
-def _rows(session: Session, only: list[str] | None) -> list[Model]:
-    query = sa.select(Model) if only is None else sa.select(Model).where(Model.name.in_(only))
-    return list(session.scalars(query))
-
-
 _FRESH: Final[dict[str, Any]] = {"tags": [], "fingerprint": "", "summary": {}}
 
 
@@ -338,14 +360,6 @@ def _insert(session: Session) -> sa.Insert:
 
         return postgresql.insert(Model).values(**_FRESH).on_conflict_do_nothing()
     return sqlite.insert(Model).values(**_FRESH).on_conflict_do_nothing()
-
-
-def _latest_trainings(session: Session, only: list[str] | None) -> dict[str, tuple[str, str]]:
-    """State and reason of the end of each run's newest training."""
-    query = sa.select(Job.run, Job.state, Job.result["reason"].as_string()).where(Job.kind == "train")
-    if only is not None:
-        query = query.where(Job.run.in_(only))
-    return {run: (state, reason or "") for run, state, reason in session.execute(query.order_by(Job.created))}
 
 
 def _status(state: str, reason: str, *, has_steps: bool) -> Status:

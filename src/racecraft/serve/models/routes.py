@@ -173,7 +173,7 @@ def train_model(name: str, request: TrainOn, context: InContext) -> JobInfo:
         Until.parse(request.until)
     if request.reward is not None:
         _require_idle(context, folder)
-        replace_reward(folder, request.reward)
+        replace_reward(folder, request.reward, foreign=context.garage.is_foreign(request.reward))
     return _train(context, folder, until=request.until)
 
 

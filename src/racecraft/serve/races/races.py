@@ -5,7 +5,7 @@
 
 Every entry starts alike, by what was announced when the race was made: its document and the commitment of its secret
 are published at once, the secret when the race is over. Until then nothing is shown that tells where it starts. The
-table says whose a race and an entry are, so that accounts can come later.
+table says whose a race and an entry are.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from racecraft.serve.races.schemas import (
     Undecided,
 )
 from racecraft.serve.races.standings import Entered, key_of, score_of, standings_of
+from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Race, User, now
 from racecraft.serve.tracks.courses import Courses
@@ -52,13 +53,25 @@ RULES: Final = ("laps", "max_resets", "offtrack_penalty", "collision_penalty", "
 
 
 class Races:
-    """The races of a console."""
+    """The races that somebody holds; a league's, which others enter, are `racecraft.serve.submissions`'s.
 
-    def __init__(self, database: Database, queue: JobQueue, garage: Garage, courses: Courses) -> None:
+    Args:
+        database: Where they are.
+        queue: Of jobs.
+        garage: Of models.
+        courses: Of tracks.
+        user_id: Who holds them.
+    """
+
+    def __init__(
+        self, database: Database, queue: JobQueue, garage: Garage, courses: Courses, *, user_id: int = OWNER
+    ) -> None:
         self._database, self._queue, self._garage, self._courses = database, queue, garage, courses
+        self._own = sa.and_(Race.owner_id == user_id, Race.group_id.is_(None), Race.deleted.is_(None))
+        self._user_id = user_id
 
-    def create(self, request: NewRace, *, user_id: int) -> int:
-        """Make a race; its id.
+    def create(self, request: NewRace, *, user_id: int, group_id: int | None = None) -> int:
+        """Make a race, of a league's group if one is given; its id.
 
         Raises:
             RacecraftError: The track or a setting is not usable.
@@ -74,10 +87,12 @@ class Races:
         terms = _terms(request, self._courses.load(request.track))
         announced = terms.announcement
         with self._database.transaction() as session:
-            if (session.scalar(sa.select(sa.func.count(Race.id)).where(Race.deleted.is_(None))) or 0) >= MAX_RACES:
+            held = sa.and_(Race.owner_id == user_id, Race.deleted.is_(None))
+            if (session.scalar(sa.select(sa.func.count(Race.id)).where(held)) or 0) >= MAX_RACES:
                 raise Conflict(f"There are {MAX_RACES} races already.", hint="Delete some first.")
             race = Race(
                 owner_id=user_id,
+                group_id=group_id,
                 title=request.title.strip(),
                 description=request.description.strip(),
                 kind=request.kind,
@@ -102,14 +117,14 @@ class Races:
     def cards(self) -> list[RaceCard]:
         """All races, newest first."""
         with self._database.transaction() as session:
-            races = list(session.scalars(sa.select(Race).where(Race.deleted.is_(None)).order_by(Race.created.desc())))
+            races = list(session.scalars(sa.select(Race).where(self._own).order_by(Race.created.desc())))
             entries = _entries(session, [race.id for race in races])
         return [RaceCard(**_card(race, entries.get(race.id, []))) for race in races]
 
     def get(self, race_id: int) -> RaceDetail:
         """A race with its standings."""
         with self._database.transaction() as session:
-            race = _race(session, race_id)
+            race = self._race(session, race_id)
             entries = _entries(session, [race_id]).get(race_id, [])
         undecided = [
             Undecided.model_validate(
@@ -125,9 +140,9 @@ class Races:
             vehicle=race.vehicle,
             seed=None if race.secret else race.seed,
             commitment=race.commitment,
-            secret="" if _is_withheld(race) else race.secret,
-            is_withheld=_is_withheld(race),
-            standings=standings_of(race, entries, runs=self._garage.runs, is_withheld=_is_withheld(race)),
+            secret="" if is_withheld(race) else race.secret,
+            is_withheld=is_withheld(race),
+            standings=standings_of(race, entries, runs=self._garage.runs, is_withheld=is_withheld(race)),
             undecided=undecided,
         )
 
@@ -139,7 +154,7 @@ class Races:
         """
         with self._database.transaction() as session:
             _hold(session, race_id)
-            race = _race(session, race_id)
+            race = self._race(session, race_id)
             if "closes" in request.model_fields_set and _is_told(race):
                 reason = "it was driven under the old rules" if not race.commitment else "everybody knows its secret"
                 raise Conflict(
@@ -155,7 +170,7 @@ class Races:
     def set_deleted(self, race_id: int, *, is_deleted: bool) -> None:
         """Put a race away, or bring it back."""
         with self._database.transaction() as session:
-            _race(session, race_id, is_deleted=not is_deleted).deleted = now() if is_deleted else None
+            self._race(session, race_id, is_deleted=not is_deleted).deleted = now() if is_deleted else None
 
     def enter(self, race_id: int, request: Enter, *, user_id: int) -> list[int]:
         """Enter models, each with a job of its own; the ids of the entries.
@@ -167,21 +182,21 @@ class Races:
         models = list(dict.fromkeys(request.models))
         with self._database.transaction() as session:
             _hold(session, race_id)
-            race = _race(session, race_id)
+            race = self._race(session, race_id)
             for name in models:
                 if self._garage.folder(name).checkpoints.last is None:
                     raise Conflict(f"Model {name!r} has no checkpoint to race with.", hint="Train it first.")
-            if (state := _state(race)) != "open":
+            if (state := state_of(race)) != "open":
                 raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
             count = session.scalar(sa.select(sa.func.count(Entry.id)).where(Entry.race_id == race_id)) or 0
             if count + len(models) > MAX_ENTRIES:
                 raise Conflict(f"A race takes {MAX_ENTRIES} entries.")
             payload = {
                 "track": self._courses.path_or_name(race.track),
-                "announcement": _announcement(race).to_dict(),
+                "announcement": announcement_of(race).to_dict(),
                 "checkpoint": request.checkpoint,
             }
-            jobs = [new_job(KIND, name, payload) for name in models]
+            jobs = [new_job(KIND, name, payload, user_id=user_id) for name in models]
             session.add_all(jobs)
             session.flush()  # entries name their jobs
             entries = [Entry(race_id=race_id, user_id=user_id, run=job.run, job_id=job.id) for job in jobs]
@@ -192,6 +207,7 @@ class Races:
     def withdraw(self, race_id: int, entry_id: int) -> None:
         """Take an entry back; if it is being driven, that ends."""
         with self._database.transaction() as session:
+            self._race(session, race_id)
             entry = session.get(Entry, entry_id)
             if entry is None or entry.race_id != race_id or entry.withdrawn is not None:
                 raise NotFound(f"There is no entry {entry_id} in this race.")
@@ -206,11 +222,11 @@ class Races:
             NotFound: There is no such race, or nobody announced it.
         """
         with self._database.transaction() as session:
-            race = _race(session, race_id)
+            race = self._race(session, race_id)
         if not race.commitment:
             raise NotFound(f"Race {race_id} was driven under the old rules, and announced by nobody.")
-        announced = _announcement(race)
-        return replace(announced, secret="") if _is_withheld(race) else announced
+        announced = announcement_of(race)
+        return replace(announced, secret="") if is_withheld(race) else announced
 
     def driven(self, race_id: int, entry_ids: Iterable[int]) -> list[tuple[int, Job]]:
         """Decided entries with their jobs, in the order asked for, to be looked at.
@@ -220,9 +236,9 @@ class Races:
             Conflict: The race is not over, and they would tell where it starts.
         """
         with self._database.transaction() as session:
-            race = _race(session, race_id)
+            race = self._race(session, race_id)
             entries = {entry.id: job for entry, job, _ in _entries(session, [race_id]).get(race_id, [])}
-        if _is_withheld(race):
+        if is_withheld(race):
             raise Conflict("What was driven in this race is shown when it is over: it tells where it starts.")
         found = []
         for entry_id in entry_ids:
@@ -232,12 +248,12 @@ class Races:
             found.append((entry_id, job))
         return found
 
-
-def _race(session: Any, race_id: int, *, is_deleted: bool = False) -> Race:
-    race: Race | None = session.get(Race, race_id) if 0 <= race_id < 2**31 else None
-    if race is None or (race.deleted is not None) != is_deleted:
-        raise NotFound(f"There is no race {race_id}.")
-    return race
+    def _race(self, session: Any, race_id: int, *, is_deleted: bool = False) -> Race:
+        race: Race | None = session.get(Race, race_id) if 0 <= race_id < 2**31 else None
+        is_own = race is not None and race.owner_id == self._user_id and race.group_id is None
+        if race is None or not is_own or (race.deleted is not None) != is_deleted:
+            raise NotFound(f"There is no race {race_id}.")
+        return race
 
 
 def _hold(session: Any, race_id: int) -> None:
@@ -284,19 +300,19 @@ def _terms(request: NewRace, track: Track) -> RaceTerms:
     )
 
 
-def _announcement(race: Race) -> Announcement:
-    """As it was made, with its secret."""
+def announcement_of(race: Race) -> Announcement:
+    """A race as it was made, with its secret."""
     return Announcement(document=race.document, commitment=race.commitment, secret=race.secret)
 
 
 def _is_told(race: Race) -> bool:
     """Whether it is over for good: driven under the old rules, or everybody may know its secret."""
-    return not race.commitment or (bool(race.secret) and _state(race) == "closed")
+    return not race.commitment or (bool(race.secret) and state_of(race) == "closed")
 
 
-def _is_withheld(race: Race) -> bool:
+def is_withheld(race: Race) -> bool:
     """Whether nobody may see yet where it starts."""
-    return bool(race.secret) and _state(race) != "closed"
+    return bool(race.secret) and state_of(race) != "closed"
 
 
 def _objects(request: NewRace) -> Objects:
@@ -308,7 +324,8 @@ def _objects(request: NewRace) -> Objects:
     return objects_for_race(request.kind, settings=settings)
 
 
-def _state(race: Race) -> RaceState:
+def state_of(race: Race) -> RaceState:
+    """Whether a race can be entered now."""
     moment = now()
     if not race.commitment:
         return "closed"  # nobody can enter what was driven under the old rules
@@ -323,7 +340,7 @@ def _card(race: Race, entries: list[Entered]) -> dict[str, Any]:
     return {
         **{name: getattr(race, name) for name in RaceCard.model_fields if hasattr(race, name)},
         "laps": int(race.rules.get("laps", 1)),
-        "state": _state(race),
+        "state": state_of(race),
         "is_old": not race.commitment,
         "entries": len(entries),
         "models": len({job.run for _, job, _ in entries}),

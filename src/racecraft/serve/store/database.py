@@ -47,7 +47,7 @@ class Database:
                 self._upgrade()
             with self.transaction() as session:
                 if session.scalar(sa.select(User.id).limit(1)) is None:
-                    session.add(User(name=LOCAL_USER))
+                    session.add(User(name=LOCAL_USER, handle=LOCAL_USER, role="admin"))
         except SQLAlchemyError as error:
             raise RunError(f"The console's database cannot be opened: {_reason(error)}.") from error
 

@@ -12,6 +12,8 @@ from sqlalchemy import JSON, BigInteger, DateTime, ForeignKey, Index, String, Un
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
+from racecraft.serve.settings import OWNER
+
 
 def now() -> datetime:
     """This moment in UTC."""
@@ -47,17 +49,89 @@ class User(Table):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(String(64), unique=True)
+    """As everybody sees it."""
+    handle: Mapped[str | None] = mapped_column(String(200), unique=True)
+    """The name as `racecraft.serve.people.names.handle_of` folds it, so that no two look alike; None once deleted."""
+    role: Mapped[str] = mapped_column(String(16), default="racer")
+    """``admin``, ``organiser`` or ``racer``."""
+    password: Mapped[str] = mapped_column(String(200), default="")
+    """Its hash; empty for who comes by card."""
     created: Mapped[datetime] = mapped_column(default=now)
+    deleted: Mapped[datetime | None]
 
 
 class Session(Table):
-    """A browser that came with the link; only a hash of its cookie is kept."""
+    """A browser that was let in; only a hash of its cookie is kept."""
 
     __tablename__ = "sessions"
 
     digest: Mapped[str] = mapped_column(String(64), primary_key=True)
-    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
     created: Mapped[datetime] = mapped_column(default=now)
+    expires: Mapped[datetime | None]
+    """None of a console that has no accounts."""
+
+
+class Card(Table):
+    """A printed card that signs somebody in, as often as it is shown; only a hash of its secret is kept."""
+
+    __tablename__ = "cards"
+
+    digest: Mapped[str] = mapped_column(String(64), primary_key=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
+    created: Mapped[datetime] = mapped_column(default=now)
+
+
+class Token(Table):
+    """What a program signs in with; only its hash is kept."""
+
+    __tablename__ = "tokens"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    digest: Mapped[str] = mapped_column(String(64), unique=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
+    title: Mapped[str] = mapped_column(String(64))
+    scopes: Mapped[list[str]] = mapped_column(default=list)
+    created: Mapped[datetime] = mapped_column(default=now)
+    expires: Mapped[datetime]
+
+
+class Group(Table):
+    """A class, a club, an event."""
+
+    __tablename__ = "groups"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    title: Mapped[str] = mapped_column(String(100))
+    created: Mapped[datetime] = mapped_column(default=now)
+
+
+class Member(Table):
+    """Somebody in a group."""
+
+    __tablename__ = "members"
+
+    group_id: Mapped[int] = mapped_column(ForeignKey("groups.id"), primary_key=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), primary_key=True, index=True)
+    role: Mapped[str] = mapped_column(String(16), default="racer")
+    """``organiser`` or ``racer``."""
+    real_name: Mapped[str] = mapped_column(String(100), default="")
+    """For the organisers only."""
+    created: Mapped[datetime] = mapped_column(default=now)
+
+
+class Invitation(Table):
+    """A code that makes accounts: of a group's members, or of an organiser."""
+
+    __tablename__ = "invitations"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    code: Mapped[str] = mapped_column(String(32), unique=True)
+    group_id: Mapped[int | None] = mapped_column(ForeignKey("groups.id"), index=True)
+    role: Mapped[str] = mapped_column(String(16))
+    uses_left: Mapped[int]
+    created: Mapped[datetime] = mapped_column(default=now)
+    expires: Mapped[datetime]
 
 
 class Model(Table):
@@ -65,8 +139,8 @@ class Model(Table):
 
     __tablename__ = "models"
 
+    owner_id: Mapped[int] = mapped_column(ForeignKey("users.id"), primary_key=True)
     name: Mapped[str] = mapped_column(String(64), primary_key=True)
-    owner_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
     tags: Mapped[list[str]] = mapped_column(default=list)
     fingerprint: Mapped[str] = mapped_column(String(200), default="")
     summary: Mapped[dict[str, Any]] = mapped_column(default=dict)
@@ -82,11 +156,14 @@ class Job(Table):
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     kind: Mapped[str] = mapped_column(String(16))
     run: Mapped[str] = mapped_column(String(64), index=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), default=OWNER)
+    """Whose it is, and in whose folder its run lies."""
     payload: Mapped[dict[str, Any]] = mapped_column(default=dict)
     state: Mapped[str] = mapped_column(String(16), default="queued")
     attempts: Mapped[int] = mapped_column(default=0)
     losses: Mapped[int] = mapped_column(default=0)
     owner: Mapped[str] = mapped_column(String(32), default="")
+    """The worker that has it."""
     lease_until: Mapped[datetime | None]
     is_cancelled: Mapped[bool] = mapped_column(default=False)
     travels: Mapped[bool] = mapped_column(default=False)
@@ -109,10 +186,12 @@ class Race(Table):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     owner_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    group_id: Mapped[int | None] = mapped_column(ForeignKey("groups.id"), index=True)
+    """Of a league's race, which is entered by submissions; None for a race of one's own models."""
     title: Mapped[str] = mapped_column(String(100))
     description: Mapped[str] = mapped_column(String(500), default="")
     visibility: Mapped[str] = mapped_column(String(16), default="private")
-    """Who sees it once there are accounts: ``private``, ``unlisted`` or ``public``."""
+    """``public`` where the board of a league's race is shown to everybody, without an account."""
     kind: Mapped[str] = mapped_column(String(24), default="time-trial")
     track: Mapped[str] = mapped_column(String(200))
     rules: Mapped[dict[str, Any]] = mapped_column(default=dict)
@@ -152,6 +231,35 @@ class Entry(Table):
     job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"))
     created: Mapped[datetime] = mapped_column(default=now)
     withdrawn: Mapped[datetime | None]
+
+
+class Submission(Table):
+    """Somebody's attempt at a league's race: a file of weights, judged by its job."""
+
+    __tablename__ = "submissions"
+    __table_args__ = (
+        UniqueConstraint("race_id", "digest"),
+        Index("submissions_by_score", "race_id", "score_ms", "best_lap_ms", "resets"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    race_id: Mapped[int] = mapped_column(ForeignKey("races.id"), index=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"), index=True)
+    digest: Mapped[str] = mapped_column(String(64))
+    """SHA-256 of what drives, whatever it was called."""
+    model: Mapped[str] = mapped_column(String(64))
+    """What its owner calls it."""
+    score_ms: Mapped[int | None]
+    """None until it is judged, and for one that did not complete enough laps."""
+    best_lap_ms: Mapped[int | None]
+    resets: Mapped[int] = mapped_column(default=0)
+    completion: Mapped[float] = mapped_column(default=0.0)
+    judged: Mapped[datetime | None]
+    """None for one that waits, is driven or failed: it is not on the board."""
+    disqualified: Mapped[str] = mapped_column(String(200), default="")
+    """The reason; empty for who is in the race."""
+    created: Mapped[datetime] = mapped_column(default=now)
 
 
 class DrivenRecord(Table):

@@ -1,0 +1,85 @@
+"""`racecraft login`, `racecraft races` and `racecraft submit`: a league on another machine."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from racecraft.cli.app import Json, app, print_json
+
+
+@app.command()
+def login(
+    url: Annotated[str, typer.Argument(help="Address of the league: https://NAME or http://NAME:PORT.")],
+    token: Annotated[
+        str,
+        typer.Option(
+            "--token",
+            envvar="RACECRAFT_TOKEN",
+            prompt=True,
+            hide_input=True,
+            help="From your account there.",
+        ),
+    ],
+    as_json: Json = False,
+) -> None:
+    """Remember a league and the token that opens it."""
+    from racecraft.judging.league import League, remember_league
+
+    league = League(url, token)
+    races = league.races()
+    remember_league(league)
+    if as_json:
+        print_json({"url": league.url, "races": len(races)})
+    else:
+        typer.echo(f"{league.url} knows you. Races that you can see: {len(races)}; racecraft races lists them.")
+
+
+@app.command()
+def races(as_json: Json = False) -> None:
+    """List the races of the league that you are logged in to."""
+    from racecraft.judging.league import remembered_league
+
+    found = remembered_league().races()
+    if as_json:
+        print_json({"races": found})
+        return
+    for race in found:
+        typer.echo(f"{race['id']:>5}  {race['state']:<9} {race['kind']:<17} {race['track']:<24} {race['title']}")
+    if not found:
+        typer.echo("There is no race yet in your groups.")
+
+
+@app.command()
+def submit(
+    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    race: Annotated[int, typer.Option("--race", help="Number of the race, as racecraft races lists it.")],
+    checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
+    wait: Annotated[bool, typer.Option("--wait/--no-wait", help="Until it is judged.")] = True,
+    as_json: Json = False,
+) -> None:
+    """Send a run to a race of a league, which drives it."""
+    from racecraft.judging.league import LeagueRefused, remembered_league
+    from racecraft.run import RunFolder
+
+    league = remembered_league()
+    found = league.submit(RunFolder.open(run), race, checkpoint=checkpoint)
+    shown = None
+    while wait and found["state"] in ("queued", "running"):
+        if not as_json and found["ahead"] != shown:
+            shown = found["ahead"]
+            left = f", about {found['seconds_left']:.0f} s" if found["seconds_left"] is not None else ""
+            typer.echo(f"Submission {found['id']} is {found['state']}; {shown} before it{left}.")
+        time.sleep(1.0)
+        found = league.submission(race, found["id"])
+    if as_json:
+        print_json(found)
+    if found["state"] in ("failed", "cancelled"):
+        error = found["error"] or {}
+        raise LeagueRefused(str(error.get("message") or "It was cancelled."), hint=str(error.get("hint") or ""))
+    if not as_json and found["state"] == "done":
+        score = "no score: too few laps" if found["score"] is None else f"{found['score']:.3f} s"
+        typer.echo(f"Submission {found['id']}: {score}.")

@@ -1,0 +1,73 @@
+"""The door of a league: in by password, card or code, and out."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
+from racecraft.serve.door.guard import COOKIE, Guard, caller
+from racecraft.serve.people.links import address_of, card_of
+from racecraft.serve.people.names import handle_of
+from racecraft.serve.people.schemas import Door, Join, Joined, Me, ShowCard, SignIn, me_of
+from racecraft.serve.problems import NotLetIn
+
+router = APIRouter(prefix="/api/door", tags=["door"])
+
+
+@router.get("")
+def look_at_door(request: Request, consoles: InLeague) -> Door:
+    """Whether this is a league, and who is signed in."""
+    user = request.state.user_id
+    return Door(me=me_of(consoles.people.get(user)) if user is not None else None)
+
+
+@router.post("/sign-in")
+def sign_in(request: Request, body: SignIn, response: Response, consoles: InLeague) -> Me:
+    """In by name and password."""
+    account, address = handle_of(body.name), caller(request)
+    consoles.tries.check(account=account, address=address)
+    user = consoles.people.by_password(body.name, body.password)
+    if user is None:
+        consoles.tries.failed(account=account, address=address)
+        raise NotLetIn("There is nobody of that name with that password.")
+    return _let_in(request, response, consoles, user)
+
+
+@router.post("/card")
+def show_card(request: Request, body: ShowCard, response: Response, consoles: InLeague) -> Me:
+    """In by a login card."""
+    consoles.tries.check(account="", address=caller(request))
+    user = consoles.keys.card_user(body.secret)
+    if user is None:
+        consoles.tries.failed(account="", address=caller(request))
+        raise NotLetIn("This card is no longer good.", hint="Ask for a new one.")
+    return _let_in(request, response, consoles, user)
+
+
+@router.post("/join", status_code=201)
+def join(request: Request, body: Join, response: Response, consoles: InLeague) -> Joined:
+    """In by a group's code, as somebody new."""
+    consoles.tries.check(account="", address=caller(request))
+    user = consoles.groups.join(body.code, body.name)
+    if user is None:
+        consoles.tries.failed(account="", address=caller(request))
+        raise NotLetIn("There is no such code, or it is no longer good.", hint="Look at the wall again.")
+    me = _let_in(request, response, consoles, user)
+    secret = consoles.keys.print_card(user)
+    address = address_of(request, consoles.owner.settings)
+    return Joined(me=me, card=card_of(address, secret, user_id=user, name=me.name))
+
+
+@router.post("/sign-out", status_code=204)
+def sign_out(request: Request, consoles: InConsoles, _: InPerson) -> Response:
+    """Out."""
+    consoles.keys.close_session(request.cookies.get(COOKIE, ""))
+    response = Response(status_code=204)
+    response.delete_cookie(COOKIE, path="/")
+    return response
+
+
+def _let_in(request: Request, response: Response, consoles: Consoles, user: int) -> Me:
+    guard: Guard = request.app.state.guard
+    guard.give_cookie(response, consoles.keys.open_session(user))
+    return me_of(consoles.people.get(user))

@@ -1,0 +1,1 @@
+"""Classes, clubs, events: who is in them, and the codes that let people in."""

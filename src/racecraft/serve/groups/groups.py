@@ -1,0 +1,230 @@
+"""Groups: who is in them and as what, and the codes by which people come in.
+
+    invitation ──code──▶ join: an account, and a member of the group      (a class scans the code from the wall)
+    organiser ──names──▶ members with cards                               (a class gets printed cards)
+
+To who is not in a group it does not exist.
+"""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Final, Literal
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session, aliased
+
+from racecraft.serve.people.names import checked_name
+from racecraft.serve.people.people import Person, Role, add_person, use_invitation
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Card, Group, Invitation, Member, User, now
+
+Part = Literal["organiser", "racer"]
+SIGNS: Final = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
+"""Of codes: none is taken for another. Eight of them are 31**8, some 10**12: with 200 tries in ten minutes from an
+address, finding one of ten codes takes it eight thousand years on average."""
+CODE_LENGTH: Final = 8
+MAX_GROUPS: Final = 100  # of an organiser
+MAX_MEMBERS: Final = 500
+
+
+@dataclass(frozen=True)
+class GroupMember:
+    """Somebody in a group."""
+
+    id: int
+    name: str
+    role: Part
+    real_name: str
+    has_card: bool
+
+
+@dataclass(frozen=True)
+class Joining:
+    """A code by which people come in."""
+
+    code: str
+    uses_left: int
+    expires: datetime
+
+
+class Groups:
+    """All groups."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def create(self, title: str, *, by: Person) -> int:
+        """A new group, whose organiser is who makes it; its number.
+
+        Raises:
+            NotFound: Only organisers may.
+            Conflict: There are too many.
+        """
+        if not by.may_organise:
+            raise NotFound("Only organisers make groups.")
+        with self._database.transaction() as session:
+            count = session.scalar(sa.select(sa.func.count()).where(Member.user_id == by.id)) or 0
+            if count >= MAX_GROUPS:
+                raise Conflict(f"You are in {MAX_GROUPS} groups already.")
+            group = Group(title=title.strip())
+            session.add(group)
+            session.flush()
+            session.add(Member(group_id=group.id, user_id=by.id, role="organiser"))
+            return group.id
+
+    def of(self, user_id: int) -> list[tuple[int, str, Part, int]]:
+        """Number, title, one's own part and how many racers, of the groups that somebody is in, newest first."""
+        others = aliased(Member)
+        racers = sa.select(sa.func.count()).where(others.group_id == Group.id, others.role == "racer")
+        query = sa.select(Group.id, Group.title, Member.role, racers.scalar_subquery())
+        query = query.join(Member, Member.group_id == Group.id).where(Member.user_id == user_id)
+        with self._database.transaction() as session:
+            return [(row[0], row[1], _part(row[2]), row[3]) for row in session.execute(query.order_by(Group.id.desc()))]
+
+    def title(self, group_id: int) -> str:
+        """Of a group."""
+        with self._database.transaction() as session:
+            return session.get_one(Group, group_id).title
+
+    def part(self, group_id: int, user_id: int) -> Part | None:
+        """What somebody is in a group; None for who is not in it."""
+        with self._database.transaction() as session:
+            member = session.get(Member, (group_id, user_id))
+            return None if member is None else _part(member.role)
+
+    def require(self, group_id: int, user_id: int, *, organiser: bool = False) -> Part:
+        """What somebody is in a group.
+
+        Raises:
+            NotFound: They are not in it, or not its organiser where that is asked for.
+        """
+        part = self.part(group_id, user_id)
+        if part is None or (organiser and part != "organiser"):
+            raise NotFound(f"There is no group {group_id} {'of yours' if organiser else 'that you are in'}.")
+        return part
+
+    def may_look(self, user_id: int, other: int) -> bool:
+        """Whether somebody organises a group in which the other one races."""
+        mine, theirs = aliased(Member), aliased(Member)
+        query = sa.select(mine.group_id).join(theirs, mine.group_id == theirs.group_id)
+        query = query.where(mine.user_id == user_id, mine.role == "organiser")
+        query = query.where(theirs.user_id == other, theirs.role == "racer").limit(1)
+        with self._database.transaction() as session:
+            return session.scalar(query) is not None
+
+    def members(self, group_id: int) -> list[GroupMember]:
+        """Everybody in a group, organisers first, by name."""
+        has_card = sa.exists().where(Card.user_id == User.id)
+        query = sa.select(User.id, User.name, Member.role, Member.real_name, has_card)
+        query = query.join(Member, Member.user_id == User.id).where(Member.group_id == group_id)
+        with self._database.transaction() as session:
+            rows = session.execute(query.order_by(Member.role, User.name)).all()
+        return [GroupMember(row[0], row[1], _part(row[2]), row[3], bool(row[4])) for row in rows]
+
+    def add(self, group_id: int, people: list[tuple[str, str]]) -> list[int]:
+        """New accounts in a group, by name and real name; their numbers.
+
+        Raises:
+            Conflict: A name is taken, or the group is full; nobody is added.
+        """
+        with self._database.transaction() as session:
+            _require_room(session, group_id, len(people))
+            numbers = []
+            for name, real_name in people:
+                user_id = add_person(session, name)
+                session.add(Member(group_id=group_id, user_id=user_id, role="racer", real_name=real_name.strip()))
+                numbers.append(user_id)
+            return numbers
+
+    def racer(self, group_id: int, user_id: int) -> None:
+        """Make sure that somebody races in a group.
+
+        Raises:
+            NotFound: They do not.
+        """
+        if self.part(group_id, user_id) != "racer":
+            raise NotFound(f"There is no racer {user_id} in this group.")
+
+    def set_real_name(self, group_id: int, user_id: int, real_name: str) -> None:
+        """What only the organisers see."""
+        with self._database.transaction() as session:
+            session.get_one(Member, (group_id, user_id)).real_name = real_name.strip()
+
+    def remove(self, group_id: int, user_id: int) -> None:
+        """Somebody leaves a group."""
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Member).where(Member.group_id == group_id, Member.user_id == user_id))
+
+    def open(self, group_id: int | None, *, role: Role, uses: int, hours: int) -> Joining:
+        """A new code; of a group an earlier one is worth nothing from now on."""
+        code = "".join(secrets.choice(SIGNS) for _ in range(CODE_LENGTH))
+        invitation = Invitation(
+            code=code, group_id=group_id, role=role, uses_left=uses, expires=now() + timedelta(hours=hours)
+        )
+        with self._database.transaction() as session:
+            if group_id is not None:
+                session.execute(sa.delete(Invitation).where(Invitation.group_id == group_id))
+            session.add(invitation)
+        return Joining(code, uses, invitation.expires)
+
+    def joining(self, group_id: int) -> Joining | None:
+        """The code of a group that is good now."""
+        is_good = sa.and_(Invitation.group_id == group_id, Invitation.uses_left > 0, Invitation.expires > now())
+        with self._database.transaction() as session:
+            found = session.scalars(sa.select(Invitation).where(is_good)).first()
+        return None if found is None else Joining(found.code, found.uses_left, found.expires)
+
+    def close(self, group_id: int) -> None:
+        """Nobody comes in by code any more."""
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Invitation).where(Invitation.group_id == group_id))
+
+    def join(self, code: str, name: str) -> int | None:
+        """A new account by a code; its number, or None where the code is wrong, used up or too old.
+
+        Raises:
+            Conflict: The name is taken or the group is full; that costs no use.
+        """
+        checked_name(name)
+        with self._database.transaction() as session:
+            invitation = use_invitation(session, plain_code(code))
+            if invitation is None:
+                return None
+            role: Role = "organiser" if invitation.role == "organiser" else "racer"
+            user_id = add_person(session, name, role=role)
+            if invitation.group_id is not None:
+                _require_room(session, invitation.group_id, 1)
+                session.add(Member(group_id=invitation.group_id, user_id=user_id, role="racer"))
+            return user_id
+
+    def join_on(self, code: str, user_id: int) -> int | None:
+        """Into a group by its code, with an account that there is; the group's number, or None for a wrong code."""
+        with self._database.transaction() as session:
+            invitation = use_invitation(session, plain_code(code))
+            if invitation is None:
+                return None
+            if invitation.group_id is None:
+                raise Conflict("This code makes an account; you have one.")  # and it keeps its use
+            if session.get(Member, (invitation.group_id, user_id)) is None:
+                _require_room(session, invitation.group_id, 1)
+                session.add(Member(group_id=invitation.group_id, user_id=user_id, role="racer"))
+            return invitation.group_id
+
+
+def plain_code(code: str) -> str:
+    """A code as it is kept, however it was typed: ``abcd-efgh`` is ``ABCDEFGH``."""
+    return "".join(sign for sign in code.upper() if sign in SIGNS)[: CODE_LENGTH + 1]
+
+
+def _require_room(session: Session, group_id: int, more: int) -> None:
+    count = session.scalar(sa.select(sa.func.count()).where(Member.group_id == group_id)) or 0
+    if count + more > MAX_MEMBERS:
+        raise Conflict(f"A group has at most {MAX_MEMBERS} members; this one has {count}.")
+
+
+def _part(role: str) -> Part:
+    return "organiser" if role == "organiser" else "racer"

@@ -1,0 +1,215 @@
+"""Groups: made, filled, opened by a code; cards; and what their members have made."""
+
+from __future__ import annotations
+
+import shutil
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Request, Response
+
+from racecraft.errors import RunError
+from racecraft.serve.context import Consoles, InConsoles, InPerson
+from racecraft.serve.door.guard import caller
+from racecraft.serve.groups.groups import Joining
+from racecraft.serve.groups.schemas import (
+    CopyModel,
+    GroupCard,
+    GroupDetail,
+    JoiningInfo,
+    MemberChange,
+    MemberInfo,
+    MemberModels,
+    NewGroup,
+    NewMembers,
+    OpenGroup,
+    PrintCards,
+)
+from racecraft.serve.live.cars import NAME as LIVE
+from racecraft.serve.models.schemas import ModelCard
+from racecraft.serve.people.links import address_of, card_of, picture
+from racecraft.serve.people.schemas import JoinOn, LoginCard
+from racecraft.serve.problems import NotFound, NotLetIn
+
+router = APIRouter(prefix="/api", tags=["groups"])
+
+Id = Annotated[int, Path(ge=0, lt=2**31)]
+
+
+@router.get("/groups")
+def list_groups(consoles: InConsoles, person: InPerson) -> list[GroupCard]:
+    """The groups that one is in, newest first."""
+    return [
+        GroupCard(id=number, title=title, part=part, racers=racers)
+        for number, title, part, racers in consoles.groups.of(person.id)
+    ]
+
+
+@router.post("/groups", status_code=201)
+def create_group(request: NewGroup, consoles: InConsoles, person: InPerson) -> GroupCard:
+    """A new group; only organisers make them."""
+    number = consoles.groups.create(request.title, by=person)
+    return GroupCard(id=number, title=request.title.strip(), part="organiser", racers=0)
+
+
+@router.post("/groups/join")
+def join_group(body: JoinOn, request: Request, consoles: InConsoles, person: InPerson) -> GroupCard:
+    """Into another group by its code, with the account that one has."""
+    consoles.tries.check(account="", address=caller(request))
+    number = consoles.groups.join_on(body.code, person.id)
+    if number is None:
+        consoles.tries.failed(account="", address=caller(request))
+        raise NotLetIn("There is no such code, or it is no longer good.", hint="Look at the wall again.")
+    return next(card for card in list_groups(consoles, person) if card.id == number)
+
+
+@router.get("/groups/{group_id}")
+def get_group(group_id: Id, request: Request, consoles: InConsoles, person: InPerson) -> GroupDetail:
+    """A group with its members; real names and the code are for its organisers."""
+    part = consoles.groups.require(group_id, person.id)
+    members = consoles.groups.members(group_id)
+    joining = consoles.groups.joining(group_id) if part == "organiser" else None
+    return GroupDetail(
+        id=group_id,
+        title=consoles.groups.title(group_id),
+        part=part,
+        racers=sum(member.role == "racer" for member in members),
+        members=[
+            MemberInfo(**{**vars(member), **({} if part == "organiser" else {"real_name": "", "has_card": False})})
+            for member in members
+        ],
+        joining=_joining(request, consoles, joining) if joining is not None else None,
+    )
+
+
+@router.post("/groups/{group_id}/joining")
+def open_group(group_id: Id, body: OpenGroup, request: Request, consoles: InConsoles, person: InPerson) -> JoiningInfo:
+    """A new code by which people come in; an earlier one is worth nothing from now on."""
+    consoles.groups.require(group_id, person.id, organiser=True)
+    return _joining(request, consoles, consoles.groups.open(group_id, role="racer", uses=body.uses, hours=body.hours))
+
+
+@router.delete("/groups/{group_id}/joining", status_code=204)
+def close_group(group_id: Id, consoles: InConsoles, person: InPerson) -> Response:
+    """Nobody comes in by code any more."""
+    consoles.groups.require(group_id, person.id, organiser=True)
+    consoles.groups.close(group_id)
+    return Response(status_code=204)
+
+
+@router.post("/groups/{group_id}/members", status_code=201)
+def add_members(
+    group_id: Id, body: NewMembers, request: Request, consoles: InConsoles, person: InPerson
+) -> list[LoginCard]:
+    """Accounts for a class, and their cards."""
+    consoles.groups.require(group_id, person.id, organiser=True)
+    numbers = consoles.groups.add(group_id, [(one.name, one.real_name) for one in body.people])
+    return _cards(request, consoles, numbers)
+
+
+@router.patch("/groups/{group_id}/members/{member}", status_code=204)
+def change_member(group_id: Id, member: Id, body: MemberChange, consoles: InConsoles, person: InPerson) -> Response:
+    """Another name for somebody, if the one they chose will not do, or a real name."""
+    _require_ward(consoles, group_id, member, person.id)
+    if body.name is not None:
+        consoles.people.rename(member, body.name)
+    if body.real_name is not None:
+        consoles.groups.set_real_name(group_id, member, body.real_name)
+    return Response(status_code=204)
+
+
+@router.delete("/groups/{group_id}/members/{member}", status_code=204)
+def remove_member(group_id: Id, member: Id, consoles: InConsoles, person: InPerson) -> Response:
+    """Somebody leaves: put out by an organiser, or by themselves."""
+    if member != person.id:
+        consoles.groups.require(group_id, person.id, organiser=True)
+        consoles.groups.racer(group_id, member)
+    elif consoles.groups.require(group_id, person.id) == "organiser":
+        raise NotFound("An organiser does not leave the group.")
+    consoles.groups.remove(group_id, member)
+    return Response(status_code=204)
+
+
+@router.post("/groups/{group_id}/members/{member}/revoke", status_code=204)
+def revoke_member(group_id: Id, member: Id, consoles: InConsoles, person: InPerson) -> Response:
+    """A lost card: it, all sessions and all tokens of its owner are worth nothing from now on."""
+    _require_ward(consoles, group_id, member, person.id)
+    consoles.keys.revoke(member)
+    return Response(status_code=204)
+
+
+@router.post("/groups/{group_id}/cards", status_code=201)
+def print_cards(
+    group_id: Id, body: PrintCards, request: Request, consoles: InConsoles, person: InPerson
+) -> list[LoginCard]:
+    """New cards for members; their earlier ones are worth nothing from now on."""
+    members = list(dict.fromkeys(body.members))
+    for member in members:
+        _require_ward(consoles, group_id, member, person.id)
+    return _cards(request, consoles, members)
+
+
+@router.get("/groups/{group_id}/models")
+def list_group_models(group_id: Id, consoles: InConsoles, person: InPerson) -> list[MemberModels]:
+    """What the racers of a group have made, for its organisers."""
+    consoles.groups.require(group_id, person.id, organiser=True)
+    return [
+        MemberModels(id=member.id, name=member.name, models=consoles.of(member.id).garage.cards())
+        for member in consoles.groups.members(group_id)
+        if member.role == "racer"
+    ]
+
+
+@router.post("/groups/{group_id}/models/copy", status_code=201)
+def copy_model(group_id: Id, body: CopyModel, consoles: InConsoles, person: InPerson) -> ModelCard:
+    """A racer's model, as it is, into an organiser's own garage, where nothing that is done to it is the racer's."""
+    consoles.groups.require(group_id, person.id, organiser=True)
+    consoles.groups.racer(group_id, body.member)
+    theirs, ours = consoles.of(body.member).garage, consoles.of(person.id).garage
+    source = theirs.folder(body.model)
+    name = body.name or ours.name_beside(body.model)
+    ours.require_new(name)
+    incoming = consoles.of(person.id).settings.state / "incoming" / name
+    try:
+        shutil.rmtree(incoming, ignore_errors=True)
+        shutil.copytree(source.path, incoming, ignore=shutil.ignore_patterns(".lock", f"{LIVE}*"))
+        incoming.rename(ours.runs / name)
+    except (OSError, shutil.Error) as error:
+        shutil.rmtree(incoming, ignore_errors=True)
+        raise RunError(f"Model {body.model!r} cannot be copied now.", hint="Wait until its job has ended.") from error
+    return ours.card(name)
+
+
+@router.post("/invitations", status_code=201)
+def invite_organisers(body: OpenGroup, request: Request, consoles: InConsoles, person: InPerson) -> JoiningInfo:
+    """A code by which organisers come in; only an admin gives it."""
+    if person.role != "admin":
+        raise NotFound("Only whoever holds the league invites organisers.")
+    return _joining(request, consoles, consoles.groups.open(None, role="organiser", uses=body.uses, hours=body.hours))
+
+
+def _joining(request: Request, consoles: Consoles, joining: Joining) -> JoiningInfo:
+    link = f"{address_of(request, consoles.owner.settings)}/join#{joining.code}"
+    return JoiningInfo(**vars(joining), link=link, picture=picture(link))
+
+
+def _cards(request: Request, consoles: Consoles, members: list[int]) -> list[LoginCard]:
+    address = address_of(request, consoles.owner.settings)
+    return [
+        card_of(address, consoles.keys.print_card(member), user_id=member, name=consoles.people.get(member).name)
+        for member in members
+    ]
+
+
+def _require_ward(consoles: Consoles, group_id: int, member: int, user_id: int) -> None:
+    """Make sure that somebody organises a group and a member is theirs to name and to let in.
+
+    Who has a password or makes groups is not, wherever they race: a card would be a way to be them.
+
+    Raises:
+        NotFound: They are not.
+    """
+    consoles.groups.require(group_id, user_id, organiser=True)
+    consoles.groups.racer(group_id, member)
+    ward = consoles.people.get(member)
+    if ward.has_password or ward.may_organise:
+        raise NotFound(f"{ward.name} has an account of their own, with a password.")

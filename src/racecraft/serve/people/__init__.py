@@ -1,0 +1,1 @@
+"""Who there is: accounts, passwords, sessions, cards, tokens."""

@@ -1,0 +1,154 @@
+"""What opens the door: sessions of browsers, printed cards, tokens of programs. Only hashes of them are kept.
+
+Each holds 256 random bits (a card 128, as it has to be scanned), so a plain SHA-256 is hash enough.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, Final, Literal
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session as Transaction
+
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Card, Session, Token, User, now
+
+Scope = Literal["read", "submit"]
+SESSION_DAYS: Final = 30
+MAX_SESSIONS: Final = 20  # of a person; the oldest makes room
+MAX_TOKENS: Final = 20
+TOKEN_MARK: Final = "rc_"
+"""What tokens begin with, so that whoever finds one knows what it is."""
+
+
+@dataclass(frozen=True)
+class TokenCard:
+    """A token as its owner sees it."""
+
+    id: int
+    title: str
+    scopes: list[str]
+    created: datetime
+    expires: datetime
+
+
+class Keys:
+    """Everybody's sessions, cards and tokens."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def open_session(self, user_id: int, *, days: int | None = SESSION_DAYS) -> str:
+        """Let a browser in; its cookie."""
+        secret = secrets.token_urlsafe(32)
+        expires = None if days is None else now() + timedelta(days=days)
+        with self._database.transaction() as session:
+            session.add(Session(digest=digest_of(secret), user_id=user_id, expires=expires))
+            session.execute(sa.delete(Session).where(Session.expires < now()))
+            session.flush()
+            if days is not None:
+                ordered = sa.select(Session.digest).where(Session.user_id == user_id).order_by(Session.created.desc())
+                for digest in session.scalars(ordered.offset(MAX_SESSIONS)).all():
+                    session.execute(sa.delete(Session).where(Session.digest == digest))
+        return secret
+
+    def session_user(self, secret: str) -> int | None:
+        """Whose cookie it is."""
+        is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
+        return self._user(sa.select(Session.user_id).where(Session.digest == digest_of(secret), is_valid))
+
+    def close_session(self, secret: str) -> None:
+        """Sign a browser out."""
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Session).where(Session.digest == digest_of(secret)))
+
+    def close_sessions(self, user_id: int) -> None:
+        """Sign somebody out everywhere."""
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Session).where(Session.user_id == user_id))
+
+    def print_card(self, user_id: int) -> str:
+        """A new card's secret; an earlier card of the same person is worth nothing from now on."""
+        secret = secrets.token_urlsafe(16)
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Card).where(Card.user_id == user_id))
+            session.add(Card(digest=digest_of(secret), user_id=user_id))
+        return secret
+
+    def card_user(self, secret: str) -> int | None:
+        """Whose card it is."""
+        return self._user(sa.select(Card.user_id).where(Card.digest == digest_of(secret)))
+
+    def revoke(self, user_id: int) -> None:
+        """Everything that opens the door to somebody: cards, sessions, tokens."""
+        with self._database.transaction() as session:
+            revoke_all(session, user_id)
+
+    def make_token(self, user_id: int, *, title: str, scopes: list[Scope], days: int) -> tuple[int, str]:
+        """A token's number and secret, which is shown once.
+
+        Raises:
+            Conflict: There are too many.
+        """
+        secret = TOKEN_MARK + secrets.token_urlsafe(32)
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Token).where(Token.expires < now()))
+            count = session.scalar(sa.select(sa.func.count(Token.id)).where(Token.user_id == user_id)) or 0
+            if count >= MAX_TOKENS:
+                raise Conflict(f"You have {MAX_TOKENS} tokens already.", hint="Remove one that you no longer need.")
+            token = Token(
+                digest=digest_of(secret),
+                user_id=user_id,
+                title=title,
+                scopes=list(dict.fromkeys(scopes)),
+                expires=now() + timedelta(days=days),
+            )
+            session.add(token)
+            session.flush()
+            return token.id, secret
+
+    def tokens(self, user_id: int) -> list[TokenCard]:
+        """Somebody's tokens, newest first."""
+        query = sa.select(Token).where(Token.user_id == user_id, Token.expires > now()).order_by(Token.id.desc())
+        with self._database.transaction() as session:
+            return [TokenCard(t.id, t.title, t.scopes, t.created, t.expires) for t in session.scalars(query)]
+
+    def remove_token(self, user_id: int, token_id: int) -> None:
+        """A token is worth nothing from now on.
+
+        Raises:
+            NotFound: There is none of this number.
+        """
+        gone = sa.delete(Token).where(Token.id == token_id, Token.user_id == user_id)
+        with self._database.transaction() as session:
+            if session.execute(gone).rowcount != 1:  # type: ignore[attr-defined]
+                raise NotFound(f"There is no token {token_id}.")
+
+    def token_user(self, secret: str) -> tuple[int, list[str]] | None:
+        """Whose token it is, and what it may be used for."""
+        query = sa.select(Token.user_id, Token.scopes).join(User, User.id == Token.user_id)
+        query = query.where(Token.digest == digest_of(secret), Token.expires > now(), User.deleted.is_(None))
+        with self._database.transaction() as session:
+            found = session.execute(query).first()
+        return None if found is None else (found[0], found[1])
+
+    def _user(self, query: sa.Select[Any]) -> int | None:
+        with self._database.transaction() as session:
+            found: int | None = session.scalar(query)
+        return found
+
+
+def revoke_all(session: Transaction, user_id: int) -> None:
+    """Remove all keys of somebody."""
+    for table in (Card, Session, Token):
+        session.execute(sa.delete(table).where(table.user_id == user_id))
+
+
+def digest_of(secret: str) -> str:
+    """What is kept of a secret."""
+    return hashlib.sha256(secret.encode(errors="surrogatepass")).hexdigest()

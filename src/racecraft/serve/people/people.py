@@ -1,0 +1,143 @@
+"""Accounts: made, renamed, given a password, removed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import sqlalchemy as sa
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from racecraft.serve.people.keys import revoke_all
+from racecraft.serve.people.names import checked_name, handle_of
+from racecraft.serve.people.passwords import hash_password, is_password
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.settings import OWNER
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Invitation, Job, Member, Submission, User, now
+
+Role = Literal["admin", "organiser", "racer"]
+
+
+@dataclass(frozen=True)
+class Person:
+    """Somebody, as the rest of the server knows them."""
+
+    id: int
+    name: str
+    role: Role
+    has_password: bool
+
+    @property
+    def may_organise(self) -> bool:
+        """Whether they may make groups."""
+        return self.role in ("admin", "organiser")
+
+
+class People:
+    """Everybody who has an account."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def get(self, user_id: int) -> Person:
+        """Somebody.
+
+        Raises:
+            NotFound: There is nobody of this number.
+        """
+        with self._database.transaction() as session:
+            user = session.get(User, user_id)
+            if user is None or user.deleted is not None:
+                raise NotFound(f"There is nobody with the number {user_id}.")
+            return _person(user)
+
+    def rename(self, user_id: int, name: str) -> None:
+        """Another name.
+
+        Raises:
+            Conflict: It is taken, or looks like one that is.
+        """
+        with self._database.transaction() as session:
+            user = session.get_one(User, user_id)
+            user.name, user.handle = checked_name(name), handle_of(checked_name(name))
+            _flush(session, user.name)
+
+    def set_password(self, user_id: int, password: str, *, old: str) -> bool:
+        """A first password, or another one; False where `old` is not the one there is.
+
+        Raises:
+            ConfigError: It is too short.
+        """
+        with self._database.transaction() as session:
+            kept = session.get_one(User, user_id).password
+        if kept and not is_password(old, kept):
+            return False
+        hashed = hash_password(password)
+        with self._database.transaction() as session:
+            session.get_one(User, user_id).password = hashed
+        return True
+
+    def by_password(self, name: str, password: str) -> int | None:
+        """Whose name and password these are; takes as long where there is nobody of that name."""
+        with self._database.transaction() as session:
+            query = sa.select(User.id, User.password).where(User.handle == handle_of(name), User.deleted.is_(None))
+            found = session.execute(query).first()
+        is_right = is_password(password, found[1] if found is not None else "")
+        return found[0] if found is not None and is_right else None
+
+    def remove(self, user_id: int) -> None:
+        """Forget somebody: name, keys and groups; their places on boards stay, nameless and out of the race.
+
+        Raises:
+            Conflict: It is who started the server.
+        """
+        if user_id == OWNER:
+            raise Conflict("Whoever starts the server cannot be removed.")
+        with self._database.transaction() as session:
+            user = session.get_one(User, user_id)
+            user.name, user.handle, user.password = f"(gone {user_id})", None, ""
+            user.role, user.deleted = "racer", now()
+            revoke_all(session, user_id)
+            session.execute(sa.delete(Member).where(Member.user_id == user_id))
+            waiting = sa.update(Job).where(Job.user_id == user_id, Job.state.in_(("queued", "running")))
+            session.execute(waiting.values(is_cancelled=True))
+            queued = sa.update(Job).where(Job.user_id == user_id, Job.state == "queued")
+            session.execute(queued.values(state="cancelled", finished=now()))
+            mine = sa.update(Submission).where(Submission.user_id == user_id)
+            session.execute(mine.values(model="-", disqualified="Withdrawn by its owner."))
+
+
+def add_person(session: Session, name: str, *, role: Role = "racer") -> int:
+    """A new account, in a transaction that goes on; its number.
+
+    Raises:
+        Conflict: The name is taken, or looks like one that is.
+    """
+    shown = checked_name(name)
+    user = User(name=shown, handle=handle_of(shown), role=role)
+    session.add(user)
+    _flush(session, shown)
+    return user.id
+
+
+def use_invitation(session: Session, code: str) -> Invitation | None:
+    """Take one of a code's uses; None where it is wrong, used up or too old."""
+    is_it = sa.and_(Invitation.code == code, Invitation.uses_left > 0, Invitation.expires > now())
+    taken = sa.update(Invitation).where(is_it).values(uses_left=Invitation.uses_left - 1)
+    if session.execute(taken).rowcount != 1:  # type: ignore[attr-defined]
+        return None
+    return session.scalars(sa.select(Invitation).where(Invitation.code == code)).one()
+
+
+def _flush(session: Session, name: str) -> None:
+    try:
+        session.flush()
+    except IntegrityError as error:
+        raise Conflict(f"The name {name!r} is taken, or looks like one that is.", hint="Choose another.") from error
+
+
+def _person(user: User) -> Person:
+    role: Role = "admin" if user.role == "admin" else "organiser" if user.role == "organiser" else "racer"
+    return Person(id=user.id, name=user.name, role=role, has_password=bool(user.password))

@@ -1,0 +1,75 @@
+"""One's own account."""
+
+from __future__ import annotations
+
+import shutil
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+
+from racecraft.errors import ConfigError
+from racecraft.serve.context import InConsoles, InPerson
+from racecraft.serve.people.schemas import AccountChange, MadeToken, Me, NewPassword, NewToken, TokenInfo, me_of
+
+router = APIRouter(prefix="/api/account", tags=["account"])
+
+
+@router.get("")
+def get_account(person: InPerson) -> Me:
+    """Who is signed in."""
+    return me_of(person)
+
+
+@router.patch("")
+def change_account(request: AccountChange, consoles: InConsoles, person: InPerson) -> Me:
+    """Another name."""
+    consoles.people.rename(person.id, request.name)
+    return me_of(consoles.people.get(person.id))
+
+
+@router.put("/password", status_code=204)
+def set_password(request: NewPassword, consoles: InConsoles, person: InPerson) -> Response:
+    """A first password, or another one; wrong old ones count like wrong ones at the door."""
+    account = f"password {person.id}"
+    consoles.tries.check(account=account, address="")
+    if not consoles.people.set_password(person.id, request.new, old=request.old):
+        consoles.tries.failed(account=account, address="")
+        raise ConfigError("That is not your password.")
+    return Response(status_code=204)
+
+
+@router.delete("/sessions", status_code=204)
+def end_sessions(consoles: InConsoles, person: InPerson) -> Response:
+    """Sign out everywhere, here too."""
+    consoles.keys.close_sessions(person.id)
+    return Response(status_code=204)
+
+
+@router.get("/tokens")
+def list_tokens(consoles: InConsoles, person: InPerson) -> list[TokenInfo]:
+    """One's tokens, newest first."""
+    return [TokenInfo(**vars(token)) for token in consoles.keys.tokens(person.id)]
+
+
+@router.post("/tokens", status_code=201)
+def make_token(request: NewToken, consoles: InConsoles, person: InPerson) -> MadeToken:
+    """A token for a program; its secret is shown this once."""
+    number, secret = consoles.keys.make_token(person.id, title=request.title, scopes=request.scopes, days=request.days)
+    return MadeToken(id=number, secret=secret)
+
+
+@router.delete("/tokens/{token_id}", status_code=204)
+def remove_token(token_id: Annotated[int, Path(ge=0, lt=2**31)], consoles: InConsoles, person: InPerson) -> Response:
+    """A token is worth nothing from now on."""
+    consoles.keys.remove_token(person.id, token_id)
+    return Response(status_code=204)
+
+
+@router.delete("", status_code=204)
+def remove_account(consoles: InConsoles, person: InPerson) -> Response:
+    """Forget somebody with all that is theirs; download it first."""
+    folder = consoles.of(person.id).settings.runs
+    consoles.people.remove(person.id)
+    consoles.forget(person.id)
+    shutil.rmtree(folder, ignore_errors=True)
+    return Response(status_code=204)

@@ -1,0 +1,125 @@
+"""What browser and server tell each other about people."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from racecraft.serve.people.keys import Scope
+from racecraft.serve.people.people import Person, Role
+from racecraft.serve.schemas import Message
+
+Name = Annotated[str, Field(min_length=1, max_length=64)]
+Password = Annotated[str, Field(max_length=1000)]
+Secret = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class Me(Message):
+    """Who is signed in."""
+
+    id: int
+    name: str
+    role: Role
+    has_password: bool
+    may_organise: bool
+
+
+class Door(Message):
+    """What a browser finds at the door."""
+
+    is_league: Literal[True] = True
+    me: Me | None
+
+
+class SignIn(Message):
+    """By password."""
+
+    name: Name
+    password: Password
+
+
+class ShowCard(Message):
+    """By card."""
+
+    secret: Secret
+
+
+class Join(Message):
+    """By a group's code, under a name of one's own."""
+
+    code: str = Field(min_length=1, max_length=40)
+    name: Name
+
+
+class JoinOn(Message):
+    """The same for who has an account."""
+
+    code: str = Field(min_length=1, max_length=40)
+
+
+class LoginCard(Message):
+    """A card to print or to keep: whoever shows it is let in as its owner."""
+
+    id: int
+    name: str
+    link: str
+    picture: str
+    """The link to scan, as the address of an image."""
+
+
+class Joined(Message):
+    """Who came in, and the card to come back with."""
+
+    me: Me
+    card: LoginCard
+
+
+class AccountChange(Message):
+    """Another name."""
+
+    name: Name
+
+
+class NewPassword(Message):
+    """A first password, or another one."""
+
+    old: Password = ""
+    new: Password
+
+
+class NewToken(Message):
+    """A token for a program."""
+
+    title: str = Field("racecraft", min_length=1, max_length=64)
+    scopes: list[Scope] = Field(["read", "submit"], min_length=1, max_length=2)
+    days: int = Field(90, ge=1, le=365)
+
+
+class TokenInfo(Message):
+    """A token, without its secret."""
+
+    id: int
+    title: str
+    scopes: list[str]
+    created: datetime
+    expires: datetime
+
+
+class MadeToken(Message):
+    """A token's secret, shown once."""
+
+    id: int
+    secret: str
+
+
+def me_of(person: Person) -> Me:
+    """Who is signed in, as the browser sees it."""
+    return Me(
+        id=person.id,
+        name=person.name,
+        role=person.role,
+        has_password=person.has_password,
+        may_organise=person.may_organise,
+    )

@@ -1,0 +1,355 @@
+"""A league's races: who sees them, what is submitted, who is where.
+
+    file ──submit──▶ looked at, refused with a sentence, or: submission + job (kind judge) ──▶ score ──▶ board
+
+A race belongs to a group. Its members see it and submit, its organisers change it; where it is public everybody sees
+the board. To all others it does not exist. Until it is over nothing is shown that tells where it starts.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import statistics
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Final, Literal
+
+import sqlalchemy as sa
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from racecraft.errors import ConfigError, RacecraftError, RunError
+from racecraft.limits import Medals
+from racecraft.limits.limit import known_limit
+from racecraft.race.announcement import Announcement
+from racecraft.race.entry_file import read_entry_file
+from racecraft.serve.jobs.queue import KINDS, kinds_of, new_job
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.races.races import announcement_of, is_withheld, state_of
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
+from racecraft.serve.submissions.board import Board, read_board
+from racecraft.serve.submissions.judge import ENTRY
+from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, SubmissionInfo
+from racecraft.serve.submissions.tasks import REPLAY, submission_folder
+from racecraft.serve.tracks.courses import Courses
+from racecraft.sim.vehicle import load_vehicle
+
+Part = Literal["organiser", "racer", "spectator"]
+KIND: Final = "judge"
+MAX_WAITING: Final = 3  # submissions of one person to one race that are not judged yet
+MAX_SUBMISSIONS: Final = 200  # of one person to one race
+LAST: Final = 20  # judged ones that the time left is taken from
+
+
+class League:
+    """The races of all groups.
+
+    Args:
+        database: Where they are.
+        state: The server's own folder.
+        courses: Of somebody: a race may be on its maker's own track.
+    """
+
+    def __init__(self, database: Database, state: Path, courses: Callable[[int], Courses]) -> None:
+        self._database, self._state, self._courses = database, state, courses
+
+    def races(self, user_id: int) -> list[LeagueRace]:
+        """The races of somebody's groups, newest first."""
+        query = sa.select(Race, Group.title, Member.role).join(Group, Group.id == Race.group_id)
+        query = query.join(Member, sa.and_(Member.group_id == Race.group_id, Member.user_id == user_id))
+        with self._database.transaction() as session:
+            rows = session.execute(query.where(Race.deleted.is_(None)).order_by(Race.id.desc())).all()
+        return [_info(race, title, "organiser" if role == "organiser" else "racer") for race, title, role in rows]
+
+    def get(self, race_id: int, user_id: int | None, *, organiser: bool = False, member: bool = False) -> LeagueRace:
+        """A race.
+
+        Args:
+            race_id: Of the race.
+            user_id: Who asks; None for somebody without an account.
+            organiser: Whether only its organisers may.
+            member: Whether only members of its group may.
+
+        Raises:
+            NotFound: There is none, or it is not theirs to see.
+        """
+        with self._database.transaction() as session:
+            race, title, part = self._seen(session, race_id, user_id)
+        if (organiser and part != "organiser") or (member and part == "spectator"):
+            raise NotFound(f"There is no race {race_id} of {'yours' if organiser else 'a group that you are in'}.")
+        return _info(race, title, part)
+
+    def change(self, race_id: int, request: LeagueRaceChange, *, user_id: int) -> None:
+        """Another title, description, end or audience.
+
+        Raises:
+            NotFound: They do not organise it.
+            Conflict: It is over and cannot be opened again: everybody knows its secret.
+        """
+        self.get(race_id, user_id, organiser=True)
+        with self._database.transaction() as session:
+            race = session.get_one(Race, race_id)
+            if "closes" in request.model_fields_set and state_of(race) == "closed":
+                raise Conflict("The race is over: everybody knows its secret.", hint="Make another one.")
+            if "closes" in request.model_fields_set:
+                race.closes = request.closes
+            race.title = request.title.strip() if request.title is not None else race.title
+            race.description = request.description.strip() if request.description is not None else race.description
+            if request.is_public is not None:
+                race.visibility = "public" if request.is_public else "private"
+            if race.closes is not None and race.closes <= race.opens:
+                raise ConfigError("The race closes before it opens.", hint="Choose a later end, or none.")
+
+    def remove(self, race_id: int, *, user_id: int) -> None:
+        """Put a race away.
+
+        Raises:
+            NotFound: They do not organise it.
+        """
+        self.get(race_id, user_id, organiser=True)
+        with self._database.transaction() as session:
+            session.get_one(Race, race_id).deleted = now()
+
+    def submit(self, race_id: int, data: bytes, *, model: str, user_id: int) -> int:
+        """Take in a file and have it judged; the same one again is the submission that it was. Its number.
+
+        Raises:
+            NotFound: There is no such race to enter.
+            Conflict: It is not open, somebody else has sent the very same, or too many wait.
+            RacecraftError: The file is not what it has to be.
+        """
+        self.get(race_id, user_id, member=True)
+        job = new_job(KIND, "", {}, user_id=user_id)
+        folder = submission_folder(self._state, job.id)
+        try:
+            folder.mkdir(parents=True)
+            _write(folder / ENTRY, data)
+            digest = read_entry_file(folder / ENTRY).digest
+            submission = self._enter(race_id, digest, job, model=model, user_id=user_id)
+        except OSError as error:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise RunError(f"The file cannot be kept: {error.strerror or error}.") from error
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+        if submission.job_id != job.id:
+            shutil.rmtree(folder, ignore_errors=True)
+        return submission.id
+
+    def _enter(self, race_id: int, digest: str, job: Job, *, model: str, user_id: int) -> Submission:
+        try:
+            with self._database.transaction() as session:
+                race = session.get_one(Race, race_id)
+                if (state := state_of(race)) != "open":
+                    raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
+                is_it = sa.and_(Submission.race_id == race_id, Submission.digest == digest)
+                known = session.scalars(sa.select(Submission).where(is_it)).first()
+                if known is not None and known.user_id != user_id:
+                    raise Conflict("Somebody has entered exactly this model already.", hint="Train it on.")
+                if known is not None and session.get_one(Job, known.job_id).state not in ("failed", "cancelled"):
+                    return known
+                _require_room(session, race_id, user_id)
+                track = self._courses(race.owner_id).path_or_name(race.track)
+                job.payload = {"announcement": announcement_of(race).to_dict(), "track": track, "name": model}
+                session.add(job)
+                session.flush()
+                if known is not None:  # its job failed, which costs no attempt
+                    known.job_id, known.model = job.id, model
+                    return known
+                fresh = Submission(race_id=race_id, user_id=user_id, job_id=job.id, digest=digest, model=model)
+                session.add(fresh)
+                session.flush()
+                return fresh
+        except IntegrityError as error:  # the same file twice at the same moment
+            raise Conflict("Exactly this model is being entered already.") from error
+
+    def submissions(self, race_id: int, *, user_id: int, everybody: bool = False) -> list[SubmissionInfo]:
+        """Somebody's submissions, newest first; for an organiser everybody's.
+
+        Raises:
+            NotFound: The race is not theirs to see.
+        """
+        self.get(race_id, user_id, organiser=everybody, member=True)
+        with self._database.transaction() as session:
+            race = session.get_one(Race, race_id)
+            query = sa.select(Submission, Job, User.name).join(Job, Job.id == Submission.job_id)
+            query = query.join(User, User.id == Submission.user_id).where(Submission.race_id == race_id)
+            if not everybody:
+                query = query.where(Submission.user_id == user_id)
+            rows = session.execute(query.order_by(Submission.id.desc()).limit(1000)).all()
+            pace = _pace(session)
+            infos = []
+            for submission, job, name in rows:
+                ahead = _ahead(session, job)
+                infos.append(_submission(submission, job, name, ahead=ahead, pace=pace, race=race))
+        return infos
+
+    def submission(self, race_id: int, submission_id: int, *, user_id: int) -> SubmissionInfo:
+        """One's own submission.
+
+        Raises:
+            NotFound: There is none of this number.
+        """
+        found = next((one for one in self.submissions(race_id, user_id=user_id) if one.id == submission_id), None)
+        if found is None:
+            raise NotFound(f"You have no submission {submission_id} in this race.")
+        return found
+
+    def disqualify(self, race_id: int, submission_id: int, reason: str, *, user_id: int) -> None:
+        """A submission does not count, for a reason; with an empty one it does again.
+
+        Raises:
+            NotFound: They do not organise the race, or it has no such submission.
+        """
+        self.get(race_id, user_id, organiser=True)
+        is_it = sa.and_(Submission.id == submission_id, Submission.race_id == race_id)
+        with self._database.transaction() as session:
+            changed = session.execute(sa.update(Submission).where(is_it).values(disqualified=reason.strip()))
+            if changed.rowcount != 1:  # type: ignore[attr-defined]
+                raise NotFound(f"There is no submission {submission_id} in this race.")
+
+    def board(self, race_id: int, *, user_id: int | None, top: int) -> tuple[LeagueRace, Board, int]:
+        """A race, its board, and how many submissions are not judged yet.
+
+        Raises:
+            NotFound: It is not theirs to see.
+        """
+        with self._database.transaction() as session:
+            race, title, part = self._seen(session, race_id, user_id)
+            board = read_board(session, race_id, user_id=user_id, top=top)
+            waiting = sa.select(sa.func.count(Submission.id)).join(Job, Job.id == Submission.job_id)
+            waiting = waiting.where(Submission.race_id == race_id, Job.state.in_(("queued", "running")))
+            return _info(race, title, part), board, session.scalar(waiting) or 0
+
+    def medals(self, race_id: int) -> Medals | None:
+        """What lap times on a race's track are worth in its car, where that is known."""
+        with self._database.transaction() as session:
+            race = session.get_one(Race, race_id)
+        with suppress(RacecraftError):
+            track = self._courses(race.owner_id).load(race.track)
+            driven = track.reversed() if race.rules.get("direction") == "reverse" else track
+            limit = known_limit(driven, load_vehicle(race.vehicle))
+            return None if limit is None else limit.medals
+        return None
+
+    def announcement(self, race_id: int, *, user_id: int | None) -> Announcement:
+        """What is published of a race: its secret only when it is over.
+
+        Raises:
+            NotFound: It is not theirs to see.
+        """
+        with self._database.transaction() as session:
+            race, _, _ = self._seen(session, race_id, user_id)
+        announced = announcement_of(race)
+        shown = "" if is_withheld(race) else announced.secret
+        return Announcement(document=announced.document, commitment=announced.commitment, secret=shown)
+
+    def replay(self, race_id: int, submission_id: int, *, user_id: int | None) -> Path:
+        """The replay file of a judged submission, once the race is over.
+
+        Raises:
+            NotFound: There is none, or the race is not theirs to see.
+            Conflict: The race is not over.
+        """
+        with self._database.transaction() as session:
+            race, _, _ = self._seen(session, race_id, user_id)
+            submission = session.get(Submission, submission_id)
+        if submission is None or submission.race_id != race_id or submission.judged is None:
+            raise NotFound(f"There is no judged submission {submission_id} in this race.")
+        if is_withheld(race):
+            raise Conflict("What was driven in this race is shown when it is over: it tells where it starts.")
+        path = submission_folder(self._state, submission.job_id) / REPLAY
+        if not path.is_file():
+            raise NotFound(f"Submission {submission_id} has no replay.")
+        return path
+
+    def _seen(self, session: Session, race_id: int, user_id: int | None) -> tuple[Race, str, Part]:
+        """A race, its group's title, and what somebody is to it."""
+        race = session.get(Race, race_id)
+        if race is not None and race.deleted is None and race.group_id is not None:
+            member = None if user_id is None else session.get(Member, (race.group_id, user_id))
+            if member is not None or race.visibility == "public":
+                part: Part = "spectator" if member is None else "organiser" if member.role == "organiser" else "racer"
+                return race, session.get_one(Group, race.group_id).title, part
+        raise NotFound(f"There is no race {race_id} in this league.")
+
+
+def _write(path: Path, data: bytes) -> None:
+    """So that a crash leaves no half of a file behind a submission."""
+    with path.open("xb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _require_room(session: Session, race_id: int, user_id: int) -> None:
+    query = sa.select(sa.func.count(Submission.id)).join(Job, Job.id == Submission.job_id)
+    query = query.where(Submission.race_id == race_id, Submission.user_id == user_id)
+    if (session.scalar(query) or 0) >= MAX_SUBMISSIONS:
+        raise Conflict(f"You have {MAX_SUBMISSIONS} submissions in this race already.")
+    if (session.scalar(query.where(Job.state.in_(("queued", "running")))) or 0) >= MAX_WAITING:
+        raise Conflict(f"{MAX_WAITING} of your submissions are not judged yet.", hint="Wait for one of them.")
+
+
+def _ahead(session: Session, job: Job) -> int:
+    """Jobs that have the places which a waiting one needs, or come first."""
+    if job.state != "queued":
+        return 0
+    is_earlier = sa.or_(Job.state == "running", sa.and_(Job.state == "queued", Job.created < job.created))
+    query = sa.select(sa.func.count(Job.id)).where(Job.kind.in_(kinds_of(KINDS[KIND].slot)), is_earlier)
+    return session.scalar(query) or 0
+
+
+def _pace(session: Session) -> float | None:
+    """Seconds that the last submissions took to be judged."""
+    query = sa.select(Job.started, Job.finished).where(Job.kind == KIND, Job.state == "done")
+    rows = session.execute(query.order_by(Job.created.desc()).limit(LAST)).all()
+    took = [(finished - started).total_seconds() for started, finished in rows if started and finished]
+    return statistics.median(took) if took else None
+
+
+def _submission(
+    submission: Submission, job: Job, name: str, *, ahead: int, pace: float | None, race: Race
+) -> SubmissionInfo:
+    is_waiting = job.state in ("queued", "running")
+    return SubmissionInfo.model_validate(
+        {
+            "id": submission.id,
+            "name": name,
+            "model": submission.model,
+            "digest": submission.digest,
+            "state": job.state,
+            "ahead": ahead,
+            "seconds_left": round((ahead + 1) * pace, 1) if is_waiting and pace is not None else None,
+            "score": seconds_of(submission.score_ms),
+            "best_lap": seconds_of(submission.best_lap_ms),
+            "completion": submission.completion,
+            "error": job.error,
+            "disqualified": submission.disqualified,
+            "created": submission.created,
+            "has_replay": submission.judged is not None and not is_withheld(race),
+        }
+    )
+
+
+def seconds_of(milliseconds: int | None) -> float | None:
+    """The same in s."""
+    return None if milliseconds is None else milliseconds / 1000
+
+
+def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
+    return LeagueRace.model_validate(
+        {
+            **{name: getattr(race, name) for name in LeagueRace.model_fields if hasattr(race, name)},
+            "group": race.group_id,
+            "group_title": group_title,
+            "part": part,
+            "is_public": race.visibility == "public",
+            "laps": int(race.rules.get("laps", 1)),
+            "state": state_of(race),
+            "secret": "" if is_withheld(race) else race.secret,
+        }
+    )

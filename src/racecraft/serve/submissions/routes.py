@@ -1,0 +1,178 @@
+"""A league's races: made by organisers, entered by members, looked at by everybody who may."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
+
+from racecraft.judging.race import FORMAT
+from racecraft.limits import Medals
+from racecraft.race.entry_file import pack_entry
+from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
+from racecraft.serve.races.schemas import NewRace
+from racecraft.serve.schemas import RunName
+from racecraft.serve.submissions.board import Row
+from racecraft.serve.submissions.league import seconds_of
+from racecraft.serve.submissions.schemas import (
+    BoardPage,
+    BoardRow,
+    Disqualify,
+    EnterModel,
+    LeagueRace,
+    LeagueRaceChange,
+    SubmissionInfo,
+)
+
+router = APIRouter(prefix="/api", tags=["league"])
+
+Id = Annotated[int, Path(ge=0, lt=2**31)]
+Top = Annotated[int, Query(ge=1, le=500)]
+
+
+@router.get("/league/races")
+def list_league_races(consoles: InConsoles, person: InPerson) -> list[LeagueRace]:
+    """The races of one's groups, newest first."""
+    return consoles.league.races(person.id)
+
+
+@router.post("/groups/{group_id}/races", status_code=201)
+def create_league_race(group_id: Id, body: NewRace, consoles: InConsoles, person: InPerson) -> LeagueRace:
+    """A race for a group."""
+    consoles.groups.require(group_id, person.id, organiser=True)
+    number = consoles.of(person.id).races.create(body, user_id=person.id, group_id=group_id)
+    return consoles.league.get(number, person.id)
+
+
+@router.patch("/league/races/{race_id}")
+def change_league_race(race_id: Id, body: LeagueRaceChange, consoles: InConsoles, person: InPerson) -> LeagueRace:
+    """Another title, description, end or audience."""
+    consoles.league.change(race_id, body, user_id=person.id)
+    return consoles.league.get(race_id, person.id)
+
+
+@router.delete("/league/races/{race_id}", status_code=204)
+def delete_league_race(race_id: Id, consoles: InConsoles, person: InPerson) -> Response:
+    """Put a race away."""
+    consoles.league.remove(race_id, user_id=person.id)
+    return Response(status_code=204)
+
+
+@router.get("/boards/{race_id}")
+def get_board(race_id: Id, request: Request, consoles: InLeague, top: Top = 100) -> BoardPage:
+    """The board of a race; where it is public without an account, too."""
+    user: int | None = request.state.user_id
+    race, board, running = consoles.league.board(race_id, user_id=user, top=top)
+    mine = next((row for row in board.rows if user is not None and row.user == user), None)
+    medals = consoles.league.medals(race_id)
+    return BoardPage(
+        race=race,
+        entrants=board.entrants,
+        ranked=board.ranked,
+        running=running,
+        rows=[_row(row, first=board.first_ms, is_me=row is mine, medals=medals) for row in board.rows],
+        mine=mine.row if mine is not None else None,
+        beaten=_beaten(mine, board.entrants),
+    )
+
+
+@router.get("/boards/{race_id}/race.json")
+def get_league_announcement(race_id: Id, request: Request, consoles: InLeague) -> Response:
+    """What is published of a race, for `racecraft verify --race`: the secret is in it when the race is over."""
+    announced = consoles.league.announcement(race_id, user_id=request.state.user_id)
+    text = json.dumps({"format": FORMAT, **announced.to_dict()}, indent=2, ensure_ascii=False)
+    return Response(text, media_type="application/json")
+
+
+@router.get("/boards/{race_id}/replays/{submission_id}")
+def get_submission_replay(race_id: Id, submission_id: Id, request: Request, consoles: InLeague) -> FileResponse:
+    """The replay file of a submission, for `racecraft verify`, once the race is over."""
+    path = consoles.league.replay(race_id, submission_id, user_id=request.state.user_id)
+    return FileResponse(path, media_type="application/octet-stream", filename=f"{race_id}-{submission_id}.replay")
+
+
+@router.post(
+    "/league/races/{race_id}/submissions",
+    status_code=202,
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+        }
+    },
+)
+async def submit(
+    race_id: Id, request: Request, consoles: InConsoles, person: InPerson, model: RunName
+) -> SubmissionInfo:
+    """A model's file, as `racecraft submit` packs it; judged as a job. The same file again is the same submission."""
+    data = await request.body()
+    return await run_in_threadpool(_submit, consoles, race_id, data, model, person.id)
+
+
+@router.post("/league/races/{race_id}/enter", status_code=202)
+def enter_model(race_id: Id, body: EnterModel, consoles: InConsoles, person: InPerson) -> SubmissionInfo:
+    """A model of one's own garage; it is packed and judged like one from elsewhere."""
+    data = pack_entry(consoles.of(person.id).garage.folder(body.model), checkpoint=body.checkpoint)
+    return _submit(consoles, race_id, data, body.model, person.id)
+
+
+@router.get("/league/races/{race_id}/submissions")
+def list_submissions(
+    race_id: Id, consoles: InConsoles, person: InPerson, everybody: bool = False
+) -> list[SubmissionInfo]:
+    """One's own submissions, newest first; for an organiser everybody's."""
+    return consoles.league.submissions(race_id, user_id=person.id, everybody=everybody)
+
+
+@router.get("/league/races/{race_id}/submissions/{submission_id}")
+def get_submission(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> SubmissionInfo:
+    """One of one's own."""
+    return consoles.league.submission(race_id, submission_id, user_id=person.id)
+
+
+@router.post("/league/races/{race_id}/submissions/{submission_id}/disqualify", status_code=204)
+def disqualify(race_id: Id, submission_id: Id, body: Disqualify, consoles: InConsoles, person: InPerson) -> Response:
+    """A submission does not count, for a reason that its owner reads."""
+    consoles.league.disqualify(race_id, submission_id, body.reason, user_id=person.id)
+    return Response(status_code=204)
+
+
+@router.post("/league/races/{race_id}/submissions/{submission_id}/restore", status_code=204)
+def restore_submission(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> Response:
+    """It counts again."""
+    consoles.league.disqualify(race_id, submission_id, "", user_id=person.id)
+    return Response(status_code=204)
+
+
+def _submit(consoles: Consoles, race_id: int, data: bytes, model: str, user_id: int) -> SubmissionInfo:
+    number = consoles.league.submit(race_id, data, model=model, user_id=user_id)
+    consoles.owner.supervisor.wake()
+    return consoles.league.submission(race_id, number, user_id=user_id)
+
+
+def _row(row: Row, *, first: int | None, is_me: bool, medals: Medals | None) -> BoardRow:
+    best = seconds_of(row.best_lap_ms)
+    return BoardRow(
+        place=row.place,
+        row=row.row,
+        submission=row.submission,
+        name=row.name,
+        model=row.model,
+        is_me=is_me,
+        score=seconds_of(row.score_ms),
+        gap=None if row.score_ms is None or first is None else (row.score_ms - first) / 1000,
+        best_lap=best,
+        medal=medals.won_by(best) if medals is not None and best is not None else "",
+        resets=row.resets,
+        completion=row.completion,
+    )
+
+
+def _beaten(mine: Row | None, entrants: int) -> float | None:
+    """Per cent of the others; None for who is alone."""
+    if mine is None or entrants < 2:
+        return None
+    return round(100 * (entrants - (mine.place or mine.row)) / (entrants - 1), 1)

@@ -1,0 +1,121 @@
+"""What browser, command line and server tell each other about a league's races."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import AwareDatetime, Field
+
+from racecraft.serve.races.schemas import RaceKind, RaceState, Ranking, Title
+from racecraft.serve.schemas import Message, RunName
+
+
+class LeagueRace(Message):
+    """A race that several people enter."""
+
+    id: int
+    title: str
+    description: str
+    group: int
+    group_title: str
+    part: Literal["organiser", "racer", "spectator"]
+    """What who looks is to it."""
+    is_public: bool
+    """Whether its board is shown to everybody."""
+    kind: RaceKind
+    track: str
+    laps: int
+    ranking: Ranking
+    minimum_laps: int
+    trials: int
+    vehicle: str
+    opens: datetime
+    closes: datetime | None
+    state: RaceState
+    commitment: str
+    secret: str
+    """64 hexadecimal digits, once the race is over."""
+
+
+class LeagueRaceChange(Message):
+    """What an organiser may change while a race is on."""
+
+    title: Title | None = None
+    description: str | None = Field(None, max_length=500)
+    closes: AwareDatetime | None = None
+    is_public: bool | None = None
+
+
+class BoardRow(Message):
+    """Somebody's best submission."""
+
+    place: int | None
+    """None without enough completed laps."""
+    row: int
+    """From 1; of equals, who was first."""
+    submission: int
+    name: str
+    model: str
+    is_me: bool
+    score: float | None
+    """s"""
+    gap: float | None
+    """s behind the first."""
+    best_lap: float | None
+    """s"""
+    medal: str
+    """Of its best lap on this track, ``author`` to ``bronze``; empty where it has none or the track has no times."""
+    resets: int
+    completion: float
+
+
+class BoardPage(Message):
+    """The board: the first ones, then the neighbours of whoever looks."""
+
+    race: LeagueRace
+    entrants: int
+    """With a judged submission."""
+    ranked: int
+    running: int
+    """Submissions that are not judged yet."""
+    rows: list[BoardRow]
+    mine: int | None
+    """The row of whoever looks."""
+    beaten: float | None
+    """Per cent of the other entrants that they are ahead of."""
+
+
+class SubmissionInfo(Message):
+    """One's own submission, or for an organiser anybody's."""
+
+    id: int
+    name: str
+    model: str
+    digest: str
+    state: Literal["queued", "running", "done", "failed", "cancelled"]
+    ahead: int
+    """Submissions and evaluations that are driven before it."""
+    seconds_left: float | None
+    """About how long until it is judged, from how long the last ones took."""
+    score: float | None
+    best_lap: float | None
+    completion: float
+    error: dict[str, Any] | None
+    disqualified: str
+    """The reason."""
+    created: datetime
+    has_replay: bool
+
+
+class EnterModel(Message):
+    """A model of one's own garage."""
+
+    model: RunName
+    checkpoint: Literal["best", "last"] = "best"
+
+
+class Disqualify(Message):
+    """Why somebody's submission does not count."""
+
+    reason: Annotated[str, Field(min_length=1, max_length=200, pattern=r"\S")]

@@ -1,0 +1,96 @@
+"""The job of a submission: it is judged in a process of its own, and what that says is checked before it counts.
+
+    FOLDER/entry.safetensors   what was sent
+    FOLDER/entry.replay        what was driven, to be driven again by anybody once the race is over
+
+The judge is given no secret. This process has it, drives the replay again from its actions alone, and only believes
+what comes out the same, from the starts that the secret gives.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import sqlalchemy as sa
+
+from racecraft.errors import RunError
+from racecraft.serve.jobs.task import Task
+from racecraft.serve.settings import STATE_FOLDER
+from racecraft.serve.store.tables import Submission, now
+from racecraft.serve.submissions.judge import JUDGED
+
+FOLDER: Final = "submissions"
+REPLAY: Final = "entry.replay"
+PATIENCE: Final = 600.0  # s
+
+
+def submission_folder(state: Path, job_id: str) -> Path:
+    """Where the files of a submission lie, by its job."""
+    return state / FOLDER / job_id
+
+
+def judge(task: Task) -> dict[str, Any]:
+    """Judge a submission, and write its score where the board is read from."""
+    from racecraft.contest.standings import median_score, ranking_score
+    from racecraft.race.announcement import Announcement
+    from racecraft.replay.replay import read_replay, write_replay
+    from racecraft.replay.verification import verify
+
+    payload = task.job.payload
+    announcement = Announcement.from_dict(payload["announcement"])
+    folder = submission_folder(task.home / STATE_FOLDER, task.job.id)
+    result = _ask_judge(folder, announcement, track=payload["track"], name=payload["name"])
+    replay = read_replay(folder / JUDGED)
+    found = verify(replay, race=announcement)
+    if not found.is_genuine:
+        raise RunError(f"The judge's result does not hold: {found.sentence}", hint="This is a bug in Racecraft.")
+    write_replay(replay, folder / REPLAY)
+    (folder / JUDGED).unlink()
+    laps: list[list[float]] = result["lap_seconds"]
+    document = announcement.document
+    score = median_score(
+        [ranking_score(one, ranking=document["ranking"], minimum_laps=document["minimum_laps"]) for one in laps]
+    )
+    best = min((seconds for one in laps for seconds in one), default=None)
+    values = {
+        "score_ms": None if score == float("inf") else round(1000 * score),
+        "best_lap_ms": None if best is None else round(1000 * best),
+        "resets": int(result.get("resets") or 0),
+        "completion": float(result.get("mean_completion") or 0.0),
+        "judged": now(),
+    }
+    with task.database.transaction() as session:
+        session.execute(sa.update(Submission).where(Submission.job_id == task.job.id).values(values))
+    return result
+
+
+def _ask_judge(folder: Path, announcement: Any, *, track: str, name: str) -> dict[str, Any]:
+    """What the judge says; it has nothing but the folder and what it is told."""
+    told = {
+        "document": dict(announcement.document),
+        "commitment": announcement.commitment,
+        "seed": announcement.seed,
+        "track": track,
+        "name": name,
+    }
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", "racecraft.serve.submissions.judge"],
+            cwd=folder,
+            env={"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+            input=json.dumps(told).encode(),
+            stdout=subprocess.PIPE,
+            timeout=PATIENCE,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise RunError(f"It drove for more than {PATIENCE:.0f} s and was stopped.") from error
+    if done.returncode not in (0, 3):
+        raise RunError("The judge's process failed.", hint="The server's jobs.log says why.")
+    result: dict[str, Any] = json.loads(done.stdout)
+    if done.returncode == 3:
+        raise RunError(result["message"], hint=result["hint"])
+    return result

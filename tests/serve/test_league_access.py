@@ -1,0 +1,293 @@
+"""Every route, every role, somebody else's object: what is not yours does not exist. A new route needs a row here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+from leagues import RunningLeague, ok, running_league, untrained_run
+
+from racecraft.race.entry_file import pack_entry
+
+MODEL: dict[str, Any] = {"name": "adas-model"}
+RACE: dict[str, Any] = {"title": "adas-race", "track": "oval", "laps": 1, "trials": 1}
+SKETCH = [[0, 0], [8, 0], [8, 6], [0, 6]]
+
+REWARD = "def reward_function(params):\n    return 1.0\n"
+
+ROWS: dict[str, tuple[str, Any]] = {
+    # whose is what it is about, and a body that would do
+    "GET /api/console": ("each", None),
+    "GET /api/console/machine": ("admin", None),
+    "GET /api/tracks": ("each", None),
+    "POST /api/tracks/validate": ("each", None),
+    "POST /api/tracks/import": ("each", None),
+    "GET /api/tracks/{track}": ("own", None),
+    "PUT /api/tracks/{track}": ("each", None),
+    "DELETE /api/tracks/{track}": ("own", None),
+    "GET /api/tracks/{track}/sketch": ("own", None),
+    "GET /api/tracks/{track}/route.npy": ("own", None),
+    "POST /api/tracks/{track}/restore": ("own", None),
+    "POST /api/drives": ("own", {"track": "adas-track"}),
+    "POST /api/drives/{drive_id}/steps": ("own", {"steering": 0.0, "speed": 1.0}),
+    "DELETE /api/drives/{drive_id}": ("hidden", None),
+    "GET /api/ghosts": ("own", "?track=adas-track"),
+    "GET /api/ghosts/{key}": ("own", "?track=oval"),
+    "GET /api/rewards": ("each", None),
+    "GET /api/actions": ("each", None),
+    "POST /api/rewards/check": (
+        "own",
+        {"source": REWARD, "track": "adas-track"},
+    ),
+    "GET /api/choices": ("each", None),
+    "POST /api/models/import": ("each", None),
+    "GET /api/models": ("each", None),
+    "POST /api/models": ("each", None),
+    **{
+        label: ("own", body)
+        for label, body in {
+            "GET /api/models/{name}": None,
+            "GET /api/models/{name}/archive": None,
+            "PATCH /api/models/{name}": {"tags": ["x"]},
+            "DELETE /api/models/{name}": None,
+            "POST /api/models/{name}/restore": None,
+            "POST /api/models/{name}/clone": {},
+            "POST /api/models/{name}/train": {},
+            "POST /api/models/{name}/stop": None,
+            "GET /api/models/{name}/history": None,
+            "GET /api/models/{name}/files/{path}": None,
+            "GET /api/models/{name}/evaluations": None,
+            "POST /api/models/{name}/evaluations": {},
+            "GET /api/models/{name}/evaluations/{stamp}/telemetry": None,
+            "GET /api/models/{name}/evaluations/{stamp}/laps": None,
+            "GET /api/models/{name}/evaluations/{stamp}/saliency": "?lap=1&row=1",
+            "GET /api/models/{name}/maps": "?first=0&last=1",
+            "GET /api/models/{name}/report": None,
+            "GET /api/models/{name}/tunings": None,
+            "POST /api/models/{name}/tunings": {"minutes": 1},
+            "GET /api/models/{name}/tunings/space": None,
+            "POST /api/models/{name}/tunings/{tuning}/keep": {},
+            "DELETE /api/models/{name}/tunings/{tuning}": None,
+            "GET /api/races/{race_id}": None,
+            "PATCH /api/races/{race_id}": {"title": "x"},
+            "DELETE /api/races/{race_id}": None,
+            "POST /api/races/{race_id}/restore": None,
+            "POST /api/races/{race_id}/entries": {"models": ["adas-model"]},
+            "DELETE /api/races/{race_id}/entries/{entry_id}": None,
+            "GET /api/races/{race_id}/race.json": None,
+            "GET /api/races/{race_id}/entries/{entry_id}/video": None,
+            "GET /api/races/{race_id}/entries/{entry_id}/replay": None,
+            "GET /api/races/{race_id}/replay": "?entries=1",
+            "GET /api/jobs/{job_id}": None,
+            "POST /api/jobs/{job_id}/cancel": None,
+            "GET /api/events/{name}": None,
+        }.items()
+    },
+    "GET /api/races": ("each", None),
+    "POST /api/races": ("each", None),
+    "GET /api/jobs": ("each", None),
+    "GET /api/door": ("open", None),
+    "POST /api/door/sign-in": ("open", {"name": "nobody", "password": "x"}),
+    "POST /api/door/card": ("open", {"secret": "x"}),
+    "POST /api/door/join": ("open", {"code": "x", "name": "x"}),
+    "POST /api/door/sign-out": ("each", None),
+    "GET /api/account": ("me", None),
+    "DELETE /api/account": ("me", None),
+    "PATCH /api/account": ("me", None),
+    "PUT /api/account/password": ("me", None),
+    "DELETE /api/account/sessions": ("me", None),
+    "GET /api/account/tokens": ("me", None),
+    "POST /api/account/tokens": ("me", None),
+    "DELETE /api/account/tokens/{token_id}": ("own", None),
+    "GET /api/groups": ("each", None),
+    "POST /api/groups": ("organisers", {"title": "x"}),
+    "POST /api/groups/join": ("each", None),
+    "GET /api/groups/{group_id}": ("member", None),
+    "POST /api/groups/{group_id}/joining": ("organiser", {}),
+    "DELETE /api/groups/{group_id}/joining": ("organiser", None),
+    "POST /api/groups/{group_id}/members": ("organiser", {"people": [{"name": "New"}]}),
+    "PATCH /api/groups/{group_id}/members/{member}": ("organiser", {"real_name": "x"}),
+    "DELETE /api/groups/{group_id}/members/{member}": ("herself", None),
+    "POST /api/groups/{group_id}/members/{member}/revoke": ("organiser", None),
+    "POST /api/groups/{group_id}/cards": ("organiser", {"members": [0]}),
+    "GET /api/groups/{group_id}/models": ("organiser", None),
+    "POST /api/groups/{group_id}/models/copy": ("organiser", {"member": 0, "model": "adas-model"}),
+    "POST /api/invitations": ("admin", {}),
+    "GET /api/league/races": ("each", None),
+    "POST /api/groups/{group_id}/races": ("organiser", RACE),
+    "PATCH /api/league/races/{cup}": ("organiser", {"title": "x"}),
+    "DELETE /api/league/races/{cup}": ("organiser", None),
+    "GET /api/boards/{cup}": ("member", None),
+    "GET /api/boards/{cup}/race.json": ("member", None),
+    "GET /api/boards/{cup}/replays/{submission_id}": ("hidden", None),
+    "POST /api/league/races/{cup}/submissions": ("member", "?model=x"),
+    "GET /api/league/races/{cup}/submissions": ("member", None),
+    "POST /api/league/races/{cup}/enter": ("own", {"model": "adas-model"}),
+    "GET /api/league/races/{cup}/submissions/{submission_id}": ("own", None),
+    "POST /api/league/races/{cup}/submissions/{submission_id}/disqualify": ("organiser", {"reason": "x"}),
+    "POST /api/league/races/{cup}/submissions/{submission_id}/restore": ("organiser", None),
+}
+MAY = {  # who may do what is theirs by role; everybody else gets 404
+    "own": ("ada",),
+    "each": ("ada", "bob", "teacher", "other", "eve", "owner"),
+    "me": ("ada", "bob", "teacher", "other", "eve", "owner"),
+    "open": ("ada", "bob", "teacher", "other", "eve", "owner"),
+    "member": ("ada", "bob", "teacher"),
+    "organiser": ("teacher",),
+    "herself": ("ada", "teacher"),
+    "organisers": ("teacher", "other", "owner"),
+    "admin": ("owner",),
+    "hidden": (),
+}
+SLIPPERY = ("DELETE /api/drives/{drive_id}", "GET /api/boards/{cup}/replays/{submission_id}")
+"""To get out of a car that is not there is no error; what was driven in a race that is on nobody sees."""
+
+
+class School:
+    """A league in which Ada has one of everything."""
+
+    def __init__(self, league: RunningLeague) -> None:
+        self.league = league
+        teacher, other = league.organiser("Teacher"), league.organiser("Other")
+        group = league.group("adas-class", teacher)
+        code = league.code(group, teacher)
+        ada, bob = league.join(code, "Ada"), league.join(code, "Bob")
+        eve = league.join(league.code(league.group("Elsewhere", other), other), "Eve")
+        self.people = {"owner": league.owner, "teacher": teacher, "other": other, "ada": ada, "bob": bob, "eve": eve}
+        number = league.number(ada)
+        home = league.console.runs / ".racecraft" / "people" / str(number)
+        ok(ada.get("/api/models"))
+        run = untrained_run(home, "adas-model")
+        (home / ".racecraft" / "tracks" / "adas-track.npy").write_bytes(ada.get("/api/tracks/oval/route.npy").content)
+        cup = ok(teacher.post(f"/api/groups/{group}/races", json=RACE), 201)["id"]
+        data = pack_entry(run)
+        submission = ok(ada.post(f"/api/league/races/{cup}/submissions?model=adas-model", content=data), 202)["id"]
+        token = ok(ada.post("/api/account/tokens", json={"title": "adas-token"}), 201)["id"]
+        race = ok(ada.post("/api/races", json=RACE), 201)["id"]
+        entry = ok(ada.post(f"/api/races/{race}/entries", json={"models": ["adas-model"]}), 202)["undecided"]
+        self.objects = {
+            "track": "adas-track",
+            "name": "adas-model",
+            "drive_id": ok(ada.post("/api/drives", json={"track": "adas-track"}), 201)["id"],
+            "key": "model:adas-model",
+            "path": "metrics/x.json",
+            "stamp": "20260101000000",
+            "tuning": "0" * 16,
+            "race_id": race,
+            "entry_id": entry[0]["entry"],
+            "job_id": ok(ada.get("/api/jobs"))[0]["id"],
+            "token_id": token,
+            "group_id": group,
+            "member": number,
+            "cup": cup,
+            "submission_id": submission,
+        }
+
+    def request(self, client: httpx.Client, label: str) -> httpx.Response:
+        method, path = label.split()
+        body = ROWS[label][1]
+        if isinstance(body, dict):
+            body = {**body}
+            body |= {"members": [self.objects["member"]]} if "members" in body else {}
+            body |= {"member": self.objects["member"]} if "member" in body else {}
+        query = body if isinstance(body, str) else ""
+        json = body if isinstance(body, dict) else None
+        with client.stream(method, path.format(**self.objects) + query, json=json) as reply:
+            if not reply.headers.get("content-type", "").startswith("text/event-stream"):
+                reply.read()
+            return reply
+
+
+@pytest.fixture(scope="module")
+def school(tmp_path_factory: pytest.TempPathFactory) -> Iterator[School]:
+    with running_league(tmp_path_factory.mktemp("access") / "runs") as league:
+        yield School(league)
+
+
+def label_of(operation: str) -> str:
+    """As in the table, where a name says what kind of thing is named."""
+    for room, name, ours in (
+        ("/api/tracks/", "{name}", "{track}"),
+        ("/api/league/", "{race_id}", "{cup}"),
+        ("/api/boards/", "{race_id}", "{cup}"),
+    ):
+        if room in operation:
+            operation = operation.replace(name, ours)
+    return operation
+
+
+def test_every_route_has_a_row(school: School) -> None:
+    paths = ok(school.league.owner.get("/api/openapi.json"))["paths"]
+    operations = {label_of(f"{method.upper()} {path}") for path, item in paths.items() for method in item}
+    assert operations == set(ROWS)
+
+
+def test_what_is_not_yours_does_not_exist(school: School) -> None:
+    found = {}
+    for label, (kind, _) in ROWS.items():
+        for role, client in school.people.items():
+            if label in SLIPPERY or role in MAY[kind]:
+                continue
+            reply = school.request(client, label)
+            if reply.status_code != 404:
+                found[f"{role}: {label}"] = (reply.status_code, reply.text[:200])
+    assert found == {}
+
+
+def test_who_may_look_can_and_sees_nothing_of_others(school: School) -> None:
+    found = {}
+    for label, (kind, _) in ROWS.items():
+        for role in MAY[kind]:
+            if not label.startswith("GET") or kind == "own":
+                continue
+            reply = school.request(school.people[role], label)
+            is_related = role in ("ada", "bob", "teacher")
+            if reply.status_code != 200 or (not is_related and "adas-" in reply.text):
+                found[f"{role}: {label}"] = (reply.status_code, reply.text[:200])
+    assert found == {}
+
+
+def test_what_is_hers_ada_finds(school: School) -> None:
+    """So that the 404s above are about whose it is."""
+    for label in (
+        "GET /api/models/{name}",
+        "GET /api/tracks/{track}",
+        "GET /api/jobs/{job_id}",
+        "GET /api/races/{race_id}",
+        "GET /api/models/{name}/history",
+        "GET /api/league/races/{cup}/submissions/{submission_id}",
+        "GET /api/events/{name}",
+    ):
+        assert school.request(school.people["ada"], label).status_code == 200, label
+
+
+def test_strangers_are_sent_to_the_door(school: School) -> None:
+    with school.league.stranger() as stranger:
+        for label, (kind, _) in ROWS.items():
+            status = school.request(stranger, label).status_code
+            is_board = label.startswith("GET /api/boards/")
+            expected = (200, 401) if kind == "open" else (404,) if is_board else (401,)
+            assert status in expected, (label, status)
+
+
+def test_a_token_to_read_changes_nothing(school: School) -> None:
+    secret = ok(school.people["ada"].post("/api/account/tokens", json={"scopes": ["read"]}), 201)["secret"]
+    with httpx.Client(
+        base_url=school.league.owner.base_url, headers={"authorization": f"Bearer {secret}"}, timeout=60
+    ) as program:
+        for label in ROWS:
+            status = school.request(program, label).status_code
+            may = label.startswith("GET") and not label.startswith("GET /api/account")
+            assert (status != 403) == may, (label, status)
+
+
+def test_a_group_cannot_be_looked_into_by_who_organises_another(school: School) -> None:
+    for role in ("other", "eve", "bob", "owner"):
+        for label, (kind, _) in ROWS.items():
+            if label.startswith("GET") and kind == "own" and "account" not in label and "league" not in label:
+                path = label.split()[1].format(**school.objects) + f"?of={school.objects['member']}"
+                assert school.people[role].get(path).status_code == 404, (role, label)
+    looked = school.people["teacher"].get(f"/api/models/adas-model?of={school.objects['member']}")
+    assert looked.status_code == 200

@@ -1,0 +1,312 @@
+"""A league's people: how they come in, what opens the door, who may do what to whom; and what strangers try."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from leagues import RunningLeague, ok, refused, running_league
+from running_consoles import running_console
+
+from racecraft.errors import ConfigError
+from racecraft.serve.people.names import checked_name, handle_of
+from racecraft.serve.settings import ServeSettings
+
+
+@pytest.fixture(scope="module")
+def league(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningLeague]:
+    with running_league(tmp_path_factory.mktemp("league") / "runs") as league:
+        yield league
+
+
+@pytest.fixture(scope="module")
+def school(league: RunningLeague) -> dict[str, Any]:
+    """A teacher with a class of two, and another teacher with a class of one."""
+    teacher, other = league.organiser("Ms Frizzle"), league.organiser("Mr Chips")
+    mine, theirs = league.group("5b", teacher), league.group("6a", other)
+    code = league.code(mine, teacher)
+    return {
+        "teacher": teacher,
+        "other": other,
+        "group": mine,
+        "code": code,
+        "ada": league.join(code, "Ada"),
+        "bob": league.join(code, "Bob"),
+        "eve": league.join(league.code(theirs, other), "Eve"),
+    }
+
+
+def test_the_owners_link_is_the_first_admin(league: RunningLeague) -> None:
+    me = ok(league.owner.get("/api/door"))["me"]
+    assert (me["id"], me["role"]) == (1, "admin")
+    assert ok(league.owner.get("/api/console"))["runs"] == str(league.console.runs)
+    with league.stranger() as stranger:
+        assert ok(stranger.get("/api/door")) == {"is_league": True, "me": None}
+        assert "not signed in" in refused(stranger.get("/api/models"), 401)
+
+
+def test_thirty_people_behind_one_address_come_in_by_card(league: RunningLeague) -> None:
+    group = league.group("Thirty")
+    people = [{"name": f"Racer {number}", "real_name": f"Real {number}"} for number in range(30)]
+    cards = ok(league.owner.post(f"/api/groups/{group}/members", json={"people": people}), 201)
+    assert all(card["picture"].startswith("data:image/svg") for card in cards)
+    began = time.process_time()
+    replies: list[int] = []
+
+    def come_in(link: str) -> None:
+        with league.stranger() as client:
+            replies.append(client.post("/api/door/card", json={"secret": link.split("#")[1]}).status_code)
+            replies.append(client.get("/api/models").status_code)
+
+    threads = [threading.Thread(target=come_in, args=(card["link"],)) for card in cards]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert replies == [200] * 60
+    assert time.process_time() - began < 60
+
+
+def test_twenty_wrong_passwords_on_one_account_are_stopped_and_the_others_come_in(league: RunningLeague) -> None:
+    owner = league.owner
+    assert "10 to 256" in refused(owner.put("/api/account/password", json={"new": "short"}), 422)
+    ok(owner.put("/api/account/password", json={"new": "correct horse"}), 204)
+    assert "not your" in refused(owner.put("/api/account/password", json={"new": "battery staple", "old": "x"}), 422)
+    victim = league.organiser("Victim")
+    ok(victim.put("/api/account/password", json={"new": "a long password"}), 204)
+    with league.stranger() as stranger:
+        for name in ("Victim", "Nobody at all"):
+            wrong = {"name": name, "password": "guess"}
+            statuses = [stranger.post("/api/door/sign-in", json=wrong).status_code for _ in range(20)]
+            assert statuses[:10] == [401] * 10
+            assert statuses[-1] == 429
+        right = {"name": "victim", "password": "a long password"}
+        assert "too many" in refused(stranger.post("/api/door/sign-in", json=right), 429)
+        me = ok(stranger.post("/api/door/sign-in", json={"name": "YOU", "password": "correct horse"}))
+        assert me["id"] == 1
+
+
+def test_guessed_codes_are_stopped(tmp_path: Path) -> None:
+    from racecraft.serve.people.tries import Tries
+    from racecraft.serve.problems import TooMany
+
+    tries = Tries()
+    for _ in range(200):
+        tries.check(account="", address="1.2.3.4")
+        tries.failed(account="", address="1.2.3.4")
+    with pytest.raises(TooMany):
+        tries.check(account="", address="1.2.3.4")
+    tries.check(account="", address="1.2.3.5")
+
+
+def test_a_code_has_uses_and_an_end_and_can_be_closed(league: RunningLeague) -> None:
+    group = league.group("Codes")
+    first = league.code(group, uses=1)
+    league.join(f"{first[:4].lower()}-{first[4:]}", "One")
+    with league.stranger() as stranger:
+        assert "no such code" in refused(stranger.post("/api/door/join", json={"code": first, "name": "Two"}), 401)
+        second, third = league.code(group), league.code(group)
+        assert "no such code" in refused(stranger.post("/api/door/join", json={"code": second, "name": "Two"}), 401)
+        for name in ("one", " O n e", "Оne\u200b", "", "x" * 33, "\u202eevil"):
+            reply = stranger.post("/api/door/join", json={"code": third, "name": name})
+            assert reply.status_code in (409, 422), (name, reply.text)
+        uses = ok(league.owner.get(f"/api/groups/{group}"))["joining"]["uses_left"]
+        assert uses == 40, "a name that is refused costs no use"
+        ok(league.owner.delete(f"/api/groups/{group}/joining"), 204)
+        refused(stranger.post("/api/door/join", json={"code": third, "name": "Two"}), 401)
+    assert [member["name"] for member in ok(league.owner.get(f"/api/groups/{group}"))["members"]] == ["you", "One"]
+
+
+def test_names_that_look_alike_are_one() -> None:
+    assert handle_of("Ada") == handle_of("ＡＤＡ") == handle_of("a d-a") == handle_of("Ädà")
+    assert handle_of("Ada") != handle_of("Adam")
+    assert checked_name("  Zoë   B. ") == "Zoë B."
+    for name in ("", "  ", "a\nb\u0007", "\u200bx", "x" * 33, "...", "\ud800"):
+        with pytest.raises(ConfigError):
+            checked_name(name)
+
+
+def test_a_stolen_card_is_worth_nothing_once_it_is_revoked(league: RunningLeague, school: dict[str, Any]) -> None:
+    teacher, group = school["teacher"], school["group"]
+    (card,) = ok(teacher.post(f"/api/groups/{group}/members", json={"people": [{"name": "Carl"}]}), 201)
+    secret = card["link"].split("#")[1]
+    thief = league.stranger()
+    ok(thief.post("/api/door/card", json={"secret": secret}))
+    token = ok(thief.post("/api/account/tokens", json={}), 201)["secret"]
+    ok(teacher.post(f"/api/groups/{group}/members/{card['id']}/revoke"), 204)
+    refused(thief.get("/api/models"), 401)
+    assert "no longer good" in refused(thief.post("/api/door/card", json={"secret": secret}), 401)
+    refused(httpx.get(f"{league.owner.base_url}/api/models", headers={"authorization": f"Bearer {token}"}), 401)
+    (fresh,) = ok(teacher.post(f"/api/groups/{group}/cards", json={"members": [card["id"]]}), 201)
+    ok(thief.post("/api/door/card", json={"secret": fresh["link"].split("#")[1]}))
+    (newest,) = ok(teacher.post(f"/api/groups/{group}/cards", json={"members": [card["id"]]}), 201)
+    refused(league.stranger().post("/api/door/card", json={"secret": fresh["link"].split("#")[1]}), 401)
+    assert newest["link"].startswith(str(league.owner.base_url).rstrip("/") + "/card#")
+
+
+def test_an_open_stream_ends_with_its_session(league: RunningLeague, school: dict[str, Any]) -> None:
+    teacher, group = school["teacher"], school["group"]
+    (card,) = ok(teacher.post(f"/api/groups/{group}/members", json={"people": [{"name": "Dora"}]}), 201)
+    with league.stranger() as dora:
+        let_in = dora.post("/api/door/card", json={"secret": card["link"].split("#")[1]})
+        assert {"HttpOnly", "SameSite=strict"} <= set(let_in.headers["set-cookie"].split("; "))
+        ok(dora.post("/api/models", json={"name": "hers", "train": False, "track": "oval"}), 201)
+        ended = threading.Event()
+        began = threading.Event()
+
+        def follow() -> None:
+            with dora.stream("GET", "/api/events/hers") as stream:
+                for _ in stream.iter_lines():
+                    began.set()
+            ended.set()
+
+        threading.Thread(target=follow, daemon=True).start()
+        assert began.wait(30)
+        ok(teacher.post(f"/api/groups/{group}/members/{card['id']}/revoke"), 204)
+        assert ended.wait(10)
+
+
+def test_tokens_do_what_they_were_made_for_and_no_more(league: RunningLeague, school: dict[str, Any]) -> None:
+    ada = school["ada"]
+    made = ok(ada.post("/api/account/tokens", json={"scopes": ["read"], "days": 1}), 201)
+    with httpx.Client(
+        base_url=ada.base_url, headers={"authorization": f"Bearer {made['secret']}"}, timeout=60
+    ) as program:
+        ok(program.get("/api/models"))
+        assert "not for that" in refused(program.post("/api/models", json={}), 403)
+        assert "not for that" in refused(program.get("/api/account"), 403)
+        assert "not for that" in refused(program.post("/api/account/tokens", json={}), 403)
+        assert "not for that" in refused(program.post("/api/league/races/1/submissions"), 403)
+        ok(ada.delete(f"/api/account/tokens/{made['id']}"), 204)
+        refused(program.get("/api/models"), 401)
+    assert made["secret"] not in json.dumps(ok(ada.get("/api/account/tokens")))
+    refused(school["bob"].delete(f"/api/account/tokens/{made['id']}"), 404)
+
+
+def test_everybodys_models_are_their_own_and_may_have_the_same_name(
+    league: RunningLeague, school: dict[str, Any]
+) -> None:
+    ada, bob, teacher, other = school["ada"], school["bob"], school["teacher"], school["other"]
+    for client, track in ((ada, "oval"), (bob, "hairpin"), (league.owner, "oval")):
+        ok(client.post("/api/models", json={"name": "mine", "train": False, "track": track}), 201)
+    assert [model["track"] for model in ok(ada.get("/api/models"))] == ["oval"]
+    assert ok(bob.get("/api/models/mine"))["track"] == "hairpin"
+    ok(ada.patch("/api/models/mine", json={"name": "hers", "tags": ["a"]}))
+    refused(bob.get("/api/models/hers"), 404)
+    assert ok(bob.get("/api/models/mine"))["tags"] == []
+    number = league.number(ada)
+    assert ok(teacher.get(f"/api/models?of={number}"))[0]["name"] == "hers"
+    assert ok(teacher.get(f"/api/models/hers?of={number}"))["track"] == "oval"
+    refused(teacher.patch(f"/api/models/hers?of={number}", json={"tags": ["x"]}), 404)
+    refused(teacher.delete(f"/api/models/hers?of={number}"), 404)
+    for nosy in (other, bob, school["eve"]):
+        refused(nosy.get(f"/api/models/hers?of={number}"), 404)
+    copied = ok(
+        teacher.post(
+            f"/api/groups/{school['group']}/models/copy", json={"member": number, "model": "hers", "name": "help"}
+        ),
+        201,
+    )
+    assert copied["name"] == "help"
+    listed = ok(teacher.get(f"/api/groups/{school['group']}/models"))
+    assert {one["name"]: [model["name"] for model in one["models"]] for one in listed}["Ada"] == ["hers"]
+    foreign = {folder: json.loads((folder / "run.json").read_text())["foreign"] for folder in _runs(league)}
+    assert all(is_foreign == (folder.parent != league.console.runs) for folder, is_foreign in foreign.items())
+
+
+def _runs(league: RunningLeague) -> list[Path]:
+    return [path.parent for path in league.console.runs.glob("**/run.json") if "trash" not in path.parts]
+
+
+def test_a_guests_changed_reward_is_foreign_whatever_the_model_was(
+    league: RunningLeague, school: dict[str, Any]
+) -> None:
+    bob = school["bob"]
+    ok(bob.post("/api/models", json={"name": "tamed", "train": False, "track": "oval"}), 201)
+    path = league.console.runs / ".racecraft" / "people" / str(league.number(bob)) / "tamed" / "run.json"
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps({**document, "foreign": False}))  # as an archive without a reward would give it
+    gate = "def reward_function(params):\n    return 1.0\n"
+    reply = bob.post("/api/models/tamed/train", json={"reward": gate, "until": "64 steps"})
+    assert reply.status_code in (202, 422)  # refused where nothing can lock it in
+    assert json.loads(path.read_text())["foreign"] is (reply.status_code == 202)
+
+
+def test_real_names_are_for_organisers_and_names_can_be_moderated(
+    league: RunningLeague, school: dict[str, Any]
+) -> None:
+    teacher, group, ada = school["teacher"], school["group"], school["ada"]
+    address = f"/api/groups/{group}/members/{league.number(ada)}"
+    ok(teacher.patch(address, json={"real_name": "Augusta King"}), 204)
+    assert "Augusta King" in teacher.get(f"/api/groups/{group}").text
+    assert "Augusta King" not in school["bob"].get(f"/api/groups/{group}").text
+    assert ok(school["bob"].get(f"/api/groups/{group}"))["joining"] is None
+    ok(teacher.patch(address, json={"name": "Countess"}), 204)
+    assert ok(ada.get("/api/account"))["name"] == "Countess"
+    refused(teacher.patch(address, json={"name": "bob"}), 409)
+    refused(school["other"].patch(address, json={"name": "Rude"}), 404)
+
+
+def test_an_organiser_cannot_print_a_card_for_who_has_power(league: RunningLeague, school: dict[str, Any]) -> None:
+    teacher, group = school["teacher"], school["group"]
+    for client in (league.owner, school["other"]):
+        ok(client.post("/api/groups/join", json={"code": school["code"]}))
+        number = league.number(client)
+        assert "account of their own" in refused(
+            teacher.post(f"/api/groups/{group}/cards", json={"members": [number]}), 404
+        )
+        refused(teacher.post(f"/api/groups/{group}/members/{number}/revoke"), 404)
+        refused(teacher.patch(f"/api/groups/{group}/members/{number}", json={"name": "Rude"}), 404)
+        ok(client.delete(f"/api/groups/{group}/members/{number}"), 204)
+
+
+def test_who_leaves_takes_everything_along(league: RunningLeague, school: dict[str, Any]) -> None:
+    gone = league.join(school["code"], "Gone")
+    ok(gone.post("/api/models", json={"name": "last", "train": False, "track": "oval"}), 201)
+    folder = league.console.runs / ".racecraft" / "people" / str(league.number(gone))
+    assert (folder / "last").is_dir()
+    ok(gone.delete("/api/account"), 204)
+    refused(gone.get("/api/models"), 401)
+    assert not folder.exists()
+    assert "Gone" not in school["teacher"].get(f"/api/groups/{school['group']}").text
+    league.join(school["code"], "Gone")
+    refused(league.owner.delete("/api/account"), 409)
+
+
+def test_one_person_alone_notices_nothing(league: RunningLeague, tmp_path: Path) -> None:
+    with running_console(tmp_path / "runs") as console, httpx.Client(base_url=console.client.base_url) as stranger:
+        assert stranger.get("/api/door").status_code == 401
+        assert "not known" in refused(stranger.get("/api/models"), 401)
+        for path in ("/api/door", "/api/account", "/api/groups", "/api/league/races", "/api/boards/1"):
+            assert "one person's" in refused(console.client.get(path), 404)
+        assert "one person's" in refused(console.client.post("/api/invitations", json={}), 404)
+        assert ok(console.client.get("/api/models?of=7")) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({"host": "0.0.0.0"}, "only on 127.0.0.1"),
+        ({"host": "0.0.0.0", "league": True}, "unencrypted"),
+        ({"address": "http://school.example:8321", "league": True}, "unencrypted"),
+        ({"address": "ftp://x", "league": True}, "allowed are"),
+        ({"address": "https://x/path", "league": True}, "allowed are"),
+        ({"host": "0.0.0.0", "league": True, "plain_http": True}, ""),
+        ({"host": "0.0.0.0", "league": True, "address": "https://school.example"}, ""),
+        ({"league": True, "address": "https://school.example"}, ""),
+    ],
+)
+def test_what_would_show_secrets_is_refused_unless_said_twice(
+    tmp_path: Path, settings: dict[str, Any], text: str
+) -> None:
+    if text:
+        with pytest.raises(ConfigError, match=text):
+            ServeSettings(runs=tmp_path, **settings)
+    else:
+        assert ServeSettings(runs=tmp_path, **settings).league

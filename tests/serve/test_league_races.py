@@ -1,0 +1,316 @@
+"""A league's races: what is sent in, who judges it, where it stands; and what is refused with which sentence."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import json
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+import sqlalchemy as sa
+from leagues import RunningLeague, ok, refused, running_league, untrained_run
+
+from racecraft.contest.standings import places, ranking_key
+from racecraft.race.entry_file import pack_entry, read_entry_file
+from racecraft.race.policy import WEIGHTS
+from racecraft.run import RunFolder
+from racecraft.run.checkpoint import HEADER_KEY
+from racecraft.run.tensor_file import tensor_file
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Group, Job, Race, Submission, User, now
+from racecraft.serve.submissions.board import AROUND, read_board
+
+CUP: dict[str, Any] = {"title": "Cup", "track": "oval", "laps": 1, "trials": 2, "max_resets": 1}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    return untrained_run(tmp_path_factory.mktemp("runs"), "novice")
+
+
+@pytest.fixture(scope="module")
+def league(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningLeague]:
+    with running_league(tmp_path_factory.mktemp("league") / "runs") as league:
+        yield league
+
+
+class Cup:
+    """A race with two racers."""
+
+    def __init__(self, league: RunningLeague) -> None:
+        self.owner, group = league.owner, league.group("Club")
+        code = league.code(group)
+        self.league = league
+        self.ada, self.bob = league.join(code, "Ada"), league.join(code, "Bob")
+        self.race = ok(self.owner.post(f"/api/groups/{group}/races", json=CUP), 201)["id"]
+        self.address = f"/api/league/races/{self.race}/submissions"
+
+    def submit(self, client: httpx.Client, data: bytes, model: str = "novice") -> httpx.Response:
+        return client.post(f"{self.address}?model={model}", content=data)
+
+    def judged(self, client: httpx.Client, number: int) -> Any:
+        def ended() -> Any:
+            found = ok(client.get(f"{self.address}/{number}"))
+            return found if found["state"] in ("done", "failed", "cancelled") else None
+
+        return self.league.console.wait_for(ended)
+
+
+@pytest.fixture(scope="module")
+def cup(league: RunningLeague) -> Cup:
+    return Cup(league)
+
+
+def test_what_is_sent_in_is_judged_and_stands_on_the_board(cup: Cup, run: RunFolder) -> None:
+    data = pack_entry(run)
+    first = ok(cup.submit(cup.ada, data), 202)
+    again = ok(cup.submit(cup.ada, data, "another-name"), 202)
+    assert again["id"] == first["id"], "the same file again is the same submission"
+    assert "already" in refused(cup.submit(cup.bob, data), 409)
+    found = cup.judged(cup.ada, first["id"])
+    assert found["state"] == "done", found
+    assert found["has_replay"] is False
+    board = ok(cup.bob.get(f"/api/boards/{cup.race}"))
+    assert (board["entrants"], board["running"], board["mine"]) == (1, 0, None)
+    (row,) = board["rows"]
+    assert (row["name"], row["model"], row["is_me"]) == ("Ada", "novice", False)
+    assert ok(cup.ada.get(f"/api/boards/{cup.race}"))["rows"][0]["is_me"]
+    refused(cup.bob.get(f"{cup.address}/{first['id']}"), 404)
+
+    # until it is over nobody sees where it starts
+    assert board["race"]["secret"] == ""
+    assert "tells where it starts" in refused(cup.ada.get(f"/api/boards/{cup.race}/replays/{first['id']}"), 409)
+    assert "secret" not in json.dumps(ok(cup.ada.get("/api/jobs")))
+    assert ok(cup.bob.get(f"/api/boards/{cup.race}/race.json"))["secret"] == ""
+    for nosy in (cup.bob, cup.ada):
+        refused(nosy.patch(f"/api/league/races/{cup.race}", json={"is_public": True}), 404)
+    with cup.league.stranger() as stranger:
+        refused(stranger.get(f"/api/boards/{cup.race}"), 404)
+        ok(cup.owner.patch(f"/api/league/races/{cup.race}", json={"is_public": True}))
+        assert ok(stranger.get(f"/api/boards/{cup.race}"))["race"]["part"] == "spectator"
+        refused(stranger.post(f"{cup.address}?model=x", content=data), 401)
+
+    # a reason, and back again
+    address = f"{cup.address}/{first['id']}"
+    refused(cup.bob.post(f"{address}/disqualify", json={"reason": "No."}), 404)
+    ok(cup.owner.post(f"{address}/disqualify", json={"reason": "Not its own work."}), 204)
+    assert ok(cup.ada.get(address))["disqualified"] == "Not its own work."
+    assert ok(cup.ada.get(f"/api/boards/{cup.race}"))["entrants"] == 0
+    ok(cup.owner.post(f"{address}/restore"), 204)
+    assert ok(cup.ada.get(f"/api/boards/{cup.race}"))["entrants"] == 1
+
+
+def test_what_is_no_entry_is_refused_with_its_sentence(cup: Cup, run: RunFolder, tmp_path: Path) -> None:
+    good = pack_entry(run)
+    header, arrays = _parts(good)
+    name = next(iter(arrays))
+
+    def packed(tensors: dict[str, Any], **changes: Any) -> bytes:
+        return b"".join(tensor_file(tensors, {HEADER_KEY: json.dumps({**header, **changes})}))
+
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as bomb:
+        bomb.writestr("weights", bytes(1 << 24))
+    nothing = np.full_like(arrays[name], np.nan)
+    cases: list[tuple[bytes, int, str]] = [
+        (b"", 422, "no safetensors"),
+        (archive.getvalue(), 422, "no safetensors"),
+        (gzip.compress(bytes(1 << 22)), 422, "no safetensors"),
+        ((1 << 62).to_bytes(8, "little") + b"{}", 422, "no safetensors"),
+        ((8).to_bytes(8, "little") + b"[[[[[[[[", 422, "no entry"),
+        (good[:-1], 422, "no entry"),
+        (bytes(33 << 20), 413, "at most 32 MB"),
+        (packed(arrays, reward="def reward_function(params): pass"), 422, "exactly"),
+        (packed({**arrays, "optimizer/m": np.zeros(3, np.float32)}), 422, "no weight of a policy"),
+        (packed({**arrays, f"{WEIGHTS}policy.extra": np.zeros(3, np.float32)}), 422, "missing in the network"),
+        (packed({**arrays, name: arrays[name].astype(np.float64)}), 422, "F64"),
+        (packed({**arrays, name: arrays[name][:1]}), 422, "does not hold the weights"),
+        (packed({**arrays, name: nothing}), 422, "NaN"),
+        (packed(arrays, network={**header["network"], "name": "EVIL"}), 422, "known are"),
+        (packed(arrays, network={**header["network"], "code": "import os"}), 422, "do not know"),
+        (packed(arrays, model_metadata={**header["model_metadata"], "sensor": ["RADAR"]}), 422, "RADAR"),
+        (packed(arrays, step="many"), 422, "step"),
+    ]
+    found = [(refused(cup.submit(cup.bob, data), status), text) for data, status, text in cases]
+    assert [(message, text) for message, text in found if text not in message] == []
+    assert all("submissions/" not in message for message, _ in found), "no path of the server is told"
+    kept = cup.league.console.runs / ".racecraft" / "submissions"
+    assert ok(cup.bob.get(cup.address)) == []
+    assert len(list(kept.iterdir())) == len(ok(cup.owner.get(f"{cup.address}?everybody=true")))
+    refused(cup.submit(cup.bob, good, "../../etc"), 422)
+
+
+def _parts(data: bytes) -> tuple[dict[str, Any], dict[str, Any]]:
+    from safetensors.numpy import load
+
+    length = int.from_bytes(data[:8], "little")
+    return json.loads(json.loads(data[8 : 8 + length])["__metadata__"][HEADER_KEY]), load(data)
+
+
+def test_the_digest_is_of_what_drives_and_nothing_else(run: RunFolder, tmp_path: Path) -> None:
+    header, arrays = _parts(pack_entry(run))
+
+    def digest(arrays: dict[str, Any], **changes: Any) -> str:
+        path = tmp_path / "entry.safetensors"
+        path.write_bytes(b"".join(tensor_file(arrays, {HEADER_KEY: json.dumps({**header, **changes})})))
+        return read_entry_file(path).digest
+
+    same = digest(arrays)
+    metadata = header["model_metadata"]
+    assert digest(arrays, step=1) == same
+    assert digest(dict(reversed(arrays.items())), model_metadata={**metadata, "note": "mine"}) == same
+    name = next(iter(arrays))
+    assert digest({**arrays, name: arrays[name] + np.float32(1e-3)}) != same
+    actions = [{**metadata["action_space"][0], "speed": 0.5}, *metadata["action_space"][1:]]
+    assert digest(arrays, model_metadata={**metadata, "action_space": actions}) != same
+
+
+def test_a_model_of_ones_own_garage_is_entered_like_any_other(cup: Cup, tmp_path: Path) -> None:
+    home = cup.league.console.runs / ".racecraft" / "people" / str(cup.league.number(cup.bob))
+    ok(cup.bob.get("/api/models"))
+    untrained_run(home, "homemade", seed=2)
+    entered = ok(cup.bob.post(f"/api/league/races/{cup.race}/enter", json={"model": "homemade"}), 202)
+    assert entered["seconds_left"] is None or entered["seconds_left"] > 0
+    assert cup.judged(cup.bob, entered["id"])["state"] == "done"
+    board = ok(cup.bob.get(f"/api/boards/{cup.race}"))
+    assert {row["name"] for row in board["rows"]} == {"Ada", "Bob"}
+    assert board["mine"] is not None
+    assert board["beaten"] in (0.0, 100.0)
+
+
+def test_the_command_line_enters_from_any_machine(cup: Cup, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from typer.testing import CliRunner
+
+    from racecraft.cli import app
+
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    token = ok(cup.bob.post("/api/account/tokens", json={}), 201)["secret"]
+    url, run = str(cup.owner.base_url), untrained_run(tmp_path, "from-afar", seed=5)
+
+    def said(*arguments: str) -> str:
+        result = CliRunner().invoke(app, [*arguments], catch_exceptions=True)
+        return result.output + (str(result.exception) if result.exception is not None else "")
+
+    assert "No league is known" in said("races")
+    assert "not signed in" in said("login", url, "--token", "rc_wrong")
+    assert "knows you" in said("login", url, "--token", token)
+    kept = tmp_path / "racecraft" / "league.json"
+    assert kept.stat().st_mode & 0o077 == 0
+    assert "Cup" in said("races")
+    assert "Submission" in said("submit", str(run.path), "--race", str(cup.race))
+    assert [one["state"] for one in ok(cup.bob.get(cup.address)) if one["model"] == "from-afar"] == ["done"]
+    assert "no race 999" in said("submit", str(run.path), "--race", "999")
+    for address in ("ftp://x", "http://", "http://x/path"):
+        assert "allowed are" in said("login", address, "--token", token)
+
+
+def test_when_it_is_over_anybody_can_check_it(cup: Cup, tmp_path: Path) -> None:
+    from racecraft.race.announcement import Announcement
+    from racecraft.replay import read_replay, verify
+
+    promised = ok(cup.ada.get(f"/api/boards/{cup.race}"))["race"]["commitment"]
+    moment = (now()).isoformat()
+    ok(cup.owner.patch(f"/api/league/races/{cup.race}", json={"closes": moment}))
+    assert "is over" in refused(cup.submit(cup.ada, pack_entry(untrained_run(tmp_path, "late", seed=3))), 409)
+    announced = Announcement.from_dict(ok(cup.ada.get(f"/api/boards/{cup.race}/race.json")))
+    assert announced.commitment == promised
+    assert len(announced.secret) == 64
+    (mine,) = ok(cup.ada.get(cup.address))
+    path = tmp_path / "entry.replay"
+    path.write_bytes(cup.bob.get(f"/api/boards/{cup.race}/replays/{mine['id']}").content)
+    assert verify(read_replay(path), race=announced).is_genuine
+    assert "is over" in refused(cup.owner.patch(f"/api/league/races/{cup.race}", json={"closes": None}), 409)
+
+
+@pytest.fixture
+def database(database_url: str) -> Iterator[Database]:
+    database = Database(database_url)
+    database.migrate()
+    yield database
+    database.close()
+
+
+def _fill(database: Database, results: list[tuple[int, int | None, int | None, int, float]]) -> int:
+    """A race with judged submissions: user, score, best lap (ms), resets, completion."""
+    with database.transaction() as session:
+        group = Group(title="g")
+        session.add(group)
+        session.flush()
+        race = Race(owner_id=1, group_id=group.id, title="r", track="oval", ranking="total")
+        session.add(race)
+        users = sorted({one[0] for one in results})
+        session.execute(
+            sa.insert(User), [{"id": 10 + user, "name": f"u{user}", "handle": f"u{user}"} for user in users]
+        )
+        session.add(Job(id="j", kind="judge", run="", state="done"))
+        session.flush()
+        rows = [
+            {
+                "race_id": race.id,
+                "user_id": 10 + user,
+                "job_id": "j",
+                "digest": hashlib.sha256(str(number).encode()).hexdigest(),
+                "model": "m",
+                "score_ms": score,
+                "best_lap_ms": best,
+                "resets": resets,
+                "completion": completion,
+                "judged": now(),
+            }
+            for number, (user, score, best, resets, completion) in enumerate(results)
+        ]
+        session.execute(sa.insert(Submission), rows)
+        return race.id
+
+
+def test_the_board_places_by_the_rules_of_every_race(database: Database) -> None:
+    random = np.random.default_rng(4)
+    results = []
+    for user in [*range(30), *random.integers(0, 30, 90).tolist()]:
+        is_ranked = random.random() < 0.7
+        score = int(random.integers(20, 25)) * 1000 if is_ranked else None
+        best = int(random.integers(8, 10)) * 1000 if is_ranked else None
+        results.append((int(user), score, best, int(random.integers(0, 3)), float(random.integers(0, 5)) / 4))
+    race = _fill(database, results)
+
+    def key(one: tuple[int, int | None, int | None, int, float]) -> Any:
+        score, best = one[1], one[2]
+        laps = [best / 1000] if best is not None else []
+        return ranking_key(
+            float("inf") if score is None else score / 1000, lap_times=laps, completion=one[4], resets=one[3]
+        )
+
+    best_of = {user: min(key(one) for one in results if one[0] == user) for user in range(30)}
+    expected = dict(zip(best_of, places(list(best_of.values())), strict=True))
+    with database.transaction() as session:
+        board = read_board(session, race, user_id=10 + 7, top=500)
+        near = read_board(session, race, user_id=10 + 7, top=1)
+    assert (board.entrants, board.ranked) == (30, sum(one[0] == 0.0 for one in best_of.values()))
+    shown = {row.user - 10: row.place for row in board.rows if row.place is not None}
+    assert shown == {user: place for user, place in expected.items() if best_of[user][0] == 0.0}
+    order = [best_of[row.user - 10] for row in board.rows]
+    assert order == sorted(order)
+    mine = next(row.row for row in board.rows if row.user == 17)
+    wanted = {1, *range(max(1, mine - AROUND), min(30, mine + AROUND) + 1)}
+    assert [row.row for row in near.rows] == sorted(wanted)
+
+
+def test_a_board_of_ten_thousand_is_read_at_once(database: Database) -> None:
+    race = _fill(database, [(user, 20_000 + user % 977, 9000 + user % 13, user % 3, 1.0) for user in range(10_000)])
+    took = []
+    for _ in range(5):
+        began = time.perf_counter()
+        with database.transaction() as session:
+            board = read_board(session, race, user_id=10 + 5000, top=100)
+        took.append(time.perf_counter() - began)
+    assert board.entrants == 10_000
+    assert len(board.rows) == 100 + 2 * AROUND + 1
+    assert min(took) < 2.0, "with room for a busy machine; benchmarks say how long it takes on a quiet one"
