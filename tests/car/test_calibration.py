@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from racecraft.agent import DiscreteActionSpace
-from racecraft.car.calibration import CarCalibration, calibrate, load_calibration
+from racecraft.car.calibration import MAX_POINTS, CarCalibration, calibrate, load_calibration
 from racecraft.errors import ConfigError, RacecraftError
 
 MEASURED = CarCalibration(
@@ -55,6 +55,13 @@ def test_speeds_run_straight_between_what_was_measured() -> None:
     np.testing.assert_allclose(CarCalibration().speed(share, 4.0), 4 * share)
 
 
+def test_as_many_speeds_may_be_measured_as_the_limit_says() -> None:
+    points = [(float(position), 0.1 * position) for position in range(1, MAX_POINTS + 2)]
+    assert calibrate(speeds=points[:-1]).speeds == tuple(points[:-1])
+    with pytest.raises(ConfigError, match=f"at most {MAX_POINTS} pairs"):
+        calibrate(speeds=points)
+
+
 def test_the_slider_stands_where_the_largest_speed_is_driven() -> None:
     car = CarCalibration(speeds=((20.0, 0.5), (60.0, 2.5)))
     for fastest, percent in ((0.25, 10.0), (0.5, 20.0), (1.5, 40.0), (2.5, 60.0), (3.0, 72.0), (4.0, 96.0)):
@@ -87,6 +94,7 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 WRONG_NUMBERS: dict[str, tuple[dict[str, Any], str]] = {
     "nothing": ({}, "Nothing was measured"),
+    "a circle of a hand": ({"circles": (0.15, None)}, "A circle of 0.15 m to the left means wheels at"),
     "a tiny circle": ({"circles": (0.3, None)}, "A circle of 0.3 m to the left means wheels at"),
     "a huge circle": ({"circles": (None, 40.0)}, "A circle of 40 m to the right means wheels at 0.47"),
     "no circle": ({"circles": (0.0, None)}, "circle-left is 0.0"),

@@ -176,7 +176,7 @@ def test_options_out_of_range(track, options):
 @pytest.mark.parametrize("index", [-1.0, 2.0, 1e9])
 def test_rows_of_another_track(shared_worker, make_row, index):
     with pytest.raises(ShapeError, match="track_index"):
-        shared_worker(make_row(track_index=index)[None])
+        shared_worker(np.stack([make_row(track_index=0), make_row(track_index=index)]))
     assert shared_worker(make_row()[None]).shape == (1,)
 
 

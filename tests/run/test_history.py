@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from racecraft.errors import RunError
-from racecraft.run.history import HistoryWriter, read_history
+from racecraft.run.history import MAX_LINE, HistoryWriter, read_history
 
 
 def test_points_are_read_from_where_the_last_call_ended(tmp_path: Path) -> None:
@@ -21,6 +21,13 @@ def test_points_are_read_from_where_the_last_call_ended(tmp_path: Path) -> None:
     points, end = read_history(path, offset=offset)
     assert points == [{"kind": "note", "step": 2, "text": "ä\n"}]
     assert end == path.stat().st_size
+
+
+def test_a_line_without_an_end_is_waited_for_until_it_is_longer_than_any(tmp_path: Path) -> None:
+    path = tmp_path / "h"
+    for size, end in ((MAX_LINE, 0), (MAX_LINE + 1, MAX_LINE + 1)):
+        path.write_bytes(b"x" * size)
+        assert read_history(path, max_bytes=2 * MAX_LINE) == ([], end)
 
 
 def test_what_is_not_known_is_null(tmp_path: Path) -> None:

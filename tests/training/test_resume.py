@@ -6,12 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tiny_runs import Recorder, Train, assert_same, logs, weights
+from tiny_runs import TINY, Recorder, Train, assert_same, logs, weights
 
 from racecraft import training
 from racecraft.errors import CheckpointError, ConfigError, RunError
@@ -19,6 +20,17 @@ from racecraft.run import RunFolder
 from racecraft.track import generate_track
 from racecraft.training import Reporter, TrainResult, Until, resume
 from racecraft.training.job import Training
+
+
+REMEMBERING = """
+last = 0.0
+
+
+def reward_function(params):
+    global last
+    gain, last = params["progress"] - last, params["progress"]
+    return gain
+"""
 
 
 def test_a_run_killed_at_any_iteration_resumes_as_if_it_never_was(tiny: Train, tmp_path: Path) -> None:
@@ -135,6 +147,18 @@ def test_a_limit_that_was_reached_before_ends_at_once_and_says_so(tiny: Train) -
     result = resume(run, reporter=recorder)
     assert (result.reason, result.steps, recorder.iterations) == ("steps", 128, [])
     assert any("reached before" in note for note in recorder.notes)
+    assert "Resumed at step 128." in recorder.notes
+    RunFolder.open(run).reward_function.write_text(REMEMBERING)
+    resume(run, reporter=recorder)
+    assert "Resumed at step 128; what the reward function remembered begins anew." in recorder.notes
+
+
+def test_actions_that_cannot_be_learned_as_before_are_refused(tiny: Train) -> None:
+    run = tiny(until="64 steps", ppo=replace(TINY, exploration="e-greedy")).run
+    continuous = tiny(until="64 steps", actions="continuous").run
+    shutil.copy(RunFolder.open(continuous).model_metadata, RunFolder.open(run).model_metadata)
+    with pytest.raises(ConfigError, match="needs a discrete action space"):
+        resume(run, until="128 steps")
 
 
 def test_more_laps_than_there_were_trials_bring_more_trials(tiny: Train) -> None:
