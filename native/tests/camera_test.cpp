@@ -304,6 +304,20 @@ TEST(walls_meet_where_a_pinhole_sees_their_corner) {
     }
 }
 
+TEST(a_sample_reads_the_level_of_its_size_whatever_the_maps_texel) {
+    const CameraModel camera(CameraSpec{});
+    const CameraView& view = camera.view();
+    for (const float texel : {0.005f, 0.01f, 0.04f}) {
+        const GroundMap map(octagon().view(), {.texel = texel});
+        const GroundView& ground = map.view();
+        const int32_t exponent = static_cast<int32_t>(std::lround(std::log2(ground.texel / 0.01f)));
+        for (int32_t sample = 0; sample < view.num_samples; ++sample) {
+            const int32_t level = clamp(view.exponent[sample] - exponent, 0, ground.num_levels - 1);
+            CHECK_EQUAL(sample_level(view, ground, sample), level);
+        }
+    }
+}
+
 TEST(walls_are_told_from_left_to_right_with_the_corners_between_them) {
     const GroundMap ground(octagon().view());
     const GroundView& view = ground.view();

@@ -19,7 +19,8 @@ from racecraft.fidelity.logs import Faults
 from racecraft.race.artifacts import write_simtrace
 from racecraft.race.evaluation import evaluate
 from racecraft.run.simtrace import COLUMNS
-from racecraft.sim import ROW_COLUMNS, STATUS_NAMES, Simulation, Start
+from racecraft.sim import ROW_COLUMNS, STATUS_NAMES, Simulation, Start, Vehicle
+from racecraft.sim.logged import LogJudge, drive_windows
 from racecraft.track import load_track
 
 OVAL = load_track("oval")
@@ -90,6 +91,39 @@ def test_our_own_drive_comes_back_in_every_form(lines, tmp_path, columns, form, 
     assert found["progress_agreement"] == found["closest_waypoint_agreement"] == found["episode_end_agreement"] == 1.0
     assert found["all_wheels_agreement"] > 0.999  # single precision at a border
     assert found["position_error_m"]["15"] < 0.02  # what remains: six rows do not tell the start exactly
+
+
+def test_what_a_paused_car_does_counts_as_no_step_back():
+    falls = [5.0 - 0.02 * row for row in range(31)]
+    places = OVAL.point_at(np.array(falls))
+    poses = np.column_stack([places, OVAL.heading_at(np.array(falls))])
+    is_paused = np.arange(31) == 15  # put back, after fourteen steps back
+    rows = LogJudge(OVAL)(
+        poses=poses,
+        commands=np.tile([0.0, 1.0], (31, 1)),
+        progress=np.zeros(31),
+        is_first=np.arange(31) == 0,
+        is_paused=is_paused,
+    )
+    told = [STATUS_NAMES[int(row[AT["status"]])] for row in rows]
+    assert told == ["prepare", *["in_progress"] * 14, "pause", *["in_progress"] * 14, "reversed"]
+
+
+@pytest.mark.parametrize("heading", [0.0, math.pi / 2, -2.0])
+def test_a_car_that_slides_at_first_slides_on(heading):
+    across = np.array([-math.sin(heading), math.cos(heading)])  # to its left
+    for way in (0.1, -0.1):
+        poses = np.column_stack([np.arange(3)[:, None] * way * across, np.full(3, heading)])
+        ((end,),) = drive_windows(
+            Vehicle().values(),
+            poses=poses,
+            commands=np.zeros((3, 2), np.float32),
+            durations=np.full(3, 1 / 15, np.float32),
+            first=np.array([0]),
+            known=2,
+            free=1,
+        )
+        assert 1.4 * abs(way) < np.sign(way) * (end[:2] @ across) < 2.0 * abs(way)
 
 
 def test_the_direction_is_found(tmp_path):
