@@ -126,9 +126,10 @@ def test_the_camera_has_the_look_that_the_run_was_trained_with(tmp_path: Path) -
 
 
 def test_latency_is_the_randomisation_s(run: Path) -> None:
-    car = CarCalibration(latency_seconds=0.05)
+    car = CarCalibration(latency_seconds=0.05, slider_percent=33.333)
     outcome = evaluate_as_car(run, car=car, laps=1, num_trials=1, max_resets=0, video=False, num_threads=1)
     assert outcome.evaluation.conditions.randomize.latency == pytest.approx((0.75, 0.75))
+    assert json.loads(outcome.files["summary"].read_text())["as_car"]["slider_driven_percent"] == 33.3
     with pytest.raises(ConfigError, match="has a latency, and so has the randomisation"):
         evaluate_as_car(run, car=car, randomize=Randomization(latency=(0.5, 0.5)), video=False)
 

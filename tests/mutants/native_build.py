@@ -26,7 +26,7 @@ CLEAN = FOLDER / "native-build"
 CHANGED = FOLDER / "native-changed"
 ARCHIVE = "libracecraft_core.a"
 MODULE = "_native"
-CPU_SECONDS, WALL_SECONDS = 100, 1800  # of one program; who needs longer does not end, and that is noticed
+CPU_SECONDS, WALL_SECONDS = 100, 600  # of one program; who needs longer does not end, and that is noticed
 TOOLS = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
 
 
