@@ -48,7 +48,8 @@ def test_the_archive_is_what_a_car_takes(run: Path) -> None:
     assert exported.file == run / "to-floor.tar.gz"  # the car would cut the name at its dot
     assert exported.size == exported.file.stat().st_size
     told = {"run": str(run), "step": exported.step, "file": str(exported.file), "size": exported.size}
-    assert json.loads(json.dumps(exported.to_dict())) == {**told, "network": exported.network, "notes": [*exported.notes]}
+    told |= {"network": exported.network, "notes": list(exported.notes)}
+    assert json.loads(json.dumps(exported.to_dict())) == told
     files = unpacked(exported.file)
     assert set(files) == {"model_metadata.json", "agent/model.pb"}
     metadata = json.loads(files["model_metadata.json"])

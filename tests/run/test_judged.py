@@ -50,9 +50,7 @@ def test_a_lap_in_training_and_a_lap_afterwards_count_alike(run: RunFolder) -> N
 def test_a_completion_is_the_mean_of_its_trials_and_what_is_no_number_counts_nowhere(run: RunFolder) -> None:
     run.history.parent.mkdir(exist_ok=True)
     points = [([1.0, 0.5], []), ([0, 0.0], []), ([True, "1", None, 0.4], [True, -1.0]), ([], [])]
-    lines = [
-        {"kind": "evaluation", "step": 100, "completions": shares, "lap_times": laps} for shares, laps in points
-    ]
+    lines = [{"kind": "evaluation", "step": 100, "completions": shares, "lap_times": laps} for shares, laps in points]
     run.history.write_text("".join(json.dumps(line) + "\n" for line in lines))
     assert [one.completion for one in judged_laps(run)] == [0.75, 0.0, 0.4, None]
     assert [one.best_lap for one in judged_laps(run)] == [None] * 4

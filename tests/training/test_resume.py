@@ -21,7 +21,6 @@ from racecraft.track import generate_track
 from racecraft.training import Reporter, TrainResult, Until, resume
 from racecraft.training.job import Training
 
-
 REMEMBERING = """
 last = 0.0
 
