@@ -76,6 +76,10 @@ class RewardError(RacecraftError, ValueError):
         self.params = params
 
 
+class RewardTimeout(RewardError):
+    """A reward function did not return in its time."""
+
+
 class CheckpointError(RacecraftError, ValueError):
     """A checkpoint is damaged or does not fit what it is loaded into."""
 

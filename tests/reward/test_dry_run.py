@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from racecraft.errors import RewardError
+from racecraft.errors import RewardError, RewardTimeout
 from racecraft.reward.dry_run import dry_run, moment, situations
 from racecraft.reward.source import load_preset, preset_names
 from racecraft.sim.columns import ROW_COLUMNS
@@ -93,6 +93,12 @@ def test_one_failing_situation_does_not_hide_the_others(track):
     assert failed[0].error.line == 3
     assert failed[0].error.params == failed[0].params
     assert all(outcome.printed == f"{outcome.params['steps']}\n" for outcome in outcomes)
+
+
+def test_a_call_that_does_not_return_is_waited_for_once(track):
+    outcomes = dry_run("def reward_function(params):\n    while True:\n        pass\n", track, timeout_s=0.2)
+    assert [type(outcome.error) for outcome in outcomes] == [RewardTimeout]
+    assert outcomes[0].error.line in (2, 3)
 
 
 def test_a_source_that_does_not_load(track):

@@ -100,6 +100,24 @@ def test_scripts_are_sent_as_small_as_the_build_made_them(console: RunningConsol
     assert client.get(f"/assets/{scripts[0].name}.gz").status_code == 404
 
 
+def test_only_large_json_is_compressed_for_who_takes_it(console: RunningConsole) -> None:
+    import gzip
+
+    sizes = {}
+    for wanted, given in (("gzip, br", "gzip"), ("identity", None), ("gzip;q=0", None)):
+        with console.client.stream("GET", "/api/tracks", headers={"accept-encoding": wanted}) as reply:
+            data = b"".join(reply.iter_raw())
+        assert reply.headers.get("content-encoding") == given
+        assert reply.headers["vary"] == "Accept-Encoding"
+        assert int(reply.headers["content-length"]) == len(data)
+        sizes[given] = len(data)
+        listed = json.loads(gzip.decompress(data) if given else data)
+        assert "oval" in {track["name"] for track in listed}
+    assert sizes["gzip"] < 0.6 * sizes[None]
+    small = console.client.get("/api/console", headers={"accept-encoding": "gzip"})
+    assert "content-encoding" not in small.headers
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not (WEB / "node_modules").exists(), reason="web/node_modules is not installed")
 @pytest.mark.parametrize("script", ["test", "check"])
@@ -147,9 +165,9 @@ def test_a_newcomers_path_to_a_lap_on_video(visited: tuple[RunningConsole, Any])
         assert len(_colours(page.locator(drawn).screenshot())) > 20
     page.get_by_role("button", name="From above").click()
     page.locator(".badge.finished").wait_for()
-    page.get_by_role("tab", name="Race").click()
+    page.get_by_role("tab", name="Evaluation").click()
     page.get_by_role("spinbutton", name="Laps").fill("1")
-    page.get_by_role("button", name="Start a race").click()
+    page.get_by_role("button", name="Start an evaluation").click()
     video = page.locator("video")
     video.wait_for()
     assert console.client.get(str(video.get_attribute("src"))).headers["content-type"] == "video/mp4"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from racecraft.errors import RewardError
+from racecraft.errors import RewardError, RewardTimeout
 from racecraft.reward.params import make_params
 from racecraft.reward.worker import RewardWorker, waypoints_of
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
@@ -58,7 +58,7 @@ class Outcome:
 def dry_run(
     source: str, track: Track, *, timeout_s: float = 1.0, seed: int = 0, foreign: bool = False
 ) -> list[Outcome]:
-    """Call a reward function once in every situation.
+    """Call a reward function once in every situation; the rest is left out when a call did not return in its time.
 
     Args:
         source: Text of the user's ``reward_function.py``.
@@ -84,6 +84,8 @@ def dry_run(
                 error = caught
             params = make_params(situation.row.tolist(), waypoints)
             outcomes.append(Outcome(situation, params, reward, error, worker.read_log()))
+            if isinstance(error, RewardTimeout):
+                break  # the others would most likely take as long
             if error is not None:
                 worker.close()
                 worker = None

@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from racecraft.checks import require
-from racecraft.errors import ConfigError, RewardError, ShapeError, printable
+from racecraft.errors import ConfigError, RewardError, RewardTimeout, ShapeError, printable
 from racecraft.reward import launch
 from racecraft.reward import worker_process as protocol
 from racecraft.reward.modules import needed_modules, used_words
@@ -306,7 +306,8 @@ class RewardWorker:
             os.kill(self._process.interpreter, signal.SIGUSR1)
         line = _line_in(self._read_stderr(timeout_s=1.0))
         text = f"did not {'load' if rows is None else 'return'} within {timeout_s:g} s"
-        return self._error(text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first)
+        error = self._error(text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first)
+        return RewardTimeout(str(error), line=error.line, row_index=error.row_index, params=error.params)
 
     def _crashed(self, rows: Rows | None, first: int) -> RewardError:
         """The error of a process that ended without a reply."""

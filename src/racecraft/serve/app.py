@@ -15,6 +15,7 @@ from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
 
 from racecraft.serve import problems
+from racecraft.serve.compression import CODINGS, Compressed, accepts
 from racecraft.serve.context import Consoles, Context
 from racecraft.serve.door import routes as door
 from racecraft.serve.door.guard import Guard, content_policy
@@ -53,18 +54,6 @@ from racecraft.serve.tuning.tunings import Tunings
 PAGES: Final = Path(__file__).parent / "pages"
 """The built web client, part of the package."""
 KINDS: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".woff2": "font/woff2"}
-
-CODINGS: Final = {"br": ".br", "gzip": ".gz"}
-"""What the build compressed the pages with, the smaller first, by HTTP's name and the file's ending."""
-
-
-def accepts(header: str, coding: str) -> bool:
-    """Whether a browser that sent this ``Accept-Encoding`` takes a coding; ``q=0`` refuses it (RFC 9110, 12.5.3)."""
-    for part in header.split(","):
-        name, _, weight = part.partition(";")
-        if name.strip().lower() == coding:
-            return weight.strip().lower().removeprefix("q=").rstrip("0") not in ("", ".") or not weight.strip()
-    return False
 
 
 def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
@@ -131,6 +120,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     keys = Keys(database)
     app.state.consoles = Consoles(context, keys)
     app.state.guard = guard = Guard(keys, settings, hosts)
+    app.add_middleware(Compressed)  # behind the guard, which stands before everything
     app.add_middleware(guard.middleware)
     problems.install(app)
     parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, races]
