@@ -44,6 +44,7 @@ CONSOLE = (
     "quick",
     "settings",
     "schemas",
+    "compression",
     "problems",
     "store",
     "people",

@@ -37,6 +37,9 @@ class Recorder:
     def note(self, text: str) -> None:
         self.notes.append(text)
 
+    def step(self) -> None:
+        """Nothing is kept of a step."""
+
     def iteration(self, report: IterationReport) -> None:
         self.iterations.append(report)
         if self._after_iteration is not None:

@@ -7,7 +7,7 @@ actions -> *action space* -> commands -> *simulation* -> rows -> *reward worker*
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Final
 
@@ -49,6 +49,7 @@ class TrainingEnvironment:
             who drives on, and neither camera nor state says how far it is, so an end there would only look like
             chance: with this a lap's end cuts the episode, and the critic's value stands for what follows.
         tells_place: Whether the privileged state ends in where on the lap the car is, as `lap_place` has it.
+        on_step: Called after every step, for who looks at the cars.
     """
 
     def __init__(
@@ -64,6 +65,7 @@ class TrainingEnvironment:
         opponents: OpponentPool | None = None,
         goes_on: bool = False,
         tells_place: bool = False,
+        on_step: Callable[[], None] = lambda: None,
     ) -> None:
         self.simulation = simulation
         self.worker = worker
@@ -75,6 +77,7 @@ class TrainingEnvironment:
         self.opponents = opponents
         self.goes_on = goes_on
         self.tells_place = tells_place
+        self._on_step = on_step
         self._own: slice | NDArray[np.intp] = slice(None) if opponents is None else opponents.own
         self.reward_seconds = 0.0
         self.trace_seconds = 0.0
@@ -133,6 +136,7 @@ class TrainingEnvironment:
             self.opponents.bring_back()
         self.reward_seconds += paid - moved
         self.trace_seconds += time.perf_counter() - paid
+        self._on_step()
         if self.goes_on:
             is_lap = terminated & (rows[:, _STATUS] == _LAP_COMPLETE)
             return rewards, terminated & ~is_lap, truncated | is_lap

@@ -76,6 +76,7 @@ class Training:
                     aws_log=self.aws_log,
                     is_checked=self.is_checked,
                     note=self.reporter.note,
+                    on_step=self.reporter.step,
                 ) as session:
                     reason = self._train(session)
                 return self._result(reason, session)

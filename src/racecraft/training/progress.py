@@ -160,6 +160,9 @@ class Reporter(Protocol):
     def note(self, text: str) -> None:
         """Something worth a line."""
 
+    def step(self) -> None:
+        """The cars drove a step; not told by a training on a GPU, whose cars nobody sees in between."""
+
     def iteration(self, report: IterationReport) -> None:
         """An iteration ended."""
 
@@ -180,6 +183,9 @@ class SilentReporter:
         """Nothing."""
 
     def note(self, text: str) -> None:
+        """Nothing."""
+
+    def step(self) -> None:
         """Nothing."""
 
     def iteration(self, report: IterationReport) -> None:

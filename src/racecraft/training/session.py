@@ -152,10 +152,12 @@ def open_session(
     aws_log: str | Path | None,
     is_checked: bool,
     note: Note,
+    on_step: Callable[[], None],
 ) -> Iterator[Session]:
     """Everything made, and brought to where the last checkpoint was; closed at the end, however that comes.
 
-    The arguments are those of `racecraft.training.job.Training`; `note` is told what the user should know.
+    The arguments are those of `racecraft.training.job.Training`; `note` is told what the user should know, `on_step`
+    that the cars drove a step.
 
     Raises:
         RacecraftError: The training cannot begin.
@@ -196,7 +198,7 @@ def open_session(
         worker = _open_worker(run, stack)
         since = _begin_stretch(run, note)
         logs = _open_logs(run, stack, aws_log=aws_log)
-        environment = _make_environment(run, simulation, learner, worker, logs, note)
+        environment = _make_environment(run, simulation, learner, worker, logs, note, on_step)
         session = Session(
             environment=environment,
             algorithm=make_algorithm(
@@ -327,6 +329,7 @@ def _make_environment(
     worker: RewardWorker,
     logs: Logs,
     note: Note,
+    on_step: Callable[[], None],
 ) -> Environment:
     settings, metadata = run.settings, run.metadata
     if not isinstance(simulation, Simulation):
@@ -347,4 +350,5 @@ def _make_environment(
         opponents=opponents,
         goes_on=settings.algorithm == "distill" or opponents is not None,
         tells_place=settings.critic == "lap",
+        on_step=on_step,
     )

@@ -98,6 +98,9 @@ class TerminalReporter:
         if self._live is None:
             self._print(text)
 
+    def step(self) -> None:
+        """Nothing: the panel has a pace of its own."""
+
     def iteration(self, report: IterationReport) -> None:
         """Move the curve on."""
         self._latest = report

@@ -35,7 +35,7 @@ MAX_BYTES: Final = 1 << 20
 HEADER: Final = 9  # int64
 POSE: Final = 6
 OBJECT: Final = 4
-STALE: Final = 3.0  # s after which a training no longer counts as live
+STALE: Final = 120.0  # s after which a training that was killed no longer counts as live
 _OBJECT_COLUMNS: Final = ("object_kind", "object_x", "object_y", "object_heading")
 _ROWS: Final = [ROW_COLUMNS.index(name) for name in ("progress", "steps")]
 
@@ -107,6 +107,11 @@ class LiveWriter:
         self._header[1], self._header[2] = step, time.time_ns()
         self._header[0] += 1
 
+    def close(self) -> None:
+        """The training has ended: there is nothing to look at any more."""
+        self._header[2] = 0
+        self._header[0] += 2  # new to who copies it to another machine
+
     def _decide(self) -> NDArray[np.float32]:
         learner = self._policy.learner
         sight = self._policy.sensors.read(self._simulation)
@@ -130,6 +135,12 @@ class LiveReader:
         self._inode = 0
         self._taken = 0  # by `snapshot`
 
+    @property
+    def is_live(self) -> bool:
+        """Whether there is a training to look at; its cars may stand still while it learns."""
+        memory = self._open()
+        return memory is not None and _is_fresh(memory[: HEADER * 8].view(np.int64).tolist())
+
     def look(self, *, after: int = -1) -> Look | None:
         """The present moment, or None when there is none, it is stale, or it is the one with number `after`."""
         memory = self._open()
@@ -137,7 +148,7 @@ class LiveReader:
             return None
         for _ in range(20):
             header = memory[: HEADER * 8].view(np.int64).tolist()
-            if header[0] == after or (header[0] == 0) or time.time_ns() - header[2] > STALE * 1e9:
+            if header[0] == after or header[0] == 0 or not _is_fresh(header):
                 return None
             if header[0] % 2 == 0:
                 _, poses, steps, objects, policy, frame = (part.copy() for part in _parts(memory, header))
@@ -194,10 +205,16 @@ def write_live(folder: Path, data: bytes) -> None:
     if not HEADER * 8 < len(data) <= MAX_BYTES:
         return
     memory = np.frombuffer(bytearray(data), np.uint8)
-    memory[: HEADER * 8].view(np.int64)[2] = time.time_ns()
+    header = memory[: HEADER * 8].view(np.int64)
+    if header[2]:  # not one that has ended
+        header[2] = time.time_ns()
     fresh = folder / f"{NAME}.new"
     fresh.write_bytes(memory.tobytes())
     os.replace(fresh, folder / NAME)
+
+
+def _is_fresh(header: list[int]) -> bool:
+    return time.time_ns() - header[2] <= STALE * 1e9
 
 
 def _length(*sizes: int) -> int:

@@ -20,16 +20,27 @@ class LiveReporter(SilentReporter):
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._writer: LiveWriter | None = None
+        self._step = 0
 
     def begin(self, simulation: Simulation, policy: NetworkPolicy) -> None:
         """Open the window."""
         self._writer = LiveWriter(self._folder, simulation, policy)
         self._writer.look(step=0)
 
-    def iteration(self, report: IterationReport) -> None:
+    def step(self) -> None:
         """Move the cars."""
         if self._writer is not None:
-            self._writer.look(step=report.stats.total_steps)
+            self._writer.look(step=self._step)
+
+    def iteration(self, report: IterationReport) -> None:
+        """Move the cars, also where the training tells of no steps."""
+        self._step = report.stats.total_steps
+        self.step()
+
+    def __exit__(self, *_: object) -> None:
+        """Close the window."""
+        if self._writer is not None:
+            self._writer.close()
 
 
 class ConsoleTraining(Training):
@@ -44,9 +55,10 @@ def train(task: Task) -> dict[str, Any]:
     """Train, from the last checkpoint where there is one."""
     until = task.job.payload.get("until")
     folder = task.folder
-    training = ConsoleTraining(folder, until=Until.parse(until) if until else None, reporter=LiveReporter(folder.path))
-    task.on_stop(training.stop)
-    result: TrainResult = training.run()
+    with LiveReporter(folder.path) as reporter:
+        training = ConsoleTraining(folder, until=Until.parse(until) if until else None, reporter=reporter)
+        task.on_stop(training.stop)
+        result: TrainResult = training.run()
     return result.to_dict()
 
 

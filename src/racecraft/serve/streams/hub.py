@@ -17,7 +17,7 @@ from sse_starlette import ServerSentEvent
 from racecraft.run.history import read_history
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.schemas import job_info
-from racecraft.serve.live.cars import STALE, LiveReader, Look
+from racecraft.serve.live.cars import LiveReader, Look
 from racecraft.serve.store.tables import Job
 from racecraft.sim.objects import OBJECT_KINDS
 
@@ -33,7 +33,6 @@ class _Seen:
     reader: LiveReader
     sequence: int = -1
     live: bytes = b""
-    live_at: float = float("-inf")
     points: dict[int, tuple[int, bytes]] = field(default_factory=dict)
     """The newest points as an event, and their end, by where they begin."""
     points_until: float = 0.0
@@ -62,9 +61,8 @@ class Hub:
         look = seen.reader.look(after=seen.sequence)
         if look is not None:
             event = ServerSentEvent(json.dumps(_document(look), separators=(",", ":")), event="live")
-            seen.sequence, seen.live, seen.live_at = look.sequence, event.encode(), time.monotonic()
-        is_live = time.monotonic() - seen.live_at < STALE
-        return (seen.sequence, seen.live) if is_live and seen.sequence != after else None
+            seen.sequence, seen.live = look.sequence, event.encode()
+        return (seen.sequence, seen.live) if seen.sequence not in (-1, after) and seen.reader.is_live else None
 
     async def points(self, name: str, *, after: int) -> tuple[int, bytes] | None:
         """The points of the curves behind an offset, as an event, and where they end; None when there are none."""
