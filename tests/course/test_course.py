@@ -120,6 +120,7 @@ def test_an_answer_that_fails_is_told_why() -> None:
     verdict = check("1.inside", lambda params: params["spede"])
     assert not verdict.is_right
     assert "Did you mean 'speed'?" in verdict.sentence
+    assert not check("1.inside", lambda params: 1.0).is_right
     assert "cannot be tried" in check("1.inside", lambda params: "much").sentence
     assert not read_progress().exercises
 

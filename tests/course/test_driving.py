@@ -38,6 +38,8 @@ def test_what_is_driven_ends_with_the_lap(driven: dict[str, Drives]) -> None:
     assert quick.laps == 3
     assert quick.lap_seconds == pytest.approx(quick.track.length / 1.9, rel=0.1)
     assert np.isnan(driven["slow"].lap_seconds)
+    finished = np.isfinite(quick.x).sum(axis=0)
+    assert len(set(finished.tolist())) > 1, "none waits for the others"
     for one in driven.values():
         over = np.isnan(one.x)
         assert (over == np.isnan(one.rewards)).all()
