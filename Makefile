@@ -8,7 +8,8 @@ BIN := $(VENV)/bin
 UV := $(BIN)/uv
 # A file of tests stays in one process, with what its tests share; tests/conftest.py puts the long files first. One process
 # more than there are cores: tests wait for servers, browsers and deadlines a third of their time.
-PYTEST = $(BIN)/python -m pytest -n $$($(BIN)/python -c 'import os; print(len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else "auto")') --dist loadscope --no-loadscope-reorder
+WORKERS = $(shell $(BIN)/python -c 'import os; print(1 + (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1))')
+PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadscope --no-loadscope-reorder
 NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hpp native/src/* native/gpu/*)
 
 PAGES := src/racecraft/serve/pages/index.html
