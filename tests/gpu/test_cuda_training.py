@@ -39,7 +39,7 @@ def device_on_the_cpu(monkeypatch):
     monkeypatch.setattr("racecraft.sim.cuda_simulation.open_device", lambda name: device)
     monkeypatch.setattr(
         "racecraft.training.session.make_learner",
-        lambda spec, *, seed, num_threads, device: CudaLearner(spec, seed=seed, device="cpu"),
+        lambda spec, *, seed, device, **_: CudaLearner(spec, seed=seed, device="cpu"),
     )
     return device
 
