@@ -167,7 +167,7 @@ def test_a_newcomers_path_to_a_lap_on_video(visited: tuple[RunningConsole, Any])
     page.locator(".badge.finished").wait_for()
     page.get_by_role("tab", name="Race").click()
     page.get_by_role("spinbutton", name="Laps").fill("1")
-    page.get_by_role("button", name="Start an evaluation").click()
+    page.get_by_role("button", name="Start a race").click()
     video = page.locator("video")
     video.wait_for()
     assert console.client.get(str(video.get_attribute("src"))).headers["content-type"] == "video/mp4"
