@@ -198,10 +198,11 @@ def test_a_server_that_is_gone_is_said_over_cars_that_look_frozen(
         page.set_default_timeout(1000 * PATIENCE)
         page.goto(f"{address}/models/stork/watch")
         page.get_by_text(re.compile(r"\d+ cars learning at once")).wait_for()
+        page.locator(".scene canvas").first.wait_for()
         console.kill()
         page.get_by_role("alert").get_by_text("The console does not answer.").wait_for()
         assert page.get_by_text("cars learning at once").count() == 0
-        assert "grayscale" in page.locator("canvas").first.evaluate("canvas => getComputedStyle(canvas).filter")
+        assert "grayscale" in page.locator(".scene canvas").first.evaluate("canvas => getComputedStyle(canvas).filter")
         with running_console(runs, "--port", address.rsplit(":", 1)[1]) as again:
             page.get_by_role("alert").wait_for(state="detached")
             page.get_by_text(re.compile(r"\d+ cars learning at once")).wait_for()

@@ -68,7 +68,8 @@ def show(picture: Picture, name: str) -> Path | None:
     """
     if not re.fullmatch(r"[\w-]+", name):
         raise ConfigError(f"A picture's name is {name!r}; allowed are letters, digits, - and _.")
-    if "ipykernel" in sys.modules:
+    shell = sys.modules.get("IPython")
+    if shell is not None and shell.get_ipython() is not None:
         import_module("IPython.display").display(picture)
         return None
     folder = Path("runs") / (Path(sys.argv[0]).stem or "lesson")
