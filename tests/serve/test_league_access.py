@@ -97,7 +97,10 @@ ROWS: dict[str, tuple[str, Any]] = {
     "DELETE /api/account": ("me", None),
     "PATCH /api/account": ("me", None),
     "PUT /api/account/password": ("me", None),
+    "GET /api/account/sessions": ("me", None),
     "DELETE /api/account/sessions": ("me", None),
+    "DELETE /api/account/sessions/{session_id}": ("own", None),
+    "GET /api/account/data": ("me", None),
     "GET /api/account/tokens": ("me", None),
     "POST /api/account/tokens": ("me", None),
     "DELETE /api/account/tokens/{token_id}": ("own", None),
@@ -120,6 +123,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "PATCH /api/league/races/{cup}": ("organiser", {"title": "x"}),
     "DELETE /api/league/races/{cup}": ("organiser", None),
     "GET /api/boards/{cup}": ("member", None),
+    "GET /api/boards/{cup}/film": ("hidden", "?submissions=1"),
     "GET /api/boards/{cup}/race.json": ("member", None),
     "GET /api/boards/{cup}/replays/{submission_id}": ("hidden", None),
     "POST /api/league/races/{cup}/submissions": ("member", "?model=x"),
@@ -141,7 +145,11 @@ MAY = {  # who may do what is theirs by role; everybody else gets 404
     "admin": ("owner",),
     "hidden": (),
 }
-SLIPPERY = ("DELETE /api/drives/{drive_id}", "GET /api/boards/{cup}/replays/{submission_id}")
+SLIPPERY = (
+    "DELETE /api/drives/{drive_id}",
+    "GET /api/boards/{cup}/replays/{submission_id}",
+    "GET /api/boards/{cup}/film",
+)
 """To get out of a car that is not there is no error; what was driven in a race that is on nobody sees."""
 
 
@@ -179,6 +187,7 @@ class School:
             "entry_id": entry[0]["entry"],
             "job_id": ok(ada.get("/api/jobs"))[0]["id"],
             "token_id": token,
+            "session_id": ok(ada.get("/api/account/sessions"))[0]["id"],
             "group_id": group,
             "member": number,
             "cup": cup,

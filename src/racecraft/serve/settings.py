@@ -27,6 +27,7 @@ OWNER: Final = 1
 """The user to whom the runs of the command line belong: whoever starts the server."""
 PEOPLE: Final = "people"
 """Inside the state folder: a folder for each other person of a league, by number, that is like the runs folder."""
+COOKIE: Final = "racecraft_session"
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 
 MAX_MACHINE: Final = 64

@@ -21,9 +21,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from racecraft.serve.people.keys import Keys
 from racecraft.serve.problems import problem
-from racecraft.serve.settings import OWNER, ServeSettings
+from racecraft.serve.settings import COOKIE, OWNER, ServeSettings
 
-COOKIE: Final = "racecraft_session"
 MAX_BODY: Final = 8 << 20  # bytes
 MAX_SUBMISSION: Final = 32 << 20
 LARGE: Final = {"/api/models/import": 1 << 30}

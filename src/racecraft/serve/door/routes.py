@@ -5,11 +5,12 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
-from racecraft.serve.door.guard import COOKIE, Guard, caller
+from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.people.links import address_of, card_of
 from racecraft.serve.people.names import handle_of
 from racecraft.serve.people.schemas import Door, Join, Joined, Me, ShowCard, SignIn, me_of
 from racecraft.serve.problems import NotLetIn
+from racecraft.serve.settings import COOKIE
 
 router = APIRouter(prefix="/api/door", tags=["door"])
 

@@ -16,6 +16,7 @@ from typing import Final, Literal
 import sqlalchemy as sa
 from sqlalchemy.orm import Session, aliased
 
+from racecraft.serve.people.keys import SIGNS, plain_code
 from racecraft.serve.people.names import checked_name
 from racecraft.serve.people.people import Person, Role, add_person, use_invitation
 from racecraft.serve.problems import Conflict, NotFound
@@ -23,10 +24,9 @@ from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Card, Group, Invitation, Member, User, now
 
 Part = Literal["organiser", "racer"]
-SIGNS: Final = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
-"""Of codes: none is taken for another. Eight of them are 31**8, some 10**12: with 200 tries in ten minutes from an
-address, finding one of ten codes takes it eight thousand years on average."""
 CODE_LENGTH: Final = 8
+"""Eight of 31 signs are some 10**12 codes: with 200 tries in ten minutes from an address, finding one of ten takes
+it eight thousand years on average."""
 MAX_GROUPS: Final = 100  # of an organiser
 MAX_MEMBERS: Final = 500
 
@@ -213,11 +213,6 @@ class Groups:
                 _require_room(session, invitation.group_id, 1)
                 session.add(Member(group_id=invitation.group_id, user_id=user_id, role="racer"))
             return invitation.group_id
-
-
-def plain_code(code: str) -> str:
-    """A code as it is kept, however it was typed: ``abcd-efgh`` is ``ABCDEFGH``."""
-    return "".join(sign for sign in code.upper() if sign in SIGNS)[: CODE_LENGTH + 1]
 
 
 def _require_room(session: Session, group_id: int, more: int) -> None:

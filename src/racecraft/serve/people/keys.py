@@ -21,7 +21,13 @@ from racecraft.serve.store.tables import Card, Session, Token, User, now
 Scope = Literal["read", "submit"]
 SESSION_DAYS: Final = 30
 MAX_SESSIONS: Final = 20  # of a person; the oldest makes room
+SESSION_ID: Final = 16
+"""Signs of a session's digest that it is known by."""
 MAX_TOKENS: Final = 20
+SIGNS: Final = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
+"""Of what people type, codes and cards: none of them is taken for another."""
+CARD_LENGTH: Final = 26
+"""26 of 31 signs hold 128 bits."""
 TOKEN_MARK: Final = "rc_"
 """What tokens begin with, so that whoever finds one knows what it is."""
 
@@ -35,6 +41,17 @@ class TokenCard:
     scopes: list[str]
     created: datetime
     expires: datetime
+
+
+@dataclass(frozen=True)
+class OpenSession:
+    """A browser that is signed in."""
+
+    id: str
+    """The beginning of what is kept of its cookie, which opens nothing."""
+    created: datetime
+    expires: datetime | None
+    is_this: bool
 
 
 class Keys:
@@ -67,6 +84,26 @@ class Keys:
         with self._database.transaction() as session:
             session.execute(sa.delete(Session).where(Session.digest == digest_of(secret)))
 
+    def sessions(self, user_id: int, *, this: str) -> list[OpenSession]:
+        """Somebody's browsers, newest first; `this` is the cookie of the one that asks."""
+        is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
+        query = sa.select(Session).where(Session.user_id == user_id, is_valid).order_by(Session.created.desc())
+        with self._database.transaction() as session:
+            found = session.scalars(query).all()
+        mine = digest_of(this)
+        return [OpenSession(s.digest[:SESSION_ID], s.created, s.expires, s.digest == mine) for s in found]
+
+    def end_session(self, user_id: int, session_id: str) -> None:
+        """Sign one browser out.
+
+        Raises:
+            NotFound: There is none of this number.
+        """
+        is_it = sa.and_(Session.user_id == user_id, sa.func.substr(Session.digest, 1, SESSION_ID) == session_id)
+        with self._database.transaction() as session:
+            if session.execute(sa.delete(Session).where(is_it)).rowcount == 0:  # type: ignore[attr-defined]
+                raise NotFound("There is no such session.")
+
     def close_sessions(self, user_id: int) -> None:
         """Sign somebody out everywhere."""
         with self._database.transaction() as session:
@@ -74,7 +111,7 @@ class Keys:
 
     def print_card(self, user_id: int) -> str:
         """A new card's secret; an earlier card of the same person is worth nothing from now on."""
-        secret = secrets.token_urlsafe(16)
+        secret = "".join(secrets.choice(SIGNS) for _ in range(CARD_LENGTH))
         with self._database.transaction() as session:
             session.execute(sa.delete(Card).where(Card.user_id == user_id))
             session.add(Card(digest=digest_of(secret), user_id=user_id))
@@ -82,7 +119,7 @@ class Keys:
 
     def card_user(self, secret: str) -> int | None:
         """Whose card it is."""
-        return self._user(sa.select(Card.user_id).where(Card.digest == digest_of(secret)))
+        return self._user(sa.select(Card.user_id).where(Card.digest == digest_of(plain_code(secret))))
 
     def revoke(self, user_id: int) -> None:
         """Everything that opens the door to somebody: cards, sessions, tokens."""
@@ -147,6 +184,11 @@ def revoke_all(session: Transaction, user_id: int) -> None:
     """Remove all keys of somebody."""
     for table in (Card, Session, Token):
         session.execute(sa.delete(table).where(table.user_id == user_id))
+
+
+def plain_code(typed: str) -> str:
+    """A code or a card's secret as it is kept, however it was typed: ``abcd-efgh`` is ``ABCDEFGH``."""
+    return "".join(sign for sign in typed.upper() if sign in SIGNS)
 
 
 def digest_of(secret: str) -> str:

@@ -5,11 +5,22 @@ from __future__ import annotations
 import shutil
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Path, Request, Response
 
 from racecraft.errors import ConfigError
 from racecraft.serve.context import InConsoles, InPerson
-from racecraft.serve.people.schemas import AccountChange, MadeToken, Me, NewPassword, NewToken, TokenInfo, me_of
+from racecraft.serve.people.keys import SESSION_ID
+from racecraft.serve.people.schemas import (
+    AccountChange,
+    MadeToken,
+    Me,
+    NewPassword,
+    NewToken,
+    SessionInfo,
+    TokenInfo,
+    me_of,
+)
+from racecraft.serve.settings import COOKIE
 
 router = APIRouter(prefix="/api/account", tags=["account"])
 
@@ -35,6 +46,22 @@ def set_password(request: NewPassword, consoles: InConsoles, person: InPerson) -
     if not consoles.people.set_password(person.id, request.new, old=request.old):
         consoles.tries.failed(account=account, address="")
         raise ConfigError("That is not your password.")
+    return Response(status_code=204)
+
+
+@router.get("/sessions")
+def list_sessions(request: Request, consoles: InConsoles, person: InPerson) -> list[SessionInfo]:
+    """The browsers that are signed in, newest first."""
+    found = consoles.keys.sessions(person.id, this=request.cookies.get(COOKIE, ""))
+    return [SessionInfo(**vars(session)) for session in found]
+
+
+@router.delete("/sessions/{session_id}", status_code=204)
+def end_session(
+    session_id: Annotated[str, Path(pattern=f"^[0-9a-f]{{{SESSION_ID}}}$")], consoles: InConsoles, person: InPerson
+) -> Response:
+    """Sign one browser out."""
+    consoles.keys.end_session(person.id, session_id)
     return Response(status_code=204)
 
 

@@ -97,6 +97,15 @@ class NewToken(Message):
     days: int = Field(90, ge=1, le=365)
 
 
+class SessionInfo(Message):
+    """A browser that is signed in."""
+
+    id: str
+    created: datetime
+    expires: datetime | None
+    is_this: bool
+
+
 class TokenInfo(Message):
     """A token, without its secret."""
 

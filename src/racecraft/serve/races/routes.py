@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path as FilePath
-from typing import Annotated, Final
+from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import FileResponse
@@ -12,12 +12,20 @@ from fastapi.responses import FileResponse
 from racecraft.contest.terms import MAX_TRIALS
 from racecraft.errors import ConfigError
 from racecraft.judging.race import FORMAT
-from racecraft.replay.replay import read_replay
 from racecraft.serve.context import InContext, InUser
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
-from racecraft.serve.races.schemas import Enter, NewRace, RaceCard, RaceChange, RaceDetail, RaceReplay, ReplayCar
-from racecraft.serve.races.standings import replay_trace
+from racecraft.serve.races.schemas import (
+    MAX_CARS,
+    Enter,
+    NewRace,
+    RaceCard,
+    RaceChange,
+    RaceDetail,
+    RaceReplay,
+    ReplayCar,
+)
+from racecraft.serve.races.standings import replay_trace, trial_poses
 from racecraft.serve.races.tasks import REPLAY, VIDEO, entry_folder
 from racecraft.serve.store.tables import Job
 from racecraft.serve.tracks.courses import geometry
@@ -25,7 +33,6 @@ from racecraft.serve.tracks.courses import geometry
 router = APIRouter(prefix="/api/races", tags=["races"])
 
 Id = Annotated[int, Path(ge=0, lt=2**31)]
-MAX_CARS: Final = 12  # of a replay
 
 
 @router.get("")
@@ -149,9 +156,7 @@ def _steps(job: Job, runs: FilePath, trial: int) -> tuple[list[list[int]], list[
     path = entry_folder(runs, job.id) / REPLAY
     if not path.is_file():
         raise NotFound(f"{job.run!r} has no replay in this race.")
-    recording = read_replay(path).cars[trial].recording
-    ends = [step + 1 for step, event in recording.events if event == "lap_complete"]
-    return (1000 * recording.poses).round().astype(int).tolist(), ends
+    return trial_poses(path, trial)
 
 
 def _old_steps(job: Job, runs: FilePath) -> tuple[list[list[int]], list[int]]:

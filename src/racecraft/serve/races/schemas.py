@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AwareDatetime, Field
 
@@ -15,6 +15,9 @@ Ranking = Literal["total", "best", "average"]
 RaceState = Literal["upcoming", "open", "closed"]
 Title = Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S")]
 Seconds = Annotated[float, Field(ge=0.0, le=600.0, allow_inf_nan=False)]
+
+MAX_CARS: Final = 12
+"""Of a replay."""
 
 
 class NewRace(Message):

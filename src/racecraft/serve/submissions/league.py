@@ -11,8 +11,10 @@ from __future__ import annotations
 import os
 import shutil
 import statistics
+from bisect import bisect_left
 from collections.abc import Callable
 from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 from typing import Final, Literal
 
@@ -28,19 +30,22 @@ from racecraft.race.entry_file import read_entry_file
 from racecraft.serve.jobs.queue import KINDS, kinds_of, new_job
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, is_withheld, state_of
+from racecraft.serve.races.standings import trial_scores
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions.board import Board, read_board
 from racecraft.serve.submissions.judge import ENTRY
 from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, SubmissionInfo
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
-from racecraft.serve.tracks.courses import Courses
+from racecraft.serve.tracks.courses import Courses, geometry
+from racecraft.serve.tracks.schemas import TrackGeometry
 from racecraft.sim.vehicle import load_vehicle
 
 Part = Literal["organiser", "racer", "spectator"]
 KIND: Final = "judge"
 MAX_WAITING: Final = 3  # submissions of one person to one race that are not judged yet
 MAX_SUBMISSIONS: Final = 200  # of one person to one race
+MAX_LISTED: Final = 1000  # submissions at once
 LAST: Final = 20  # judged ones that the time left is taken from
 
 
@@ -166,8 +171,10 @@ class League:
         except IntegrityError as error:  # the same file twice at the same moment
             raise Conflict("Exactly this model is being entered already.") from error
 
-    def submissions(self, race_id: int, *, user_id: int, everybody: bool = False) -> list[SubmissionInfo]:
-        """Somebody's submissions, newest first; for an organiser everybody's.
+    def submissions(
+        self, race_id: int, *, user_id: int, everybody: bool = False, only: int | None = None
+    ) -> list[SubmissionInfo]:
+        """Somebody's submissions, newest first; for an organiser everybody's; `only` that of a number.
 
         Raises:
             NotFound: The race is not theirs to see.
@@ -179,13 +186,11 @@ class League:
             query = query.join(User, User.id == Submission.user_id).where(Submission.race_id == race_id)
             if not everybody:
                 query = query.where(Submission.user_id == user_id)
-            rows = session.execute(query.order_by(Submission.id.desc()).limit(1000)).all()
-            pace = _pace(session)
-            infos = []
-            for submission, job, name in rows:
-                ahead = _ahead(session, job)
-                infos.append(_submission(submission, job, name, ahead=ahead, pace=pace, race=race))
-        return infos
+            if only is not None:
+                query = query.where(Submission.id == only)
+            rows = session.execute(query.order_by(Submission.id.desc()).limit(MAX_LISTED)).all()
+            pace, line = _pace(session), _line(session)
+        return [_submission(*row, ahead=_ahead(row[1], line), pace=pace, race=race) for row in rows]
 
     def submission(self, race_id: int, submission_id: int, *, user_id: int) -> SubmissionInfo:
         """One's own submission.
@@ -193,10 +198,10 @@ class League:
         Raises:
             NotFound: There is none of this number.
         """
-        found = next((one for one in self.submissions(race_id, user_id=user_id) if one.id == submission_id), None)
-        if found is None:
+        found = self.submissions(race_id, user_id=user_id, only=submission_id)
+        if not found:
             raise NotFound(f"You have no submission {submission_id} in this race.")
-        return found
+        return found[0]
 
     def disqualify(self, race_id: int, submission_id: int, reason: str, *, user_id: int) -> None:
         """A submission does not count, for a reason; with an empty one it does again.
@@ -266,6 +271,29 @@ class League:
             raise NotFound(f"Submission {submission_id} has no replay.")
         return path
 
+    def names(self, submissions: list[int]) -> dict[int, str]:
+        """Whose submissions they are."""
+        query = sa.select(Submission.id, User.name).join(User, User.id == Submission.user_id)
+        with self._database.transaction() as session:
+            return {row[0]: row[1] for row in session.execute(query.where(Submission.id.in_(submissions)))}
+
+    def track(self, race_id: int) -> TrackGeometry:
+        """Everything to draw a race's track; it may be on its maker's own."""
+        with self._database.transaction() as session:
+            race = session.get_one(Race, race_id)
+        return geometry(race.track, self._courses(race.owner_id).load(race.track))
+
+    def counted_trial(self, submission_id: int) -> int:
+        """The trial that a judged submission is ranked by; the first where it has no score."""
+        query = sa.select(Submission, Job, Race).join(Job, Job.id == Submission.job_id)
+        query = query.join(Race, Race.id == Submission.race_id).where(Submission.id == submission_id)
+        with self._database.transaction() as session:
+            submission, job, race = session.execute(query).one()
+        if submission.score_ms is None:
+            return 0
+        away = [abs(score - submission.score_ms / 1000) for score in trial_scores(race, job)]
+        return away.index(min(away))
+
     def _seen(self, session: Session, race_id: int, user_id: int | None) -> tuple[Race, str, Part]:
         """A race, its group's title, and what somebody is to it."""
         race = session.get(Race, race_id)
@@ -294,13 +322,15 @@ def _require_room(session: Session, race_id: int, user_id: int) -> None:
         raise Conflict(f"{MAX_WAITING} of your submissions are not judged yet.", hint="Wait for one of them.")
 
 
-def _ahead(session: Session, job: Job) -> int:
+def _line(session: Session) -> list[datetime]:
+    """When the jobs were made that have or wait for the places which submissions need, in order."""
+    is_open = sa.and_(Job.kind.in_(kinds_of(KINDS[KIND].slot)), Job.state.in_(("queued", "running")))
+    return list(session.scalars(sa.select(Job.created).where(is_open).order_by(Job.created)))
+
+
+def _ahead(job: Job, line: list[datetime]) -> int:
     """Jobs that have the places which a waiting one needs, or come first."""
-    if job.state != "queued":
-        return 0
-    is_earlier = sa.or_(Job.state == "running", sa.and_(Job.state == "queued", Job.created < job.created))
-    query = sa.select(sa.func.count(Job.id)).where(Job.kind.in_(kinds_of(KINDS[KIND].slot)), is_earlier)
-    return session.scalar(query) or 0
+    return bisect_left(line, job.created) if job.state == "queued" else 0
 
 
 def _pace(session: Session) -> float | None:

@@ -9,13 +9,16 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
+from racecraft.errors import ConfigError
 from racecraft.judging.race import FORMAT
 from racecraft.limits import Medals
 from racecraft.race.entry_file import pack_entry
 from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
-from racecraft.serve.races.schemas import NewRace
+from racecraft.serve.races.schemas import MAX_CARS, NewRace, RaceReplay, ReplayCar
+from racecraft.serve.races.standings import trial_poses
 from racecraft.serve.schemas import RunName
 from racecraft.serve.submissions.board import Row
+from racecraft.serve.submissions.data import data_of
 from racecraft.serve.submissions.league import seconds_of
 from racecraft.serve.submissions.schemas import (
     BoardPage,
@@ -61,6 +64,16 @@ def delete_league_race(race_id: Id, consoles: InConsoles, person: InPerson) -> R
     return Response(status_code=204)
 
 
+@router.get("/account/data")
+def download_data(consoles: InConsoles, person: InPerson) -> Response:
+    """All that is kept of who asks; their models are archives of their own."""
+    names = [card.name for card in consoles.of(person.id).garage.cards()]
+    document = {**data_of(consoles.owner.database, person.id), "models": names}
+    text = json.dumps(document, indent=2, ensure_ascii=False, default=str)
+    headers = {"Content-Disposition": 'attachment; filename="racecraft-my-data.json"'}
+    return Response(text, media_type="application/json", headers=headers)
+
+
 @router.get("/boards/{race_id}")
 def get_board(race_id: Id, request: Request, consoles: InLeague, top: Top = 100) -> BoardPage:
     """The board of a race; where it is public without an account, too."""
@@ -92,6 +105,27 @@ def get_submission_replay(race_id: Id, submission_id: Id, request: Request, cons
     """The replay file of a submission, for `racecraft verify`, once the race is over."""
     path = consoles.league.replay(race_id, submission_id, user_id=request.state.user_id)
     return FileResponse(path, media_type="application/octet-stream", filename=f"{race_id}-{submission_id}.replay")
+
+
+@router.get("/boards/{race_id}/film")
+def get_film(
+    race_id: Id,
+    request: Request,
+    consoles: InLeague,
+    submissions: Annotated[str, Query(max_length=200, pattern=r"^\d{1,9}(,\d{1,9})*$")],
+) -> RaceReplay:
+    """The trial that the first of some submissions is ranked by, of all of them side by side, once the race is over."""
+    league, user = consoles.league, request.state.user_id
+    wanted = list(dict.fromkeys(int(part) for part in submissions.split(",")))
+    if len(wanted) > MAX_CARS:
+        raise ConfigError(f"A film shows at most {MAX_CARS} cars, {len(wanted)} were asked for.")
+    paths = [league.replay(race_id, number, user_id=user) for number in wanted]
+    names, trial = league.names(wanted), league.counted_trial(wanted[0])
+    cars = []
+    for number, path in zip(wanted, paths, strict=True):
+        trace, laps = trial_poses(path, trial)
+        cars.append(ReplayCar(entry=number, model=names[number], trace=trace, laps=laps))
+    return RaceReplay(trial=trial, geometry=league.track(race_id), cars=cars)
 
 
 @router.post(

@@ -1,0 +1,42 @@
+"""All that a league keeps of somebody, but for their models, which are archives of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sqlalchemy as sa
+
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Card, Group, Job, Member, Race, Session, Submission, Table, Token, User
+
+KEPT: dict[str, type[Table]] = {"sessions": Session, "cards": Card, "tokens": Token, "jobs": Job}
+"""Tables of rows that belong to somebody, by the name that they have in the document."""
+SECRET = ("digest", "password", "owner", "secret")
+"""Columns that are not handed out: hashes, and what is of the machine."""
+
+
+def data_of(database: Database, user_id: int) -> dict[str, Any]:
+    """A document of everything that is about somebody."""
+    with database.transaction() as session:
+        groups = sa.select(Group.title, Member).join(Member, Member.group_id == Group.id)
+        submissions = sa.select(Race.title, Submission).join(Submission, Submission.race_id == Race.id)
+        return {
+            "account": _row(session.get_one(User, user_id)),
+            **{
+                name: [_row(row) for row in session.scalars(sa.select(table).where(table.user_id == user_id))]  # type: ignore[attr-defined]
+                for name, table in KEPT.items()
+            },
+            "groups": [
+                {"title": title, **_row(row)} for title, row in session.execute(groups.where(Member.user_id == user_id))
+            ],
+            "races": [_row(row) for row in session.scalars(sa.select(Race).where(Race.owner_id == user_id))],
+            "submissions": [
+                {"race": title, "file": row.digest, **_row(row)}
+                for title, row in session.execute(submissions.where(Submission.user_id == user_id))
+            ],
+        }
+
+
+def _row(row: Table) -> dict[str, Any]:
+    columns = row.__table__.columns
+    return {column.key: getattr(row, column.key) for column in columns if column.key not in SECRET}
