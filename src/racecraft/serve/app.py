@@ -142,6 +142,8 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
                 )
         return FileResponse(path, media_type=KINDS[path.suffix], headers=headers)
 
+    rooms = "league" if settings.league else "console"
+
     @app.get("/{path:path}", include_in_schema=False)
     def page(path: str, request: Request) -> Response:
         if path == "api" or path.startswith("api/"):
@@ -152,7 +154,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         except OSError:
             text = "<!doctype html><title>Racecraft</title><p>The pages are not built. Run <code>make console</code>."
         return HTMLResponse(
-            text.replace("__NONCE__", nonce),
+            text.replace("__NONCE__", nonce).replace("__ROOMS__", rooms),
             headers={"Content-Security-Policy": content_policy(nonce), "Cache-Control": "no-store"},
         )
 

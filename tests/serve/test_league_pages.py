@@ -1,0 +1,206 @@
+"""A lesson in real browsers: a teacher's and two pupils' at once, from the first card to the board at the wall."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from browsers import AXE, CHROMIUM, SOFTWARE_3D, Visit, needs_axe, needs_browser, needs_pages
+from leagues import RunningLeague, ok, running_league, untrained_run
+from running_consoles import PATIENCE
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+
+@dataclass
+class Lesson:
+    """A league, and the browsers of who is in the room."""
+
+    league: RunningLeague
+    browser: Browser
+    visits: dict[str, Visit]
+
+    def arrive(self, name: str) -> Visit:
+        """Somebody's own browser, that knows nothing yet."""
+        page = self.browser.new_context(locale="en-GB").new_page()
+        page.set_default_timeout(1000 * PATIENCE)
+        visit = self.visits[name] = Visit(self.league.console, page)
+        page.on("console", lambda message: visit.complaints.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: visit.complaints.append(str(error)))
+        return visit
+
+
+@pytest.fixture(scope="module")
+def lesson(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lesson]:
+    from playwright.sync_api import sync_playwright
+
+    with running_league(tmp_path_factory.mktemp("lesson") / "runs") as league, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
+        lesson = Lesson(league, browser, {})
+        teacher = lesson.arrive("teacher")
+        cookie = league.owner.cookies["racecraft_session"]
+        teacher.page.context.add_cookies(
+            [{"name": "racecraft_session", "value": cookie, "url": str(league.owner.base_url)}]
+        )
+        yield lesson
+        browser.close()
+        assert {name: visit.complaints for name, visit in lesson.visits.items()} == {name: [] for name in lesson.visits}
+
+
+@pytest.fixture(scope="module")
+def race(lesson: Lesson) -> int:
+    """A class with cards, two of them used, and a race that both have entered."""
+    page = lesson.visits["teacher"].open("/league")
+    page.get_by_label("New group").fill("Class 7b")
+    page.get_by_role("button", name="Make", exact=True).click()
+    page.get_by_role("heading", name="Class 7b").wait_for()
+    page.get_by_role("textbox", name="Make cards for a class").fill("Comet, Ada Lovelace\nTurbo\n")
+    page.get_by_role("button", name="Make 2 cards").click()
+    page.get_by_role("heading", name="Login cards").wait_for()
+    links = ["".join(link.split()) for link in page.locator(".sheet .link").all_inner_texts()]
+    assert len(links) == 2
+    page.get_by_role("button", name="Done").click()
+    page.get_by_role("cell", name="Ada Lovelace").wait_for()
+    page.get_by_label("Title").fill("Friday cup")
+    page.get_by_label("Track").select_option("oval")
+    page.get_by_label("Laps").fill("1")
+    page.get_by_role("button", name="Make the race").click()
+    page.get_by_text("Nobody has arrived yet.").wait_for()
+    number = int(page.url.split("/")[-1])
+
+    for name, link, seed in zip(("Comet", "Turbo"), links, (1, 2), strict=True):
+        pupil = lesson.arrive(name).page
+        address, _, secret = link.partition("/card")
+        pupil.goto(f"{address}/card#{secret}")
+        pupil.get_by_role("link", name="Friday cup").first.wait_for()
+        assert pupil.evaluate("location.href").endswith("/league"), "the secret does not stay in the address"
+        member = ok(pupil_client(lesson, name).get("/api/account"))["id"]
+        home = lesson.league.console.runs / ".racecraft" / "people" / str(member)
+        untrained_run(home, f"{name.lower()}-one", seed=seed)
+    return number
+
+
+def pupil_client(lesson: Lesson, name: str) -> Any:
+    """What somebody's browser is known by, for a program."""
+    client = lesson.league.stranger()
+    (cookie,) = lesson.visits[name].page.context.cookies()
+    client.cookies.set("racecraft_session", str(cookie["value"]))
+    return client
+
+
+def test_two_pupils_enter_and_see_where_they_stand(lesson: Lesson, race: int) -> None:
+    wall = lesson.visits["teacher"].open(f"/league/{race}/screen")
+    wall.get_by_text("Nobody has arrived yet.").wait_for()
+    for name in ("Comet", "Turbo"):
+        page = lesson.visits[name].open(f"/league/{race}")
+        page.get_by_text("Not in the race yet").wait_for()
+        page.get_by_label("Model", exact=True).select_option(f"{name.lower()}-one")
+        page.get_by_role("button", name="Enter").click()
+        page.get_by_text("Judged", exact=True).wait_for()
+    rows = ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"]
+    order = [row["name"] for row in rows]
+    assert sorted(order) == ["Comet", "Turbo"]
+    wall.get_by_role("listitem").nth(1).wait_for()  # by itself
+    assert wall.locator("li .name").all_inner_texts() == order
+    for place, name in enumerate(order, start=1):
+        page = lesson.visits[name].open(f"/league/{race}")
+        page.get_by_text(f"{place} of 2").wait_for()
+        assert name in page.locator("tr[aria-current=true]").inner_text()
+        page.get_by_text("You lead." if place == 1 else f"{rows[1]['gap']:.2f} s behind").wait_for()
+        assert page.get_by_role("button", name="Film").count() == 0
+        assert page.get_by_text("Ada Lovelace").count() == 0
+
+
+def test_the_teacher_judges_and_ends_it_and_everybody_sees_the_films(lesson: Lesson, race: int) -> None:
+    last = ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"][1]["name"]
+    teacher, pupil = lesson.visits["teacher"].open(f"/league/{race}"), lesson.visits[last].open(f"/league/{race}")
+    teacher.get_by_role("button", name=f"Take out: {last}").click()
+    teacher.get_by_label("Reason, which its owner reads").fill("Driven by hand.")
+    teacher.get_by_role("button", name="Take out", exact=True).click()
+    pupil.get_by_text("Does not count: Driven by hand.").wait_for()
+    teacher.get_by_role("button", name=f"Let in again: {last}").click()
+    pupil.get_by_text("2 of 2").wait_for()
+
+    teacher.get_by_role("button", name="End the race").click()
+    teacher.get_by_role("alert").get_by_role("button", name="End the race").click()
+    pupil.get_by_role("button", name="Film of the first eight").wait_for()
+    pupil.locator(f"button[aria-label='Film: {'Turbo' if last == 'Comet' else 'Comet'}']").click()
+    pupil.locator("#film canvas").wait_for()
+    assert sorted(pupil.locator("#film li button span:first-of-type").all_inner_texts()) == ["Comet", "Turbo"]
+
+
+def test_a_code_at_the_wall_and_a_card_that_was_lost(lesson: Lesson, race: int) -> None:
+    teacher = lesson.visits["teacher"].open("/league")
+    teacher.get_by_role("link", name="Class 7b", exact=True).click()
+    teacher.get_by_role("button", name="Make a code").click()
+    link = str(teacher.locator(".joining img").get_attribute("alt"))
+    pupil = lesson.arrive("Rocket")
+    page = pupil.page
+    page.goto(link)
+    page.get_by_role("button", name="Come in").wait_for()
+    page.get_by_label("Nickname").fill("comet")
+    page.get_by_role("button", name="Come in").click()
+    page.get_by_role("alert").get_by_text("looks like one that is").wait_for()
+    page.get_by_label("Nickname").fill("Rocket")
+    page.get_by_role("button", name="Come in").click()
+    page.get_by_role("heading", name="Hello, Rocket!").wait_for()
+    page.get_by_role("button", name="Let's go").click()
+    page.get_by_role("link", name="Friday cup").first.wait_for()
+
+    teacher.reload()
+    teacher.get_by_role("button", name="Lock out: Rocket").click()
+    teacher.get_by_text("Rocket is locked out").wait_for()
+    page.get_by_role("link", name="Class 7b").click()
+    page.get_by_role("heading", name="Come in").wait_for()
+    pupil.complaints = [one for one in pupil.complaints if "409" not in one and "401" not in one]  # both were wanted
+
+
+def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
+    page = lesson.visits["Turbo"].open("/me")
+    page.get_by_label("New password, at least 10 characters").fill("correct horse")
+    page.get_by_role("button", name="Save").nth(1).click()
+    page.get_by_text("The password is set.").wait_for()
+    page.get_by_role("button", name="Make a token").click()
+    token = page.locator("code").inner_text()
+    client = lesson.league.stranger()
+    assert ok(client.get("/api/league/races", headers={"authorization": f"Bearer {token}"}))[0]["id"] == race
+    with page.expect_download() as download:
+        page.get_by_role("link", name="What is kept of me").click()
+    assert "Friday cup" in download.value.path().read_text()
+    page.get_by_role("button", name="Sign out", exact=True).click()
+    page.get_by_role("button", name="Password").click()
+    page.get_by_label("Nickname").fill("turbo")
+    page.get_by_label("Password", exact=True).fill("correct horse")
+    page.get_by_role("button", name="Come in").click()
+    page.get_by_role("link", name="Friday cup").first.wait_for()
+    page = lesson.visits["Turbo"].open("/me")
+    page.get_by_label("Type your nickname").fill("Turbo")
+    page.get_by_role("button", name="Delete my account").click()
+    page.get_by_role("heading", name="Come in").wait_for()
+    assert "Turbo" not in [row["name"] for row in ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"]]
+
+
+@needs_axe
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_serious_and_nothing_sticks_out(lesson: Lesson, race: int, theme: str) -> None:
+    assert AXE.exists()
+    teacher, pupil, stranger = lesson.visits["teacher"], lesson.visits["Comet"], lesson.arrive(f"stranger {theme}")
+    group = ok(lesson.league.owner.get("/api/groups"))[0]["id"]
+    for visit in (teacher, pupil):
+        visit.look(theme, "de")
+    for visit, paths in (
+        (teacher, ("/league", f"/groups/{group}", f"/league/{race}", f"/league/{race}/screen", "/me")),
+        (pupil, ("/league", f"/groups/{group}", f"/league/{race}")),
+        (stranger, ("/",)),
+    ):
+        for path in paths:
+            page = visit.open(path, width=390, height=844)
+            page.wait_for_load_state("networkidle")
+            assert visit.overflow() == 0, path
+            assert visit.violations() == [], path
+    stranger.complaints = [one for one in stranger.complaints if "401" not in one]

@@ -1,0 +1,72 @@
+/** The routes of a league. */
+import { ask } from "../api/client";
+import type { RaceReplay } from "../api/races";
+import type { components } from "../api/schema";
+import type { Me } from "./who.svelte";
+
+type Schemas = components["schemas"];
+export type GroupCard = Schemas["GroupCard"];
+export type GroupDetail = Schemas["GroupDetail"];
+export type MemberInfo = Schemas["MemberInfo"];
+export type MemberModels = Schemas["MemberModels"];
+export type JoiningInfo = Schemas["JoiningInfo"];
+export type LoginCard = Schemas["LoginCard"];
+export type LeagueRace = Schemas["LeagueRace"];
+export type BoardPage = Schemas["BoardPage"];
+export type BoardRow = Schemas["BoardRow"];
+export type SubmissionInfo = Schemas["SubmissionInfo"];
+export type SessionInfo = Schemas["SessionInfo"];
+export type TokenInfo = Schemas["TokenInfo"];
+
+export const leagueApi = {
+  signIn: (name: string, password: string) => ask<Me>("POST", "/door/sign-in", { name, password }),
+  showCard: (secret: string) => ask<Me>("POST", "/door/card", { secret }),
+  join: (code: string, name: string) => ask<Schemas["Joined"]>("POST", "/door/join", { code, name }),
+  signOut: () => ask<void>("POST", "/door/sign-out"),
+  joinOn: (code: string) => ask<GroupCard>("POST", "/groups/join", { code }),
+
+  groups: () => ask<GroupCard[]>("GET", "/groups"),
+  group: (id: number) => ask<GroupDetail>("GET", `/groups/${id}`),
+  makeGroup: (title: string) => ask<GroupCard>("POST", "/groups", { title }),
+  open: (id: number, uses: number, hours: number) => ask<JoiningInfo>("POST", `/groups/${id}/joining`, { uses, hours }),
+  close: (id: number) => ask<void>("DELETE", `/groups/${id}/joining`),
+  add: (id: number, people: { name: string; real_name: string }[]) =>
+    ask<LoginCard[]>("POST", `/groups/${id}/members`, { people }),
+  changeMember: (id: number, member: number, change: { name?: string; real_name?: string }) =>
+    ask<void>("PATCH", `/groups/${id}/members/${member}`, change),
+  removeMember: (id: number, member: number) => ask<void>("DELETE", `/groups/${id}/members/${member}`),
+  revoke: (id: number, member: number) => ask<void>("POST", `/groups/${id}/members/${member}/revoke`),
+  cards: (id: number, members: number[]) => ask<LoginCard[]>("POST", `/groups/${id}/cards`, { members }),
+  models: (id: number) => ask<MemberModels[]>("GET", `/groups/${id}/models`),
+  copy: (id: number, member: number, model: string) =>
+    ask<Schemas["ModelCard"]>("POST", `/groups/${id}/models/copy`, { member, model }),
+  invite: () => ask<JoiningInfo>("POST", "/invitations", { uses: 1, hours: 24 * 7 }),
+
+  races: () => ask<LeagueRace[]>("GET", "/league/races"),
+  makeRace: (group: number, race: Partial<Schemas["NewRace"]> & { title: string }) =>
+    ask<LeagueRace>("POST", `/groups/${group}/races`, race),
+  changeRace: (id: number, change: Partial<Schemas["LeagueRaceChange"]>) =>
+    ask<LeagueRace>("PATCH", `/league/races/${id}`, change),
+  removeRace: (id: number) => ask<void>("DELETE", `/league/races/${id}`),
+  board: (id: number, top: number) => ask<BoardPage>("GET", `/boards/${id}?top=${top}`),
+  film: (id: number, submissions: number[]) =>
+    ask<RaceReplay>("GET", `/boards/${id}/film?submissions=${submissions.join(",")}`),
+  enter: (id: number, model: string) => ask<SubmissionInfo>("POST", `/league/races/${id}/enter`, { model }),
+  submissions: (id: number, everybody: boolean) =>
+    ask<SubmissionInfo[]>("GET", `/league/races/${id}/submissions?everybody=${everybody}`),
+  disqualify: (id: number, submission: number, reason: string) =>
+    ask<void>("POST", `/league/races/${id}/submissions/${submission}/disqualify`, { reason }),
+  restore: (id: number, submission: number) =>
+    ask<void>("POST", `/league/races/${id}/submissions/${submission}/restore`),
+
+  rename: (name: string) => ask<Me>("PATCH", "/account", { name }),
+  setPassword: (old: string, fresh: string) => ask<void>("PUT", "/account/password", { old, new: fresh }),
+  sessions: () => ask<SessionInfo[]>("GET", "/account/sessions"),
+  endSession: (id: string) => ask<void>("DELETE", `/account/sessions/${id}`),
+  endSessions: () => ask<void>("DELETE", "/account/sessions"),
+  tokens: () => ask<TokenInfo[]>("GET", "/account/tokens"),
+  makeToken: (title: string, days: number) =>
+    ask<Schemas["MadeToken"]>("POST", "/account/tokens", { title, days, scopes: ["read", "submit"] }),
+  removeToken: (id: number) => ask<void>("DELETE", `/account/tokens/${id}`),
+  removeAccount: () => ask<void>("DELETE", "/account"),
+};
