@@ -40,7 +40,7 @@ SCALE: Final[tuple[Color, ...]] = ((49, 44, 108), (43, 96, 156), (38, 152, 148),
 _SPELLED: Final = str.maketrans(
     dict(zip("–−×→", ["-", "-", "x", "->"], strict=True))
     | dict(zip("²≥≤", ["^2", ">=", "<="], strict=True))
-    | dict(zip("εγαπ", ["epsilon", "gamma", "alpha", "pi"], strict=True))
+    | dict(zip("εγαλπ", ["epsilon", "gamma", "alpha", "lambda", "pi"], strict=True))
     | dict(zip("äöüß", ["ae", "oe", "ue", "ss"], strict=True))
 )
 """What Pillow's own font has no letters for."""
