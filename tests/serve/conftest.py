@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from postgres_servers import PostgresServer, binaries, postgres_server
 from running_consoles import RunningConsole, running_console
+from running_workers import processes_on
 
 pytest.importorskip("fastapi")
 
@@ -32,6 +36,16 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
         return f"sqlite:///{tmp_path / 'console.db'}"
     server: PostgresServer = request.getfixturevalue("postgres")
     return server.new_database()
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> Iterator[Path]:
+    """A folder on which nothing works after the test any more: jobs of a console that was killed go on without it."""
+    folder = tmp_path / "runs"
+    yield folder
+    for process in processes_on(folder):
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

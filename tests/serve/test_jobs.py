@@ -184,8 +184,7 @@ def test_cancelling(queue: JobQueue) -> None:
 
 
 @pytest.mark.slow
-def test_a_killed_server_and_a_killed_worker_lose_nothing(tmp_path: Path) -> None:
-    runs = tmp_path / "runs"
+def test_a_killed_server_and_a_killed_worker_lose_nothing(runs: Path) -> None:
     with running_console(runs) as console:
         name = console.create(name="tough", until="20000 steps")
         console.wait_for(lambda: console.client.get(f"/api/models/{name}").json()["checkpoints"])
@@ -199,8 +198,7 @@ def test_a_killed_server_and_a_killed_worker_lose_nothing(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_a_stopped_server_hands_its_training_to_the_next(tmp_path: Path) -> None:
-    runs = tmp_path / "runs"
+def test_a_stopped_server_hands_its_training_to_the_next(runs: Path) -> None:
     with running_console(runs) as console:
         name = console.create(name="patient", until="20000 steps")
         console.wait_for(lambda: console.client.get(f"/api/models/{name}/history").json()["points"])

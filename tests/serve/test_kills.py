@@ -27,8 +27,8 @@ KILLS = 20
 UNTIL = "24000 steps"
 
 
-def test_a_server_killed_twenty_times(tmp_path: Path) -> None:
-    runs, dice = tmp_path / "runs", random.Random(6)
+def test_a_server_killed_twenty_times(runs: Path) -> None:
+    dice = random.Random(6)
     raced: list[str] = []
     for kill in range(KILLS):
         with running_console(runs) as console:

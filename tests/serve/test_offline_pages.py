@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from browsers import needs_browser, needs_pages, visiting
@@ -15,8 +16,7 @@ AWAY = 12.0  # s; it was 60 when it was looked at
 USUAL = 5.0  # s between two points of the graph, at most; the machine may be busy
 
 
-def test_a_graph_has_no_gap_after_a_time_without_server(tmp_path_factory: pytest.TempPathFactory) -> None:
-    runs = tmp_path_factory.mktemp("offline") / "runs"
+def test_a_graph_has_no_gap_after_a_time_without_server(runs: Path) -> None:
     with running_console(runs) as first, visiting(first) as visit:
         first.create(name="away", track="oval", until="20 minutes")
         page = visit.open("/models/away/watch")

@@ -182,12 +182,9 @@ def test_a_lost_network_is_one_banner_and_everything_comes_back(visit: Visit) ->
     assert page.locator(".toast").count() == 0
 
 
-def test_a_server_that_is_gone_is_said_over_cars_that_look_frozen(
-    visit: Visit, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_a_server_that_is_gone_is_said_over_cars_that_look_frozen(visit: Visit, runs: Path) -> None:
     browser = visit.page.context.browser
     assert browser is not None
-    runs = tmp_path_factory.mktemp("gone") / "runs"
     with running_console(runs) as console:
         console.create(name="stork", track="oval", until="10 minutes", seed=1)
         address = str(console.client.base_url).rstrip("/")
