@@ -12,7 +12,12 @@ Tests = tuple[str, ...]
 
 PUT_BACK: Final = "tests/contest/test_races_together.py::test_two_that_are_put_back_at_once_do_not_stand_in_each_other"
 LEARN: Final[Tests] = ("tests/learn/test_ppo.py", "-k", "not learns")
-SERVE: Final[Tests] = ("tests/serve/test_races_api.py", "-k", "not beginning_to_end and not postgresql")
+SERVE: Final[Tests] = (
+    "tests/serve/test_races.py",
+    "tests/serve/test_races_api.py",
+    "-k",
+    "not beginning_to_end and not postgresql",
+)
 QUEUE: Final[Tests] = (
     "tests/serve/test_jobs.py",
     "-k",

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-PATIENCE = 120.0  # s; the machine may be busy
+from running_consoles import end
 
 
 @dataclass
@@ -40,15 +40,7 @@ def running_worker(runs: Path, *, database: str, artifacts: str) -> Iterator[Run
         assert process.stdout is not None
         yield RunningWorker(process, json.loads(process.stdout.readline())["machine"], runs)
     finally:
-        if process.poll() is None:
-            process.terminate()
-            try:
-                process.wait(PATIENCE)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-        assert process.stdout is not None
-        process.stdout.close()
+        end(process)
 
 
 def processes_on(runs: Path) -> list[int]:
