@@ -35,11 +35,12 @@ def test_every_operation_is_tried(operations: dict[str, Any]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("label", OPERATIONS)
 def test_no_request_breaks_the_server(console: RunningConsole, operations: dict[str, Any], label: str) -> None:
+    from requests import Session
     from schemathesis import GenerationMode
 
     operation = operations[label]
     if console.client.get("/api/models/fuzzed").status_code == 404:
-        console.create(name="fuzzed", train=False, track="oval")
+        console.create(name="fuzzed", train=False, track="oval", until="512 steps")  # when it is told to train
     modes = [operation.as_strategy(generation_mode=mode) for mode in GenerationMode]
     cookie = f"racecraft_session={console.client.cookies['racecraft_session']}"
     base = str(console.client.base_url).rstrip("/")
@@ -58,13 +59,14 @@ def test_no_request_breaks_the_server(console: RunningConsole, operations: dict[
             case.path_parameters["name"] = name
         if operation.label == "POST /api/models" and isinstance(case.body, dict):
             case.body["train"] = False
-        reply = case.call(base_url=base, headers={"Cookie": cookie}, timeout=60)
+        reply = case.call(base_url=base, headers={"Cookie": cookie}, timeout=60, session=session)
         assert reply.status_code < 500, reply.text
         if reply.status_code >= 400:
             assert set(reply.json()) == {"error"}, reply.text
             assert {"code", "message", "hint"} <= set(reply.json()["error"])
 
-    attempt()
+    with Session() as session:
+        attempt()
     assert console.process.poll() is None
     assert console.client.get("/api/console").status_code == 200
 
