@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 from running_consoles import PATIENCE, RunningConsole
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[2]
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
+THEMES: Final = ("light", "dark")
 SOFTWARE_3D = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 
 needs_pages = pytest.mark.skipif(
@@ -53,17 +54,47 @@ class Visit:
 
     def violations(self) -> list[Any]:
         """What axe finds, but for trifles."""
-        self.page.evaluate(AXE.read_text())
-        found = self.page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
-        return [
-            (one["id"], [node["html"][:160] for node in one["nodes"][:3]])
-            for one in found
-            if one["impact"] in ("serious", "critical")
-        ]
+        return violations(self.page)
 
     def overflow(self) -> int:
         """Pixels that the page is wider than the window."""
         return int(self.page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
+
+    def flaws(self, path: str) -> dict[str, Any]:
+        """What axe finds on a wide and on a narrow page, and by how much it is too wide, by path and width."""
+        found: dict[str, Any] = {}
+        page = self.open(path)
+        for width in (1440, 390):
+            page.set_viewport_size({"width": width, "height": 900})
+            page.wait_for_timeout(600)
+            if there := self.violations():
+                found[f"{path} {width}"] = there
+            if (pixels := self.overflow()) > 0:
+                found[f"{path} {width} is too wide"] = pixels
+        return found
+
+
+def violations(page: Page) -> list[Any]:
+    """What axe finds on a page, but for trifles."""
+    if not page.evaluate("'axe' in window"):
+        page.evaluate(AXE.read_text())
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+    return [
+        (one["id"], [node["html"][:160] for node in one["nodes"][:3]])
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
+
+
+def violations_by_theme(page: Page) -> dict[str, list[Any]]:
+    """The same of a page that looks as the system does, in both themes."""
+    found = {}
+    for theme in THEMES:
+        page.emulate_media(color_scheme=theme)
+        page.wait_for_function("theme => document.documentElement.dataset.theme === theme", arg=theme)
+        page.evaluate("Promise.all(document.getAnimations().map(one => one.finished.catch(() => {})))")
+        found[theme] = violations(page)
+    return found
 
 
 @contextmanager
@@ -72,7 +103,7 @@ def visiting(console: RunningConsole) -> Iterator[Visit]:
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
-        page = browser.new_page()
+        page = browser.new_context().new_page()
         page.set_default_timeout(1000 * PATIENCE)
         cookie = console.client.cookies["racecraft_session"]
         page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])

@@ -13,20 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from running_consoles import PATIENCE, RunningConsole, running_console
+from browsers import ROOT, THEMES, needs_axe, needs_browser, needs_pages, violations_by_theme, visiting
+from running_consoles import RunningConsole, running_console
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-ROOT = Path(__file__).parents[2]
 WEB = ROOT / "web"
 BUILT = ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-AXE = WEB / "node_modules" / "axe-core" / "axe.min.js"
-MILLISECONDS = 1000 * PATIENCE
-
-needs_pages = pytest.mark.skipif(not BUILT.exists(), reason="the pages are not built: make console builds them")
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
 
 
 def test_the_committed_openapi_is_the_servers() -> None:
@@ -130,21 +124,12 @@ def test_the_web_clients_own(script: str) -> None:
 
 @pytest.fixture(scope="module")
 def visited() -> Iterator[tuple[RunningConsole, Page]]:
-    from playwright.sync_api import sync_playwright
-
     with (
         tempfile.TemporaryDirectory() as folder,
         running_console(Path(folder) / "runs") as console,
-        sync_playwright() as playwright,
+        visiting(console) as visit,
     ):
-        arguments = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        page = browser.new_page()
-        page.set_default_timeout(MILLISECONDS)
-        cookie = console.client.cookies["racecraft_session"]
-        page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
-        yield console, page
-        browser.close()
+        yield console, visit.page
 
 
 @pytest.mark.slow
@@ -194,27 +179,29 @@ def test_mistakes_are_shown_where_they_are(visited: tuple[RunningConsole, Any]) 
     assert page.get_by_role("button", name="Train now").first.is_disabled()
 
 
-@pytest.mark.slow
-@needs_pages
-@needs_browser
-@pytest.mark.skipif(not AXE.exists(), reason="web/node_modules is not installed")
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_axe_finds_nothing_serious(visited: tuple[RunningConsole, Any], theme: str) -> None:
+@pytest.fixture(scope="module")
+def flaws(visited: tuple[RunningConsole, Any]) -> dict[str, dict[str, Any]]:
+    """What axe finds in each theme on pages that are opened once for both."""
     console, page = visited
     model = next(iter(console.client.get("/api/models").json()), None)
     own = [f"/models/{model['name']}/{tab}" for tab in ("watch", "race", "setup")] if model else []
-    page.context.add_init_script(f"localStorage.setItem('racecraft-theme', '{theme}')")
-    found = {}
+    found: dict[str, dict[str, Any]] = {theme: {} for theme in THEMES}
     for path in ("/", "/create", "/tracks", "/settings", *own):
         page.goto(f"{console.client.base_url}{path}")
         page.locator("h1").wait_for()
         page.wait_for_timeout(1000)
-        page.evaluate(AXE.read_text())
-        result = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
-        for violation in result["violations"]:
-            if violation["impact"] in ("serious", "critical"):
-                found[f"{path}: {violation['id']}"] = [node["html"][:160] for node in violation["nodes"][:3]]
-    assert found == {}
+        for theme, there in violations_by_theme(page).items():
+            found[theme] |= {path: there} if there else {}
+    return found
+
+
+@pytest.mark.slow
+@needs_pages
+@needs_browser
+@needs_axe
+@pytest.mark.parametrize("theme", THEMES)
+def test_axe_finds_nothing_serious(flaws: dict[str, dict[str, Any]], theme: str) -> None:
+    assert flaws[theme] == {}
 
 
 def _colours(png: bytes) -> set[Any]:

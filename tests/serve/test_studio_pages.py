@@ -2,39 +2,28 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from running_consoles import PATIENCE, RunningConsole, running_console
+from browsers import THEMES, needs_axe, needs_browser, needs_pages, violations_by_theme, visiting
+from running_consoles import RunningConsole, running_console
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-ROOT = Path(__file__).parents[2]
-AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-PAGES = ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html"
-
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not PAGES.exists(), reason="the pages are not built: make console builds them"),
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
-]
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 
 @pytest.fixture(scope="module")
 def studio() -> Iterator[tuple[RunningConsole, Page]]:
     """A console with two small models that have raced, and a page in it; complaints of the page fail the tests."""
-    from playwright.sync_api import sync_playwright
-
     with (
         tempfile.TemporaryDirectory() as folder,
         running_console(Path(folder) / "runs") as console,
-        sync_playwright() as playwright,
+        visiting(console) as tab,
     ):
         for name, reward in (("left", "racing"), ("right", "centerline")):
             console.create(name=name, track="oval", until="6000 steps", seed=1, reward=reward)
@@ -43,18 +32,8 @@ def studio() -> Iterator[tuple[RunningConsole, Page]]:
             request = {"laps": 1, "num_trials": 2, "rules": "first_lap"}
             job = console.client.post(f"/api/models/{name}/evaluations", json=request).json()
             assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
-        arguments = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        page = browser.new_context().new_page()
-        page.set_default_timeout(1000 * PATIENCE)
-        cookie = console.client.cookies["racecraft_session"]
-        page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
-        complaints: list[str] = []
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
-        yield console, page
-        browser.close()
-        assert complaints == []
+        yield console, tab.page
+        assert tab.complaints == []
 
 
 def visit(studio: tuple[RunningConsole, Any], path: str) -> Any:
@@ -289,21 +268,23 @@ def test_training_goes_on_with_a_changed_reward(studio: tuple[RunningConsole, An
     assert studio[0].client.get("/api/models/right").json()["reward"].endswith("return params['speed']\n")
 
 
-@pytest.mark.skipif(not AXE.exists(), reason="web/node_modules is not installed")
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_axe_finds_nothing_serious_in_the_studio(studio: tuple[RunningConsole, Any], theme: str) -> None:
+@pytest.fixture(scope="module")
+def flaws(studio: tuple[RunningConsole, Any]) -> dict[str, dict[str, Any]]:
+    """What axe finds in each theme on pages that are opened once for both."""
     page = studio[1].context.new_page()  # axe itself tries what the page's policy forbids
-    page.add_init_script(f"localStorage.setItem('racecraft-theme', '{theme}')")
-    found = {}
+    found: dict[str, dict[str, Any]] = {theme: {} for theme in THEMES}
     own = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "tune", "setup")]
     for path in ("/", "/create", "/compare/left/right", *own):
         visit((studio[0], page), path)
         page.wait_for_timeout(1500)
         page.evaluate("document.querySelectorAll('details:not(.keep)').forEach(part => { part.open = true; })")
-        page.evaluate(AXE.read_text())
-        result = page.evaluate("axe.run(document, {resultTypes: ['violations']})")
-        for violation in result["violations"]:
-            if violation["impact"] in ("serious", "critical"):
-                found[f"{path}: {violation['id']}"] = [node["html"][:160] for node in violation["nodes"][:3]]
+        for theme, there in violations_by_theme(page).items():
+            found[theme] |= {path: there} if there else {}
     page.close()
-    assert found == {}
+    return found
+
+
+@needs_axe
+@pytest.mark.parametrize("theme", THEMES)
+def test_axe_finds_nothing_serious_in_the_studio(flaws: dict[str, dict[str, Any]], theme: str) -> None:
+    assert flaws[theme] == {}

@@ -165,11 +165,5 @@ def test_axe_finds_nothing_serious_and_nothing_sticks_out(visit: Visit, theme: s
     visit.look(theme, "de" if theme == "dark" else "en")
     found = {}
     for path in ("/tracks", "/draw", "/draw/generated:7", "/drive/oval"):
-        for width in (1440, 390):
-            page = visit.open(path, width=width)
-            page.wait_for_timeout(600)
-            if violations := visit.violations():
-                found[f"{path} {width}"] = violations
-            if visit.overflow() > 0:
-                found[f"{path} {width} is too wide"] = [str(visit.overflow())]
+        found |= visit.flaws(path)
     assert found == {}
