@@ -26,7 +26,7 @@ for name in ("none", "light", "strong"):
     worlds[name] = [frame.copy() for frame in cars.frames]
 show(
     image_rows(
-        "One place in fifteen worlds", worlds, subtitle="What a car sees at the start, by how much is drawn by lot"
+        "One place in eleven worlds", worlds, subtitle="What a car sees at the start, by how much is drawn by lot"
     ),
     "worlds",
 )
