@@ -14,9 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from test_export import trained
 from test_policy_graph import AWS_MODEL, FRONT, OLD, REAL, SHALLOW, SMALL, answers, fed, made, suite_and_spec
 
 from racecraft.agent.sensor_suite import SensorSuite
+from racecraft.car import export_run
+from racecraft.car.converters import openvino_model, tflite_model
 from racecraft.car.policy_graph import policy_graph, policy_output
 from racecraft.importing.frozen_graph import open_frozen_graph
 from racecraft.importing.weights import read_weights
@@ -40,11 +43,12 @@ def tensorflow(graph: bytes, output: str, feeds: Feeds, folder: Path) -> NDArray
 def openvino(graph: bytes, output: str, feeds: Feeds, folder: Path) -> NDArray[np.float32]:
     """As a car of x86 does: weights in FP16."""
     ov = pytest.importorskip("openvino", reason="OpenVINO is not installed")
-    (folder / "model.pb").write_bytes(graph)
-    model = ov.convert_model(folder / "model.pb")
+    xml, weights = openvino_model(graph)
+    (folder / "model.xml").write_bytes(xml)
+    (folder / "model.bin").write_bytes(weights)
+    model = ov.Core().read_model(folder / "model.xml")
     assert [out.any_name for out in model.outputs] == [f"{output}:0"]
-    ov.save_model(model, folder / "model.xml", compress_to_fp16=True)
-    compiled = ov.Core().compile_model(folder / "model.xml", "CPU", {"INFERENCE_PRECISION_HINT": "f32"})
+    compiled = ov.Core().compile_model(model, "CPU", {"INFERENCE_PRECISION_HINT": "f32"})
     given = {name: feeds[name.removesuffix(":0")] for name in (source.any_name for source in model.inputs)}
     return np.asarray(next(iter(compiled(given).values())))
 
@@ -52,15 +56,7 @@ def openvino(graph: bytes, output: str, feeds: Feeds, folder: Path) -> NDArray[n
 def tflite(graph: bytes, output: str, feeds: Feeds, folder: Path) -> NDArray[np.float32]:
     """As a car with a Raspberry Pi does: weights in FP16."""
     tf: Any = pytest.importorskip("tensorflow", reason="TensorFlow is not installed")
-    definition = tf.compat.v1.GraphDef()
-    definition.ParseFromString(graph)
-    with tf.Graph().as_default() as loaded:
-        tf.import_graph_def(definition, name="")
-        inputs = [loaded.get_tensor_by_name(f"{name}:0") for name in feeds]
-        converter = tf.compat.v1.lite.TFLiteConverter(definition, inputs, [loaded.get_tensor_by_name(f"{output}:0")])
-        converter.optimizations = [tf.lite.Optimize.DEFAULT]
-        converter.target_spec.supported_types = [tf.float16]
-        converted = converter.convert()
+    converted = tflite_model(graph, list(feeds), output)
     interpreter = tf.lite.Interpreter(model_content=converted, num_threads=1)
     places = {name: part["index"] for part in interpreter.get_input_details() for name in feeds if name in part["name"]}
     for name, place in places.items():
@@ -124,3 +120,17 @@ def compare(
     np.testing.assert_allclose(theirs, ours, atol=within)
     if spec.is_discrete:
         assert (theirs.argmax(1) == ours.argmax(1)).all()
+
+
+@pytest.mark.parametrize(
+    ("to", "module", "endings"), [("tflite", "tensorflow", [".tflite"]), ("openvino", "openvino", [".xml", ".bin"])]
+)
+def test_a_run_s_model_lies_beside_its_files(to: str, module: str, endings: list[str], tmp_path: Path) -> None:
+    pytest.importorskip(module, reason=f"{module} is not installed")
+    run = trained(tmp_path, name="floor")
+    exported = export_run(run, to=to)
+    files = [run / f"floor{ending}" for ending in endings]
+    assert exported.file == files[0]
+    assert exported.size == sum(file.stat().st_size for file in files)
+    onnx = export_run(run, to="onnx").size
+    assert 0.4 * onnx < exported.size < 0.8 * onnx  # FP16

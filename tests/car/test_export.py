@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import io
 import json
+import sys
 import tarfile
 from dataclasses import replace
 from pathlib import Path
@@ -135,8 +136,12 @@ WRONG = {
     "a space": ({"output": "my model.tar.gz"}, ConfigError, "replaces spaces"),
     "no name": ({"output": ".tar.gz"}, ConfigError, "use letters, digits, - and _"),
     "a checkpoint that is not there": ({"checkpoint": 77}, CheckpointError, "77"),
-    "another target": ({"to": "bike"}, ConfigError, "--to is 'bike'; allowed are car, onnx"),
-    "an archive as ONNX": ({"to": "onnx", "output": "a.tar.gz"}, ConfigError, "an ONNX model's name ends in .onnx"),
+    "another target": ({"to": "bike"}, ConfigError, "--to is 'bike'; allowed are car, onnx, tflite, openvino"),
+    "an archive as ONNX": (
+        {"to": "onnx", "output": "a.tar.gz"},
+        ConfigError,
+        "the name of a model for onnx ends in .onnx",
+    ),
     "a folder in the way": ({"output": "taken/model.tar.gz"}, RunError, "cannot be written"),
 }
 
@@ -182,3 +187,15 @@ def test_an_onnx_model_lies_beside_the_run_s_files(run: Path) -> None:
     assert exported.file == run / "to.floor.onnx"
     assert exported.notes == ()
     assert exported.size == exported.file.stat().st_size > 100_000
+
+
+@pytest.mark.parametrize(("to", "module"), [("tflite", "tensorflow"), ("openvino", "openvino")])
+def test_a_target_whose_library_is_missing_says_what_brings_it(
+    to: str, module: str, run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    before = set(run.iterdir())
+    with pytest.raises(ConfigError, match=f"needs {module}, which is not installed") as caught:
+        export_run(run, to=to)
+    assert f"pip install {module}" in caught.value.hint
+    assert set(run.iterdir()) == before

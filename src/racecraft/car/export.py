@@ -11,8 +11,9 @@ from typing import Any, Final
 
 from racecraft.agent.model_metadata import ModelMetadata
 from racecraft.car.archive import GRAPH, METADATA, archive_name, car_archive, check_archive_name
+from racecraft.car.converters import openvino_model, tflite_model
 from racecraft.car.metadata import car_metadata, car_notes
-from racecraft.car.policy_graph import policy_graph, policy_onnx
+from racecraft.car.policy_graph import policy_graph, policy_onnx, policy_output, sensor_inputs
 from racecraft.checks import check_choice
 from racecraft.errors import ConfigError, RunError
 from racecraft.importing.model_files import ModelFiles
@@ -24,9 +25,10 @@ from racecraft.race.policy import NetworkPolicy, load_policy
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file
 
-TARGETS: Final = ("car", "onnx")
+ENDINGS: Final = {"onnx": ".onnx", "tflite": ".tflite", "openvino": ".xml"}
+"""What a network alone can become, and how the name of its file ends; OpenVINO writes a second one, ``.bin``."""
+TARGETS: Final = ("car", *ENDINGS)
 """What a run can become."""
-ONNX: Final = ".onnx"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,7 @@ class ExportedModel:
     file: Path
     """What was written."""
     size: int
-    """Bytes."""
+    """Bytes; of both files of OpenVINO."""
     network: str
     """Name of the network."""
     notes: tuple[str, ...]
@@ -54,7 +56,7 @@ class ExportedModel:
 def export_run(
     run: str | Path, *, to: str = "car", output: str | Path | None = None, checkpoint: str | int = "best"
 ) -> ExportedModel:
-    """Write the archive that a physical car takes, or a policy's network alone as an ONNX model.
+    """Write the archive that a physical car takes, or a policy's network alone as another program's model.
 
     Args:
         run: The run folder.
@@ -65,31 +67,43 @@ def export_run(
     Raises:
         RunError: There is no such run, or the file cannot be written.
         CheckpointError: There is no such checkpoint, or it is damaged.
-        ConfigError: The car has not what the policy needs, or would not take the archive's name.
+        ConfigError: The car has not what the policy needs, or would not take the archive's name, or the library that
+            the target needs is not installed.
     """
     check_choice("--to", to, TARGETS)
     folder = RunFolder.open(run)
-    name = archive_name(folder.name) if to == "car" else folder.name + ONNX
-    file = folder.path / name if output is None else Path(output)
+    ending = ENDINGS.get(to, "")
+    file = (
+        folder.path / (folder.name + ending if ending else archive_name(folder.name))
+        if output is None
+        else Path(output)
+    )
     if to == "car":
         check_archive_name(file)
-    elif file.suffix != ONNX:
-        raise ConfigError(f"The model is to be called {file.name!r}; an ONNX model's name ends in {ONNX}.")
+    elif file.suffix != ending:
+        raise ConfigError(f"The model is to be called {file.name!r}; the name of a model for {to} ends in {ending}.")
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=1)
     metadata, spec, weights = folder.read_model_metadata(), policy.learner.spec, policy.learner.weights()
-    notes: list[str] = []
-    if to == "car":
-        _write(file, car_archive(policy_graph(weights, spec, metadata.suite), car_metadata(metadata, spec)))
-        notes = car_notes(metadata, spec)
+    files = {file: b""}
+    if to == "onnx":
+        files[file] = policy_onnx(weights, spec, metadata.suite)
     else:
-        _write(file, policy_onnx(weights, spec, metadata.suite))
+        graph = policy_graph(weights, spec, metadata.suite)
+        if to == "car":
+            files[file] = car_archive(graph, car_metadata(metadata, spec))
+        elif to == "tflite":
+            files[file] = tflite_model(graph, sensor_inputs(spec, metadata.suite), policy_output(spec))
+        else:
+            files[file], files[file.with_suffix(".bin")] = openvino_model(graph)
+    for path, data in files.items():
+        _write(path, data)
     return ExportedModel(
         run=folder.path,
         step=step,
         file=file,
-        size=file.stat().st_size,
+        size=sum(map(len, files.values())),
         network=spec.name,
-        notes=tuple(notes),
+        notes=tuple(car_notes(metadata, spec)) if to == "car" else (),
     )
 
 

@@ -34,6 +34,11 @@ def sensor_input(spec: NetworkSpec, sensor: str) -> str:
     return f"{_online(spec)}/network_0/{sensor}/{sensor}"
 
 
+def sensor_inputs(spec: NetworkSpec, sensors: SensorSuite) -> list[str]:
+    """Names of all placeholders: the camera's, and the LIDAR's where there is one."""
+    return [sensor_input(spec, name) for name in (sensors.camera_name, sensors.lidar_name) if name]
+
+
 def policy_graph(weights: Weights, spec: NetworkSpec, sensors: SensorSuite) -> bytes:
     """The graph as the content of a ``.pb`` file.
 

@@ -13,7 +13,7 @@ from racecraft.cli.app import Json, app, print_json
 @app.command()
 def export(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
-    to: Annotated[str, typer.Option("--to", help="What for: car, or onnx.")] = "car",
+    to: Annotated[str, typer.Option("--to", help="What for: car, onnx, tflite or openvino.")] = "car",
     checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
     output: Annotated[
         Path | None,
@@ -21,7 +21,7 @@ def export(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write the archive that a physical car takes, or an ONNX model."""
+    """Write what a physical car takes, or the network alone."""
     from racecraft.car import export_run
     from racecraft.cli import car_text
 
