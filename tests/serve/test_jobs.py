@@ -13,9 +13,9 @@ import sqlalchemy as sa
 from running_consoles import running_console
 
 from racecraft.errors import RunError
-from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, MAX_LOSSES, JobQueue, kinds_of
+from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, MAX_LOSSES, JobQueue, kinds_of, waiting_line
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Job, Table, now
+from racecraft.serve.store.tables import Job, Table, User, now
 
 
 @pytest.fixture
@@ -77,6 +77,23 @@ def test_jobs_are_claimed_in_order_by_kind(queue: JobQueue) -> None:
     assert queue.claim(("train",), owner="x").id == first.id  # type: ignore[union-attr]
     assert queue.claim(("train",), owner="y").id == second.id  # type: ignore[union-attr]
     assert queue.claim(("train", "evaluate"), owner="z") is None
+
+
+def test_nobodys_hundred_jobs_stand_before_anothers_first(database: Database, queue: JobQueue) -> None:
+    with database.transaction() as session:
+        session.add(User(id=2, name="Bob", handle="bob"))
+    bob = queue.of(2)
+    running = queue.add("train", "many-0", {})
+    assert queue.claim(("train",), owner="w") is not None
+    many = [queue.add("train", f"many-{number}", {}) for number in range(1, 101)]
+    first, second = bob.add("train", "bobs-first", {}), bob.add("train", "bobs-second", {})
+    assert bob.before(first) == ["…"], "only what has the place already"
+    with database.transaction() as session:
+        line = [job.id for job in waiting_line(session, ("train",))]
+    assert line[:2] == [running.id, first.id]
+    assert line[2:4] == [many[0].id, second.id], "turn by turn"
+    assert (found := queue.claim(("train",), owner="w")) is not None
+    assert found.id == first.id
 
 
 def test_many_workers_never_own_a_job_together(database: Database) -> None:

@@ -9,6 +9,7 @@ import json
 import time
 import zipfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -171,6 +172,74 @@ def test_the_digest_is_of_what_drives_and_nothing_else(run: RunFolder, tmp_path:
     assert digest({**arrays, name: arrays[name] + np.float32(1e-3)}) != same
     actions = [{**metadata["action_space"][0], "speed": 0.5}, *metadata["action_space"][1:]]
     assert digest(arrays, model_metadata={**metadata, "action_space": actions}) != same
+
+
+def test_a_final_of_the_first_a_day_that_is_used_up_and_a_season(league: RunningLeague, tmp_path: Path) -> None:
+    owner, group = league.owner, league.group("Season")
+    code = league.code(group)
+    pupils = {name: league.join(code, name) for name in ("Mia", "Noah")}
+    terms = {"track": "oval", "laps": 1, "trials": 1}
+    files = [pack_entry(untrained_run(tmp_path, f"novice-{seed}", seed=seed)) for seed in (1, 2, 3)]
+
+    def race(title: str) -> int:
+        return int(ok(owner.post(f"/api/groups/{group}/races", json={"title": title, **terms}), 201)["id"])
+
+    def submit(number: int, name: str, file: int) -> httpx.Response:
+        return pupils[name].post(f"/api/league/races/{number}/submissions?model=novice", content=files[file])
+
+    def judged(number: int, name: str, submission: int) -> Any:
+        def ended() -> Any:
+            found = ok(pupils[name].get(f"/api/league/races/{number}/submissions/{submission}"))
+            return found if found["state"] == "done" else None
+
+        return league.console.wait_for(ended)
+
+    qualifying, final = race("Qualifying"), race("Final")
+    address = f"/api/league/races/{final}"
+    ok(owner.post(f"{address}/follow", json={"race": qualifying, "best": 1}))
+    assert "itself" in refused(owner.post(f"/api/league/races/{qualifying}/follow", json={"race": final}), 409)
+    elsewhere = league.group("Elsewhere")
+    foreign = ok(owner.post(f"/api/groups/{elsewhere}/races", json={"title": "x", **terms}), 201)["id"]
+    refused(owner.post(f"{address}/follow", json={"race": foreign}), 404)
+
+    # one a day, and what fails costs none
+    ok(owner.patch(f"/api/league/races/{qualifying}", json={"attempts_per_day": 1, "is_frozen": True}))
+    assert "frozen" in refused(submit(qualifying, "Mia", 0), 409)
+    ok(owner.patch(f"/api/league/races/{qualifying}", json={"is_frozen": False}))
+    first = ok(submit(qualifying, "Mia", 0), 202)["id"]
+    ok(submit(qualifying, "Mia", 0), 202)  # the same one again is no attempt
+    assert "takes 1 a day" in refused(submit(qualifying, "Mia", 2), 409)
+    other = ok(submit(qualifying, "Noah", 1), 202)["id"]
+    scores = {name: judged(qualifying, name, number)["score"] for name, number in (("Mia", first), ("Noah", other))}
+    with database_of(league) as database, database.transaction() as session:
+        job = sa.select(Submission.job_id).where(Submission.id == first).scalar_subquery()
+        session.execute(sa.update(Job).where(Job.id == job).values(state="failed"))
+    ok(submit(qualifying, "Mia", 2), 202)
+
+    # judged again it comes out the same
+    refused(pupils["Noah"].post(f"/api/league/races/{qualifying}/submissions/{other}/judge"), 404)
+    ok(owner.post(f"/api/league/races/{qualifying}/submissions/{other}/judge"), 202)
+    assert judged(qualifying, "Noah", other)["score"] == scores["Noah"]
+
+    # only the first of qualifying drive in the final, once that is over
+    assert "not over yet" in refused(submit(final, "Mia", 0), 409)
+    league.console.wait_for(lambda: ok(owner.get(f"/api/boards/{qualifying}"))["running"] == 0)
+    ok(owner.patch(f"/api/league/races/{qualifying}", json={"closes": now().isoformat()}))
+    winner, loser = (row["name"] for row in ok(owner.get(f"/api/boards/{qualifying}"))["rows"])
+    assert "The first 1 of 'Qualifying' drive here" in refused(submit(final, loser, 1), 409)
+    number = ok(submit(final, winner, 0), 202)["id"]
+    judged(final, winner, number)
+    assert ok(owner.get(f"/api/groups/{group}/season")) == []
+    ok(owner.patch(address, json={"closes": now().isoformat()}))
+    season = ok(pupils[winner].get(f"/api/groups/{group}/season"))
+    assert season == [{"name": winner, "points": 25, "races": 1, "wins": 1, "is_me": True}], "qualifying gives none"
+
+
+@contextmanager
+def database_of(league: RunningLeague) -> Iterator[Database]:
+    database = Database(f"sqlite:///{league.console.runs / '.racecraft' / 'console.db'}")
+    yield database
+    database.close()
 
 
 def test_a_model_of_ones_own_garage_is_entered_like_any_other(cup: Cup, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ export type LeagueRace = Schemas["LeagueRace"];
 export type BoardPage = Schemas["BoardPage"];
 export type BoardRow = Schemas["BoardRow"];
 export type SubmissionInfo = Schemas["SubmissionInfo"];
+export type SeasonRow = Schemas["SeasonRow"];
 export type SessionInfo = Schemas["SessionInfo"];
 export type TokenInfo = Schemas["TokenInfo"];
 
@@ -47,6 +48,11 @@ export const leagueApi = {
     ask<LeagueRace>("POST", `/groups/${group}/races`, race),
   changeRace: (id: number, change: Partial<Schemas["LeagueRaceChange"]>) =>
     ask<LeagueRace>("PATCH", `/league/races/${id}`, change),
+  follow: (id: number, race: number, best: number) =>
+    ask<LeagueRace>("POST", `/league/races/${id}/follow`, { race, best }),
+  season: (group: number) => ask<SeasonRow[]>("GET", `/groups/${group}/season`),
+  judgeAgain: (id: number, submission: number) =>
+    ask<unknown>("POST", `/league/races/${id}/submissions/${submission}/judge`),
   removeRace: (id: number) => ask<void>("DELETE", `/league/races/${id}`),
   board: (id: number, top: number) => ask<BoardPage>("GET", `/boards/${id}?top=${top}`),
   film: (id: number, submissions: number[]) =>

@@ -16,11 +16,11 @@ from datetime import timedelta
 from typing import Any, Final, Literal
 
 import sqlalchemy as sa
-from sqlalchemy.orm import aliased
+from sqlalchemy.orm import Session, aliased
 
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Job, now
+from racecraft.serve.store.tables import Job
 
 Slot = Literal["training", "other"]
 
@@ -63,8 +63,6 @@ MAX_LOSSES: Final = 5
 MAX_DEATHS: Final = 20
 """The same where all else on its machine died with it: rarely the job's doing."""
 ENDED: Final = ("done", "failed", "cancelled")
-
-
 WATCHED: Final = timedelta(seconds=5)
 """How long a look at a training on another machine makes that show its cars."""
 
@@ -157,11 +155,10 @@ class JobQueue:
         """
         if job.state != "queued":
             return []
-        is_earlier = sa.or_(Job.state == "running", sa.and_(Job.state == "queued", Job.created < job.created))
-        shown = sa.case((Job.user_id == self._user_id, Job.run), else_="…")
-        query = sa.select(shown).where(Job.kind.in_(kinds_of(KINDS[job.kind].slot)), is_earlier).order_by(Job.created)
         with self._database.transaction() as session:
-            return session.scalars(query).all()
+            line = waiting_line(session, kinds_of(KINDS[job.kind].slot))
+        earlier = line[: next((place for place, one in enumerate(line) if one.id == job.id), 0)]
+        return [one.run if one.user_id == self._user_id else "…" for one in earlier]
 
     def elsewhere(self, machine: str) -> Sequence[Job]:
         """What other machines are doing."""
@@ -182,7 +179,9 @@ class JobQueue:
             return session.scalar(query) or 0
 
     def claim(self, kinds: tuple[str, ...], *, owner: str, machine: str = "", is_home: bool = True) -> Job | None:
-        """Take the oldest queued job of these kinds, or None; away from home one that travels.
+        """Take the next queued job of these kinds, or None; away from home one that travels.
+
+        Next is the oldest of whoever has the fewest before it, so nobody's hundred jobs stand before another's first.
 
         A run is worked on by one machine at a time, which has its newest files.
         """
@@ -198,7 +197,7 @@ class JobQueue:
         if not is_home:
             oldest = oldest.where(Job.travels)
         # of two that ask at once the second gets the next one; SQLite has one writer at a time
-        oldest = oldest.order_by(Job.created, Job.id).limit(1).with_for_update(skip_locked=True)
+        oldest = oldest.order_by(_turn(kinds), Job.created, Job.id).limit(1).with_for_update(skip_locked=True)
         with self._database.transaction() as session:
             moment = self._database.moment(session)
             job_id = session.scalar(oldest)
@@ -239,14 +238,14 @@ class JobQueue:
     ) -> bool:
         """End a job that this owner holds; False when it is another's now."""
         ended = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
-        ended = ended.values(
-            state=state,
-            result=None if result is None else dict(result),
-            error=None if error is None else dict(error),
-            finished=now(),
-            lease_until=None,
-        )
         with self._database.transaction() as session:
+            ended = ended.values(
+                state=state,
+                result=None if result is None else dict(result),
+                error=None if error is None else dict(error),
+                finished=self._database.moment(session),
+                lease_until=None,
+            )
             return session.execute(ended).rowcount == 1  # type: ignore[attr-defined, no-any-return]
 
     def cancel(self, job_id: str) -> None:
@@ -254,7 +253,7 @@ class JobQueue:
         with self._database.transaction() as session:
             session.execute(sa.update(Job).where(Job.id == job_id).values(is_cancelled=True))
             waiting = sa.update(Job).where(Job.id == job_id, Job.state == "queued")
-            session.execute(waiting.values(state="cancelled", finished=now()))
+            session.execute(waiting.values(state="cancelled", finished=self._database.moment(session)))
 
     def hand_back(self, owner: str) -> None:
         """Put back what an owner was asked to let go of; that is no fault of the job's."""
@@ -274,11 +273,30 @@ class JobQueue:
         held = sa.update(Job).where(Job.state == "running", condition)
         gone = {"code": "WorkerLost", "message": f"The job's process died {limit} times.", "hint": ""}
         with self._database.transaction() as session:
-            session.execute(held.where(Job.is_cancelled).values(state="cancelled", finished=now(), lease_until=None))
+            moment = self._database.moment(session)
+            stopped = held.where(Job.is_cancelled)
+            session.execute(stopped.values(state="cancelled", finished=moment, lease_until=None))
             if limit:
                 tired = held.where(Job.losses >= limit - 1)
-                session.execute(tired.values(state="failed", error=gone, finished=now(), lease_until=None))
+                session.execute(tired.values(state="failed", error=gone, finished=moment, lease_until=None))
             session.execute(held.values(state="queued", owner="", lease_until=None, losses=Job.losses + int(limit > 0)))
+
+
+def _turn(kinds: tuple[str, ...]) -> sa.ScalarSelect[int]:
+    """How many jobs of its owner have a place already or come before a queued one."""
+    other = aliased(Job)
+    is_earlier = sa.or_(
+        other.created < Job.created, sa.and_(other.created == Job.created, other.id < Job.id), other.state == "running"
+    )
+    query = sa.select(sa.func.count()).where(other.user_id == Job.user_id, other.kind.in_(kinds), other.id != Job.id)
+    return query.where(other.state.in_(("queued", "running")), is_earlier).scalar_subquery()
+
+
+def waiting_line(session: Session, kinds: tuple[str, ...]) -> Sequence[Job]:
+    """The jobs that have the places of these kinds, then those that wait for them in the order they get them."""
+    turn = sa.case((Job.state == "running", -1), else_=_turn(kinds))
+    open_ = sa.select(Job).where(Job.kind.in_(kinds), Job.state.in_(("queued", "running")))
+    return session.scalars(open_.order_by(turn, Job.created, Job.id)).all()
 
 
 def kinds_of(slot: Slot) -> tuple[str, ...]:

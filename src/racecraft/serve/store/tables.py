@@ -151,7 +151,11 @@ class Job(Table):
     """Work for a child process; see racecraft.serve.jobs.queue."""
 
     __tablename__ = "jobs"
-    __table_args__ = (Index("jobs_by_state", "state", "created"), Index("jobs_by_kind", "kind", "run", "created"))
+    __table_args__ = (
+        Index("jobs_by_state", "state", "created"),
+        Index("jobs_by_kind", "kind", "run", "created"),
+        Index("jobs_by_user", "user_id", "state", "created"),
+    )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     kind: Mapped[str] = mapped_column(String(16))
@@ -212,6 +216,14 @@ class Race(Table):
     """Published from the beginning; empty of an old race."""
     secret: Mapped[str] = mapped_column(String(64), default="")
     """Hexadecimal, published when the race is over; empty where everybody knows the seed."""
+    attempts_per_day: Mapped[int] = mapped_column(default=0)
+    """Of each person; 0 for as many as they like."""
+    is_frozen: Mapped[bool] = mapped_column(default=False)
+    """Whether nobody may enter for the time being."""
+    after_id: Mapped[int | None] = mapped_column(ForeignKey("races.id"))
+    """The race that this one follows: qualifying before a final."""
+    best_of_it: Mapped[int] = mapped_column(default=0)
+    """How many of the first of that race may enter this one."""
     opens: Mapped[datetime] = mapped_column(default=now)
     closes: Mapped[datetime | None]
     created: Mapped[datetime] = mapped_column(default=now)

@@ -11,10 +11,8 @@ from __future__ import annotations
 import os
 import shutil
 import statistics
-from bisect import bisect_left
 from collections.abc import Callable
 from contextlib import suppress
-from datetime import datetime
 from pathlib import Path
 from typing import Final, Literal
 
@@ -27,15 +25,16 @@ from racecraft.limits import Medals
 from racecraft.limits.limit import known_limit
 from racecraft.race.announcement import Announcement
 from racecraft.race.entry_file import read_entry_file
-from racecraft.serve.jobs.queue import KINDS, kinds_of, new_job
+from racecraft.serve.jobs.queue import KINDS, kinds_of, new_job, waiting_line
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, is_withheld, state_of
 from racecraft.serve.races.standings import trial_scores
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
+from racecraft.serve.submissions.admission import require_place, require_room
 from racecraft.serve.submissions.board import Board, read_board
 from racecraft.serve.submissions.judge import ENTRY
-from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, SubmissionInfo
+from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, Stage, SubmissionInfo
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
 from racecraft.serve.tracks.courses import Courses, geometry
 from racecraft.serve.tracks.schemas import TrackGeometry
@@ -43,8 +42,6 @@ from racecraft.sim.vehicle import load_vehicle
 
 Part = Literal["organiser", "racer", "spectator"]
 KIND: Final = "judge"
-MAX_WAITING: Final = 3  # submissions of one person to one race that are not judged yet
-MAX_SUBMISSIONS: Final = 200  # of one person to one race
 MAX_LISTED: Final = 1000  # submissions at once
 LAST: Final = 20  # judged ones that the time left is taken from
 
@@ -103,6 +100,10 @@ class League:
                 race.closes = request.closes
             race.title = request.title.strip() if request.title is not None else race.title
             race.description = request.description.strip() if request.description is not None else race.description
+            if request.attempts_per_day is not None:
+                race.attempts_per_day = request.attempts_per_day
+            if request.is_frozen is not None:
+                race.is_frozen = request.is_frozen
             if request.is_public is not None:
                 race.visibility = "public" if request.is_public else "private"
             if race.closes is not None and race.closes <= race.opens:
@@ -156,7 +157,8 @@ class League:
                     raise Conflict("Somebody has entered exactly this model already.", hint="Train it on.")
                 if known is not None and session.get_one(Job, known.job_id).state not in ("failed", "cancelled"):
                     return known
-                _require_room(session, race_id, user_id)
+                require_room(session, race, user_id)
+                require_place(session, race, user_id)
                 track = self._courses(race.owner_id).path_or_name(race.track)
                 job.payload = {"announcement": announcement_of(race).to_dict(), "track": track, "name": model}
                 session.add(job)
@@ -189,8 +191,12 @@ class League:
             if only is not None:
                 query = query.where(Submission.id == only)
             rows = session.execute(query.order_by(Submission.id.desc()).limit(MAX_LISTED)).all()
-            pace, line = _pace(session), _line(session)
-        return [_submission(*row, ahead=_ahead(row[1], line), pace=pace, race=race) for row in rows]
+            pace = _pace(session)
+            line = [job.id for job in waiting_line(session, kinds_of(KINDS[KIND].slot))]
+        return [
+            _submission(submission, job, name, ahead=_ahead(job, line), pace=pace, race=race)
+            for submission, job, name in rows
+        ]
 
     def submission(self, race_id: int, submission_id: int, *, user_id: int) -> SubmissionInfo:
         """One's own submission.
@@ -215,6 +221,54 @@ class League:
             changed = session.execute(sa.update(Submission).where(is_it).values(disqualified=reason.strip()))
             if changed.rowcount != 1:  # type: ignore[attr-defined]
                 raise NotFound(f"There is no submission {submission_id} in this race.")
+
+    def follow(self, race_id: int, stage: Stage, *, user_id: int) -> None:
+        """Let a race take its drivers from another one of its group.
+
+        Raises:
+            NotFound: They do not organise both, or the other is of another group.
+            Conflict: Somebody has entered already, or it would follow itself.
+        """
+        race = self.get(race_id, user_id, organiser=True)
+        before = self.get(stage.race, user_id, organiser=True)
+        if race.group != before.group:
+            raise NotFound(f"There is no race {stage.race} in this race's group.")
+        with self._database.transaction() as session:
+            if session.scalar(sa.select(Submission.id).where(Submission.race_id == race_id).limit(1)) is not None:
+                raise Conflict("Somebody has entered already.", hint="Make another race.")
+            one: int | None = stage.race
+            while one is not None:
+                if one == race_id:
+                    raise Conflict("A race does not follow itself.")
+                one = session.get_one(Race, one).after_id
+            row = session.get_one(Race, race_id)
+            row.after_id, row.best_of_it = stage.race, stage.best
+
+    def judge_again(self, race_id: int, submission_id: int, *, user_id: int) -> None:
+        """Have a submission driven once more; it is off the board until that is done.
+
+        Raises:
+            NotFound: They do not organise the race, or it has no such submission.
+            Conflict: It waits or is driven already, or its file is gone.
+        """
+        self.get(race_id, user_id, organiser=True)
+        with self._database.transaction() as session:
+            submission = session.get(Submission, submission_id)
+            if submission is None or submission.race_id != race_id:
+                raise NotFound(f"There is no submission {submission_id} in this race.")
+            old = session.get_one(Job, submission.job_id)
+            source = submission_folder(self._state, old.id) / ENTRY
+            if old.state in ("queued", "running"):
+                raise Conflict("It is not judged yet.")
+            if not source.is_file():
+                raise Conflict("Its file is gone.")
+            job = new_job(KIND, "", old.payload, user_id=submission.user_id)
+            folder = submission_folder(self._state, job.id)
+            folder.mkdir(parents=True)
+            _write(folder / ENTRY, source.read_bytes())
+            session.add(job)
+            session.flush()
+            submission.job_id, submission.judged = job.id, None
 
     def board(self, race_id: int, *, user_id: int | None, top: int) -> tuple[LeagueRace, Board, int]:
         """A race, its board, and how many submissions are not judged yet.
@@ -313,24 +367,9 @@ def _write(path: Path, data: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def _require_room(session: Session, race_id: int, user_id: int) -> None:
-    query = sa.select(sa.func.count(Submission.id)).join(Job, Job.id == Submission.job_id)
-    query = query.where(Submission.race_id == race_id, Submission.user_id == user_id)
-    if (session.scalar(query) or 0) >= MAX_SUBMISSIONS:
-        raise Conflict(f"You have {MAX_SUBMISSIONS} submissions in this race already.")
-    if (session.scalar(query.where(Job.state.in_(("queued", "running")))) or 0) >= MAX_WAITING:
-        raise Conflict(f"{MAX_WAITING} of your submissions are not judged yet.", hint="Wait for one of them.")
-
-
-def _line(session: Session) -> list[datetime]:
-    """When the jobs were made that have or wait for the places which submissions need, in order."""
-    is_open = sa.and_(Job.kind.in_(kinds_of(KINDS[KIND].slot)), Job.state.in_(("queued", "running")))
-    return list(session.scalars(sa.select(Job.created).where(is_open).order_by(Job.created)))
-
-
-def _ahead(job: Job, line: list[datetime]) -> int:
+def _ahead(job: Job, line: list[str]) -> int:
     """Jobs that have the places which a waiting one needs, or come first."""
-    return bisect_left(line, job.created) if job.state == "queued" else 0
+    return line.index(job.id) if job.state == "queued" and job.id in line else 0
 
 
 def _pace(session: Session) -> float | None:
@@ -375,6 +414,7 @@ def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
         {
             **{name: getattr(race, name) for name in LeagueRace.model_fields if hasattr(race, name)},
             "group": race.group_id,
+            "after": race.after_id,
             "group_title": group_title,
             "part": part,
             "is_public": race.visibility == "public",

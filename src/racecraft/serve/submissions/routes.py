@@ -27,8 +27,11 @@ from racecraft.serve.submissions.schemas import (
     EnterModel,
     LeagueRace,
     LeagueRaceChange,
+    SeasonRow,
+    Stage,
     SubmissionInfo,
 )
+from racecraft.serve.submissions.season import read_season
 
 router = APIRouter(prefix="/api", tags=["league"])
 
@@ -50,10 +53,29 @@ def create_league_race(group_id: Id, body: NewRace, consoles: InConsoles, person
     return consoles.league.get(number, person.id)
 
 
+@router.get("/groups/{group_id}/season")
+def get_season(group_id: Id, consoles: InConsoles, person: InPerson) -> list[SeasonRow]:
+    """Points of a group's races that are over, most first."""
+    consoles.groups.require(group_id, person.id)
+    with consoles.owner.database.transaction() as session:
+        found = read_season(session, group_id)
+    return [
+        SeasonRow(name=one.name, points=one.points, races=one.races, wins=one.wins, is_me=one.user == person.id)
+        for one in found
+    ]
+
+
 @router.patch("/league/races/{race_id}")
 def change_league_race(race_id: Id, body: LeagueRaceChange, consoles: InConsoles, person: InPerson) -> LeagueRace:
     """Another title, description, end or audience."""
     consoles.league.change(race_id, body, user_id=person.id)
+    return consoles.league.get(race_id, person.id)
+
+
+@router.post("/league/races/{race_id}/follow")
+def follow_race(race_id: Id, body: Stage, consoles: InConsoles, person: InPerson) -> LeagueRace:
+    """Let only the first of another race of the group enter this one, as in a final after qualifying."""
+    consoles.league.follow(race_id, body, user_id=person.id)
     return consoles.league.get(race_id, person.id)
 
 
@@ -179,6 +201,14 @@ def restore_submission(race_id: Id, submission_id: Id, consoles: InConsoles, per
     """It counts again."""
     consoles.league.disqualify(race_id, submission_id, "", user_id=person.id)
     return Response(status_code=204)
+
+
+@router.post("/league/races/{race_id}/submissions/{submission_id}/judge", status_code=202)
+def judge_again(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> Response:
+    """Have it driven once more."""
+    consoles.league.judge_again(race_id, submission_id, user_id=person.id)
+    consoles.owner.supervisor.wake()
+    return Response(status_code=202)
 
 
 def _submit(consoles: Consoles, race_id: int, data: bytes, model: str, user_id: int) -> SubmissionInfo:

@@ -32,6 +32,13 @@ class LeagueRace(Message):
     vehicle: str
     opens: datetime
     closes: datetime | None
+    attempts_per_day: int
+    """Of each person; 0 for as many as they like."""
+    is_frozen: bool
+    """Whether nobody may enter for the time being."""
+    after: int | None
+    """The race whose first drive in this one."""
+    best_of_it: int
     state: RaceState
     commitment: str
     secret: str
@@ -45,6 +52,26 @@ class LeagueRaceChange(Message):
     description: str | None = Field(None, max_length=500)
     closes: AwareDatetime | None = None
     is_public: bool | None = None
+    is_frozen: bool | None = None
+    attempts_per_day: int | None = Field(None, ge=0, le=1000)
+
+
+class Stage(Message):
+    """The race that another one follows, and how many of its first go on."""
+
+    race: Annotated[int, Field(ge=0, lt=2**31)]
+    best: int = Field(8, ge=1, le=500)
+
+
+class SeasonRow(Message):
+    """Somebody's season in a group so far."""
+
+    name: str
+    points: int
+    races: int
+    """In which they have points."""
+    wins: int
+    is_me: bool
 
 
 class BoardRow(Message):

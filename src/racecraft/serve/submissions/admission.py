@@ -1,0 +1,58 @@
+"""Who may enter a league's race once more: how often, and who qualified for it."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Final
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from racecraft.serve.problems import Conflict
+from racecraft.serve.races.races import state_of
+from racecraft.serve.store.tables import Job, Race, Submission, now
+from racecraft.serve.submissions.board import read_board
+
+MAX_WAITING: Final = 3  # submissions of one person to one race that are not judged yet
+MAX_SUBMISSIONS: Final = 200  # of one person to one race
+DAY: Final = timedelta(days=1)
+
+
+def require_room(session: Session, race: Race, user_id: int) -> None:
+    """Refuse what is too many; what failed or was cancelled costs no attempt of the day.
+
+    Raises:
+        Conflict: It is.
+    """
+    query = sa.select(Submission.created, Job.state).join(Job, Job.id == Submission.job_id)
+    mine = session.execute(query.where(Submission.race_id == race.id, Submission.user_id == user_id)).all()
+    if len(mine) >= MAX_SUBMISSIONS:
+        raise Conflict(f"You have {MAX_SUBMISSIONS} submissions in this race already.")
+    if sum(state in ("queued", "running") for _, state in mine) >= MAX_WAITING:
+        raise Conflict(f"{MAX_WAITING} of your submissions are not judged yet.", hint="Wait for one of them.")
+    since = now() - DAY
+    today = sorted(created for created, state in mine if created > since and state not in ("failed", "cancelled"))
+    if race.attempts_per_day and len(today) >= race.attempts_per_day:
+        raise Conflict(
+            f"This race takes {race.attempts_per_day} a day of everybody; yours are used up.",
+            hint=f"The next one is possible at {today[-race.attempts_per_day] + DAY:%H:%M} UTC.",
+        )
+
+
+def require_place(session: Session, race: Race, user_id: int) -> None:
+    """Refuse everybody where a race is frozen, and who did not qualify where it follows another.
+
+    Raises:
+        Conflict: They may not enter.
+    """
+    if race.is_frozen:
+        raise Conflict("The race is frozen: nobody enters it for the time being.")
+    if race.after_id is None:
+        return
+    before = session.get_one(Race, race.after_id)
+    if state_of(before) != "closed":
+        raise Conflict(f"Who drives here is decided by {before.title!r}, which is not over yet.")
+    rows = read_board(session, before.id, user_id=user_id, top=1).rows
+    place = next((row.place for row in rows if row.user == user_id), None)
+    if place is None or place > race.best_of_it:
+        raise Conflict(f"The first {race.best_of_it} of {before.title!r} drive here.")
