@@ -19,7 +19,13 @@ ROOT = Path(__file__).parents[2]
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
 THEMES: Final = ("light", "dark")
-SOFTWARE_3D = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+# WebGL is drawn by the processor; the page around it in another way, or it costs ten times as much.
+SOFTWARE_3D = [
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+    "--no-sandbox",
+]
 
 needs_pages = pytest.mark.skipif(
     not (ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html").exists(),
