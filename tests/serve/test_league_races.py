@@ -90,6 +90,18 @@ def test_what_is_sent_in_is_judged_and_stands_on_the_board(cup: Cup, run: RunFol
     assert board["race"]["secret"] == ""
     assert "tells where it starts" in refused(cup.ada.get(f"/api/boards/{cup.race}/replays/{first['id']}"), 409)
     assert "secret" not in json.dumps(ok(cup.ada.get("/api/jobs")))
+    with database_of(cup.league) as database, database.transaction() as session:
+        race = session.get_one(Race, cup.race)
+        (job,) = session.scalars(sa.select(Job).where(Job.kind == "judge"))
+        assert len(race.secret) == 64
+        assert race.secret not in json.dumps(job.payload), "the table of jobs is read on other machines, too"
+        own = {"announcement": {"secret": race.secret}}  # as a race in a console of one's own has it
+        session.add(Job(id="own", kind="race", run="novice", payload=own, user_id=job.user_id, state="cancelled"))
+        secret = race.secret
+    kept = ok(cup.ada.get("/api/account/data"))
+    assert {(one["race"], one["model"]) for one in kept["submissions"]} == {("Cup", "novice")}
+    assert {one["id"] for one in kept["jobs"]} >= {job.id, "own"}
+    assert secret not in json.dumps(kept)
     assert ok(cup.bob.get(f"/api/boards/{cup.race}/race.json"))["secret"] == ""
     for nosy in (cup.bob, cup.ada):
         refused(nosy.patch(f"/api/league/races/{cup.race}", json={"is_public": True}), 404)

@@ -12,7 +12,7 @@ from racecraft.serve.store.tables import Card, Group, Job, Member, Race, Session
 KEPT: dict[str, type[Table]] = {"sessions": Session, "cards": Card, "tokens": Token, "jobs": Job}
 """Tables of rows that belong to somebody, by the name that they have in the document."""
 SECRET = ("digest", "password", "owner", "secret")
-"""Columns that are not handed out: hashes, and what is of the machine."""
+"""What is not handed out, at any depth: hashes, what is of the machine, and where a race starts that is not over."""
 
 
 def data_of(database: Database, user_id: int) -> dict[str, Any]:
@@ -38,5 +38,11 @@ def data_of(database: Database, user_id: int) -> dict[str, Any]:
 
 
 def _row(row: Table) -> dict[str, Any]:
-    columns = row.__table__.columns
-    return {column.key: getattr(row, column.key) for column in columns if column.key not in SECRET}
+    told: dict[str, Any] = _told({column.key: getattr(row, column.key) for column in row.__table__.columns})
+    return told
+
+
+def _told(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _told(inner) for name, inner in value.items() if name not in SECRET}
+    return [_told(inner) for inner in value] if isinstance(value, list) else value

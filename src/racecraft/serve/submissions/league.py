@@ -160,7 +160,7 @@ class League:
                 require_room(session, race, user_id)
                 require_place(session, race, user_id)
                 track = self._courses(race.owner_id).path_or_name(race.track)
-                job.payload = {"announcement": announcement_of(race).to_dict(), "track": track, "name": model}
+                job.payload = {"track": track, "name": model}
                 session.add(job)
                 session.flush()
                 if known is not None:  # its job failed, which costs no attempt
@@ -192,9 +192,11 @@ class League:
                 query = query.where(Submission.id == only)
             rows = session.execute(query.order_by(Submission.id.desc()).limit(MAX_LISTED)).all()
             pace = _pace(session)
-            line = [job.id for job in waiting_line(session, kinds_of(KINDS[KIND].slot))]
+            line = waiting_line(session, kinds_of(KINDS[KIND].slot))
+        # jobs that have the places which a waiting one needs, or come first
+        ahead = {job.id: place for place, job in enumerate(line) if job.state == "queued"}
         return [
-            _submission(submission, job, name, ahead=_ahead(job, line), pace=pace, race=race)
+            _submission(submission, job, name, ahead=ahead.get(job.id, 0), pace=pace, race=race)
             for submission, job, name in rows
         ]
 
@@ -365,11 +367,6 @@ def _write(path: Path, data: bytes) -> None:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
-
-
-def _ahead(job: Job, line: list[str]) -> int:
-    """Jobs that have the places which a waiting one needs, or come first."""
-    return line.index(job.id) if job.state == "queued" and job.id in line else 0
 
 
 def _pace(session: Session) -> float | None:

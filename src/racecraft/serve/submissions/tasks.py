@@ -18,9 +18,11 @@ from typing import Any, Final
 import sqlalchemy as sa
 
 from racecraft.errors import RunError
+from racecraft.race.announcement import Announcement
 from racecraft.serve.jobs.task import Task
+from racecraft.serve.races.races import announcement_of
 from racecraft.serve.settings import STATE_FOLDER
-from racecraft.serve.store.tables import Submission, now
+from racecraft.serve.store.tables import Race, Submission, now
 from racecraft.serve.submissions.judge import JUDGED
 
 FOLDER: Final = "submissions"
@@ -36,12 +38,11 @@ def submission_folder(state: Path, job_id: str) -> Path:
 def judge(task: Task) -> dict[str, Any]:
     """Judge a submission, and write its score where the board is read from."""
     from racecraft.contest.standings import median_score, ranking_score
-    from racecraft.race.announcement import Announcement
     from racecraft.replay.replay import read_replay, write_replay
     from racecraft.replay.verification import verify
 
     payload = task.job.payload
-    announcement = Announcement.from_dict(payload["announcement"])
+    announcement = _announcement(task)
     folder = submission_folder(task.home / STATE_FOLDER, task.job.id)
     result = _ask_judge(folder, announcement, track=payload["track"], name=payload["name"])
     replay = read_replay(folder / JUDGED)
@@ -68,7 +69,14 @@ def judge(task: Task) -> dict[str, Any]:
     return result
 
 
-def _ask_judge(folder: Path, announcement: Any, *, track: str, name: str) -> dict[str, Any]:
+def _announcement(task: Task) -> Announcement:
+    """The race as it was made, with its secret, which is in no job: whoever entered can read what their jobs hold."""
+    race = sa.select(Race).join(Submission, Submission.race_id == Race.id).where(Submission.job_id == task.job.id)
+    with task.database.transaction() as session:
+        return announcement_of(session.scalars(race).one())
+
+
+def _ask_judge(folder: Path, announcement: Announcement, *, track: str, name: str) -> dict[str, Any]:
     """What the judge says; it has nothing but the folder and what it is told."""
     told = {
         "document": dict(announcement.document),
