@@ -73,18 +73,15 @@ def export_run(
     check_choice("--to", to, TARGETS)
     folder = RunFolder.open(run)
     ending = ENDINGS.get(to, "")
-    file = (
-        folder.path / (folder.name + ending if ending else archive_name(folder.name))
-        if output is None
-        else Path(output)
-    )
+    name = folder.name + ending if ending else archive_name(folder.name)
+    file = folder.path / name if output is None else Path(output)
     if to == "car":
         check_archive_name(file)
     elif file.suffix != ending:
         raise ConfigError(f"The model is to be called {file.name!r}; the name of a model for {to} ends in {ending}.")
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=1)
     metadata, spec, weights = folder.read_model_metadata(), policy.learner.spec, policy.learner.weights()
-    files = {file: b""}
+    files: dict[Path, bytes] = {}
     if to == "onnx":
         files[file] = policy_onnx(weights, spec, metadata.suite)
     else:

@@ -23,23 +23,22 @@ def check_returns(returns: Callable[..., Any]) -> Verdict:
         return right("Every action answers for what came after it, and for nothing else.")
     if np.allclose(found, found[0]):
         return wrong(
-            f"It gives {found[0]:g} to every step: the last action is praised for rewards that came before it. "
-            "Each step's return begins with its own reward."
+            f"It gives {found[0]:g} to every step: the last action is praised for rewards that came before it. Each "
+            "step's return begins with its own reward."
         )
     if np.allclose(found, np.cumsum(REWARDS[::-1])[::-1]):
         return wrong(
-            f"It makes {found[0]:g} of the first step: all rewards count alike. One that comes a step later "
-            f"counts gamma = {GAMMA} of it."
+            f"It makes {found[0]:g} of the first step: all rewards count alike. One that comes a step later counts "
+            f"gamma = {GAMMA} of it."
         )
     if np.isclose(found[0], REWARDS[0]):
         return wrong(
-            f"The first step got {found[0]:g}, its own reward alone or what came before: go through the "
-            "episode from its "
-            "end, and keep what follows."
+            f"The first step got {found[0]:g}, its own reward alone or what came before: go through the episode from "
+            "its end, and keep what follows."
         )
     return wrong(
-        f"Rewards {REWARDS.tolist()} with gamma = {GAMMA} make {RETURNS.tolist()}, and it made {found.tolist()}: "
-        "G of a step is its reward plus gamma times the next step's G."
+        f"Rewards {REWARDS.tolist()} with gamma = {GAMMA} make {RETURNS.tolist()}, and it made {found.tolist()}: G of "
+        "a step is its reward plus gamma times the next step's G."
     )
 
 
@@ -62,9 +61,8 @@ def check_step(step: Callable[..., Any]) -> Verdict:
         return right("What was better than expected becomes likelier, and everything else less.")
     if np.allclose(moved, -RATE * (REWARD - BASELINE) * direction):
         return wrong(
-            f"The pull brought {REWARD - BASELINE:g} more than expected, and it became less likely: the sign "
-            "is the wrong "
-            "way round. Go up the gradient."
+            f"The pull brought {REWARD - BASELINE:g} more than expected, and it became less likely: the sign is the "
+            "wrong way round. Go up the gradient."
         )
     if np.allclose(moved, RATE * REWARD * direction):
         return wrong(

@@ -29,20 +29,18 @@ def check_advantages(advantages: Callable[..., Any]) -> Verdict:
         return wrong(f"Right for lambda = {LAMBDA}, but not for 0 and 1: use the argument lam, not a number.")
     if np.allclose(found, _truth(0.0)):
         return wrong(
-            "These are the surprises of single steps, as lambda = 0 has them. Add what comes after: "
-            "gamma * lam times the next step's advantage."
+            "These are the surprises of single steps, as lambda = 0 has them. Add what comes after: gamma * lam times "
+            "the next step's advantage."
         )
     if np.allclose(found, _truth(LAMBDA, ends=False)):
         return wrong(
-            f"The second step ended its episode, and it made {found[1]:g} of it: neither a value nor an "
-            "advantage comes "
-            "from beyond the end. Leave both out where terminated."
+            f"The second step ended its episode, and it made {found[1]:g} of it: neither a value nor an advantage "
+            "comes from beyond the end. Leave both out where terminated."
         )
     if np.allclose(found, _truth(LAMBDA, leaks=True)):
         return wrong(
-            "The second step ended its episode: its value is left out, but the advantage of the next "
-            "episode leaks into it "
-            f"({found[1]:g}). Begin anew where terminated."
+            "The second step ended its episode: its value is left out, but the advantage of the next episode leaks "
+            f"into it ({found[1]:g}). Begin anew where terminated."
         )
     if np.allclose(found, _truth(LAMBDA) + VALUES):
         return wrong(
@@ -53,9 +51,8 @@ def check_advantages(advantages: Callable[..., Any]) -> Verdict:
             "It waits for everything that really happens, as lambda = 1 does: fade by gamma * lam, not by gamma."
         )
     return wrong(
-        f"The last step paid {REWARDS[3]:g}, the critic had expected {VALUES[3]:g} and now expects "
-        f"{AFTERWARDS[3]:g} more: "
-        f"its surprise is {_truth(0.0)[3]:g}, and it made {found[3]:g}. Begin there and go backwards."
+        f"The last step paid {REWARDS[3]:g}, the critic had expected {VALUES[3]:g} and now expects {AFTERWARDS[3]:g} "
+        f"more: its surprise is {_truth(0.0)[3]:g}, and it made {found[3]:g}. Begin there and go backwards."
     )
 
 

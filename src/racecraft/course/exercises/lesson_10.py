@@ -25,14 +25,13 @@ def check_gain(gain: Callable[..., Any]) -> Verdict:
         return right("It counts what is gained within the limits, and all that is lost.")
     if np.allclose(found, free):
         return wrong(
-            f"A good action that became 1.5 times as likely counts {found[3]:g}: nothing holds the policy. Beyond "
-            f"1 + {CLIP} no more is to be gained; np.clip(ratio, 1 - clip, 1 + clip) does it."
+            f"A good action that became 1.5 times as likely counts {found[3]:g}: nothing holds the policy. Beyond 1 + "
+            f"{CLIP} no more is to be gained; np.clip(ratio, 1 - clip, 1 + clip) does it."
         )
     if np.allclose(found, held):
         return wrong(
-            f"A bad action that became 1.5 times as likely counts {found[6]:g}, clipped: so it would never "
-            "be mended. Take "
-            "the smaller of the clipped and the unclipped product."
+            f"A bad action that became 1.5 times as likely counts {found[6]:g}, clipped: so it would never be mended. "
+            "Take the smaller of the clipped and the unclipped product."
         )
     if np.allclose(found, np.maximum(free, held)):
         return wrong(
@@ -40,9 +39,8 @@ def check_gain(gain: Callable[..., Any]) -> Verdict:
             "hopeful one. PPO takes the smaller one, and is careful."
         )
     return wrong(
-        f"A ratio of 1.5 with an advantage of 2 should count {1.2 * 2.0:g} and counts {found[3]:g}; with "
-        "an advantage of "
-        f"-2 it should count -3 and counts {found[6]:g}."
+        f"A ratio of 1.5 with an advantage of 2 should count {1.2 * 2.0:g} and counts {found[3]:g}; with an advantage "
+        f"of -2 it should count -3 and counts {found[6]:g}."
     )
 
 
@@ -60,24 +58,21 @@ def check_repair(accumulate: Callable[..., Any]) -> Verdict:
         return right("The end of an episode holds. Nothing had stopped, and nothing had said a word.")
     if np.allclose(found, _summed(lambda t, following: following)):
         return wrong(
-            "In the first world an episode ends with the second step, and that step still gets "
-            f"{found[1, 0]:g} instead of "
-            f"{SURPRISE[1, 0]:g}: it is praised for what the next episode brought. Where is_over is not "
+            f"In the first world an episode ends with the second step, and that step still gets {found[1, 0]:g} "
+            f"instead of {SURPRISE[1, 0]:g}: it is praised for what the next episode brought. Where is_over is not "
             "looked at, it leaks."
         )
     if np.allclose(found[1, 0], 0.0) or np.allclose(found[0, 0], SURPRISE[0, 0]):
         return wrong(
-            f"Now the first world has {found[:, 0].tolist()}: the end cuts off too much. The step that ends "
-            "an episode keeps "
-            "its own surprise and leads back to those before it; only what comes *after* it is dropped, "
-            "where is_over[t]."
+            f"Now the first world has {found[:, 0].tolist()}: the end cuts off too much. The step that ends an episode "
+            "keeps its own surprise and leads back to those before it; only what comes *after* it is dropped, where "
+            "is_over[t]."
         )
     if np.allclose(found[:, 1], np.cumsum(SURPRISE[::-1, 1])[::-1]):
         return wrong("Nothing leaks any more, but nothing fades either: what comes a step later counts fade of it.")
     return wrong(
-        f"The second world has no end in it, and {SURPRISE[:, 1].tolist()} with fade {FADE} make [2.5, "
-        "5.0, 2.0] there; it "
-        f"made {found[:, 1].tolist()}."
+        f"The second world has no end in it, and {SURPRISE[:, 1].tolist()} with fade {FADE} make [2.5, 5.0, 2.0] "
+        f"there; it made {found[:, 1].tolist()}."
     )
 
 

@@ -33,9 +33,8 @@ def check_steer(steer: Callable[..., Any]) -> Verdict:
         )
     if max(map(abs, answers)) > 1.6:
         return wrong(
-            f"It answers {max(answers, key=abs):g}: the angle is in rad, and the wheels turn no further than "
-            "0.52, which is "
-            "30 degrees."
+            f"It answers {max(answers, key=abs):g}: the angle is in rad, and the wheels turn no further than 0.52, "
+            "which is 30 degrees."
         )
     if left > 0.0 or turned > 0.0:
         what = "20 cm left of the middle" if left > 0.0 else "pointing 0.2 rad to the left"

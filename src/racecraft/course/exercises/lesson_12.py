@@ -31,21 +31,20 @@ def check_ranges(ranges: Any) -> Verdict:
             return wrong(f"{name} goes from {low:g} to {high:g}: write the lower end first.")
         if low == high:
             return wrong(
-                f"{name} is always {low:g}: that is one world, however well it was measured, and no car is like it. "
-                "A range must hold all five."
+                f"{name} is always {low:g}: that is one world, however well it was measured, and no car is like it. A "
+                "range must hold all five."
             )
         if low > least or high < most:
             outside = least if low > least else most
             return wrong(
-                f"A car with {name} {outside:g} was measured, and {low:g} to {high:g} leaves it out: it would "
-                "meet something "
-                "there that it never saw."
+                f"A car with {name} {outside:g} was measured, and {low:g} to {high:g} leaves it out: it would meet "
+                "something there that it never saw."
             )
         if high - low > WIDEST * (most - least):
             return wrong(
-                f"{name} from {low:g} to {high:g} holds all five, and much that no car is like: a driver that is "
-                "ready for "
-                f"everything drives slowly. They spread over {most - least:.2g}; take at most {WIDEST:g} times that."
+                f"{name} from {low:g} to {high:g} holds all five, and much that no car is like: a driver that is ready "
+                f"for everything drives slowly. They spread over {most - least:.2g}; take at most {WIDEST:g} times "
+                "that."
             )
     return right("All five are in it, with some room for the sixth.")
 
