@@ -22,7 +22,7 @@ RC_KERNEL(draw_frames, kImageThreads) {
         frame.lens = lens_of(batch, env, camera, frame.ground);
         frame.sheen = sheen_share(camera, batch.colours.sheen, frame.lens);
         frame.num_walls = walls_in_view(frame.ground, frame.lens, frame.walls);
-        frame.is_above_walls = camera.spec.above >= kWallHeight;
+        frame.is_above_walls = camera.spec.above >= camera.spec.wall_height;
     }
     for (int32_t row = 0; row < height;) {
         const int32_t first = camera.row_begin[row];

@@ -2,6 +2,7 @@
 
 #include "lanes.hpp"
 #include "racecraft/camera_walk.hpp"
+#include "racecraft/surroundings.hpp"
 
 namespace racecraft::RC_ISA {
 namespace {
@@ -221,9 +222,14 @@ class Painter {
           sheen_share_(sheen_share(camera, sheen, lens)),
           width_(camera.spec.width),
           stride_((camera.spec.width + 15) / 16 * 16),
-          is_above_walls_(camera.spec.above >= kWallHeight),
+          is_above_walls_(camera.spec.above >= camera.spec.wall_height),
+          has_crowd_(palettes[0].crowd != 0),
+          bearing_(has_crowd_ ? bearing_of(camera.spec, lens) : Bearing{}),
           num_walls_(walls_in_view(ground, lens, walls_)) {
-        for (int c = 0; c < kChannels; ++c) tables_[c] = shade_table(palettes[c]);
+        for (int c = 0; c < kChannels; ++c) {
+            tables_[c] = shade_table(palettes[c]);
+            print_row_[c] = -1;
+        }
     }
 
     // begin is the row's first sample; its walks start at index i of block (and of upper, their counterparts
@@ -249,17 +255,18 @@ class Painter {
         }
         for (int k = 0; k < kChannels * stride_; ++k) sums_[k] = 0;
         bool has_walls = false;
-        int bare = 0;  // samples that show nothing but walls
+        int bare = 0;   // samples that show nothing but walls
+        int clear = 0;  // and nothing but sky
         for (int k = 0; k < samples; ++k) {
             const PixelSpan inside = {block.begin[i + k], block.end[i + k]};
             const uint8_t kind = camera_.kind[begin + k];
             if (kind == kSampleGround && inside.begin < inside.end) add_walk(begin + k, block, i + k, inside);
             if (kind != kSampleWall && inside.begin == 0 && inside.end == width_) {
-                if (kind == kSampleSky) add_all(0, width_, &ShadeTable::sky);
+                if (kind == kSampleSky) ++clear;
                 continue;
             }
             if (is_above_walls_ && kind != kSampleGround) {
-                add_all(0, width_, &ShadeTable::sky);
+                ++clear;
                 continue;
             }
             if (!has_walls) find_walls(row);
@@ -269,11 +276,12 @@ class Painter {
             } else if (kind == kSampleWall || inside.begin >= inside.end) {
                 ++bare;
             } else {
-                if (kind == kSampleSky) add_all(inside.begin, inside.end, &ShadeTable::sky);
+                if (kind == kSampleSky) add_sky(row, 1, inside.begin, inside.end);
                 add_walls(0, inside.begin);
                 add_walls(inside.end, width_);
             }
         }
+        if (clear > 0) add_sky(row, clear, 0, width_);
         for (int c = 0; bare > 0 && c < kChannels; ++c) {
             add_values(sums_ + c * stride_, wall_row_ + c * stride_, bare, 0, width_);
         }
@@ -326,6 +334,33 @@ class Painter {
         for (int c = 0; c < kChannels; ++c) add_constant(sums_ + c * stride_, tables_[c].*shade, begin, end);
     }
 
+    void add_sky(int row, int samples, int begin, int end) {
+        if (has_crowd_) find_crowd(row);
+        for (int c = 0; c < kChannels; ++c) {
+            int32_t* sums = sums_ + c * stride_;
+            if (has_crowd_) {
+                add_values(sums, crowd_ + c * stride_, samples, begin, end);
+            } else {
+                add_constant(sums, samples * tables_[c].sky, begin, end);
+            }
+        }
+    }
+
+    // What stands above the walls.
+    void find_crowd(int row) {
+        if (row / kCrowdRows == crowd_row_) return;
+        crowd_row_ = row / kCrowdRows;
+        for (int c = 0; c < kChannels; ++c) {
+            const GreyPalette palette = palettes_[c];
+            const Bearing bearing = bearing_;
+            const int32_t sky = tables_[c].sky;
+            int32_t* values = crowd_ + c * stride_;
+            const int width = width_;
+#pragma GCC ivdep
+            for (int x = 0; x < width; ++x) values[x] = above_walls(palette, bearing, row, x, sky);
+        }
+    }
+
     void add_walls(int begin, int end) {
         for (int c = 0; c < kChannels; ++c)
             add_values(sums_ + c * stride_, wall_row_ + c * stride_, 1, begin, end);
@@ -333,6 +368,8 @@ class Painter {
 
     // What the row would show if there were only walls; a corner's pixel is a mixture of both walls.
     void find_walls(int row) {
+        if (num_walls_ == 1 && row / kPrintRows == wall_row_of_) return;
+        wall_row_of_ = row / kPrintRows;
         for (int c = 0; c < kChannels; ++c) {
             int32_t* values = wall_row_ + c * stride_;
             int x = 0;
@@ -348,7 +385,23 @@ class Painter {
                 values[edge.pixel] = edge.mixture;
                 x = max_of(x, edge.pixel + 1);
             }
+            if (has_crowd_) add_prints(row, c, values);
         }
+    }
+
+    // What hangs on the walls, which are `values` of a row.
+    void add_prints(int row, int c, int32_t* values) {
+        int32_t* prints = prints_ + c * stride_;
+        const int width = width_;
+        if (row / kPrintRows != print_row_[c]) {
+            print_row_[c] = row / kPrintRows;
+            const GreyPalette palette = palettes_[c];
+            const Bearing bearing = bearing_;
+#pragma GCC ivdep
+            for (int x = 0; x < width; ++x) prints[x] = print_on_wall(palette, bearing, row, x);
+        }
+#pragma GCC ivdep
+        for (int x = 0; x < width; ++x) values[x] = clamp(values[x] + prints[x], 0, 255 * kCoverageUnit);
     }
 
     void store_row(int samples, uint8_t* line) const {
@@ -373,17 +426,24 @@ class Painter {
     int width_;
     int stride_;  // of a channel in the arrays below
     bool is_above_walls_;
+    bool has_crowd_;
+    Bearing bearing_;
+    int crowd_row_ = -1;    // what crowd_ is of, in kCrowdRows
+    int wall_row_of_ = -1;  // and wall_row_, in kPrintRows
+    int print_row_[kChannels];
     WallSpan walls_[kNumWalls];
     int num_walls_;
     alignas(64) int32_t sums_[kChannels * (kMaxImageWidth + 16)];
     alignas(64) int32_t wall_row_[kChannels * (kMaxImageWidth + 16)];
+    alignas(64) int32_t crowd_[kChannels * (kMaxImageWidth + 16)];
+    alignas(64) int32_t prints_[kChannels * (kMaxImageWidth + 16)];
 };
 
 template <int kChannels>
 void render(const CameraView& camera, const GroundView& ground, const GreyPalette* palettes,
             const Sheen& sheen, const LensPose& lens, uint8_t* out) {
     Painter<kChannels> painter(camera, ground, palettes, sheen, lens);
-    const bool is_above_walls = camera.spec.above >= kWallHeight;
+    const bool is_above_walls = camera.spec.above >= camera.spec.wall_height;
     alignas(64) Block block;
     alignas(64) Block upper;
     for (int row = 0; row < camera.spec.height;) {

@@ -6,9 +6,11 @@
 #include <stdexcept>
 
 #include "exposure_kernel.hpp"
+#include "lens_kernel.hpp"
 #include "lidar_kernel.hpp"
 #include "object_painter_kernel.hpp"
 #include "object_rule.hpp"
+#include "racecraft/folds.hpp"
 #include "vehicle_kernel.hpp"
 
 namespace racecraft {
@@ -100,6 +102,7 @@ void Engine::set_up_batch(const EngineConfig& config, const VehicleParameters& v
     b.has_lidar = config.has_lidar;
     b.is_randomized = randomization != nullptr;
     b.has_latency = randomization != nullptr && randomization->has_latency();
+    b.has_lens = randomization != nullptr && randomization->has_lens();
     b.has_cameras = randomization != nullptr && randomization->has_cameras() && camera_ != nullptr;
     b.draws_tracks = config.draws_tracks;
     b.substeps = config.substeps;
@@ -179,26 +182,44 @@ void Engine::draw(int32_t env) {
     const size_t car = static_cast<size_t>(env);
     const size_t pixels = static_cast<size_t>(batch_.num_pixels);
     uint8_t* frame = &frames_[car * num_lenses() * pixels];
-    render(cameras_.empty() ? *camera_ : cameras_[car], env, frame);
+    photograph(cameras_.empty() ? *camera_ : cameras_[car], env, 0, frame);
     if (right_camera_ != nullptr) {
-        render(right_cameras_.empty() ? *right_camera_ : right_cameras_[car], env, frame + pixels);
+        photograph(right_cameras_.empty() ? *right_camera_ : right_cameras_[car], env, 1, frame + pixels);
     }
 }
 
-void Engine::render(const CameraModel& camera, int32_t env, uint8_t* frame) {
+void Engine::photograph(const CameraModel& camera, int32_t env, int32_t eye, uint8_t* frame) {
     const size_t car = static_cast<size_t>(env);
-    const GroundMap& ground = *grounds_[static_cast<size_t>(episodes_[car].track) % num_tracks()];
-    const Sheen& sheen = batch_.colours.sheen;
-    const Sight from = sight_of(batch_, env);
-    render_grey(camera, ground, palettes_[car], sheen, from.x, from.y, from.heading, frame);
-    if (batch_.num_objects > 0) {
-        const LensPose lens = place_lens(camera.view(), ground.view(), from.x, from.y, from.heading);
-        RC_DISPATCH(draw_objects, camera.spec(), lens, around(batch_, env), frame);
+    Sight from = sight_of(batch_, env);
+    if (!batch_.has_lens) {
+        render(camera, env, from, nullptr, frame);
+    } else {
+        thread_local std::vector<uint8_t> drawn;
+        drawn.resize(static_cast<size_t>(batch_.num_pixels) + 2 * kDrawnMargin);
+        uint8_t* picture = drawn.data() + kDrawnMargin;
+        const Shot shot = take_shot(conditions_[car], camera.spec(), draws_of(batch_, env),
+                                    std::max(episodes_[car].steps, 1), eye, from.heading,
+                                    load_vehicle(batch_, env).yaw_rate);
+        from.heading += shot.yaw;
+        render(camera, env, from, &shot, picture);
+        RC_DISPATCH(take_picture, camera.spec(), conditions_[car], shot, picture, frame);
     }
     if (!conditions_.empty()) {
         const Conditions& light = conditions_[car];
         RC_DISPATCH(expose, frame, camera.spec().width, camera.spec().height, light.gradient_across,
                     light.gradient_down, light.blur);
+    }
+}
+
+void Engine::render(const CameraModel& camera, int32_t env, const Sight& from, const Shot* shot,
+                    uint8_t* picture) {
+    const size_t car = static_cast<size_t>(env);
+    const GroundMap& ground = *grounds_[static_cast<size_t>(episodes_[car].track) % num_tracks()];
+    const LensPose lens = place_lens(camera.view(), ground.view(), from.x, from.y, from.heading);
+    render_grey(camera, ground, palettes_[car], batch_.colours.sheen, from.x, from.y, from.heading, picture);
+    if (shot != nullptr) draw_folds(camera.spec(), lens, *shot, conditions_[car].folds, picture);
+    if (batch_.num_objects > 0) {
+        RC_DISPATCH(draw_objects, camera.spec(), lens, around(batch_, env), picture);
     }
 }
 

@@ -29,6 +29,8 @@ struct EngineConfig {
     int picture_age = 0;        // substeps from when a picture is taken to the end of its step
 };
 
+struct Shot;
+
 // Calls from several threads wait for each other; the arrays are shared all the same.
 class Engine {
   public:
@@ -91,7 +93,9 @@ class Engine {
     void see_from(int32_t env);     // the current pose
     void show_others(int32_t env);  // the others of its race what has changed about a car between two steps
     void draw(int32_t env);
-    void render(const CameraModel& camera, int32_t env, uint8_t* frame);
+    void photograph(const CameraModel& camera, int32_t env, int32_t eye, uint8_t* frame);
+    void render(const CameraModel& camera, int32_t env, const Sight& from, const Shot* shot,
+                uint8_t* picture);
     size_t chunk_size(size_t most) const;
     template <typename Work>
     void for_chunks(size_t most, Work&& work);  // work(begin, end, here) by all threads

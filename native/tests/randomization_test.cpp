@@ -92,12 +92,14 @@ TEST(a_range_counts_from_either_end) {
     randomization.conditions[kCondition_latency] = {0.0f, 0.5f};
     CHECK(randomization.has_latency());
     for (int i = 0; i < kNumConditions; ++i) {
-        const bool is_camera = i >= kCondition_camera_pitch && i <= kCondition_camera_fov;
+        const bool is_camera =
+            (i >= kCondition_camera_pitch && i <= kCondition_camera_fov) || i == kCondition_wall_height;
         for (const Range range : {Range{-0.1f, 0.0f}, Range{0.0f, 0.1f}, Range{0.1f, 0.1f}}) {
             Randomization one = fixed();
             CHECK(!one.has_cameras());
             one.conditions[i] = range;
             CHECK_EQUAL(one.has_cameras(), is_camera);
+            CHECK_EQUAL(one.has_lens(), i >= kCondition_crowd);
         }
     }
 }

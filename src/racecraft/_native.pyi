@@ -247,7 +247,7 @@ class DevicePlan:
 
     def batch(self, world: int, addresses: Sequence[int]) -> Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C')]: ...
 
-BATCH_BYTES: int = 1456
+BATCH_BYTES: int = 1560
 
 CAR_THREADS: int = 128
 

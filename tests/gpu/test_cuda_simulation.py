@@ -141,6 +141,8 @@ def test_wrong_arguments_are_refused():
         CudaSimulation(load_track("oval"), num_envs=0, device=HostDevice())
     with pytest.raises(ConfigError, match="substeps"):
         CudaSimulation(load_track("oval"), num_envs=2, device=HostDevice(), substeps=1)
+    with pytest.raises(ConfigError, match=r"draws crowd, sheen, folds, .* which a GPU cannot show yet"):
+        CudaSimulation(load_track("oval"), num_envs=2, device=HostDevice(), randomize="real")
     with pytest.raises(ConfigError, match="With objects"):
         _ = pair("boxes", cars=2)[0].rows
 

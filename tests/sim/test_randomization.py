@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from racecraft.track import load_track
 OVAL = load_track("oval")
 SMALL = CameraSpec(width=64, height=48)
 STRAIGHT = np.float32([0.0, 1.5])
+REAL = {name: getattr(PRESETS["real"], name) for name in CONDITIONS[CONDITIONS.index("pale_dashes") :]}
+"""Ranges of what only `real` draws."""
 
 
 def drive(simulation: Simulation, steps: int = 12, action: np.ndarray = STRAIGHT) -> None:
@@ -60,8 +63,9 @@ def episodes(simulation: Simulation, count: int) -> np.ndarray:
 
 
 def test_draws_fill_their_ranges_evenly_and_independently():
-    drawn = episodes(Simulation(OVAL, num_envs=500, camera=None, randomize="strong"), 8).reshape(-1, len(CONDITIONS))
-    ranges = np.array([getattr(PRESETS["strong"], name) for name in CONDITIONS])
+    wide = Randomization(**{name: getattr(PRESETS["strong"], name) for name in CONDITIONS[:16]}, **REAL)
+    drawn = episodes(Simulation(OVAL, num_envs=500, camera=None, randomize=wide), 8).reshape(-1, len(CONDITIONS))
+    ranges = np.array([getattr(wide, name) for name in CONDITIONS])
     unit = (drawn - ranges[:, 0]) / (ranges[:, 1] - ranges[:, 0])
     assert unit.min() >= 0.0
     assert unit.max() <= 1.0
@@ -78,7 +82,9 @@ def test_a_draw_depends_on_seed_car_and_episode_alone():
     np.testing.assert_array_equal(
         episodes(Simulation(OVAL, num_envs=2, camera=None, seed=5, randomize="strong"), 3), whole[:, :2]
     )
-    assert (episodes(Simulation(OVAL, num_envs=6, camera=None, seed=6, randomize="strong"), 3) != whole).all()
+    shown = [i for i, name in enumerate(CONDITIONS) if name not in REAL]
+    other = episodes(Simulation(OVAL, num_envs=6, camera=None, seed=6, randomize="strong"), 3)
+    assert (other != whole)[:, :, shown].all()
     narrower = replace(PRESETS["strong"], friction=(1.0, 1.0), light=(1.0, 1.0))
     others = [i for i, name in enumerate(CONDITIONS) if name not in ("friction", "light")]
     same = episodes(Simulation(OVAL, num_envs=6, camera=None, seed=5, randomize=narrower), 3)
@@ -98,13 +104,14 @@ def test_a_car_begun_anew_with_a_seed_is_the_first_of_that_seed():
         np.testing.assert_array_equal(alone.frames[0], several.frames[car])
 
 
+@pytest.mark.parametrize("preset", ["strong", "real"])
 @pytest.mark.parametrize("num_threads", [1, 3])
-def test_bits_do_not_depend_on_batch_threads_or_instruction_set(num_threads):
+def test_bits_do_not_depend_on_batch_threads_or_instruction_set(num_threads, preset):
     def seen(batch: int) -> list[bytes]:
         records = []
         for first in range(0, 12, batch):
             seeds = np.arange(first, first + batch, dtype=np.uint64)
-            simulation = Simulation(OVAL, num_envs=batch, camera=SMALL, randomize="strong", num_threads=num_threads)
+            simulation = Simulation(OVAL, num_envs=batch, camera=SMALL, randomize=preset, num_threads=num_threads)
             simulation.reset(seeds=seeds)
             drive(simulation, 20, np.float32([0.3, 3.0]))
             arrays = (simulation.vehicles.T, simulation.frames, simulation.rows)
@@ -132,15 +139,17 @@ def test_a_saved_simulation_goes_on_as_if_nothing_had_happened():
         np.testing.assert_array_equal(getattr(saved_one, name), getattr(other, name))
 
 
-def test_a_saved_episode_comes_back_with_its_conditions():
-    """Conditions, cameras and latencies are not saved but drawn again, by seed, car and episode."""
-    saved_one = Simulation(OVAL, num_envs=3, camera=SMALL, seed=1, randomize="strong", lidar=True)
+@pytest.mark.parametrize("preset", ["strong", "real"])
+def test_a_saved_episode_comes_back_with_its_conditions(preset):
+    """Conditions, cameras, latencies and shakes are not saved but drawn again, by seed, car, episode and step."""
+    saved_one = Simulation(OVAL, num_envs=3, camera=SMALL, seed=1, randomize=preset, lidar=True)
     saved_one.reset()
     drive(saved_one, 3)
     saved_one.reset(np.array([True, False, True]))
     drive(saved_one, 5)
-    other = Simulation(OVAL, num_envs=3, camera=SMALL, seed=2, randomize="strong", lidar=True)
-    assert (other.conditions != saved_one.conditions).all()
+    other = Simulation(OVAL, num_envs=3, camera=SMALL, seed=2, randomize=preset, lidar=True)
+    drawn = [i for i, name in enumerate(CONDITIONS) if np.ptp(getattr(PRESETS[preset], name)) > 0.0]
+    assert (other.conditions != saved_one.conditions)[:, drawn].all()
     other.load(saved_one.save())
     for _ in range(10):
         for name in ("conditions", "frames", "lidar", "state", "vehicles", "rows"):
@@ -294,6 +303,88 @@ def test_every_colour_has_its_own_shift():
     for level in (sky, road):
         assert 40 < np.ptp(level) <= 52
     assert abs(np.corrcoef(sky, road)[0, 1]) < 0.3
+
+
+def test_dashes_fade_to_the_edge_lines_and_walls_to_white():
+    def seen(**ranges: float) -> np.ndarray:
+        simulation = one(**ranges)
+        simulation.place(0, 0.0)
+        return simulation.frames[0].astype(int)
+
+    plain, half, pale = (seen(pale_dashes=share) for share in (0.0, 0.5, 1.0))
+    changed = pale != plain
+    assert 20 < changed.sum() < 400
+    assert (pale > plain)[changed].all()
+    assert np.abs(2 * half - plain - pale).max() <= 3
+    assert pale[changed].max() == pytest.approx(plain[20:].max(), abs=2)  # an edge line's
+
+    walls = seen(pale_walls=0.5)
+    assert (walls[20:] == plain[20:]).all()
+    assert walls[:8].min() == pytest.approx(127 + plain[:8].min() / 2, abs=2)
+
+
+def test_lower_walls_show_the_hall_above_them():
+    """Rows of sky at the top grow as walls shrink, as a ray over the wall's upper edge says."""
+    shown = []
+    for height in (0.0, -0.5, -0.75):
+        frame = one(CameraSpec(), wall_height=height).frames[0]
+        shown.append(int((frame[:60, 80] > 150).sum()))
+    assert shown[0] < shown[1] < shown[2]
+
+
+def test_a_crowd_is_seen_above_the_walls_and_hardly_on_them():
+    plain = one(CameraSpec(), wall_height=-0.75).frames[0].astype(int)
+    full = one(CameraSpec(), wall_height=-0.75, crowd=1.0).frames[0].astype(int)
+    change = np.abs(full - plain)
+    above, wall = plain == 180, plain < 40
+    wall[60:] = False
+    assert above.sum() > 500
+    assert change[above].mean() > 30
+    assert 1 < change[wall].mean() < 12
+    assert change[60:].max() == 0
+    halls = {one(CameraSpec(), wall_height=-0.75, crowd=1.0).frames[0].tobytes()}
+    for seed in range(4):
+        randomize = Randomization(wall_height=(-0.75, -0.75), crowd=(1.0, 1.0))
+        halls.add(Simulation(OVAL, randomize=randomize, seed=seed + 5).frames[0].tobytes())
+    assert len(halls) == 5
+
+
+def test_pictures_of_a_car_that_stands_shake_and_are_noisy():
+    simulation = one(CameraSpec(), shake=0.01)
+    stand = np.zeros((1, 2), np.float32)
+    pictures = []
+    for _ in range(6):
+        pictures.append(simulation.frames[0].astype(int))
+        simulation.step(stand)
+    assert all(np.abs(a - b).max() > 20 for a, b in pairwise(pictures))
+    noisy = one(CameraSpec(), noise=0.02)
+    plain = one(CameraSpec()).frames[0].astype(int)
+    first = noisy.frames[0].astype(int)
+    assert (first - plain)[40:].std() == pytest.approx(5.1, abs=0.6)
+    noisy.step(stand)
+    assert np.abs(noisy.frames[0] - first).mean() > 4
+
+
+def test_a_turning_car_smears_its_pictures_and_one_that_goes_straight_does_not():
+    contrast = {}
+    for name, steering in (("straight", 0.0), ("turning", 0.5)):
+        sharp, smeared = one(CameraSpec()), one(CameraSpec(), shutter=0.02)
+        for simulation in (sharp, smeared):
+            drive(simulation, 8, np.float32([steering, 2.0]))
+        edges = [np.abs(np.diff(s.frames[0, 40:].astype(int), axis=1)).max(axis=1).mean() for s in (sharp, smeared)]
+        contrast[name] = edges[1] / edges[0]
+    assert contrast["straight"] > 0.95
+    assert contrast["turning"] < 0.8
+
+
+def test_two_lenses_shake_together_and_have_noise_of_their_own():
+    camera = CameraSpec(baseline=0.06)
+    left, right = one(camera, shake=0.02).frames[0].astype(int)
+    still = one(camera).frames[0].astype(int)
+    rows = [int(np.abs(np.diff(eye[:, 80])).argmax()) for eye in (left, right, *still)]
+    assert abs((rows[0] - rows[2]) - (rows[1] - rows[3])) <= 1
+    noisy = one(camera, noise=0.02).frames[0].astype(int) - still
+    assert abs(np.corrcoef(noisy.reshape(2, -1))[0, 1]) < 0.1
 
 
 @pytest.mark.parametrize("name", sorted(PRESETS))

@@ -47,7 +47,7 @@ struct Batch {
     // Sizes; of a camera, those of one frame. num_objects is what a car has around it.
     int32_t num_envs, cars_per_race, num_tracks, num_objects, num_lenses, num_pixels;
     int32_t row_width, state_width, camera_bytes;
-    int32_t has_lidar, is_randomized, has_latency, has_cameras, draws_tracks;
+    int32_t has_lidar, is_randomized, has_latency, has_cameras, has_lens, draws_tracks;
 
     // Settings.
     int32_t substeps;

@@ -34,6 +34,7 @@ struct CameraSpec {
     float above = 0.1314f;     // m, lens above the ground
     int32_t min_samples = 1;   // of every row: 1, 2, 4 or 8; 4 gives pictures for people their smooth edges
     float yaw = 0.0f;          // rad, looking to the left of where the car points
+    float wall_height = kWallHeight;  // m, of the room that it is in
 };
 
 enum SampleKind : uint8_t {

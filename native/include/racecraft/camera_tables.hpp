@@ -67,7 +67,7 @@ RC_HD CameraView fill_camera(const CameraSpec& spec, const CameraTables& out) {
             const CameraRay r = ray(upper + 0.5f * part);
             const float middle_pixel = 0.5f * width - 0.5f - shifts[k];
             // The plane that the walk lies in: the ground, or that of the walls' upper edge.
-            const float drop = r.down > 0.0f ? spec.above : spec.above - kWallHeight;
+            const float drop = r.down > 0.0f ? spec.above : spec.above - spec.wall_height;
             const bool is_seen = drop / r.down > 0.0f && abs_of(r.down) * kFarthest > abs_of(drop);
             const float reach = is_seen ? drop / r.down : 0.0f;
             const float step = reach / focal;
@@ -105,7 +105,7 @@ RC_HD CameraView fill_camera(const CameraSpec& spec, const CameraTables& out) {
     view.corner_scale = out.corner_scale;
     view.down = ray(0.5f).down;
     view.down_step = cosine / focal;
-    view.upper_scale = spec.pitch > kSteep ? 1.0f : (spec.above - kWallHeight) / spec.above;
+    view.upper_scale = spec.pitch > kSteep ? 1.0f : (spec.above - spec.wall_height) / spec.above;
     return view;
 }
 

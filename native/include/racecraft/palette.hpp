@@ -14,6 +14,8 @@ struct GreyPalette {
     uint8_t sky;
     uint8_t outside;               // the floor beyond the walls, seen only from above them
     uint8_t grain[kNumMaterials];  // contrast: a material's two shades are so many 256ths of it off its mean
+    uint8_t crowd;                 // contrast of what is in the hall, see surroundings.hpp
+    uint8_t hall;                  // which hall
 };
 
 // What the ground throws back of one distant light, to a lens that looks to where it comes from: as the
@@ -81,6 +83,14 @@ RC_HD GreyPalette grey_palette(const RgbPalette& colours) {
     grey.outside = grey_of(colours.outside);
     for (int32_t i = 0; i < kNumMaterials; ++i) grey.grain[i] = colours.grain[i];
     return grey;
+}
+
+// What lies between two colours, at this share of the way.
+RC_HD void mix_colours(const uint8_t* from, const uint8_t* to, float share, uint8_t* out) {
+    for (int32_t c = 0; c < 3; ++c) {
+        const float begin = static_cast<float>(from[c]);
+        out[c] = static_cast<uint8_t>(begin + share * (static_cast<float>(to[c]) - begin) + 0.5f);
+    }
 }
 
 // A palette in the form the inner loop wants; see shade_edge() and shade_coverage().

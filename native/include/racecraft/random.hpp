@@ -22,6 +22,8 @@ enum class Purpose : uint32_t {
     conditions = 17,     // of an episode, see randomization.hpp; word i is that of quantity i
     tint = 18,           // colour of an episode's light
     colours = 19,        // of an episode's world
+    hall = 20,           // what stands in an episode's world, where its lamps hang and its floor is folded
+    picture = 21,        // shake and noise of a single picture
 };
 
 struct RandomBlock {

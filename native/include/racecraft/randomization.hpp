@@ -13,23 +13,36 @@
 namespace racecraft {
 
 // What an episode has one value of, in the order of their random words: new ones go to the end.
-#define RC_CONDITIONS(X)                                                                              \
-    X(friction)        /* factor on the tyres' friction, 1 */                                         \
-    X(mass)            /* factor on mass and inertia; motors and brakes stay as strong as they are */ \
-    X(speed_gain)      /* factor on the speed reached, 1 */                                           \
-    X(steering_bias)   /* rad, added */                                                               \
-    X(latency)         /* control steps before a command acts, 0 to kMaxLatency */                    \
-    X(camera_pitch)    /* rad, added */                                                               \
-    X(camera_yaw)      /* rad, to the left */                                                         \
-    X(camera_height)   /* m, added */                                                                 \
-    X(camera_left)     /* m, added */                                                                 \
-    X(camera_forward)  /* m, added */                                                                 \
-    X(camera_fov)      /* rad, added to the horizontal field of view */                               \
-    X(light)           /* factor on every brightness, 1 */                                            \
-    X(black_level)     /* added to every brightness, 1 is white */                                    \
-    X(gradient_across) /* change of the light from the picture's middle to its right edge, 1 */       \
-    X(gradient_down)   /* change of the light from the picture's middle to its lower edge, 1 */       \
-    X(blur)            /* pixels, standard deviation */
+#define RC_CONDITIONS(X)                                                                                  \
+    X(friction)        /* factor on the tyres' friction, 1 */                                             \
+    X(mass)            /* factor on mass and inertia; motors and brakes stay as strong as they are */     \
+    X(speed_gain)      /* factor on the speed reached, 1 */                                               \
+    X(steering_bias)   /* rad, added */                                                                   \
+    X(latency)         /* control steps before a command acts, 0 to kMaxLatency */                        \
+    X(camera_pitch)    /* rad, added */                                                                   \
+    X(camera_yaw)      /* rad, to the left */                                                             \
+    X(camera_height)   /* m, added */                                                                     \
+    X(camera_left)     /* m, added */                                                                     \
+    X(camera_forward)  /* m, added */                                                                     \
+    X(camera_fov)      /* rad, added to the horizontal field of view */                                   \
+    X(light)           /* factor on every brightness, 1 */                                                \
+    X(black_level)     /* added to every brightness, 1 is white */                                        \
+    X(gradient_across) /* change of the light from the picture's middle to its right edge, 1 */           \
+    X(gradient_down)   /* change of the light from the picture's middle to its lower edge, 1 */           \
+    X(blur)            /* pixels, standard deviation */                                                   \
+    X(pale_dashes)     /* share of the edge lines' colour in the dashes */                                \
+    X(pale_walls)      /* share of white in the walls */                                                  \
+    X(wall_height)     /* m, added */                                                                     \
+    X(crowd)           /* contrast of what hangs on the walls and stands behind them */                   \
+    X(sheen)           /* a lamp's reflection in the floor at its brightest, 1 is white */                \
+    X(folds)           /* light on one side of a fold in the floor, shade on the other, 1 is white */     \
+    X(vignette)        /* light lost a half of the picture away from the lens's middle, across or down */ \
+    X(vignette_across) /* where that middle is, halves of the picture to the right */                     \
+    X(vignette_down)   /* and down */                                                                     \
+    X(defocus)         /* pixels of a box */                                                              \
+    X(shutter)         /* s that a picture takes: a car that turns smears it */                           \
+    X(shake)           /* rad, standard deviation of the lens from picture to picture */                  \
+    X(noise)           /* standard deviation, 1 is white */
 
 enum ConditionIndex : int {
 #define RC_INDEX(name) kCondition_##name,
@@ -56,9 +69,17 @@ struct Randomization {
     Range tint;    // factor on the light's red, green and blue, drawn for each
     Range colour;  // added to every colour's brightness, drawn for each; 1 is white
 
+    // Whether pictures are taken by a real lens (lens.hpp), in a real hall (surroundings.hpp).
+    bool has_lens() const { return is_any(kCondition_crowd, kCondition_noise); }
     bool has_latency() const { return conditions[kCondition_latency].high > 0.0f; }
     bool has_cameras() const {
-        for (int i = kCondition_camera_pitch; i <= kCondition_camera_fov; ++i) {
+        return is_any(kCondition_camera_pitch, kCondition_camera_fov) ||
+               is_any(kCondition_wall_height, kCondition_wall_height);
+    }
+
+    // Whether any of the quantities first..last, which are 0 where they change nothing, may differ from it.
+    bool is_any(int first, int last) const {
+        for (int i = first; i <= last; ++i) {
             if (conditions[i].low != 0.0f || conditions[i].high != 0.0f) return true;
         }
         return false;
@@ -101,6 +122,7 @@ RC_HD CameraSpec camera_under(const Conditions& conditions, CameraSpec camera) {
     camera.left += conditions.camera_left;
     camera.forward += conditions.camera_forward;
     camera.hfov += conditions.camera_fov;
+    camera.wall_height += conditions.wall_height;
     return camera;
 }
 
@@ -122,11 +144,25 @@ RC_HD GreyPalette palette_under(const Conditions& conditions, const Randomizatio
         return static_cast<uint8_t>(clamp(lit, 0.0f, 255.0f));
     };
     GreyPalette palette{};
-    for (int32_t i = 0; i < kNumMaterials; ++i) palette.ground[i] = grey(colours.ground[i]);
-    for (int32_t i = 0; i < kNumWalls; ++i) palette.wall[i] = grey(colours.wall[i]);
+    constexpr uint8_t white[3] = {255, 255, 255};
+    for (int32_t i = 0; i < kNumMaterials; ++i) {
+        uint8_t rgb[3];
+        const float share = i == kCenterLine ? conditions.pale_dashes : 0.0f;
+        mix_colours(colours.ground[i], colours.ground[kEdgeLine], share, rgb);
+        palette.ground[i] = grey(rgb);
+    }
+    for (int32_t i = 0; i < kNumWalls; ++i) {
+        uint8_t rgb[3];
+        mix_colours(colours.wall[i], white, conditions.pale_walls, rgb);
+        palette.wall[i] = grey(rgb);
+    }
     palette.sky = grey(colours.sky);
     palette.outside = grey(colours.outside);
     for (int32_t i = 0; i < kNumMaterials; ++i) palette.grain[i] = colours.grain[i];
+    palette.crowd = static_cast<uint8_t>(clamp(255.0f * conditions.crowd, 0.0f, 255.0f) + 0.5f);
+    if (palette.crowd > 0) {
+        palette.hall = static_cast<uint8_t>(philox(seed, car, episode, 0, Purpose::hall).words[0] >> 24);
+    }
     return palette;
 }
 

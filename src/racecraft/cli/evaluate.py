@@ -39,7 +39,8 @@ def evaluate(
         str, typer.Option("--direction", help="forward or reverse; by default as it was trained.")
     ] = "",
     randomize: Annotated[
-        str, typer.Option("--randomize", help="What differs from trial to trial: light, strong, aws or a JSON file.")
+        str,
+        typer.Option("--randomize", help="What differs from trial to trial: light, strong, real, aws or a JSON file."),
     ] = "none",
     offtrack_penalty: race_options.OfftrackPenalty = None,
     collision_penalty: race_options.CollisionPenalty = None,

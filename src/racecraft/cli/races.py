@@ -53,7 +53,9 @@ def race(
     placement: race_options.Placement = "",
     positions: race_options.Positions = "",
     vehicle: Vehicle = "v5",
-    randomize: Annotated[str, typer.Option("--randomize", help="none, light, strong, aws or a JSON file.")] = "none",
+    randomize: Annotated[
+        str, typer.Option("--randomize", help="none, light, strong, real, aws or a JSON file.")
+    ] = "none",
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts and objects, known to everybody.")] = 0,
     secret: Annotated[
         bool, typer.Option("--secret", help="Draw them from a secret instead; its commitment is told first.")

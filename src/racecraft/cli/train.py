@@ -72,7 +72,7 @@ def train(
     direction: Annotated[str, typer.Option("--direction", help="forward, reverse or alternate.")] = "forward",
     randomize: Annotated[
         str,
-        typer.Option("--randomize", help="What differs between episodes: light, strong, aws or a JSON file."),
+        typer.Option("--randomize", help="What differs between episodes: light, strong, real, aws or a JSON file."),
     ] = "none",
     race: race_options.TrainRace = "time-trial",
     opponents: race_options.Rivals = [],  # noqa: B006 (Typer copies it)

@@ -87,6 +87,11 @@ class CudaSimulation:
         self.settings = settings
         self.template = Simulation(tracks, num_envs=1, **{**settings, "num_threads": 1})
         """One car on the CPU with the same settings."""
+        if seen := self.template.randomize.of_lenses():
+            raise ConfigError(
+                f"The randomization draws {', '.join(seen)}, which a GPU cannot show yet.",
+                hint="Take the presets light, strong or aws, or --device cpu.",
+            )
         self.tracks = self.template.tracks
         self.camera = self.template.camera
         self.objects = self.template.objects

@@ -60,6 +60,32 @@ class Randomization:
     """Change of the light from the middle of the picture to its lower edge, as a fraction."""
     blur: Range = (0.0, 0.0)
     """Pixels, standard deviation."""
+    pale_dashes: Range = (0.0, 0.0)
+    """Share of the edge lines' colour in the dashes."""
+    pale_walls: Range = (0.0, 0.0)
+    """Share of white in the walls."""
+    wall_height: Range = (0.0, 0.0)
+    """m, higher walls; lower ones show more of the hall."""
+    crowd: Range = (0.0, 0.0)
+    """Contrast of what stands behind the walls and hangs on them, people and banners, 1 is all there is."""
+    sheen: Range = (0.0, 0.0)
+    """A lamp's reflection in the floor at its brightest, as a fraction of white."""
+    folds: Range = (0.0, 0.0)
+    """Light on one side of a fold in the floor and shade on the other, as a fraction of white."""
+    vignette: Range = (0.0, 0.0)
+    """Light lost half a picture away from the lens's middle, across or down, as a fraction."""
+    vignette_across: Range = (0.0, 0.0)
+    """Where that middle is: to the right, in halves of the picture."""
+    vignette_down: Range = (0.0, 0.0)
+    """Where that middle is: down, in halves of the picture."""
+    defocus: Range = (0.0, 0.0)
+    """Pixels that lie over each other: from 1 on two rows and two columns do."""
+    shutter: Range = (0.0, 0.0)
+    """Seconds that a picture takes, in which a car that turns smears it."""
+    shake: Range = (0.0, 0.0)
+    """rad, standard deviation of where the lens looks from picture to picture."""
+    noise: Range = (0.0, 0.0)
+    """Standard deviation of every pixel, as a fraction of white."""
     tint: Range = (1.0, 1.0)
     """Factor on the light's red, green and blue, drawn for each; grey weighs them afterwards."""
     colour: Range = (0.0, 0.0)
@@ -83,6 +109,11 @@ class Randomization:
     def is_off(self) -> bool:
         """Whether nothing is changed."""
         return self == PRESETS["none"]
+
+    def of_lenses(self) -> list[str]:
+        """The quantities in use that only the CPU's cameras show: those of a real lens in a real hall."""
+        first, last = CONDITIONS.index("crowd"), CONDITIONS.index("noise")
+        return [name for name in CONDITIONS[first : last + 1] if getattr(self, name) != (0.0, 0.0)]
 
     def check(self, vehicle: Vehicle, camera: CameraSpec | None) -> None:
         """Refuse ranges that would make a car or a camera that cannot be.
@@ -144,6 +175,19 @@ LIMITS: Final[dict[str, Range]] = {
     "gradient_across": (-0.9, 0.9),
     "gradient_down": (-0.9, 0.9),
     "blur": (0.0, 4.0),
+    "pale_dashes": (0.0, 1.0),
+    "pale_walls": (0.0, 1.0),
+    "wall_height": (-0.9, 2.0),
+    "crowd": (0.0, 1.0),
+    "sheen": (0.0, 1.0),
+    "folds": (0.0, 0.5),
+    "vignette": (0.0, 0.5),
+    "vignette_across": (-1.0, 1.0),
+    "vignette_down": (-1.0, 1.0),
+    "defocus": (0.0, 3.0),
+    "shutter": (0.0, 0.07),
+    "shake": (0.0, 0.1),
+    "noise": (0.0, 0.2),
     "tint": (0.0, 4.0),
     "colour": (-0.5, 0.5),
 }
@@ -192,9 +236,40 @@ PRESETS: Final[dict[str, Randomization]] = {
         colour=(-0.12, 0.12),
     ),
     "aws": Randomization(light=(0.8, 1.0), tint=(0.5, 1.0)),
+    "real": Randomization(
+        friction=(0.7, 1.2),
+        mass=(0.9, 1.2),
+        speed_gain=(0.85, 1.1),
+        steering_bias=(-0.06, 0.06),
+        latency=(0.0, 1.0),
+        camera_pitch=(-0.06, 0.06),
+        camera_yaw=(-0.04, 0.04),
+        camera_height=(-0.015, 0.015),
+        camera_left=(-0.015, 0.015),
+        camera_forward=(-0.02, 0.02),
+        camera_fov=(-0.08, 0.08),
+        light=(0.6, 2.1),
+        black_level=(-0.05, 0.12),
+        tint=(0.8, 1.2),
+        colour=(-0.1, 0.1),
+        pale_dashes=(0.0, 1.0),
+        pale_walls=(0.0, 0.7),
+        wall_height=(-0.65, 0.0),
+        crowd=(0.0, 1.0),
+        sheen=(0.0, 0.45),
+        folds=(0.0, 0.12),
+        vignette=(0.0, 0.3),
+        vignette_across=(-0.5, 0.5),
+        vignette_down=(-0.5, 0.5),
+        defocus=(0.0, 1.4),
+        shutter=(0.0, 0.02),
+        shake=(0.0, 0.012),
+        noise=(0.0, 0.02),
+    ),
 }
-"""``aws`` is what the original's ENABLE_DOMAIN_RANDOMIZATION does to the driver's picture: each lamp takes a random
-colour while half of the light, the ambient part, stays as it is."""
+"""``real`` is what pictures of a car on a floor show and the simulator's own do not. ``aws`` is what the original's
+ENABLE_DOMAIN_RANDOMIZATION does to the driver's picture: each lamp takes a random colour while half of the light, the
+ambient part, stays as it is."""
 
 
 def load_randomization(name_or_path: str | Path) -> Randomization:

@@ -43,6 +43,7 @@ export const create: Record<keyof typeof english, string> = {
   randomize_none: "Nichts",
   randomize_light: "Licht, Reibung und Kamera, ein wenig",
   randomize_strong: "Viel von allem",
+  randomize_real: "Wie mit einem echten Auto",
   randomize_aws: "Wie das Original",
   goal: "Bis wann",
   goal_lead: "Das Training endet, wenn das Können da ist oder die Zeit um.",

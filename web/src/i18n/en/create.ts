@@ -41,6 +41,7 @@ export const create = {
   randomize_none: "Nothing",
   randomize_light: "Light, friction and camera, a little",
   randomize_strong: "Much of everything",
+  randomize_real: "As with a real car",
   randomize_aws: "As the original",
   goal: "Until when",
   goal_lead: "Training ends when the skill is there, or the time is over.",
