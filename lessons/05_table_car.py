@@ -37,7 +37,9 @@ for cut, name in zip(CAR_IN_A_TABLE, ("across the road", "angle to the road", "b
 # ## Learning, in less than a second
 #
 # It is the Q-learning of lesson 4, with the very same line. It learns on an oval, with 64 cars at once, which all
-# write into the same table. A reward for being in the middle is enough.
+# write into the same table; cars that did the same in the same cell move it by their mean. The reward is 1 in the
+# middle of the road and falls to 0 at its border. And the table is an optimist: at first it says 6 everywhere, more
+# than most cells turn out to be worth, so that each action is tried before it is judged.
 
 # %%
 learned = learn("racecraft:Racecraft-v0", "q-table", seed=1)
@@ -76,12 +78,13 @@ show(film("735 numbers drive a car", {"the table": drives}, seconds=8.0, subtitl
 # %%
 values = learned.policy.values.reshape(7, 7, 3, 5)  # across, angle, bend, action
 ANGLES = np.radians([-30, -15, 0, 15, 30])  # of the five actions, left positive
+AT_FIRST = 6.0  # what the table says of a cell in which nobody has been
 
 
 def sheet(bend):
     """Rows: angle to the road, left on top. Columns: place across the road, left border first, as one sees it."""
     cells = values[::-1, :, bend].transpose(1, 0, 2)[::-1]
-    known = (cells != 0.0).any(axis=-1)
+    known = (cells != AT_FIRST).any(axis=-1)
     turn = 2.0 * ANGLES[cells.argmax(axis=-1)]
     arrows = np.stack([-np.sin(turn), np.cos(turn)], axis=-1) * known[..., None]
     return np.where(known, cells.max(axis=-1), np.nan), arrows
@@ -106,7 +109,9 @@ show(
 
 # %%
 print(
-    "Cells never visited, by bend ahead (right, straight, left):", (values == 0).all(axis=-1).sum(axis=(0, 1)), "of 49"
+    "Cells never visited, by bend ahead (right, straight, left):",
+    (values == AT_FIRST).all(axis=-1).sum(axis=(0, 1)),
+    "of 49",
 )
 elsewhere = drive(learned, "reinvent_2018", cars=20, seconds=60.0, seed=1000)
 print(f"On another track, with bends to the right: {elsewhere.laps} of 20 laps.")
@@ -119,7 +124,7 @@ print(f"On another track, with bends to the right: {elsewhere.laps} of 20 laps."
 # %% [markdown]
 # ## γ: how far ahead it looks
 #
-# A driver with γ = 0 wants the reward of the next step and nothing else. With γ = 0.7 a reward three steps ahead
+# A driver with γ = 0 wants the reward of the next step and nothing else. With γ = 0.9 a reward ten steps ahead
 # still counts a third. What does that do?
 
 # %%

@@ -1,5 +1,5 @@
 # %% right cuts
-cuts = {"offset": (-0.2, 0.2), "sin_heading_error": (-0.1, 0.1), "curvature_2": (0.3,)}
+cuts = {"offset": (-0.2, 0.2), "sin_heading_error": (-0.2, -0.07, 0.07, 0.2), "curvature_2": (0.3,)}
 
 # %% wrong cuts: blind to where it is across the road
 cuts = {"offset": (), "sin_heading_error": (-0.2, -0.07, 0.07, 0.2), "curvature_2": (0.3,)}

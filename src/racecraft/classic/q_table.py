@@ -61,8 +61,19 @@ def learn(worlds: Worlds, policy: Table, settings: TableSettings, rng: np.random
 
         future = np.where(step.terminated, 0.0, values[step.successors].max(axis=1))
         surprise = step.rewards + gamma * future - values[states, actions]
-        values[states, actions] += learning_rate(settings, share) * surprise
+        follow(values, states, actions, learning_rate(settings, share) * surprise)
         yield
+
+
+def follow(
+    values: NDArray[np.float64], states: NDArray[np.int64], actions: NDArray[np.int64], steps: NDArray[np.float64]
+) -> None:
+    """Move the table in place, a step for each of N worlds; worlds that did the same in one cell move it by their mean.
+
+    ``values[states, actions] += steps`` would keep the last of them only, and their sum would go too far.
+    """
+    cells, cell_of, visitors = np.unique(states * values.shape[1] + actions, return_inverse=True, return_counts=True)
+    values.reshape(-1)[cells] += np.bincount(cell_of, steps) / visitors
 
 
 def epsilon_greedy(values: NDArray[np.float64], epsilon: float, rng: np.random.Generator) -> NDArray[np.int64]:

@@ -52,6 +52,13 @@ CAR_IN_A_TABLE: Final = (
 )
 """What a car must know to stay on a road: where across it, at what angle to it, and how it bends half a metre ahead."""
 
+MIDDLE: Final = """
+def reward_function(params):
+    return 1.0 - 2.0 * params["distance_from_center"] / params["track_width"]
+"""
+"""A reward for a table: 1 in the middle of the road, 0 at its border. Every step towards the middle pays at once, where
+bands of equal reward leave a cell's actions alike."""
+
 MAKE: Final[Mapping[str, Mapping[str, Any]]] = {
     ENV_ID: {"track": "oval", "observation": "state", "action_space": "steady"},
 }
@@ -78,9 +85,16 @@ RECIPES: Final[Mapping[tuple[str, str], Recipe]] = {
     ),
     (ENV_ID, "q-table"): Recipe(
         settings=TableSettings(
-            steps=40_000, num_envs=64, gamma=0.7, learning_rate=0.3, final_learning_rate=0.02, cuts=CAR_IN_A_TABLE
+            steps=40_000,
+            num_envs=64,
+            gamma=0.9,
+            exploration=1.0,
+            learning_rate=0.5,
+            final_learning_rate=0.02,
+            initial=6.0,
+            cuts=CAR_IN_A_TABLE,
         ),
-        make={"reward": "centerline"},
+        make={"reward": MIDDLE},
         evaluate_every=40_000,
     ),
     ("CartPole-v1", "dqn"): Recipe(

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from racecraft.classic.policy import Table
-from racecraft.classic.q_table import TableSettings, begin, epsilon, epsilon_greedy, learning_rate
+from racecraft.classic.q_table import TableSettings, begin, epsilon, epsilon_greedy, follow, learning_rate
 from racecraft.classic.worlds import Worlds
 
 __all__ = ["TableSettings", "begin", "learn"]
@@ -31,7 +31,7 @@ def learn(worlds: Worlds, policy: Table, settings: TableSettings, rng: np.random
         next_actions = epsilon_greedy(values[step.successors], epsilon(settings, share), rng)
         future = np.where(step.terminated, 0.0, values[step.successors, next_actions])
         surprise = step.rewards + gamma * future - values[states, actions]
-        values[states, actions] += learning_rate(settings, share) * surprise
+        follow(values, states, actions, learning_rate(settings, share) * surprise)
 
         actions = next_actions
         if step.over.any():  # a new episode, a new choice
