@@ -6,6 +6,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -13,6 +15,7 @@
 #include "distributions.hpp"
 #include "learner.hpp"
 #include "learner_profile.hpp"
+#include "numpy_random.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -205,6 +208,42 @@ void bind_learner(nb::module_& m) {
         .def_ro("seconds", &LayerTime::seconds);
     m.def("peak_operations_per_second", &peak_operations_per_second,
           "Fused multiply-adds on registers alone, counted as two operations each, on one thread.");
+
+    nb::class_<NumpyRandom>(m, "NumpyRandom",
+                            "The core's own numpy.random.default_rng(seeds), at most four of them.")
+        .def(
+            "__init__",
+            [](NumpyRandom* self, const std::vector<uint64_t>& seeds) {
+                require(seeds.size() <= NumpyRandom::kMostSeeds, "There may be at most four seeds.");
+                new (self) NumpyRandom(seeds);
+            },
+            "seeds"_a)
+        .def(
+            "random",
+            [](NumpyRandom& self, size_t count) {
+                auto out = new_array<double, 1>({count});
+                std::generate_n(out.data(), count, [&self] { return self.random(); });
+                return out;
+            },
+            "count"_a, "Uniform in [0, 1).")
+        .def(
+            "integers",
+            [](NumpyRandom& self, uint32_t bound, size_t count) {
+                require(bound > 0, "No whole number is below a bound of 0.");
+                auto out = new_array<int64_t, 1>({count});
+                std::generate_n(out.data(), count, [&self, bound] { return self.integer(bound); });
+                return out;
+            },
+            "bound"_a, "count"_a, "Uniform from 0 to bound - 1.")
+        .def(
+            "permutation",
+            [](NumpyRandom& self, size_t count) {
+                auto out = new_array<int64_t, 1>({count});
+                std::iota(out.data(), out.data() + count, int64_t{0});
+                self.shuffle(out.data(), count);
+                return out;
+            },
+            "count"_a, "The whole numbers below count in any order.");
 
     m.def(
         "sample_categorical",

@@ -207,6 +207,20 @@ def peak_operations_per_second() -> float:
     Fused multiply-adds on registers alone, counted as two operations each, on one thread.
     """
 
+class NumpyRandom:
+    """The core's own numpy.random.default_rng(seeds), at most four of them."""
+
+    def __init__(self, seeds: Sequence[int]) -> None: ...
+
+    def random(self, count: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
+        """Uniform in [0, 1)."""
+
+    def integers(self, bound: int, count: int) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C')]:
+        """Uniform from 0 to bound - 1."""
+
+    def permutation(self, count: int) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C')]:
+        """The whole numbers below count in any order."""
+
 def sample_categorical(logits: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], uniforms: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C')]:
     """Indices drawn from a categorical policy."""
 
