@@ -104,12 +104,12 @@ void bind_learner(nb::module_& m) {
         .def(
             "__init__",
             [](Objective* self, double learning_rate, double clip_coef, double ent_coef, double vf_coef,
-               bool is_huber, double max_grad_norm, double adam_eps) {
-                new (self)
-                    Objective{learning_rate, clip_coef, ent_coef, vf_coef, is_huber, max_grad_norm, adam_eps};
+               bool is_huber, double max_grad_norm, double adam_eps, bool is_eps_hat) {
+                new (self) Objective{learning_rate, clip_coef,     ent_coef, vf_coef,
+                                     is_huber,      max_grad_norm, adam_eps, is_eps_hat};
             },
             nb::kw_only(), "learning_rate"_a, "clip_coef"_a, "ent_coef"_a, "vf_coef"_a, "is_huber"_a,
-            "max_grad_norm"_a, "adam_eps"_a);
+            "max_grad_norm"_a, "adam_eps"_a, "is_eps_hat"_a);
 
     nb::class_<Learner>(m, "Learner", "A network that learns; see racecraft.learn.native_learner.")
         .def(

@@ -27,6 +27,7 @@ namespace racecraft {
 
 void bind_learner(nb::module_& m);  // bind_learner.cpp
 void bind_device(nb::module_& m);   // bind_device.cpp
+void bind_ppo(nb::module_& m);      // bind_ppo.cpp
 void bind_views(nb::module_& m);    // bind_views.cpp
 
 const RgbPalette& rgb_palette(const std::string& name) {
@@ -438,4 +439,5 @@ NB_MODULE(_native, m) {
     racecraft::bind_replay(m);
     racecraft::bind_learner(m);
     racecraft::bind_device(m);
+    racecraft::bind_ppo(m);
 }

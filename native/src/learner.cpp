@@ -111,6 +111,12 @@ void Learner::for_each_task(size_t count, const Body& body) {
     });
 }
 
+ActorCriticShape Learner::shape() const {
+    const NetworkSpec& spec = network_.spec;
+    return {spec.sight_size(), spec.observation_size(), static_cast<size_t>(spec.state_size),
+            static_cast<size_t>(spec.num_actions), spec.is_discrete};
+}
+
 void Learner::encode(const uint8_t* sight, size_t count, uint8_t* out) {
     const std::lock_guard lock(mutex_);
     const NetworkSpec& spec = network_.spec;
@@ -400,15 +406,17 @@ double Learner::sum_over_tasks(size_t num_groups, size_t size) {
 
 void Learner::step(const Objective& objective, double norm) {
     ++num_updates_;
+    const double correction2 = 1.0 - power(kBeta2, num_updates_);
     const bool is_clipped = objective.max_grad_norm > 0.0 && norm > objective.max_grad_norm;
     const AdamStep adam_step{
         .gradient_scale = is_clipped ? static_cast<float>(objective.max_grad_norm / norm) : 1.0f,
         .decay1 = static_cast<float>(1.0 - kBeta1),
         .beta2 = static_cast<float>(kBeta2),
         .decay2 = static_cast<float>(1.0 - kBeta2),
-        .correction2 = static_cast<float>(1.0 / (1.0 - power(kBeta2, num_updates_))),
+        .correction2 = static_cast<float>(1.0 / correction2),
         .step_size = static_cast<float>(objective.learning_rate / (1.0 - power(kBeta1, num_updates_))),
-        .epsilon = static_cast<float>(objective.adam_eps),
+        .epsilon = static_cast<float>(objective.is_eps_hat ? objective.adam_eps / std::sqrt(correction2)
+                                                           : objective.adam_eps),
     };
     pool_.for_each(num_blocks(network_.num_packed), [&](size_t block) {
         const size_t first = block * kBlock, count = std::min(kBlock, network_.num_packed - first);

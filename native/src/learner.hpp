@@ -14,52 +14,26 @@
 #include <mutex>
 #include <vector>
 
-#include "learner_loss.hpp"
+#include "actor_critic.hpp"
 #include "network.hpp"
 #include "network_kernel.hpp"
 #include "thread_pool.hpp"
 
 namespace racecraft {
 
-// Samples of one gradient step: B rows of arrays that may hold more.
-struct Minibatch {
-    size_t size;                    // B
-    const int64_t* rows;            // (B,), null for the first B
-    const uint8_t* observations;    // (M, observation_size): the image, then the LIDAR
-    const float* states;            // (M, state_size)
-    const int64_t* action_indices;  // (M,), discrete; each within [0, num_actions)
-    const float* actions;           // (M, num_actions), continuous
-    const float* log_probs;         // (M,)
-    const float* advantages;        // (M,)
-    const float* returns;           // (M,)
-
-    size_t row(size_t sample) const { return rows == nullptr ? sample : static_cast<size_t>(rows[sample]); }
-};
-
-struct UpdateStats {
-    double policy_loss, value_loss, entropy, approx_kl, clip_fraction, grad_norm;
-};
-
-class Learner {
+class Learner : public ActorCritic {
   public:
     // Weights are zero at first. num_threads counts the calling thread; 0 takes one per core.
     Learner(const NetworkSpec& spec, int num_threads);
 
     const Network& network() const { return network_; }
 
-    // What the sensors tell (count, sight_size), image by image and then the LIDAR -> out (count,
-    // observation_size).
-    void encode(const uint8_t* sight, size_t count, uint8_t* out);
-
-    // Logits, or means and log standard deviations  (count, policy_size). `states` are read by a policy that
-    // sees them, `observations` by the others.
-    void policy(const uint8_t* observations, const float* states, size_t count, float* out);
-
-    // The critic's estimates  (count,).
-    void values(const uint8_t* observations, const float* states, size_t count, float* out);
-
-    // One gradient step; changes nothing when loss or gradient is not finite.
-    UpdateStats update(const Minibatch& minibatch, const Objective& objective);
+    ActorCriticShape shape() const override;
+    // Of the sensors' images, one after the other, and then of the LIDAR.
+    void encode(const uint8_t* sight, size_t count, uint8_t* out) override;
+    void policy(const uint8_t* observations, const float* states, size_t count, float* out) override;
+    void values(const uint8_t* observations, const float* states, size_t count, float* out) override;
+    UpdateStats update(const Minibatch& minibatch, const Objective& objective) override;
 
     // Parameters, Adam's first and second moments, as published  (num_public,).
     enum class Part { weights, moment1, moment2 };

@@ -15,6 +15,7 @@ struct Objective {
     bool is_huber;  // else half the squared error
     double max_grad_norm;
     double adam_eps;
+    bool is_eps_hat = false;  // added before the second moment is corrected
 };
 
 struct LossTerms {

@@ -153,7 +153,7 @@ def replay_windows(vehicle: Sequence[float], poses: Annotated[NDArray[numpy.floa
 class Objective:
     """The loss and the step taken on it; see racecraft.learn.Objective."""
 
-    def __init__(self, *, learning_rate: float, clip_coef: float, ent_coef: float, vf_coef: float, is_huber: bool, max_grad_norm: float, adam_eps: float) -> None: ...
+    def __init__(self, *, learning_rate: float, clip_coef: float, ent_coef: float, vf_coef: float, is_huber: bool, max_grad_norm: float, adam_eps: float, is_eps_hat: bool) -> None: ...
 
 class Learner:
     """A network that learns; see racecraft.learn.native_learner."""
@@ -270,3 +270,83 @@ IMAGE_THREADS: int = 256
 ROW_THREADS: int = 128
 
 LIDAR_RAYS: int = 64
+
+class PpoConfig:
+    """See racecraft.learn.PPOConfig."""
+
+    def __init__(self, *, num_envs: int, num_steps: int, episodes_per_iteration: int, max_steps_per_iteration: int, rate_steps: int, gamma: float, gae_lambda: float, minibatch_size: int, update_epochs: int, normalize_returns: bool, is_greedy: bool, epsilon_start: float, epsilon_end: float, epsilon_steps: int, objective: Objective) -> None: ...
+
+class Ppo:
+    """PPO's loop, native/src/ppo.hpp; see racecraft.learn.PPO, its face."""
+
+    def __init__(self, *, config: PpoConfig, learner: object, sight_size: int, observation_size: int, state_size: int, num_actions: int, is_discrete: bool) -> None: ...
+
+    def begin(self, seed: int, iteration: int, total_steps: int) -> None: ...
+
+    def act(self, sight: Annotated[NDArray, dict(order='C', device='cpu', writable=False)], states: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> bool:
+        """
+        Store what the cars see and draw `actions`; False where the policy's outputs are not finite.
+        """
+
+    def pay(self, rewards: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], terminated: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)], truncated: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> bool:
+        """Store the outcome; True where look() is to come before any reset."""
+
+    def look(self, sight: Annotated[NDArray, dict(order='C', device='cpu', writable=False)], states: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None: ...
+
+    def learn(self) -> bool:
+        """False where the last update was not finite, and not applied."""
+
+    def column(self, name: str) -> object:
+        """A copy of one column of the rollout  (T, N, ...)."""
+
+    @property
+    def is_full(self) -> bool: ...
+
+    @property
+    def any_begins(self) -> bool: ...
+
+    @property
+    def total_steps(self) -> int: ...
+
+    @property
+    def num_driven(self) -> int: ...
+
+    @property
+    def explained_variance(self) -> float: ...
+
+    @property
+    def updates(self) -> list[tuple[float, float, float, float, float, float]]:
+        """What every gradient step of the last learn() saw."""
+
+    @property
+    def ended(self) -> list[tuple[int, float, int]]:
+        """
+        Car, sum of rewards and steps of the episodes that ended since begin().
+        """
+
+    @property
+    def actions(self) -> object:
+        """What the cars do, overwritten by every act()."""
+
+    @property
+    def begins(self) -> Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C')]:
+        """Which cars are to be put at a new start, overwritten by every pay()."""
+
+    @property
+    def totals(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
+        """Sums of rewards of the episodes under way, to be read and written."""
+
+    @property
+    def lengths(self) -> Annotated[NDArray[numpy.int64], dict(shape=(None,), order='C')]:
+        """Steps of the same."""
+
+    @property
+    def return_scale(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
+        """
+        Mean and spread of the returns, the critic's unit, to be read and written.
+        """
+
+def generalized_advantages(*, rewards: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], next_values: Annotated[NDArray[numpy.float32], dict(shape=(None, None), order='C', device='cpu', writable=False)], terminated: Annotated[NDArray[numpy.bool_], dict(shape=(None, None), order='C', device='cpu', writable=False)], truncated: Annotated[NDArray[numpy.bool_], dict(shape=(None, None), order='C', device='cpu', writable=False)], gamma: float, gae_lambda: float) -> tuple:
+    """
+    Generalised advantages and returns of a rollout, each (T, N), as the loop computes them.
+    """

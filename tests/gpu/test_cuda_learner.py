@@ -171,7 +171,7 @@ def test_advantages_are_those_of_the_reference():
     ppo._generator.manual_seed(1)
     ppo._collect_all()
     ppo._estimate_all()
-    from racecraft.learn.rollout import generalized_advantages
+    from racecraft._native import generalized_advantages
 
     values = ppo.learner.estimates(ppo._observations.flatten(0, 1), ppo._states.flatten(0, 1)).view(44, 16)
     advantages, returns = generalized_advantages(

@@ -136,9 +136,10 @@ def test_the_student_takes_its_teachers_critic_in_the_teachers_unit() -> None:
     refining = trained._begin_refining()
     world = StripeWorld(32, seed=2)
     frames, states = world.observe()
-    told = trained.teacher._values(states, states)
-    np.testing.assert_array_equal(refining._values(refining.learner.encode(frames), states), told)
-    assert np.ptp(told) > 0.1
+    told = trained.teacher.learner.values(states, states)
+    np.testing.assert_array_equal(refining.learner.values(refining.learner.encode(frames), states), told)
+    np.testing.assert_array_equal(refining.return_scale, trained.teacher.return_scale)
+    assert np.ptp(told * refining.return_scale[1]) > 0.1
     assert not np.array_equal(refining.return_scale, [0.0, 1.0])
     assert (refining.iteration, refining.total_steps) == (trained.iteration - 1, trained.total_steps)
 

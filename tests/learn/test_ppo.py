@@ -38,7 +38,7 @@ def test_learns_to_centre_the_stripe(is_discrete, backend):
     rewards = []
     for _ in range(12):
         ppo.iterate()
-        rewards.append(ppo._rollout.rewards.mean())
+        rewards.append(ppo.column("rewards").mean())
     assert np.mean(rewards[:2]) < 0.65
     assert np.mean(rewards[-3:]) > 0.78
 
@@ -168,23 +168,21 @@ def test_truncated_steps_bootstrap_the_last_frame_before_the_reset(config):
 
     def spy(mask):
         _, states = ppo.environment.observe()
-        seen.append((ppo._rollout.num_steps - 1, mask.copy(), states.copy()))
+        seen.append((len(ppo.column("rewards")) - 1, mask.copy(), states.copy()))
         reset(mask)
 
     ppo.environment.reset = spy
-    values = ppo._values
-    ppo._values = lambda observations, states: states[:, 0] + 100.0  # a critic that repeats the offset
+    ppo.learner.values = lambda observations, states: states[:, 0] + 100.0  # a critic that repeats the offset
     ppo.iterate()
-    ppo._values = values
-    rollout = ppo._rollout
-    assert rollout.truncated[4].any()
+    terminated, truncated, next_values = (ppo.column(name) for name in ("terminated", "truncated", "next_values"))
+    assert truncated[4].any()
     for row, mask, states in seen:
-        for car in np.flatnonzero(mask & rollout.truncated[row]):
-            assert rollout.next_values[row, car] == np.float32(states[car, 0] + 100)
-    alive = ~rollout.truncated[8] & ~rollout.terminated[8]
+        for car in np.flatnonzero(mask & truncated[row]):
+            assert next_values[row, car] == np.float32(states[car, 0] + 100)
+    alive = ~truncated[8] & ~terminated[8]
     _, states = ppo.environment.observe()
-    np.testing.assert_array_equal(rollout.next_values[8, alive], states[alive, 0] + 100)
-    assert (rollout.next_values[rollout.terminated] == 0).all()
+    np.testing.assert_array_equal(next_values[8, alive], states[alive, 0] + 100)
+    assert (next_values[terminated] == 0).all()
 
 
 def test_whole_episodes_are_shared_between_the_cars(config):
@@ -192,13 +190,13 @@ def test_whole_episodes_are_shared_between_the_cars(config):
     ppo = ppo_for(config, time_limit=7)
     for _ in range(2):
         stats = ppo.iterate()
-        rollout = ppo._rollout
-        ends = (rollout.terminated | rollout.truncated) & rollout.is_valid
+        is_valid = ppo.column("is_valid")
+        ends = (ppo.column("terminated") | ppo.column("truncated")) & is_valid
         assert stats.episodes == 6
-        assert ends[: rollout.num_steps].sum(0).tolist() == [2, 2, 1, 1]
-        assert stats.num_steps == rollout.is_valid[: rollout.num_steps].sum()
+        assert ends.sum(0).tolist() == [2, 2, 1, 1]
+        assert stats.num_steps == is_valid.sum()
         for car in range(4):  # nothing counts after a car's last episode
-            assert ends[np.flatnonzero(rollout.is_valid[: rollout.num_steps, car]).max(), car]
+            assert ends[np.flatnonzero(is_valid[:, car]).max(), car]
 
 
 def scheduled(config: PPOConfig, world: ScheduledWorld) -> PPO:
@@ -227,16 +225,15 @@ def test_the_seconds_of_an_iteration_are_its_own(config, monkeypatch):
         assert (stats.policy_seconds, stats.environment_seconds, stats.update_seconds) == (8.0, 8.0, 1.0)
 
 
-def test_values_are_the_same_however_many_are_computed_at_once(config, monkeypatch):
-    ppo = ppo_for(config)
+def test_values_are_in_units_of_reward(config):
+    ppo = ppo_for(dataclasses.replace(config, learning_rate=0.0))
     ppo.return_scale = np.array([5.0, 2.0])
-    frames, states = ppo.environment.observe()
-    observations = ppo.learner.encode(frames)
-    whole = ppo._values(observations, states)
-    np.testing.assert_allclose(whole, 2.0 * ppo.learner.values(observations, states) + 5.0, rtol=1e-6)
-    monkeypatch.setattr("racecraft.learn.ppo._VALUE_BATCH", 5)
-    np.testing.assert_allclose(ppo._values(observations, states), whole, rtol=1e-5)
-    assert np.ptp(whole) > 0
+    ppo.iterate()
+    observations = ppo.column("observations").reshape(-1, *ppo.learner.observation_shape)
+    states = ppo.column("states").reshape(len(observations), 2)
+    expected = 2.0 * ppo.learner.values(observations, states) + 5.0
+    np.testing.assert_allclose(ppo.column("values").ravel(), expected, rtol=1e-6)
+    assert np.ptp(expected) > 0
     assert ppo.spec == ppo.learner.spec
 
 
@@ -259,7 +256,7 @@ def test_cars_without_episodes_left_wait_unpaid_at_no_cost_and_do_not_begin_agai
     assert (stats.num_steps, stats.total_steps) == (10 + 25, 10 + 2 + 35)
     assert stats.mean_return == (5 + 5 + 50) / 3
     assert stats.mean_length == (5 + 5 + 25) / 3
-    assert ppo._rollout.num_steps == 25
+    assert len(ppo.column("rewards")) == 25
 
 
 def test_only_the_steps_of_driving_cars_use_up_an_iteration(config):
@@ -267,7 +264,7 @@ def test_only_the_steps_of_driving_cars_use_up_an_iteration(config):
     config = dataclasses.replace(config, episodes_per_iteration=2, max_steps_per_iteration=20, minibatch_size=8)
     ppo = scheduled(config, world)
     stats = ppo.iterate()
-    assert ppo._rollout.num_steps == 10  # of two cars; the third one waits
+    assert len(ppo.column("rewards")) == 10  # of two cars; the third one waits
     assert (stats.num_steps, stats.total_steps, stats.episodes) == (20, 20, 0)
 
 
@@ -276,19 +273,19 @@ def test_what_a_cut_iteration_left_unfinished_is_not_counted_in_the_next(config)
     config = dataclasses.replace(config, episodes_per_iteration=2, max_steps_per_iteration=10, minibatch_size=4)
     ppo = scheduled(config, world)
     assert ppo.iterate().episodes == 0
-    ppo.config = dataclasses.replace(ppo.config, max_steps_per_iteration=16)
-    ppo._rollout = scheduled(ppo.config, world)._rollout
-    stats = ppo.iterate()
+    longer = scheduled(dataclasses.replace(config, max_steps_per_iteration=16), world)
+    longer.load_state(ppo.state())
+    stats = longer.iterate()
     assert (stats.episodes, stats.mean_return, stats.mean_length) == (2, 8, 8)
 
 
 def test_the_critics_unit_is_the_first_rollouts_and_then_follows_slowly(config):
     ppo = ppo_for(dataclasses.replace(config, gamma=0.0, learning_rate=0.0))  # returns are the rewards
     ppo.iterate()
-    first = ppo._rollout.rewards.copy()
+    first = ppo.column("rewards")
     np.testing.assert_allclose(ppo.return_scale, [first.mean(), first.std()], rtol=1e-5)
     ppo.iterate()
-    second = ppo._rollout.rewards
+    second = ppo.column("rewards")
     expected = 0.9 * np.array([first.mean(), first.std()]) + 0.1 * np.array([second.mean(), second.std()])
     np.testing.assert_allclose(ppo.return_scale, expected, rtol=1e-5)
 
@@ -303,7 +300,7 @@ def test_fewer_episodes_than_cars(config):
     ppo = ppo_for(dataclasses.replace(config, episodes_per_iteration=3, minibatch_size=8), time_limit=6)
     stats = ppo.iterate()
     assert stats.episodes == 3
-    assert not ppo._rollout.is_valid[:, 3:].any()
+    assert not ppo.column("is_valid")[:, 3:].any()
 
 
 def test_whole_episodes_stop_at_the_limit_of_steps(config):
@@ -311,9 +308,8 @@ def test_whole_episodes_stop_at_the_limit_of_steps(config):
     ppo = ppo_for(config, time_limit=10**6)
     stats = ppo.iterate()
     assert 50 <= stats.num_steps < 54
-    last = ppo._rollout.num_steps - 1
-    alive = ppo._rollout.is_valid[last] & ~ppo._rollout.terminated[last]
-    assert (ppo._rollout.next_values[last, alive] != 0).all()
+    alive = ppo.column("is_valid")[-1] & ~ppo.column("terminated")[-1]
+    assert (ppo.column("next_values")[-1, alive] != 0).all()
 
 
 def test_an_iteration_smaller_than_a_minibatch_still_learns(config):
@@ -364,8 +360,8 @@ def test_e_greedy_falls_from_all_random_to_its_end(config):
     shares = []
     for _ in range(7):
         ppo.iterate()
-        outputs = ppo.learner.policy(ppo._rollout.observations.reshape(-1, *ppo.learner.observation_shape))
-        shares.append((ppo._rollout.actions.ravel() == outputs.argmax(1)).mean())
+        outputs = ppo.learner.policy(ppo.column("observations").reshape(-1, *ppo.learner.observation_shape))
+        shares.append((ppo.column("actions").ravel() == outputs.argmax(1)).mean())
     assert shares[0] == pytest.approx(1 / 3 + 0.1 * 2 / 3, abs=0.12)  # epsilon about 0.9 in the first iteration
     assert shares[-1] == pytest.approx(0.9 + 0.1 / 3, abs=0.04)
 
@@ -397,7 +393,7 @@ def test_continuous_commands_stay_within_bounds(config):
     ppo = PPO(config, learner, Recorder(config.num_envs))
     ppo.iterate()
     assert abs(np.concatenate(commands)).max() == 1.0
-    assert abs(ppo._rollout.actions).max() > 1.0  # the density is that of the unclipped action
+    assert abs(ppo.column("actions")).max() > 1.0  # the density is that of the unclipped action
 
 
 def test_without_a_seed_it_is_that_of_seed_0(config):

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scheduled_world import ScheduledWorld
 
-from racecraft.learn.rollout import Rollout, generalized_advantages
+from racecraft._native import generalized_advantages
+from racecraft.learn import PPO, NetworkSpec, PPOConfig, make_learner
 
 
 def column(*values, dtype=np.float32):
@@ -58,23 +60,27 @@ def test_cars_do_not_touch_each_other(seed, gamma, gae_lambda):
 
 
 def test_a_car_that_is_terminated_and_truncated_is_terminated():
-    rollout = Rollout(1, num_envs=2, observation_shape=(2, 2, 1), state_size=1, action_size=0)
-    rollout.add(
-        observations=np.zeros((2, 2, 2, 1), np.uint8),
-        states=np.zeros((2, 1), np.float32),
-        actions=np.zeros(2, np.int64),
-        log_probs=np.zeros(2, np.float32),
-    )
-    rollout.finish(rewards=np.ones(2), terminated=np.array([True, False]), truncated=np.array([True, True]))
-    assert rollout.truncated.tolist() == [[False, True]]
-    rollout.next_values[:] = 8
-    advantages, _ = rollout.advantages(gamma=0.5, gae_lambda=0.9)
-    assert advantages.tolist() == [[1.0, 5.0]]
+    class Both(ScheduledWorld):
+        def step(self, actions):
+            rewards, terminated, truncated = super().step(actions)
+            return rewards, terminated, terminated | truncated
+
+    config = PPOConfig(num_envs=2, num_steps=4, minibatch_size=8)
+    learner = make_learner(NetworkSpec(num_actions=3, state_size=2), num_threads=1)
+    ppo = PPO(config, learner, Both([[4], [4]], [1.0, 1.0], cars_cut=[1]))
+    ppo.iterate()
+    assert ppo.column("terminated")[3].tolist() == [True, False]
+    assert ppo.column("truncated")[3].tolist() == [False, True]
+    assert (ppo.column("next_values")[3] != 0).tolist() == [False, True]
 
 
-@pytest.mark.parametrize(("action_size", "dtype", "shape"), [(0, np.int64, (4, 3)), (2, np.float32, (4, 3, 2))])
-def test_actions_are_indices_or_vectors(action_size, dtype, shape):
-    rollout = Rollout(4, num_envs=3, observation_shape=(15, 20, 16), state_size=0, action_size=action_size)
-    assert rollout.actions.dtype == dtype
-    assert rollout.actions.shape == shape
-    assert rollout.observations.dtype == np.uint8
+@pytest.mark.parametrize(("is_discrete", "dtype", "shape"), [(True, np.int64, (4, 3)), (False, np.float32, (4, 3, 2))])
+def test_actions_are_indices_or_vectors(is_discrete, dtype, shape):
+    learner = make_learner(NetworkSpec(num_actions=2, is_discrete=is_discrete), num_threads=1)
+    ppo = PPO(PPOConfig(num_envs=3, num_steps=4, minibatch_size=8), learner, ScheduledWorld([[9]] * 3, [1.0] * 3))
+    ppo.iterate()
+    assert ppo.column("actions").dtype == dtype
+    assert ppo.column("actions").shape == shape
+    assert ppo.column("observations").dtype == np.uint8
+    with pytest.raises(ValueError, match="'speed'"):
+        ppo.column("speed")

@@ -57,7 +57,7 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "fidelity/rules.py": (4, ("tests/fidelity/test_replay.py", "tests/fidelity/test_fidelity.py")),
     "fidelity/logs.py": (4, ("tests/fidelity/test_replay.py", "tests/fidelity/test_fidelity.py")),
     # learning
-    "learn/rollout.py": (5, ("tests/learn/test_rollout.py", "tests/learn/test_ppo.py", "-k", "not learns")),
+    "learn/native_loop.py": (2, ("tests/learn/test_ppo_bits.py",)),
     "learn/ppo.py": (12, LEARN),
     "learn/average.py": (3, ("tests/learn/test_average.py",)),
     "learn/distill.py": (8, ("tests/learn/test_distill.py",)),

@@ -178,19 +178,21 @@ def test_a_full_disk_at_a_log_is_one_clear_error(
 def test_a_loss_that_is_not_finite_stops_and_the_checkpoint_is_good(
     tiny: Train, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def spoil(*arguments: Any, **settings: Any) -> Any:
-        learner = make_learner(*arguments, **settings)
-        update, count = learner.update, [0]
+    class Spoiled:
+        """Everything a learner does, until its ninth gradient step."""
 
-        def spoiled(*minibatch: Any) -> UpdateStats:
-            count[0] += 1
-            stats = update(*minibatch)
-            return stats if count[0] < 9 else replace(stats, policy_loss=float("nan"))
+        def __init__(self, *arguments: Any, **settings: Any) -> None:
+            self._learner, self._count = make_learner(*arguments, **settings), 0
 
-        monkeypatch.setattr(learner, "update", spoiled)
-        return learner
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._learner, name)
 
-    monkeypatch.setattr(session, "make_learner", spoil)
+        def update(self, *minibatch: Any) -> UpdateStats:
+            self._count += 1
+            stats = self._learner.update(*minibatch)
+            return stats if self._count < 9 else replace(stats, policy_loss=float("nan"))
+
+    monkeypatch.setattr(session, "make_learner", Spoiled)
     with pytest.raises(TrainingError) as caught:
         tiny(name="mine")
     assert isinstance(caught.value, RacecraftError)

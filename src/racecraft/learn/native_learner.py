@@ -44,10 +44,13 @@ class NativeLearner:
             self._native = self._make(spec, num_threads)
         except ValueError as error:
             raise ConfigError(str(error)) from None
-        # the last one, Adam's epsilon in it, and as the core knows both
-        self._objective: tuple[Objective | None, float, Any] = (None, 0.0, None)
         if seed is not None:
             self.load_weights(networks.initial_weights(spec, seed=seed, orthonormalize=_native.orthonormalize))
+
+    @property
+    def core(self) -> _native.Learner:
+        """What the core's loop trains."""
+        return self._native
 
     def _make(self, spec: NetworkSpec, num_threads: int) -> _native.Learner:
         arch = networks.architecture_of(spec)
@@ -105,9 +108,6 @@ class NativeLearner:
                 )
         else:
             actions = self._column("actions", minibatch.actions, (size, spec.num_actions))
-        eps = objective.eps_at(self._native.num_updates + 1)
-        if objective is not self._objective[0] or eps != self._objective[1]:
-            self._objective = objective, eps, _native_objective(objective, eps)
         terms = self._native.update(
             *self._sensed(minibatch, size),
             indices,
@@ -116,7 +116,7 @@ class NativeLearner:
             self._column("advantages", minibatch.advantages, (size,)),
             self._column("returns", minibatch.returns, (size,)),
             rows,
-            self._objective[2],
+            native_objective(objective),
         )
         return UpdateStats.of(terms)
 
@@ -168,7 +168,8 @@ def _flat(array: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return array.reshape(len(array), int(np.prod(array.shape[1:])))
 
 
-def _native_objective(objective: Objective, eps: float) -> Any:
+def native_objective(objective: Objective) -> _native.Objective:
+    """The same for the core."""
     return _native.Objective(
         learning_rate=objective.learning_rate,
         clip_coef=objective.clip_coef,
@@ -176,5 +177,6 @@ def _native_objective(objective: Objective, eps: float) -> Any:
         vf_coef=objective.vf_coef,
         is_huber=objective.value_loss == "huber",
         max_grad_norm=objective.max_grad_norm,
-        adam_eps=eps,
+        adam_eps=objective.adam_eps,
+        is_eps_hat=objective.is_eps_hat,
     )

@@ -1,10 +1,11 @@
-"""Proximal policy optimisation, top to bottom: collect a rollout, estimate advantages, improve the policy.
+"""Proximal policy optimisation: its settings, what an iteration did, and the loop as it is told to the native core.
 
-    environment ──frames, state──▶ collect ──▶ Rollout ──▶ bootstrap, advantages ──▶ update ──▶ new weights
+    environment ──frames, state──▶ act ──▶ step ──rewards──▶ pay ──▶ until the rollout is full: learn ──▶ new weights
 
 https://arxiv.org/abs/1707.06347, with AWS DeepRacer's variants (whole episodes per iteration, e-greedy
 exploration, Huber value loss) as settings. Anything with ``observe``, ``step`` and ``reset`` can be learned
-from; a `Learner` holds the network.
+from; a `Learner` holds the network. The rollout, all chance, advantages and minibatches are `native/src/ppo.hpp`'s,
+which a browser's tab runs as well.
 """
 
 from __future__ import annotations
@@ -20,14 +21,27 @@ from numpy.typing import NDArray
 
 from racecraft.checks import check_choice, check_number, check_whole, require
 from racecraft.errors import CheckpointError, TrainingError
-from racecraft.learn import distributions
 from racecraft.learn.average import WeightAverage
-from racecraft.learn.learner import Learner, Minibatch, NetworkSpec, Objective, UpdateStats, Weights, holding
-from racecraft.learn.ledger import Ended, EpisodeLedger
+from racecraft.learn.learner import Learner, NetworkSpec, Objective, UpdateStats, Weights, holding
+from racecraft.learn.ledger import Ended
+from racecraft.learn.native_loop import make_loop
 from racecraft.learn.networks import INITIAL_WEIGHTS
-from racecraft.learn.rollout import Rollout
 
-_VALUE_BATCH = 4096  # observations whose values are computed at once
+_LOOP_SETTINGS = (
+    "num_envs",
+    "num_steps",
+    "episodes_per_iteration",
+    "max_steps_per_iteration",
+    "rate_steps",
+    "gamma",
+    "gae_lambda",
+    "minibatch_size",
+    "update_epochs",
+    "normalize_returns",
+    "epsilon_start",
+    "epsilon_end",
+    "epsilon_steps",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,27 +207,20 @@ class PPO:
         require("num_envs", config.num_envs, is_driven, f"the environment's {environment.num_envs}")
         is_possible = spec.is_discrete or config.exploration != "e-greedy"
         require("exploration", config.exploration, is_possible, "'categorical' for continuous actions")
-        if config.episodes_per_iteration:
-            capacity = -(-config.max_steps_per_iteration // min(config.num_envs, config.episodes_per_iteration))
-        else:
-            capacity = config.num_steps
-            samples = config.num_steps * config.num_envs
-            is_filled = config.minibatch_size <= samples
-            require("minibatch_size", config.minibatch_size, is_filled, f"at most num_steps x num_envs = {samples}")
+        samples = config.num_steps * config.num_envs
+        is_filled = config.episodes_per_iteration > 0 or config.minibatch_size <= samples
+        require("minibatch_size", config.minibatch_size, is_filled, f"at most num_steps x num_envs = {samples}")
         self.config = config
         self.learner = learner
         self.environment, self.seed = environment, seed
         self.iteration = self.total_steps = 0
-        self._rollout = Rollout(
-            capacity,
-            num_envs=config.num_envs,
-            observation_shape=learner.observation_shape,
-            state_size=spec.state_size,
-            action_size=0 if spec.is_discrete else spec.num_actions,
-            observation_dtype=getattr(learner, "observation_dtype", np.uint8),
+        self._loop = make_loop(
+            learner,
+            config.objective,
+            is_greedy=config.exploration == "e-greedy",
+            **{name: getattr(config, name) for name in _LOOP_SETTINGS},
         )
-        self._ledger = EpisodeLedger(config.num_envs)
-        self.return_scale = np.array([0.0, 1.0])  # running mean and spread of the returns, in units of reward
+        self._chosen, self._begins = np.asarray(self._loop.actions), self._loop.begins  # filled by every step
         self.prefers_average = False
         """Whether the averaged weights drive. The mean of beginners is none: set it once the policy drives well."""
         self._average = WeightAverage(learner, config.average_share)
@@ -225,31 +232,77 @@ class PPO:
         Raises:
             TrainingError: Loss or gradient is not finite; the weights are those of before that gradient step.
         """
-        rng = np.random.default_rng([self.seed, self.iteration])
+        loop = self._loop
+        loop.begin(self.seed, self.iteration, self.total_steps)
         self._clocks = dict.fromkeys(self._clocks, 0.0)
-        ended = self._collect(rng)
+        self._collect()
 
         started = time.perf_counter()
-        advantages, returns = self._estimate()
-        losses = self._update(advantages, returns, rng)
+        losses = self._learn()
         self._average.add(iteration=self.iteration + 1)
         self._clocks["update"] += time.perf_counter() - started
 
-        rollout = self._rollout
-        used = rollout.is_valid[: rollout.num_steps]
-        variance = float(returns[used].var())
         self.iteration += 1
         return IterationStats(
             iteration=self.iteration,
             total_steps=self.total_steps,
-            num_steps=int(used.sum()),
-            ended=tuple(ended),
+            num_steps=loop.num_driven,
+            ended=tuple(Ended(*episode) for episode in loop.ended),
             losses=losses,
-            explained_variance=1 - float(advantages[used].var()) / variance if variance > 0 else float("nan"),
+            explained_variance=loop.explained_variance,
             environment_seconds=self._clocks["environment"],
             policy_seconds=self._clocks["policy"],
             update_seconds=self._clocks["update"],
         )
+
+    def _collect(self) -> None:
+        """Drive until the rollout is full."""
+        loop, environment = self._loop, self.environment
+        if self.config.episodes_per_iteration:
+            environment.reset(np.ones(self.config.num_envs, bool))
+        while not loop.is_full:
+            started = time.perf_counter()
+            if not loop.act(*self._see()):
+                raise TrainingError(
+                    "The policy's outputs are not finite.", hint="Lower learning_rate, or check the reward."
+                )
+            acted = time.perf_counter()
+            if loop.pay(*environment.step(self._chosen)):  # some returns go on from frames that are soon gone
+                loop.look(*self._see())
+            self.total_steps = loop.total_steps
+            if loop.any_begins:
+                environment.reset(self._begins)
+            self._clocks["policy"] += acted - started
+            self._clocks["environment"] += time.perf_counter() - acted
+
+    def _see(self) -> tuple[NDArray[Any], NDArray[np.float32]]:
+        frames, states = self.environment.observe()
+        return np.ascontiguousarray(frames), np.ascontiguousarray(states)
+
+    def _learn(self) -> UpdateStats:
+        """Advantages and gradient steps; the mean of what these saw."""
+        is_fine = self._loop.learn()
+        stats = [UpdateStats.of(terms) for terms in self._loop.updates]
+        if not is_fine:
+            raise TrainingError(
+                f"The loss is {stats[-1].policy_loss + stats[-1].value_loss} with gradient norm "
+                f"{stats[-1].grad_norm} in iteration {self.iteration + 1}; its step was not taken.",
+                hint="Lower learning_rate, set max_grad_norm, or look for huge rewards.",
+            )
+        return UpdateStats.mean(stats)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """A copy of a column of the last rollout, one of those in `native/src/rollout.hpp`  (T, N, ...)."""
+        return np.asarray(self._loop.column(name))
+
+    @property
+    def return_scale(self) -> NDArray[np.float64]:
+        """Running mean and spread of the returns, in units of reward: the critic's unit  (2,)."""
+        return self._loop.return_scale
+
+    @return_scale.setter
+    def return_scale(self, scale: NDArray[np.float64]) -> None:
+        self._loop.return_scale[:] = scale
 
     @property
     def spec(self) -> NetworkSpec:
@@ -265,167 +318,6 @@ class PPO:
         """Within, the learner holds the weights that are to drive; afterwards those it learns with."""
         return holding(self.learner, self.driving_weights)
 
-    # ---- collect: drive until the rollout is full
-
-    def _collect(self, rng: np.random.Generator) -> list[Ended]:
-        """Fill the rollout; the episodes that ended."""
-        rollout, environment = self._rollout, self.environment
-        num_envs, episodes = self.config.num_envs, self.config.episodes_per_iteration
-        ended: list[Ended] = []
-        size = self.config.num_steps * num_envs
-        budget = self.config.max_steps_per_iteration if episodes else size
-        quota = np.full(num_envs, np.iinfo(np.int64).max)  # episodes each car may still begin
-        if episodes:
-            quota = np.array([episodes // num_envs + (car < episodes % num_envs) for car in range(num_envs)])
-            everyone = np.ones(num_envs, bool)
-            environment.reset(everyone)
-            self._ledger.forget(everyone)
-        rollout.clear()
-        cut: list[tuple[int, NDArray[np.intp], NDArray[np.uint8], NDArray[np.float32]]] = []
-
-        while budget > 0 and quota.any() and rollout.num_steps < len(rollout.rewards):
-            started = time.perf_counter()
-            frames, states = environment.observe()
-            observations = self.learner.encode(frames)
-            actions, log_probs = self._act(observations, rng)
-            is_driving = quota > 0
-            rollout.add(
-                observations=observations,
-                states=states[:, : rollout.states.shape[2]],
-                actions=actions,
-                log_probs=log_probs,
-                is_valid=is_driving,
-            )
-            acted = time.perf_counter()
-            command = actions if self.learner.spec.is_discrete else actions.clip(-1.0, 1.0)
-            rewards, terminated, truncated = environment.step(command)
-            rollout.finish(rewards=rewards, terminated=terminated, truncated=truncated)
-            budget -= int(is_driving.sum())
-            self.total_steps += int(is_driving.sum())
-
-            # the last frame of a truncated episode is gone after the reset: keep it for its value
-            done = terminated | truncated
-            cars = np.flatnonzero(truncated & ~terminated & is_driving)
-            if len(cars):
-                cut.append((rollout.num_steps - 1, cars, *self._look(cars)))
-            ended += self._ledger.add(rewards, done, is_counted=is_driving)
-            if episodes:
-                quota -= done & is_driving
-            begins = done & (quota > 0)
-            if begins.any():
-                environment.reset(begins)
-            self._clocks["policy"] += acted - started
-            self._clocks["environment"] += time.perf_counter() - acted
-
-        # every car still under way continues after the last row: its value stands in for what follows
-        last = rollout.num_steps - 1
-        cars = np.flatnonzero(rollout.is_valid[last] & ~rollout.terminated[last] & ~rollout.truncated[last])
-        if len(cars):
-            cut.append((last, cars, *self._look(cars)))
-        for row, cars, observations, states in cut:
-            rollout.next_values[row, cars] = self._values(observations, states)
-        return ended
-
-    def _act(
-        self, observations: NDArray[np.uint8], rng: np.random.Generator
-    ) -> tuple[NDArray[Any], NDArray[np.float32]]:
-        """Explore: actions as the policy drew them, and their log-probabilities under it."""
-        spec, config = self.learner.spec, self.config
-        outputs = self.learner.policy(observations)
-        if not np.isfinite(outputs).all():
-            raise TrainingError(
-                "The policy's outputs are not finite.", hint="Lower learning_rate, or check the reward."
-            )
-        num_cars, is_discrete = len(outputs), spec.is_discrete
-        if config.exploration == "e-greedy":
-            actions = distributions.most_likely(outputs, is_discrete=True)
-            done = min(self.total_steps / config.epsilon_steps, 1.0) if config.epsilon_steps else 1.0
-            epsilon = config.epsilon_start + (config.epsilon_end - config.epsilon_start) * done
-            is_random = rng.random(num_cars) < epsilon
-            actions = np.where(is_random, rng.integers(spec.num_actions, size=num_cars), actions)
-        else:
-            noise = distributions.noise_for(num_cars, num_actions=spec.num_actions, is_discrete=is_discrete, rng=rng)
-            actions = distributions.sample(outputs, noise, is_discrete=is_discrete)
-        return actions, distributions.log_prob(outputs, actions, is_discrete=is_discrete)
-
-    def _look(self, cars: NDArray[np.intp]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Observations and states of some cars where they are now."""
-        frames, states = self.environment.observe()
-        return self.learner.encode(frames[cars]), np.array(states[cars, : self.learner.spec.state_size])
-
-    # ---- estimate: values, advantages, returns
-
-    def _estimate(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Advantages and returns of the rollout, (T, N), in units of reward."""
-        rollout = self._rollout
-        rows = slice(0, rollout.num_steps)
-        shape = rollout.values[rows].shape
-        observations = rollout.observations[rows].reshape(-1, *rollout.observations.shape[2:])
-        states = rollout.states[rows].reshape(len(observations), rollout.states.shape[2])
-        rollout.values[rows] = self._values(observations, states).reshape(shape)
-        return rollout.advantages(gamma=self.config.gamma, gae_lambda=self.config.gae_lambda)
-
-    def _values(self, observations: NDArray[np.uint8], states: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The critic's values, in units of reward  (N,)."""
-        starts = range(0, len(observations), _VALUE_BATCH)
-        values = [self.learner.values(observations[i : i + _VALUE_BATCH], states[i : i + _VALUE_BATCH]) for i in starts]
-        mean, spread = self.return_scale
-        return np.asarray(np.concatenate(values) * spread + mean, np.float32)
-
-    # ---- update: gradient steps on shuffled minibatches
-
-    def _update(
-        self, advantages: NDArray[np.float32], returns: NDArray[np.float32], rng: np.random.Generator
-    ) -> UpdateStats:
-        config, rollout = self.config, self._rollout
-        used = np.flatnonzero(rollout.is_valid[: rollout.num_steps])
-        self._follow_returns(returns.reshape(-1)[used])
-        mean, spread = self.return_scale
-        b_observations = rollout.observations.reshape(-1, *rollout.observations.shape[2:])
-        b_states = rollout.states.reshape(len(b_observations), rollout.states.shape[2])
-        b_actions = rollout.actions.reshape(-1, *rollout.actions.shape[2:])
-        b_log_probs = rollout.log_probs.reshape(-1)
-        b_returns = ((returns - mean) / spread).astype(np.float32).reshape(-1)
-        b_advantages = advantages.reshape(-1)
-        centre, scale = distributions.moments(b_advantages[used])
-        b_advantages = ((b_advantages - centre) / (scale + 1e-8)).astype(np.float32)
-
-        everything = len(b_advantages)
-        minibatch = Minibatch(
-            observations=b_observations[:everything],
-            states=b_states[:everything],
-            actions=b_actions[:everything],
-            log_probs=b_log_probs[:everything],
-            advantages=b_advantages,
-            returns=b_returns,
-        )
-        minibatch_size = min(config.minibatch_size, len(used))
-        objective = config.objective
-        if config.rate_steps:
-            rate = config.learning_rate / (1.0 + self.total_steps / config.rate_steps)
-            objective = dataclasses.replace(objective, learning_rate=rate)
-        stats: list[UpdateStats] = []
-        for _ in range(config.update_epochs):
-            order = rng.permutation(used)
-            for start in range(0, len(used) - minibatch_size + 1, minibatch_size):  # a last partial one is dropped
-                rows = order[start : start + minibatch_size]
-                stats.append(self.learner.update(dataclasses.replace(minibatch, rows=rows), objective))
-                if not stats[-1].is_finite:
-                    raise TrainingError(
-                        f"The loss is {stats[-1].policy_loss + stats[-1].value_loss} with gradient norm "
-                        f"{stats[-1].grad_norm} in iteration {self.iteration + 1}; its step was not taken.",
-                        hint="Lower learning_rate, set max_grad_norm, or look for huge rewards.",
-                    )
-        return UpdateStats.mean(stats)
-
-    def _follow_returns(self, returns: NDArray[np.float32]) -> None:
-        """Move the critic's unit towards the returns seen lately; the first rollout sets it."""
-        if not self.config.normalize_returns:
-            return
-        mean, spread = distributions.moments(returns)
-        seen = np.array([mean, max(spread, 1e-6)])
-        self.return_scale = seen if self.iteration == 0 else 0.9 * self.return_scale + 0.1 * seen
-
     # ---- resume
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -435,8 +327,8 @@ class PPO:
         """
         arrays: dict[str, NDArray[Any]] = {
             "ppo/counters": np.array([self.seed, self.iteration, self.total_steps], np.int64),
-            "ppo/episode_returns": self._ledger.totals.copy(),
-            "ppo/episode_lengths": self._ledger.lengths.copy(),
+            "ppo/episode_returns": self._loop.totals.copy(),
+            "ppo/episode_lengths": self._loop.lengths.copy(),
             "ppo/return_scale": self.return_scale.copy(),
         }
         return arrays | self._average.state(is_preferred=self.prefers_average)
@@ -453,12 +345,12 @@ class PPO:
             )
         except KeyError as error:
             raise CheckpointError(f"The training state has no entry {error}.") from None
-        if returns.shape != self._ledger.totals.shape:
+        if returns.shape != self._loop.totals.shape:
             raise CheckpointError(
                 f"The training state is of {len(returns)} cars, not of {self.config.num_envs}.",
                 hint=f"Resume with num_envs = {len(returns)}.",
             )
         self._average.load_state(state)
         self.seed, self.iteration, self.total_steps = (int(number) for number in counters)
-        self._ledger.totals[:], self._ledger.lengths[:] = returns, lengths
-        self.return_scale = scale.copy()
+        self._loop.totals[:], self._loop.lengths[:] = returns, lengths
+        self.return_scale = scale

@@ -309,10 +309,10 @@ class CudaPPO(PPO):
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Everything needed to continue, except where the cars are; the names of `PPO`."""
-        self._ledger.totals[:] = self._running.cpu().numpy()
+        self._loop.totals[:] = self._running.cpu().numpy()
         return super().state()
 
     def load_state(self, state: dict[str, NDArray[Any]]) -> None:
         """Continue from what ``state`` gave."""
         super().load_state(state)
-        self._running.copy_(torch.from_numpy(self._ledger.totals))
+        self._running.copy_(torch.from_numpy(self._loop.totals))
