@@ -98,6 +98,11 @@ HEAVY = ("torch", "gymnasium", "scipy", "shapely", "PIL", "av", "tensorboard")
         (["--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
         (["train", "--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
         (["learn", "--help"], (*HEAVY, "numpy", "rich", "racecraft._native")),
+        (["--version"], (*HEAVY, "numpy", "rich", "racecraft._native")),
+        (
+            ["train", "--track", "oval", "--until", "1 steps", "--num-envs", "2", "--json"],
+            (*HEAVY, "casadi", "fastapi", "numba", "rich", "racecraft.cli.serve"),
+        ),
         (["tracks"], ("torch", "av", "PIL", "gymnasium", "scipy", "casadi")),
         (["reward", "check", "centerline"], ("torch", "av", "PIL", "gymnasium")),
     ],

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from racecraft.cli import app
+from racecraft.cli import every_verb
 from racecraft.errors import ConfigError
 from racecraft.fidelity.frame import FrameFit, fit_frame, network_frame
 from racecraft.fidelity.likeness import edge_offsets, mean_difference, structural_similarity
@@ -88,12 +88,12 @@ def test_the_command_prints_and_draws(tmp_path):
     frame = our_frame(tmp_path / "frame.png", track, pose)
     sheet = tmp_path / "sheet.png"
     command = ["replay", "--frame", str(frame), "--track", "oval"]
-    done = CliRunner().invoke(app, [*command, "--json"], catch_exceptions=False)
+    done = CliRunner().invoke(every_verb(), [*command, "--json"], catch_exceptions=False)
     found = json.loads(done.stdout)
     assert found["pose"]["x"] == pytest.approx(pose[0], abs=0.003)
     assert found["structural_similarity"] > 0.9
     assert set(found["edge_offsets_px"]) == {"horizon", "lines", "dashes"}
-    said = CliRunner().invoke(app, [*command, "-o", str(sheet)], catch_exceptions=False).stdout
+    said = CliRunner().invoke(every_verb(), [*command, "-o", str(sheet)], catch_exceptions=False).stdout
     with Image.open(sheet) as picture:
         assert picture.size == (1920, 960)
     assert "Taken on oval" in said
@@ -103,7 +103,7 @@ def test_the_command_prints_and_draws(tmp_path):
 @pytest.mark.parametrize("arguments", [[], ["log.csv", "--frame", "frame.png"]])
 def test_either_logs_or_a_frame(arguments):
     with pytest.raises(ConfigError, match="either logs or one --frame"):
-        CliRunner().invoke(app, ["replay", *arguments], catch_exceptions=False)
+        CliRunner().invoke(every_verb(), ["replay", *arguments], catch_exceptions=False)
 
 
 def test_files_that_are_no_frames(tmp_path):

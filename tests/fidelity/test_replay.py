@@ -324,19 +324,19 @@ def test_picture(lines, tmp_path):
 def test_the_verbs(lines, tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
-    from racecraft.cli import app
+    from racecraft.cli import every_verb
 
     monkeypatch.chdir(tmp_path)
     path = str(write(tmp_path / "a.csv", lines))
-    done = CliRunner().invoke(app, ["replay", path, "--track", "oval", "--json"])
+    done = CliRunner().invoke(every_verb(), ["replay", path, "--track", "oval", "--json"])
     assert done.exit_code == 0
     assert json.loads(done.stdout)["rows"] == len(lines)
     assert not (tmp_path / "replay.png").exists()
-    done = CliRunner().invoke(app, ["replay", path, "--track", "oval"])
+    done = CliRunner().invoke(every_verb(), ["replay", path, "--track", "oval"])
     assert done.exit_code == 0
     assert "progress" in done.stdout
     assert (tmp_path / "replay.png").exists()
-    done = CliRunner().invoke(app, ["calibrate", path, "--track", "oval", "--output", "car.json"])
+    done = CliRunner().invoke(every_verb(), ["calibrate", path, "--track", "oval", "--output", "car.json"])
     assert done.exit_code == 0
     assert "car.json" in done.stdout
     assert json.loads((tmp_path / "car.json").read_text())["mass"] == 7.5

@@ -9,7 +9,7 @@ import pytest
 from host_device import HostDevice
 from typer.testing import CliRunner
 
-from racecraft.cli.entry import app
+from racecraft.cli import every_verb
 from racecraft.errors import ConfigError
 from racecraft.gpu import open_device
 from racecraft.learn import PPOConfig
@@ -46,7 +46,7 @@ def device_on_the_cpu(monkeypatch):
 
 @pytest.mark.skipif(has_gpu(), reason="this machine has a GPU")
 def test_without_a_gpu_nothing_is_begun(tmp_path):
-    result = CliRunner().invoke(app, ["train", "--device", "cuda", "--runs", str(tmp_path / "runs"), "--json"])
+    result = CliRunner().invoke(every_verb(), ["train", "--device", "cuda", "--runs", str(tmp_path / "runs"), "--json"])
     assert result.exit_code != 0
     assert isinstance(result.exception, ConfigError)
     assert "Device 'cuda' was asked for" in str(result.exception)

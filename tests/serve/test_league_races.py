@@ -270,14 +270,14 @@ def test_a_model_of_ones_own_garage_is_entered_like_any_other(cup: Cup, tmp_path
 def test_the_command_line_enters_from_any_machine(cup: Cup, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from typer.testing import CliRunner
 
-    from racecraft.cli import app
+    from racecraft.cli import every_verb
 
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     token = ok(cup.bob.post("/api/account/tokens", json={}), 201)["secret"]
     url, run = str(cup.owner.base_url), untrained_run(tmp_path, "from-afar", seed=5)
 
     def said(*arguments: str) -> str:
-        result = CliRunner().invoke(app, [*arguments], catch_exceptions=True)
+        result = CliRunner().invoke(every_verb(), [*arguments], catch_exceptions=True)
         return result.output + (str(result.exception) if result.exception is not None else "")
 
     assert "No league is known" in said("races")

@@ -7,7 +7,6 @@ A file holds the verbs of one subject. Everything heavy is imported inside the v
 what people read is in `text`.
 """
 
-from racecraft.cli.app import app
-from racecraft.cli.entry import main
+from racecraft.cli.entry import every_verb, main
 
-__all__ = ["app", "main"]
+__all__ = ["every_verb", "main"]

@@ -6,6 +6,7 @@ import importlib
 import sys
 import traceback
 import warnings
+from collections.abc import Sequence
 from typing import Any, cast
 
 import typer
@@ -34,10 +35,22 @@ VERBS = (
     "serve",
     "machine",
 )
-"""Files of verbs in the order of ``--help``; to import one is to register it."""
+"""Files of verbs in the order of ``--help``; to import one is to register its verbs."""
+ALONE = frozenset({"train", "evaluate", "report", "export", "learn", "tune"})
+"""Verbs that are all that the file of their name holds: who types one waits for no other."""
 
-for name in VERBS:
-    importlib.import_module(f"racecraft.cli.{name}")
+
+def register(arguments: Sequence[str]) -> None:
+    """Register the verb that the arguments begin with, where it stands alone, or else every verb."""
+    verb = arguments[0] if arguments else ""
+    for name in [verb] if verb in ALONE else VERBS:
+        importlib.import_module(f"racecraft.cli.{name}")
+
+
+def every_verb() -> typer.Typer:
+    """The application with all its verbs."""
+    register(())
+    return app
 
 
 def main() -> None:
@@ -50,6 +63,7 @@ def main() -> None:
     is_debug, is_json = len(arguments) < len(sys.argv) - 1, "--json" in arguments
     warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {message}", err=True)
     try:
+        register(arguments)
         status = app(arguments, prog_name="racecraft", standalone_mode=False)
     except UsageError as error:
         usage: Any = error

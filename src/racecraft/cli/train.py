@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from racecraft.cli import race_options
 from racecraft.cli.app import INTERRUPTED, AwsLog, Json, app, is_given, print_json, text
+
+if TYPE_CHECKING:
+    from racecraft.training.terminal import TerminalReporter
 
 DEFAULT_TRACK: Final = "reinvent_2018"
 _OPTIONS_OF: Final = {
@@ -118,7 +121,6 @@ def train(
     from racecraft.sim import slower_than_could_be
     from racecraft.training.progress import SilentReporter
     from racecraft.training.regimes import regime_of
-    from racecraft.training.terminal import TerminalReporter
 
     if not is_quiet and (slower := slower_than_could_be()):
         text().say_progress(slower)
@@ -129,7 +131,7 @@ def train(
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
     if parent is not None:
         title = f"Racecraft · from {parent}"
-    with SilentReporter() if is_quiet else TerminalReporter(title=title) as reporter:
+    with SilentReporter() if is_quiet else _terminal(title) as reporter:
         if resume is not None:
             result = training.resume(
                 resume,
@@ -191,6 +193,13 @@ def train(
         print_json({**result.to_dict(), **({"evaluation": outcome.to_dict()} if outcome is not None else {})})
     if result.reason == "interrupted":
         raise typer.Exit(INTERRUPTED)
+
+
+def _terminal(title: str) -> TerminalReporter:
+    """Imported late, as rich takes its time."""
+    from racecraft.training.terminal import TerminalReporter
+
+    return TerminalReporter(title=title)
 
 
 def _refuse_beside_resume(context: typer.Context) -> None:
