@@ -293,7 +293,10 @@ def test_the_command_line_enters_from_any_machine(cup: Cup, tmp_path: Path, monk
         assert "allowed are" in said("login", address, "--token", token)
 
 
-def test_when_it_is_over_anybody_can_check_it(cup: Cup, tmp_path: Path) -> None:
+def test_when_it_is_over_anybody_can_check_it(cup: Cup, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from typer.testing import CliRunner
+
+    from racecraft.cli import every_verb
     from racecraft.race.announcement import Announcement
     from racecraft.replay import read_replay, verify
 
@@ -308,7 +311,44 @@ def test_when_it_is_over_anybody_can_check_it(cup: Cup, tmp_path: Path) -> None:
     path = tmp_path / "entry.replay"
     path.write_bytes(cup.bob.get(f"/api/boards/{cup.race}/replays/{mine['id']}").content)
     assert verify(read_replay(path), race=announced).is_genuine
+
+    # the whole board, by the command line of somebody without an account
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    address = f"{cup.owner.base_url}/api/boards/{cup.race}"
+    arguments = ["verify", "--race", address, "--commitment", promised]
+    checked = CliRunner().invoke(every_verb(), arguments)
+    assert checked.exit_code == 0, checked.output
+    assert "Genuine: starts, 2 replays and places are what the board says." in checked.output
+    assert CliRunner().invoke(every_verb(), ["verify", str(path), "--race", address]).exit_code == 0
+    with database_of(cup.league) as database, database.transaction() as session:
+        session.execute(sa.update(Submission).where(Submission.id == mine["id"]).values(completion=1.0))
+    checked = CliRunner().invoke(every_verb(), arguments)
+    assert checked.exit_code == 1
+    assert "Ada: submission 1: its distance is 1.000000 on the board" in checked.output
     assert "is over" in refused(cup.owner.patch(f"/api/league/races/{cup.race}", json={"closes": None}), 409)
+
+
+def test_films_of_an_open_race_tell_no_driver_apart(cup: Cup, run: RunFolder) -> None:
+    """Of a race whose starts everybody knows there are films at once, too coarse to train by, and no replays."""
+    owner, group = cup.owner, ok(cup.owner.get(f"/api/boards/{cup.race}"))["race"]["group"]
+    practice = ok(owner.post(f"/api/groups/{group}/races", json={**CUP, "seed": 5}), 201)["id"]
+    address = f"/api/league/races/{practice}"
+    number = ok(cup.ada.post(f"{address}/submissions?model=novice", content=pack_entry(run)), 202)["id"]
+    cup.league.console.wait_for(lambda: ok(cup.ada.get(f"{address}/submissions/{number}"))["state"] == "done")
+
+    def poses() -> np.ndarray[Any, Any]:
+        return np.array(ok(cup.bob.get(f"/api/boards/{practice}/film?submissions={number}"))["cars"][0]["trace"])
+
+    assert "when the race is over" in refused(cup.bob.get(f"/api/boards/{practice}/replays/{number}"), 409)
+    assert ok(cup.bob.get(f"/api/boards/{practice}/race.json"))["board"] == []
+    coarse = poses()
+    assert (coarse % 50 == 0).all()
+    ok(owner.patch(address, json={"closes": now().isoformat()}))
+    exact = poses()
+    assert (np.abs(exact - coarse) <= 26).all()
+    assert (exact % 50 != 0).any()
+    assert cup.bob.get(f"/api/boards/{practice}/replays/{number}").status_code == 200
+    assert [row["submission"] for row in ok(cup.bob.get(f"/api/boards/{practice}/race.json"))["board"]] == [number]
 
 
 @pytest.fixture

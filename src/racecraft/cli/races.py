@@ -184,9 +184,18 @@ def film(
 
 @app.command()
 def verify(
-    replay: Annotated[Path, typer.Argument(help="Replay file, or a race's folder or race.json.")],
+    context: typer.Context,
+    replay: Annotated[Path | None, typer.Argument(help="Replay file, or a race's folder or race.json.")] = None,
     race: Annotated[
-        str, typer.Option("--race", help="That the replay must be of: its race.json, its folder or its commitment.")
+        str,
+        typer.Option(
+            "--race",
+            help="That the replay must be of: its race.json, its folder, its commitment or its address in a league; "
+            "without a replay that address alone, and the whole board is checked.",
+        ),
+    ] = "",
+    commitment: Annotated[
+        str, typer.Option("--commitment", help="With an address alone: what the race had while it was open.")
     ] = "",
     as_json: Json = False,
 ) -> None:
@@ -194,11 +203,25 @@ def verify(
 
     Of a race all replays, and that its starts were drawn beforehand and its result is theirs.
     """
+    from racecraft.judging.board_verification import is_address, published_at
+
+    if replay is None:
+        if not is_address(race):
+            context.fail("Give a replay, or the address of a league's race with --race.")
+        _verify_board(race, commitment, as_json=as_json)
+        return
+    if commitment:
+        context.fail("--commitment goes with the address of a race alone; with a replay --race takes it.")
     if replay.is_dir() or replay.suffix == ".json":
         from racecraft.judging.verification import verify_race
 
         whole = verify_race(replay, race=race)
-        print_json(whole.to_dict()) if as_json else text().say_race_verified(whole)
+        if as_json:
+            print_json(whole.to_dict())
+        else:
+            from racecraft.cli.verify_text import say_race_verified
+
+            say_race_verified(whole)
         if not whole.is_genuine:
             raise typer.Exit(1)
         return
@@ -206,11 +229,28 @@ def verify(
     from racecraft.replay import read_replay
     from racecraft.replay import verify as drive_again
 
-    found = drive_again(read_replay(replay), race=published(race) if race else None)
+    of = published_at(race) if is_address(race) else published(race) if race else None
+    found = drive_again(read_replay(replay), race=of)
     if as_json:
         print_json(found.to_dict())
     else:
-        text().say_verified(found)
+        from racecraft.cli.verify_text import say_verified
+
+        say_verified(found)
+    if not found.is_genuine:
+        raise typer.Exit(1)
+
+
+def _verify_board(address: str, commitment: str, *, as_json: bool) -> None:
+    from racecraft.judging.board_verification import verify_board
+
+    found = verify_board(address, commitment=commitment)
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        from racecraft.cli.verify_text import say_board_verified
+
+        say_board_verified(found)
     if not found.is_genuine:
         raise typer.Exit(1)
 

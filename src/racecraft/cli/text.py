@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from racecraft.judging.evaluation import RunEvaluation
     from racecraft.judging.generalization import RunGeneralization
     from racecraft.judging.race import RunRace
-    from racecraft.judging.verification import RaceVerification
     from racecraft.limits import TrackLimit
-    from racecraft.replay import Verification
     from racecraft.reward import Outcome, Problem
     from racecraft.track import Track
     from racecraft.training import TrainResult
@@ -207,50 +205,6 @@ def say_rated(found: Ladder) -> None:
 def say_filmed(path: Path) -> None:
     """Where a film is."""
     _say(Console(), "Film: ", (str(path), "bold"))
-
-
-def say_verified(found: Verification) -> None:
-    """Whether a replay is what its actions lead to, and what it holds."""
-    console, replay = Console(), found.replay
-    for name, car in zip(replay.names, replay.cars, strict=True):
-        best = f", best {min(car.lap_times):.2f} s" if car.lap_times else ""
-        laps = f"{len(car.lap_times)} laps{best}, {car.time:.2f} s in all"
-        _say(console, f"  {_harmless(name)}: ", (laps, "dim"))
-    if found.is_genuine:
-        _say(console, ("Genuine", "bold green"), _harmless(found.provenance.verdict, width=1000), ".")
-        _say(console, f"All {found.num_steps:,} steps come out the same, bit for bit.")
-        if found.race_note:
-            _say(console, found.race_note)
-    elif found.difference is None:
-        _say(console, ("Not of its race: ", "bold red"), _harmless(found.foul), ".")
-    else:
-        _say(console, ("Not genuine: ", "bold red"), found.difference.sentence)
-        if found.version_note:
-            _say(console, ("note: ", "bold"), _harmless(found.version_note))
-
-
-def say_race_verified(found: RaceVerification) -> None:
-    """Whether a race's starts, replays and result are what it says."""
-    from racecraft.judging.verification import OLD_RULES
-
-    console = Console()
-    for name, one in found.verifications.items():
-        style = "dim" if one.is_genuine else "bold red"
-        _say(console, f"  {_harmless(name)}: ", (_harmless(one.sentence, width=1000), style))
-    race = found.announcement
-    if race is None:
-        _say(console, ("note: ", "bold"), OLD_RULES)
-    else:
-        _say(console, f"Commitment {race.commitment}", (" (its seed was known)" if "seed" in race.document else "", ""))
-    if found.is_genuine:
-        _say(
-            console,
-            ("Genuine: ", "bold green"),
-            "replays, starts and result are what the race says." if race else "its replays.",
-        )
-    else:
-        reason = found.foul or "not all of its replays are genuine"
-        _say(console, ("Not genuine: ", "bold red"), _harmless(reason), ".")
 
 
 def say_limit(name: str, limit: TrackLimit) -> None:

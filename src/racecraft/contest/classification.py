@@ -51,6 +51,15 @@ class Standing:
         """As JSON."""
         return {**vars(self), "scores": list(self.scores), "statuses": list(self.statuses)}
 
+    def in_whole_ms(self) -> dict[str, Any]:
+        """All that places are decided by, as a league's board has it."""
+        return {
+            "score_ms": None if self.score is None else round(1000 * self.score),
+            "best_lap_ms": None if self.best is None else round(1000 * self.best),
+            "resets": self.resets,
+            "completion": self.completion,
+        }
+
 
 def classify(
     results: Sequence[Sequence[Trial]], *, ranking: str = "total", minimum_laps: int = 1, ranks_all: bool = False

@@ -1,24 +1,32 @@
-"""A league on another machine: its races, and a run that is sent to one. Only what drives leaves this machine."""
+"""A league on another machine: its races, a run that is sent to one, what it publishes of a race that is over.
+
+Only what drives leaves this machine.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import urllib.error
 import urllib.request
 from collections.abc import Mapping
+from http.client import HTTPException
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
 from racecraft.errors import ConfigError, RacecraftError, RunError
-from racecraft.json_file import read_json_object
+from racecraft.json_file import parse_json_object, read_json_object
 from racecraft.race.entry_file import pack_entry
+from racecraft.replay.codec import MAX_FILE_BYTES
 from racecraft.run import RunFolder
 from racecraft.run.folder import sanitize_name
 
 PATIENCE: Final = 60.0  # s
-MOST: Final = 1 << 24  # bytes of an answer
+MOST: Final = 1 << 25  # bytes of an answer
+MARK: Final = re.compile(r"[!-~]+")
+"""A token is one printable word."""
 
 
 class LeagueRefused(RunError):
@@ -37,17 +45,17 @@ class League:
 
     Args:
         url: ``https://NAME`` or ``http://NAME:PORT``.
-        token: From the page of one's account there.
+        token: From the page of one's account there; empty for who has no account, and sees what is public.
 
     Raises:
         ConfigError: The address is none.
     """
 
-    def __init__(self, url: str, token: str) -> None:
+    def __init__(self, url: str, token: str = "") -> None:
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.hostname or parts.path not in ("", "/"):
             raise ConfigError(f"The league's address is {url[:80]!r}; allowed are https://NAME and http://NAME:PORT.")
-        if not token.isascii() or not token.isprintable() or not token:
+        if token and not MARK.fullmatch(token):
             raise ConfigError("A token is one word, which begins with rc_.", hint="Make one on your account's page.")
         self.url, self.token = f"{parts.scheme}://{parts.netloc}", token
         self._opener = urllib.request.build_opener(_Straight)
@@ -77,16 +85,42 @@ class League:
         found: dict[str, Any] = self._ask("GET", f"/api/league/races/{race}/submissions/{number}")
         return found
 
+    def published(self, race: int) -> dict[str, Any]:
+        """What is published of a race: its announcement, and when it is over its board.
+
+        Raises:
+            LeagueRefused: It does not answer, or does not show it.
+            ConfigError: What it says is no JSON object.
+        """
+        return parse_json_object(self._fetch("GET", f"/api/boards/{race}/race.json", most=MOST), name="The board")
+
+    def replay(self, race: int, submission: int) -> bytes:
+        """A replay file, when the race is over.
+
+        Raises:
+            LeagueRefused: There is none.
+        """
+        return self._fetch("GET", f"/api/boards/{race}/replays/{submission}", most=MAX_FILE_BYTES + 1)
+
     def _ask(self, method: str, path: str, data: bytes | None = None) -> Any:
-        headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/octet-stream"}
+        told = self._fetch(method, path, data, most=MOST)
+        try:
+            return json.loads(told)
+        except ValueError as error:
+            raise LeagueRefused(f"{self.url} does not answer as a league does: {str(error)[:200]}.") from error
+
+    def _fetch(self, method: str, path: str, data: bytes | None = None, *, most: int) -> bytes:
+        headers = {"Content-Type": "application/octet-stream"}
+        if self.token:
+            headers["Authorization"] = f"Bearer {self.token}"
         request = urllib.request.Request(self.url + path, data=data, headers=headers, method=method)
         try:
             with self._opener.open(request, timeout=PATIENCE) as reply:
-                return json.loads(reply.read(MOST))
+                return bytes(reply.read(most))
         except urllib.error.HTTPError as error:
             with error:
                 raise _refusal(error, self.url) from error
-        except (OSError, ValueError) as error:
+        except (OSError, HTTPException, ValueError) as error:
             reason = getattr(error, "reason", error)
             raise LeagueRefused(f"{self.url} does not answer as a league does: {str(reason)[:200]}.") from error
 
@@ -121,6 +155,13 @@ def remembered_league() -> League:
         raise RunError("No league is known to this machine.", hint="Begin with: racecraft login URL")
     kept = read_json_object(path)
     return League(str(kept.get("url", "")), str(kept.get("token", "")))
+
+
+def remembered_token(url: str) -> str:
+    """The token that opens the league at an address; empty where this machine knows none."""
+    path = _remembered()
+    kept = read_json_object(path) if path.is_file() else {}
+    return str(kept.get("token", "")) if kept.get("url") == url else ""
 
 
 def _remembered() -> Path:

@@ -197,5 +197,10 @@ class Evaluation:
             "penalty_seconds": math.fsum(lap.penalty_seconds for lap in self.laps()),
         }
 
+    def report(self) -> dict[str, Any]:
+        """The figures and the lap times of each trial, without the seed: for who entered a race that is not over."""
+        figures = {name: value for name, value in self.summary().items() if name != "seed"}
+        return {**figures, "lap_seconds": [list(trial.lap_times) for trial in self.trials]}
+
     def _lap_times(self) -> list[float]:
         return [time for trial in self.trials for time in trial.lap_times]

@@ -81,11 +81,17 @@ def replay_trace(job: Job, *, runs: Path) -> Path | None:
     return path if path is not None and path.is_file() else None
 
 
-def trial_poses(path: Path, trial: int) -> tuple[list[list[int]], list[int]]:
-    """Poses of one trial of a replay file in whole mm and mrad, and the steps after which its laps ended."""
+def trial_poses(path: Path, trial: int, *, grain: int = 1) -> tuple[list[list[int]], list[int]]:
+    """Poses of one trial of a replay file in whole mm and mrad, and the steps after which its laps ended.
+
+    Args:
+        path: The file.
+        trial: From 0.
+        grain: mm and mrad that poses are rounded to.
+    """
     recording = read_replay(path).cars[trial].recording
     ends = [step + 1 for step, event in recording.events if event == "lap_complete"]
-    return (1000 * recording.poses).round().astype(int).tolist(), ends
+    return ((1000 / grain * recording.poses).round().astype(int) * grain).tolist(), ends
 
 
 def _standing(race: Race, entered: Entered, *, place: int, score: float, first: float, attempts: int) -> Standing:

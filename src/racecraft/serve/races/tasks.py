@@ -54,10 +54,8 @@ def race(task: Task) -> dict[str, Any]:
         name=task.job.run,
         sensors=entry.sensors,
     )
-    summary = Evaluation(conditions=terms.conditions, trials=trials).summary()
     return {
-        **{name: value for name, value in summary.items() if name != "seed"},
+        **Evaluation(conditions=terms.conditions, trials=trials).report(),
         "step": entry.step,
-        "lap_seconds": [list(trial.lap_times) for trial in trials],
         "verification": {"is_genuine": found.is_genuine, "verdict": "" if found.is_genuine else found.sentence},
     }

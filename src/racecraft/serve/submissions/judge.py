@@ -3,7 +3,7 @@
     standard input    the race's document, its commitment, the seed of its starts, its track; no secret, no address
     entry             what drives, read from the folder
     judged.replay     what was driven
-    standard output   laps and mistakes
+    standard output   how far the model was trained, or why it cannot drive
 
 It has no environment, no database and no key: a file that got the better of it would find nothing. It drives twice,
 with one thread and with two, and answers only if every bit came out the same.
@@ -39,7 +39,6 @@ def _judge(told: dict[str, Any]) -> dict[str, Any]:
     from racecraft.errors import RunError
     from racecraft.race.announcement import Announcement
     from racecraft.race.entry_file import read_entry_file
-    from racecraft.race.results import Evaluation
     from racecraft.replay.replay import write_replay
     from racecraft.track import load_track
 
@@ -64,13 +63,7 @@ def _judge(told: dict[str, Any]) -> dict[str, Any]:
     path.unlink()
     if written[0] != written[1]:
         raise RunError("It drove differently the second time.", hint="This is a bug in Racecraft; please report it.")
-    (trials,) = contest.trials
-    summary = Evaluation(conditions=terms.conditions, trials=trials).summary()
-    return {
-        **{name: value for name, value in summary.items() if name != "seed"},
-        "step": file.saved.step,
-        "lap_seconds": [list(trial.lap_times) for trial in trials],
-    }
+    return {"step": file.saved.step}
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import statistics
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
@@ -32,7 +32,7 @@ from racecraft.serve.races.standings import trial_scores
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions.admission import require_place, require_room
-from racecraft.serve.submissions.board import Board, read_board
+from racecraft.serve.submissions.board import NONE, Board, read_board
 from racecraft.serve.submissions.judge import ENTRY
 from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, Stage, SubmissionInfo
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
@@ -43,6 +43,8 @@ from racecraft.sim.vehicle import load_vehicle
 Part = Literal["organiser", "racer", "spectator"]
 KIND: Final = "judge"
 MAX_LISTED: Final = 1000  # submissions at once
+PUBLISHED: Final = ("submission", "name", "model", "place", "score_ms", "best_lap_ms", "resets", "completion")
+"""Of each row of the board of a race that is over."""
 LAST: Final = 20  # judged ones that the time left is taken from
 
 
@@ -308,12 +310,36 @@ class League:
         shown = "" if is_withheld(race) else announced.secret
         return Announcement(document=announced.document, commitment=announced.commitment, secret=shown)
 
+    def published(self, race_id: int, *, user_id: int | None) -> dict[str, Any]:
+        """All that anybody needs to check a race: its announcement, and when it is over its whole board.
+
+        Raises:
+            NotFound: It is not theirs to see.
+        """
+        announced = self.announcement(race_id, user_id=user_id).to_dict()
+        race, board, running = self.board(race_id, user_id=user_id, top=NONE)
+        told = {"title": race.title, "state": race.state, "running": running}
+        rows = [vars(row) for row in board.rows] if race.state == "closed" else []
+        return {**told, **announced, "board": [{name: row[name] for name in PUBLISHED} for row in rows]}
+
     def replay(self, race_id: int, submission_id: int, *, user_id: int | None) -> Path:
-        """The replay file of a judged submission, once the race is over.
+        """The replay file of a judged submission, once the race is over: it has every action.
 
         Raises:
             NotFound: There is none, or the race is not theirs to see.
             Conflict: The race is not over.
+        """
+        path, is_over = self.driven(race_id, submission_id, user_id=user_id)
+        if not is_over:
+            raise Conflict("Replays are published when the race is over; until then there is the film.")
+        return path
+
+    def driven(self, race_id: int, submission_id: int, *, user_id: int | None) -> tuple[Path, bool]:
+        """The same to make a film of, also of a race whose starts everybody knows, and whether the race is over.
+
+        Raises:
+            NotFound: There is none, or the race is not theirs to see.
+            Conflict: The race is not over and has a secret.
         """
         with self._database.transaction() as session:
             race, _, _ = self._seen(session, race_id, user_id)
@@ -325,7 +351,7 @@ class League:
         path = submission_folder(self._state, submission.job_id) / REPLAY
         if not path.is_file():
             raise NotFound(f"Submission {submission_id} has no replay.")
-        return path
+        return path, state_of(race) == "closed"
 
     def names(self, submissions: list[int]) -> dict[int, str]:
         """Whose submissions they are."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
@@ -36,6 +36,9 @@ from racecraft.serve.submissions.season import read_season
 router = APIRouter(prefix="/api", tags=["league"])
 
 Id = Annotated[int, Path(ge=0, lt=2**31)]
+OPEN_GRAIN: Final = 50
+"""mm and mrad that films of an open race are rounded to: in a step of 1/15 s that is 0.75 m/s, so that nobody reads a
+driver's choices off them and trains another one by those."""
 Top = Annotated[int, Query(ge=1, le=500)]
 
 
@@ -116,9 +119,9 @@ def get_board(race_id: Id, request: Request, consoles: InLeague, top: Top = 100)
 
 @router.get("/boards/{race_id}/race.json")
 def get_league_announcement(race_id: Id, request: Request, consoles: InLeague) -> Response:
-    """What is published of a race, for `racecraft verify --race`: the secret is in it when the race is over."""
-    announced = consoles.league.announcement(race_id, user_id=request.state.user_id)
-    text = json.dumps({"format": FORMAT, **announced.to_dict()}, indent=2, ensure_ascii=False)
+    """What is published of a race, for `racecraft verify --race`: secret and whole board are in it when it is over."""
+    told = consoles.league.published(race_id, user_id=request.state.user_id)
+    text = json.dumps({"format": FORMAT, **told}, indent=2, ensure_ascii=False)
     return Response(text, media_type="application/json")
 
 
@@ -136,16 +139,16 @@ def get_film(
     consoles: InLeague,
     submissions: Annotated[str, Query(max_length=200, pattern=r"^\d{1,9}(,\d{1,9})*$")],
 ) -> RaceReplay:
-    """The trial that the first of some submissions is ranked by, of all of them side by side, once the race is over."""
+    """The trial that the first of some submissions is ranked by, of all of them side by side, once starts are known."""
     league, user = consoles.league, request.state.user_id
     wanted = list(dict.fromkeys(int(part) for part in submissions.split(",")))
     if len(wanted) > MAX_CARS:
         raise ConfigError(f"A film shows at most {MAX_CARS} cars, {len(wanted)} were asked for.")
-    paths = [league.replay(race_id, number, user_id=user) for number in wanted]
+    driven = [league.driven(race_id, number, user_id=user) for number in wanted]
     names, trial = league.names(wanted), league.counted_trial(wanted[0])
     cars = []
-    for number, path in zip(wanted, paths, strict=True):
-        trace, laps = trial_poses(path, trial)
+    for number, (path, is_over) in zip(wanted, driven, strict=True):
+        trace, laps = trial_poses(path, trial, grain=1 if is_over else OPEN_GRAIN)
         cars.append(ReplayCar(entry=number, model=names[number], trace=trace, laps=laps))
     return RaceReplay(trial=trial, geometry=league.track(race_id), cars=cars)
 

@@ -4,7 +4,7 @@
     FOLDER/entry.replay        what was driven, to be driven again by anybody once the race is over
 
 The judge is given no secret. This process has it, drives the replay again from its actions alone, and only believes
-what comes out the same, from the starts that the secret gives.
+what comes out the same, from the starts that the secret gives: laps and mistakes are taken from there.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def submission_folder(state: Path, job_id: str) -> Path:
 
 def judge(task: Task) -> dict[str, Any]:
     """Judge a submission, and write its score where the board is read from."""
-    from racecraft.contest.standings import median_score, ranking_score
+    from racecraft.contest.classification import classify
     from racecraft.replay.replay import read_replay, write_replay
     from racecraft.replay.verification import verify
 
@@ -51,22 +51,12 @@ def judge(task: Task) -> dict[str, Any]:
         raise RunError(f"The judge's result does not hold: {found.sentence}", hint="This is a bug in Racecraft.")
     write_replay(replay, folder / REPLAY)
     (folder / JUDGED).unlink()
-    laps: list[list[float]] = result["lap_seconds"]
-    document = announcement.document
-    score = median_score(
-        [ranking_score(one, ranking=document["ranking"], minimum_laps=document["minimum_laps"]) for one in laps]
-    )
-    best = min((seconds for one in laps for seconds in one), default=None)
-    values = {
-        "score_ms": None if score == float("inf") else round(1000 * score),
-        "best_lap_ms": None if best is None else round(1000 * best),
-        "resets": int(result.get("resets") or 0),
-        "completion": float(result.get("mean_completion") or 0.0),
-        "judged": now(),
-    }
+    terms = announcement.document
+    (standing,) = classify([replay.cars], ranking=terms["ranking"], minimum_laps=terms["minimum_laps"])
+    values = {**standing.in_whole_ms(), "judged": now()}
     with task.database.transaction() as session:
         session.execute(sa.update(Submission).where(Submission.job_id == task.job.id).values(values))
-    return result
+    return {**replay.evaluation.report(), "step": int(result["step"])}
 
 
 def _announcement(task: Task) -> Announcement:
