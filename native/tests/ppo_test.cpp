@@ -119,6 +119,19 @@ TEST(a_rollout_holds_what_was_seen_and_paid) {
     CHECK_EQUAL(rollout.returns[2 * kCars + 0], 1.5f);
 }
 
+TEST(no_value_of_another_rollout_stays) {
+    Notes learner;
+    Ppo loop(config_of(0), learner);
+    Cars cars;
+    for (uint64_t iteration = 0; iteration < 3; ++iteration) {
+        drive(loop, cars, iteration);
+        CHECK(loop.learn());
+        // in the last row car 1 is at age 1, then 2, and then its episode of 3 steps is over
+        CHECK_EQUAL(loop.rollout().next_values[3 * kCars + 1],
+                    iteration < 2 ? 1.0f + static_cast<float>(iteration) : 0.0f);
+    }
+}
+
 TEST(minibatches_are_a_shuffle_of_what_was_driven) {
     Notes learner;
     Ppo loop(config_of(0), learner);
