@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from racecraft import _native
 from racecraft.learn import Learner, Minibatch, PPOConfig, distributions
 
 
@@ -69,11 +70,11 @@ def iterate(config: PPOConfig, learner: Learner, world: Any, *, seed: int, itera
     returns, advantages = (advantages + values).ravel(), advantages.ravel()
     used = np.flatnonzero(flat["is_valid"])
     if config.normalize_returns:
-        seen = distributions.moments(returns[used])
+        seen = _native.moments(returns[used])
         seen = np.array([seen[0], max(seen[1], 1e-6)])
         memory["scale"] = seen if iteration == 0 else 0.9 * np.array([mean, spread]) + 0.1 * seen
         mean, spread = memory["scale"]
-    centre, scale = distributions.moments(advantages[used])
+    centre, scale = _native.moments(advantages[used])
     minibatch = Minibatch(
         **{name: flat[name] for name in ("observations", "states", "actions", "log_probs")},
         advantages=(advantages - np.float32(centre)) / np.float32(scale + 1e-8),

@@ -51,8 +51,3 @@ def most_likely(outputs: NDArray[np.float32], *, is_discrete: bool, is_squashed:
 def log_prob(outputs: NDArray[np.float32], actions: NDArray[Any], *, is_discrete: bool) -> NDArray[np.float32]:
     """Log-probability, or log-density, of actions  (N,)."""
     return native_distributions.log_prob(outputs, actions, is_discrete=is_discrete)
-
-
-def moments(values: NDArray[np.float32]) -> tuple[float, float]:
-    """Mean and standard deviation, in double and in a fixed order."""
-    return native_distributions.moments(values)

@@ -33,9 +33,3 @@ def log_prob(outputs: NDArray[np.float32], actions: NDArray[Any], *, is_discrete
     if is_discrete:
         return _native.categorical_log_probs(outputs, np.ascontiguousarray(actions, np.int64))
     return _native.gaussian_log_probs(outputs, np.ascontiguousarray(actions, np.float32))
-
-
-def moments(values: NDArray[np.float32]) -> tuple[float, float]:
-    """Mean and standard deviation, summed up in double from first to last."""
-    mean, spread = _native.moments(np.ascontiguousarray(values, np.float32).reshape(-1))
-    return mean, spread
