@@ -124,6 +124,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "PATCH /api/league/races/{cup}": ("organiser", {"title": "x"}),
     "DELETE /api/league/races/{cup}": ("organiser", None),
     "POST /api/league/races/{cup}/follow": ("organiser", {"race": 1}),
+    "DELETE /api/league/races/{cup}/follow": ("organiser", None),
     "POST /api/league/races/{cup}/submissions/{submission_id}/judge": ("organiser", None),
     "GET /api/boards/{cup}": ("member", None),
     "GET /api/boards/{cup}/film": ("hidden", "?submissions=1"),

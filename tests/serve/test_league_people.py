@@ -73,6 +73,21 @@ def test_thirty_people_behind_one_address_come_in_by_card(league: RunningLeague)
     assert time.process_time() - began < 60
 
 
+def test_what_may_hold_a_secret_is_not_compressed(league: RunningLeague) -> None:
+    """Its length would tell who listens whether a name that they chose has a sign in common with it (BREACH)."""
+    group = league.group("Lengths")
+    people = [{"name": f"Length {number}"} for number in range(3)]
+    told = [
+        league.owner.post(f"/api/groups/{group}/members", json={"people": people}),
+        league.owner.post(f"/api/groups/{group}/joining", json={}),
+        league.owner.get(f"/api/groups/{group}"),
+        league.owner.post("/api/invitations", json={"uses": 1}),
+    ]
+    assert all(len(reply.content) > 1024 and reply.status_code in (200, 201) for reply in told)
+    assert ["content-encoding" in reply.headers for reply in told] == [False] * 4
+    assert league.owner.get("/api/tracks").headers["content-encoding"] == "gzip"
+
+
 def test_twenty_wrong_passwords_on_one_account_are_stopped_and_the_others_come_in(league: RunningLeague) -> None:
     owner = league.owner
     assert "10 to 256" in refused(owner.put("/api/account/password", json={"new": "short"}), 422)

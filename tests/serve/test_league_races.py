@@ -214,6 +214,16 @@ def test_a_final_of_the_first_a_day_that_is_used_up_and_a_season(league: Running
     foreign = ok(owner.post(f"/api/groups/{elsewhere}/races", json={"title": "x", **terms}), 201)["id"]
     refused(owner.post(f"{address}/follow", json={"race": foreign}), 404)
 
+    # it can follow none again, and is not left behind by the race that it follows
+    assert "'Final' takes its drivers from this race" in refused(owner.delete(f"/api/league/races/{qualifying}"), 409)
+    refused(pupils["Mia"].delete(f"{address}/follow"), 404)
+    assert ok(owner.delete(f"{address}/follow"))["after"] is None
+    spare = race("Spare")
+    ok(owner.post(f"{address}/follow", json={"race": spare, "best": 1}))
+    ok(owner.delete(f"{address}/follow"))
+    ok(owner.delete(f"/api/league/races/{spare}"), 204)
+    ok(owner.post(f"{address}/follow", json={"race": qualifying, "best": 1}))
+
     # one a day, and what fails costs none
     ok(owner.patch(f"/api/league/races/{qualifying}", json={"attempts_per_day": 1, "is_frozen": True}))
     assert "frozen" in refused(submit(qualifying, "Mia", 0), 409)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gzip
+import re
 from typing import Final
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -26,8 +27,15 @@ def accepts(header: str, coding: str) -> bool:
     return False
 
 
+TELLS_SECRETS: Final = re.compile(r"/api/(door|account|invitations|groups)(/.*)?")
+"""Replies of these may hold a card, a token or a code beside names that others chose; how long they are when compressed
+together tells who listens which of their guesses is in there (BREACH, 2013)."""
+
+
 class Compressed:
     """An application whose JSON replies are compressed; all others go through as they are, streams above all.
+
+    What may hold a secret is not compressed.
 
     Args:
         app: The application.
@@ -42,6 +50,7 @@ class Compressed:
             await self._app(scope, receive, send)
             return
         takes_gzip = accepts(Headers(scope=scope).get("accept-encoding", ""), "gzip")
+        takes_gzip = takes_gzip and not TELLS_SECRETS.fullmatch(scope["path"])
         begun: Message | None = None  # held back until its body is known
 
         async def send_small(message: Message) -> None:

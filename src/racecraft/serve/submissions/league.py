@@ -116,9 +116,13 @@ class League:
 
         Raises:
             NotFound: They do not organise it.
+            Conflict: Another race takes its drivers from it and would be closed for ever.
         """
         self.get(race_id, user_id, organiser=True)
         with self._database.transaction() as session:
+            follows = sa.select(Race.title).where(Race.after_id == race_id, Race.deleted.is_(None))
+            if (final := session.scalar(follows.limit(1))) is not None:
+                raise Conflict(f"{final!r} takes its drivers from this race.", hint="Let it follow no race first.")
             session.get_one(Race, race_id).deleted = now()
 
     def submit(self, race_id: int, data: bytes, *, model: str, user_id: int) -> int:
@@ -247,6 +251,17 @@ class League:
                 one = session.get_one(Race, one).after_id
             row = session.get_one(Race, race_id)
             row.after_id, row.best_of_it = stage.race, stage.best
+
+    def follow_none(self, race_id: int, *, user_id: int) -> None:
+        """Let everybody of the group enter a race again.
+
+        Raises:
+            NotFound: They do not organise it.
+        """
+        self.get(race_id, user_id, organiser=True)
+        with self._database.transaction() as session:
+            row = session.get_one(Race, race_id)
+            row.after_id, row.best_of_it = None, 0
 
     def judge_again(self, race_id: int, submission_id: int, *, user_id: int) -> None:
         """Have a submission driven once more; it is off the board until that is done.

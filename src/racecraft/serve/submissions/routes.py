@@ -82,6 +82,13 @@ def follow_race(race_id: Id, body: Stage, consoles: InConsoles, person: InPerson
     return consoles.league.get(race_id, person.id)
 
 
+@router.delete("/league/races/{race_id}/follow")
+def follow_no_race(race_id: Id, consoles: InConsoles, person: InPerson) -> LeagueRace:
+    """Let everybody of the group enter a race again."""
+    consoles.league.follow_none(race_id, user_id=person.id)
+    return consoles.league.get(race_id, person.id)
+
+
 @router.delete("/league/races/{race_id}", status_code=204)
 def delete_league_race(race_id: Id, consoles: InConsoles, person: InPerson) -> Response:
     """Put a race away."""
