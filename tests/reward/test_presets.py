@@ -6,8 +6,10 @@ import math
 
 import pytest
 
+from racecraft.reward.painting import OFFSETS, paint_presets, paint_reward
 from racecraft.reward.params import TEMPLATE
 from racecraft.reward.source import load_preset, preset_names
+from racecraft.track import load_track
 
 EAST = {"waypoints": [(0.0, 0.0), (1.0, 0.0), (0.0, 0.0)], "closest_waypoints": [0, 1]}
 WEST = {"waypoints": [(0.0, 0.0), (-1.0, -1e-9), (0.0, 0.0)], "closest_waypoints": [0, 1]}
@@ -202,3 +204,17 @@ def test_overtake_is_lap_time_with_something_for_passing():
     assert overtake(0.2, is_offtrack=True, **AHEAD) == -1.0
     assert overtake(0.2, is_crashed=True, is_offtrack=True, **AHEAD) == -2.0
     assert reward("overtake", steps=7.0, progress=50.0, **AHEAD) == 0.0  # the first step it sees
+
+
+def test_pictures_of_all_of_them_show_what_the_walled_worker_paints():
+    track = load_track("oval")
+    points, painted = paint_presets(track)
+    assert set(painted) == set(preset_names())
+    for name in ("centerline", "racing", "stay_inside"):  # these remember nothing and look at no clock
+        whole = paint_reward(load_preset(name), track)
+        assert whole.points[::2] == pytest.approx(points)
+        assert whole.rewards[::2] == pytest.approx(painted[name])
+    spacing = track.length / len(points)
+    assert painted["lap_time"] == pytest.approx(spacing)  # metres gained since the place before
+    middle = len(OFFSETS) // 2
+    assert (painted["centerline"][:, middle] > painted["centerline"][:, 0]).all()

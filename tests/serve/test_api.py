@@ -11,6 +11,8 @@ import httpx
 import pytest
 from running_consoles import RunningConsole
 
+from racecraft.serve.models.names import ANIMALS, free_name
+
 GATE = "def reward_function(params):\n    return 1.0 if params['all_wheels_on_track'] else 0.001\n"
 
 
@@ -54,6 +56,13 @@ def test_a_reward_is_checked_and_painted(console: RunningConsole) -> None:
     verdict = client.post("/api/rewards/check", json={"source": failing, "track": "oval"}).json()
     assert not verdict["ok"]
     assert verdict["problems"][-1]["line"] == 2
+
+
+def test_every_preset_has_a_picture(console: RunningConsole) -> None:
+    pictures = console.client.get("/api/rewards/pictures").json()
+    assert set(pictures["rewards"]) == {reward["name"] for reward in console.client.get("/api/rewards").json()}
+    grid = [len(across) for across in pictures["points"]]
+    assert all([len(across) for across in paid] == grid for paid in pictures["rewards"].values())
 
 
 def test_from_a_click_to_a_race(console: RunningConsole) -> None:
@@ -275,6 +284,26 @@ def test_a_model_in_use_is_not_moved_away(console: RunningConsole) -> None:
         assert "in use" in error(moved, 409)["message"]
     ended = console.wait_for(console.job_ended(job["id"]))
     assert ended["state"] == "failed"
+
+
+def test_models_that_nobody_named_have_names_of_their_own_that_one_can_say(console: RunningConsole) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        names = list(pool.map(lambda _: console.create(track="oval", train=False), range(8)))
+    assert len(set(names)) == 8
+    assert set(names) <= set(ANIMALS)
+    for name in names:
+        console.client.delete(f"/api/models/{name}")
+    again = [console.create(track="oval", train=False) for _ in range(2)]
+    assert not set(again) & set(names)  # they may come back from the trash
+    for name in again:
+        console.client.delete(f"/api/models/{name}")
+
+
+def test_when_all_words_are_taken_a_name_has_a_number() -> None:
+    assert free_name(set(ANIMALS) - {"heron"}) == "heron"
+    word, number = free_name(set(ANIMALS)).split("-")
+    assert word in ANIMALS
+    assert number == "2"
 
 
 def test_a_new_model_by_the_name_of_one_in_the_trash_is_new(console: RunningConsole) -> None:

@@ -192,7 +192,7 @@ def test_tabs_and_tracks_are_chosen_with_arrow_keys(studio: tuple[RunningConsole
     page = visit(studio, "/models/left/watch")
     page.get_by_role("tab", name="Watch").press("ArrowRight")
     page.wait_for_url("**/models/left/race")
-    assert page.evaluate("document.activeElement.textContent") == "Race"
+    assert page.evaluate("document.activeElement.textContent") == "Evaluation"
     page.keyboard.press("End")
     page.wait_for_url("**/models/left/setup")
     page = visit(studio, "/create")

@@ -142,6 +142,93 @@ def test_an_import_without_a_track_is_offered_one(visit: Visit, tmp_path: Path) 
     assert visit.console.client.get(f"/api/models/{name}").json()["track"] == "oval"
 
 
+METADATA = {
+    "action_space": [{"steering_angle": "-25", "speed": "0.9", "index": 0}, {"steering_angle": 25, "speed": 0.9}],
+    "sensor": ["STEREO_CAMERAS"],
+    "neural_network": "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW",
+    "version": "4",
+}
+
+
+def test_files_of_the_original_are_taken_over_on_a_new_model(visit: Visit) -> None:
+    page = _fresh(visit, "/create")
+    files = {
+        "model_metadata.json": json.dumps(METADATA),
+        "hyperparameters.json": json.dumps({"lr": 0.0007, "batch_size": 128, "exploration_type": "x", "made_up": 1}),
+        "mine.py": "def reward_function(params):\n    return 7.25\n",
+        "notes.json": "{}",
+    }
+    payload = [{"name": name, "mimeType": "text/plain", "buffer": text.encode()} for name, text in files.items()]
+    page.get_by_label("Files of AWS").first.set_input_files(payload)  # type: ignore[arg-type]
+    page.get_by_text("notes.json: This is neither").wait_for()
+    page.get_by_text("mine.py was taken over.").wait_for()
+    page.get_by_text(re.compile("hyperparameters.json was taken over, but .* made_up")).wait_for()
+    page.get_by_text("return 7.25").wait_for()
+    page.get_by_role("button", name="Action 1: left 25°, 0.90 m/s").wait_for()
+    page.locator("summary", has_text="Learning").click()
+    assert page.locator("#hp-lr").input_value() == "0.0007"
+    page.get_by_role("textbox", name="Name").locator("visible=true").count()
+    page.locator("summary", has_text="More settings").click()
+    page.get_by_role("textbox", name="Name").fill("veteran")
+    page.route("**/api/models", _make_untrained)
+    page.get_by_role("button", name="Train now").first.click()
+    page.wait_for_url("**/models/veteran*")
+    page.unroute("**/api/models")
+    made = visit.console.client.get("/api/models/veteran").json()
+    assert made["reward"] == files["mine.py"]
+    assert made["model_metadata"]["sensor"] == ["STEREO_CAMERAS"]
+    assert made["settings"]["network"] == METADATA["neural_network"]
+    assert [action["steering_angle"] for action in made["model_metadata"]["action_space"]] == [-25, 25]
+    assert made["hyperparameters"]["lr"] == 0.0007
+    assert made["hyperparameters"]["batch_size"] == 128
+
+
+def test_a_reward_is_chosen_by_its_picture_and_brings_what_it_needs(visit: Visit) -> None:
+    page = _fresh(visit, "/create")
+    cards = page.get_by_role("radiogroup", name="Preset").get_by_role("radio")
+    assert cards.count() == 12
+    assert cards.filter(has_text="racing").first.get_attribute("aria-checked") == "true"
+    page.locator(".cards svg path").first.wait_for()
+    colours = (
+        cards.filter(has_text="centerline")
+        .locator("path")
+        .evaluate_all("cells => new Set(cells.map((cell) => cell.getAttribute('fill'))).size")
+    )
+    assert colours >= 3
+    cards.filter(has_text="dodge").click()
+    page.get_by_text("This reward looks out for boxes").wait_for()
+    page.get_by_role("button", name="Put boxes on the road").click()
+    assert page.get_by_role("button", name="Object avoidance").get_attribute("aria-pressed") == "true"
+    assert page.get_by_text("This reward looks out for boxes").count() == 0
+
+
+def _make_untrained(route: Any) -> None:
+    """The same request, for a model that is made and not trained."""
+    asked = route.request
+    route.continue_(
+        **({"post_data": json.dumps(asked.post_data_json | {"train": False})} if asked.method == "POST" else {})
+    )
+
+
+def test_nothing_is_drawn_while_nothing_moves(visit: Visit) -> None:
+    page = visit.open("/models/heron/watch")
+    canvas = page.locator(".scene canvas")
+    canvas.wait_for()
+    page.evaluate(
+        "() => { const ask = requestAnimationFrame; window.asked = 0;"
+        " window.requestAnimationFrame = (draw) => { window.asked++; return ask(draw); }; }"
+    )
+    page.wait_for_timeout(1500)  # the last frame is a sharp one
+    page.evaluate("window.asked = 0")
+    page.wait_for_timeout(1000)
+    assert page.evaluate("window.asked") == 0
+    before = canvas.screenshot()
+    page.get_by_role("button", name="From above").click()
+    page.wait_for_function("window.asked > 0")
+    page.wait_for_timeout(600)
+    assert canvas.screenshot() != before
+
+
 def test_a_waiting_model_says_what_it_waits_for(visit: Visit) -> None:
     console = visit.console
     console.create(name="first", track="oval", until="10 minutes")

@@ -7,14 +7,17 @@ for progress between two calls, are painted as they answer to that, place after 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import RewardError
 from racecraft.reward.dry_run import HALF_CAR, TYPICAL_SPEED, moment
-from racecraft.reward.worker import RewardWorker
+from racecraft.reward.params import make_params
+from racecraft.reward.source import load_preset, preset_names
+from racecraft.reward.worker import RewardWorker, waypoints_of
+from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.track.track import Track
 
 PLACES: Final = 96
@@ -61,6 +64,35 @@ def paint_reward(source: str, track: Track, *, timeout_s: float = 0.5, foreign: 
             except RewardError:
                 break
     return Painting(places=places, offsets=offsets, points=points, rewards=rewards)
+
+
+def paint_presets(track: Track) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]]]:
+    """What every reward that ships with Racecraft pays, on a grid of its own: half the places, for small pictures.
+
+    Our own code needs no walls, so it is called here and now: a lap, step after step, at each distance from the centre.
+
+    Args:
+        track: A closed one.
+
+    Returns:
+        Points, x and y in m  (P, O, 2), and by each preset's name its rewards  (P, O).
+    """
+    count = PLACES // 2
+    places = track.length * np.arange(-1, count) / count  # the first is only the step before the lap
+    half = 0.5 * track.width_at(places)
+    rows = np.array([[_row(track, s, o * w) for o in OFFSETS] for s, w in zip(places, half, strict=True)])
+    rows[:, :, ROW_COLUMNS.index("steps")] = np.arange(1, count + 2)[:, None]
+    waypoints = waypoints_of([track])
+    painted = {name: np.empty(rows.shape[:2]) for name in preset_names()}
+    for name, paid in painted.items():
+        code = compile(load_preset(name), f"{name}.py", "exec")
+        for across in range(len(OFFSETS)):  # a lap each, for those that remember the step before
+            preset: dict[str, Any] = {}
+            exec(code, preset)
+            paid[:, across] = [
+                preset["reward_function"](make_params(row.tolist(), waypoints)) for row in rows[:, across]
+            ]
+    return rows[1:, :, 2:4], {name: paid[1:] for name, paid in painted.items()}
 
 
 def _row(track: Track, place: float, offset: float) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ export type TrainingStretch = Schemas["TrainingStretch"];
 export type ImportedModel = Schemas["ImportedModel"];
 export type TrackFacts = Schemas["TrackFacts"];
 export type TrackGeometry = Schemas["TrackGeometry"];
+export type PresetPictures = Schemas["PresetPictures"];
 export type RewardPreset = Schemas["RewardPreset"];
 export type RewardVerdict = Schemas["RewardVerdict"];
 export type RewardPainting = Schemas["RewardPainting"];
@@ -118,6 +119,7 @@ export const api = {
   history: (run: string, offset: number) => ask<HistoryPage>("GET", `/models/${name(run)}/history?offset=${offset}`),
   tracks: () => ask<TrackFacts[]>("GET", "/tracks"),
   track: (track: string) => ask<TrackGeometry>("GET", `/tracks/${name(track)}`),
+  pictures: () => ask<PresetPictures>("GET", "/rewards/pictures"),
   rewards: () => ask<RewardPreset[]>("GET", "/rewards"),
   actions: () => ask<ActionPreset[]>("GET", "/actions"),
   checkReward: (source: string, track: string, run?: string) =>

@@ -66,8 +66,14 @@ export function flatten(value: unknown, name = ""): Map<string, string> {
   return found;
 }
 
+export interface Difference {
+  name: string;
+  /** One for each of what is compared. */
+  values: (string | undefined)[];
+}
+
 /** Settings by name with each run's value, only those that are not the same for all. */
-export function differences(documents: unknown[]): { name: string; values: (string | undefined)[] }[] {
+export function differences(documents: unknown[]): Difference[] {
   const flat = documents.map((document) => flatten(document));
   const names = [...new Set(flat.flatMap((one) => [...one.keys()]))].sort();
   return names

@@ -1,5 +1,5 @@
-/** The track and all cars of a batch in 3D. Loaded when it is shown; draws only what has changed, in three draw calls,
- * and while it moves only as sharp as the machine can at a good pace. */
+/** The track and all cars of a batch in 3D. Loaded when it is shown; draws only what has changed, in three draw calls, no
+ * frame while nothing moves, and while it moves only as sharp as the machine can at a good pace. */
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { TrackGeometry } from "../api/client";
@@ -129,12 +129,18 @@ export class Scene {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 1.5;
     this.controls.addEventListener("start", () => (this.isMoved = true));
-    this.controls.addEventListener("change", () => (this.isDirty = true));
+    this.controls.addEventListener("change", () => this.wake());
     this.reset();
     this.watcher = new ResizeObserver(() => this.resize());
     this.watcher.observe(canvas);
     this.resize();
-    this.frame = requestAnimationFrame(this.draw);
+    this.wake();
+  }
+
+  /** Something has changed: frames are drawn until nothing moves any more. */
+  private wake(): void {
+    this.isDirty = true;
+    this.frame ||= requestAnimationFrame(this.draw);
   }
 
   /** The newest moment. */
@@ -152,7 +158,7 @@ export class Scene {
           heading: heading / 1000,
         })),
       );
-    this.isDirty = true;
+    this.wake();
   }
 
   /** What is on the road besides; how many of it the canvas says, too. */
@@ -170,13 +176,13 @@ export class Scene {
     }
     this.canvas.dataset["boxes"] = String(this.boxes.count);
     this.canvas.dataset["bots"] = String(this.bots.count);
-    this.isDirty = true;
+    this.wake();
   }
 
   /** Put cars somewhere at once; the camera follows the first one. */
   put(cars: PlacedCar[]): void {
     this.placed = cars;
-    this.isDirty = true;
+    this.wake();
   }
 
   /** Draw lines on the ground, instead of those before. */
@@ -195,7 +201,7 @@ export class Scene {
       geometry.setAttribute("color", new three.Float32BufferAttribute(tints, 3));
       this.trails.add(new three.Line(geometry, new three.LineBasicMaterial({ vertexColors: true })));
     }
-    this.isDirty = true;
+    this.wake();
   }
 
   private clearTrails(): void {
@@ -219,7 +225,7 @@ export class Scene {
     this.scene.background = sky;
     this.paints.fade(sky, this.size * 1.6, this.size * 5);
     paintGround(this.field.geometry, isDark ? 0x4d6350 : 0x86a37e);
-    this.isDirty = true;
+    this.wake();
   }
 
   close(): void {
@@ -247,7 +253,7 @@ export class Scene {
     const distance = standBack(this.edges, view, tangent, this.camera.aspect);
     this.camera.position.set(x + distance * back.x, y + distance * back.y, distance * back.z);
     this.camera.lookAt(this.middle);
-    this.isDirty = true;
+    this.wake();
   }
 
   private resize(): void {
@@ -258,7 +264,7 @@ export class Scene {
     this.camera.fov = Math.min(70, 42 * Math.max(1, 1.45 / this.camera.aspect));
     this.camera.updateProjectionMatrix();
     if (!this.isMoved && (this.view === "orbit" || this.view === "top")) this.reset();
-    this.isDirty = true;
+    this.wake();
   }
 
   /** Of the way to the newest look, 0 to 1; they come unevenly, and the cars had better not stop before a late one. */
@@ -267,7 +273,7 @@ export class Scene {
   }
 
   private readonly draw = (time: number): void => {
-    this.frame = requestAnimationFrame(this.draw);
+    this.frame = 0;
     const share = this.share(time);
     const isMoving = this.now !== undefined && !this.isCalm && time - this.arrived < LATE * this.interval + 50;
     if (isMoving || this.isDirty) {
@@ -281,6 +287,7 @@ export class Scene {
       this.isSharp = true;
       this.render(share);
     }
+    if (!this.isSharp) this.frame ||= requestAnimationFrame(this.draw);
   };
 
   private sharpen(ratio: number): void {
@@ -345,7 +352,7 @@ export class Scene {
       const away = this.camera.position.distanceTo(wanted);
       this.camera.position.lerp(wanted, this.isCalm || away > 4 ? 1 : 0.12);
       this.camera.lookAt(x + 0.5 * Math.cos(heading), y + 0.5 * Math.sin(heading), 0.1);
-      if (away > 0.02) this.isDirty = true; // until it has arrived, also where the car stands
+      if (away > 0.02) this.wake(); // until it has arrived, also where the car stands
     }
   }
 }

@@ -7,6 +7,7 @@ import math
 import os
 import re
 import shutil
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -21,6 +22,7 @@ from sqlalchemy.orm import Session
 from racecraft.errors import RacecraftError, RunError
 from racecraft.run import RunFolder, RunInfo, Stretch, best_of, judged_laps, list_runs, read_stretches, stretch_at
 from racecraft.run.history import read_history
+from racecraft.serve.models.names import free_name
 from racecraft.serve.models.schemas import Checkpoint, ModelCard, TrainingStretch
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.settings import OWNER
@@ -50,6 +52,7 @@ class Garage:
 
     def __init__(self, runs: Path, state: Path, database: Database, *, user_id: int = OWNER) -> None:
         self._runs, self._trash, self._database, self._user_id = runs, state / TRASH, database, user_id
+        self._naming, self._given = threading.Lock(), set[str]()
 
     @property
     def runs(self) -> Path:
@@ -128,6 +131,14 @@ class Garage:
         """
         if (self._runs / name).exists():
             raise Conflict(f"There is a model {name!r} already.", hint="Choose another name.")
+
+    def new_name(self) -> str:
+        """A name that nothing has or had, the trash included; it is given to nobody else while the server runs."""
+        with self._naming, self._database.transaction() as session:
+            taken = {*(row.name for row in self._rows(session, None)), *self._given}
+            taken |= {entry.name for entry in self._runs.iterdir()} if self._runs.is_dir() else set()
+            self._given.add(name := free_name(taken))
+        return name
 
     def name_beside(self, name: str) -> str:
         """A name for a copy of a model that nothing has yet: the same with a number from 2 on."""

@@ -83,7 +83,7 @@ def create_model(request: NewModel, context: InContext) -> ModelCard:
         metadata=metadata,
         hyperparameters=parameters,
         root=context.garage.runs,
-        name=request.name,
+        name=context.garage.new_name() if request.name is None else request.name,
         foreign=context.garage.is_foreign(source),
     )
     if request.train:

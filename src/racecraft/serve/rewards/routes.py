@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 from contextlib import suppress
+from functools import cache
 from typing import Final
 
 from fastapi import APIRouter
@@ -15,11 +16,12 @@ from racecraft.analysis import pay_laps
 from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
 from racecraft.reward import check_reward, dry_run, load_preset, preset_names
-from racecraft.reward.painting import paint_reward
+from racecraft.reward.painting import paint_presets, paint_reward
 from racecraft.serve.context import Context, InContext
 from racecraft.serve.rewards.schemas import (
     Action,
     ActionPreset,
+    PresetPictures,
     RewardCheck,
     RewardLap,
     RewardPainting,
@@ -28,7 +30,10 @@ from racecraft.serve.rewards.schemas import (
     RewardSituation,
     RewardVerdict,
 )
+from racecraft.track import load_track
 
+PICTURED: Final = "hairpin"
+"""The track of the presets' pictures: small, with bends both ways."""
 router = APIRouter(prefix="/api", tags=["rewards"])
 
 DESCRIPTIONS: Final = {
@@ -50,6 +55,20 @@ def list_rewards() -> list[RewardPreset]:
         description = (ast.get_docstring(ast.parse(source)) or "").split("\n")[0]
         listed.append(RewardPreset(name=name, description=description, source=source))
     return listed
+
+
+@router.get("/rewards/pictures")
+def list_pictures() -> PresetPictures:
+    """What each of them pays along a small track."""
+    return _pictures()
+
+
+@cache
+def _pictures() -> PresetPictures:
+    points, rewards = paint_presets(load_track(PICTURED))
+    return PresetPictures(
+        points=points.round(3).tolist(), rewards={name: paid.round(4).tolist() for name, paid in rewards.items()}
+    )
 
 
 @router.get("/actions")

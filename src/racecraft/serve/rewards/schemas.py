@@ -35,6 +35,15 @@ class RewardPreset(Message):
     source: str
 
 
+class PresetPictures(Message):
+    """What the rewards that ship with Racecraft pay along one small track."""
+
+    points: list[list[list[float]]]
+    """(P, O, 2)"""
+    rewards: dict[str, list[list[float]]]
+    """By preset  (P, O)."""
+
+
 class RewardCheck(Message):
     """Check a reward function and paint it along a track."""
 

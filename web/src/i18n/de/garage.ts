@@ -2,7 +2,7 @@
 import type { garage as english } from "../en/garage";
 
 export const garage: Record<keyof typeof english, string> = {
-  garage_lead: "Deine Modelle. Öffne eines, um zuzusehen, ein Rennen zu fahren oder weiter zu trainieren.",
+  garage_lead: "Deine Modelle. Öffne eines, um zuzusehen, es auszuwerten oder weiter zu trainieren.",
   garage_empty: "Noch kein Modell",
   garage_empty_lead: "Das erste dauert keine Minute: Alles ist schon sinnvoll eingestellt.",
   garage_first: "Das erste Modell anlegen",
@@ -14,8 +14,8 @@ export const garage: Record<keyof typeof english, string> = {
   sort_name: "Name",
   nothing_found: "Nichts passt zur Suche.",
   best_lap_is:
-    "Die schnellste ganze Runde samt Strafen aus allen Prüfungen auf ihrer Strecke: im Training und in Rennen gegen die Uhr danach.",
-  best_lap_race: "Beste Runde dieses Rennens",
+    "Die schnellste ganze Runde samt Strafen aus allen Auswertungen auf ihrer Strecke: im Training und danach.",
+  best_lap_race: "Beste Runde dieser Auswertung",
   best_lap_checkpoint: "In der Prüfung, mit der dieser Stand gespeichert wurde",
   import_trackless: "{name} braucht eine Strecke",
   import_trackless_lead:

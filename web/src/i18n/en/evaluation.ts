@@ -3,9 +3,9 @@ export const evaluation = {
   race_lead: "Against the clock by the rules of the league: off the track costs seconds.",
   laps: "Laps",
   trials: "Trials",
-  start_race: "Start a race",
+  start_race: "Start an evaluation",
   racing: "Racing…",
-  no_races: "No race yet.",
+  no_races: "No evaluation yet.",
   result: "Result",
   clean_laps: "Clean laps",
   clean_interval: "95 % interval {low} to {high}",
@@ -25,5 +25,5 @@ export const evaluation = {
   end_immobilized: "Stood still",
   end_time_up: "Time up",
   end_in_progress: "Under way",
-  train_first: "Train the model first: it has no checkpoint to race with.",
+  train_first: "Train the model first: it has no checkpoint to drive with.",
 } as const;

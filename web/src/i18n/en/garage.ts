@@ -1,6 +1,6 @@
 /** Garage. */
 export const garage = {
-  garage_lead: "Your models. Open one to watch it, race it or train it further.",
+  garage_lead: "Your models. Open one to watch it, evaluate it or train it further.",
   garage_empty: "No model yet",
   garage_empty_lead: "The first one takes less than a minute: everything has a good default.",
   garage_first: "Make the first model",
@@ -12,8 +12,8 @@ export const garage = {
   sort_name: "Name",
   nothing_found: "Nothing fits the search.",
   best_lap_is:
-    "The fastest whole lap, penalties included, of all evaluations on its track: during training and in races against the clock afterwards.",
-  best_lap_race: "Best lap of this race",
+    "The fastest whole lap, penalties included, of all evaluations on its track: during training and afterwards.",
+  best_lap_race: "Best lap of this evaluation",
   best_lap_checkpoint: "In the evaluation that this checkpoint was saved with",
   import_trackless: "{name} needs a track",
   import_trackless_lead:
