@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,43 @@ def test_the_curve_has_a_band_for_each_stretch(changed: Visit) -> None:
         "Stretch 1 · the beginning",
         "Stretch 2 · reward",
     ]
+
+
+def test_a_band_shows_its_change_and_a_model_branches_off_from_before_it(changed: Visit) -> None:
+    page = changed.open("/models/heron/watch")
+    page.get_by_role("button", name="Stretch 2 · reward").click()
+    assert page.locator("tr.added", has_text="-params['speed']").count() == 1
+    page.get_by_role("button", name="Stretch 1 · the beginning").click()
+    page.get_by_role("button", name="Branch from stretch 1").click()
+    page.wait_for_url("**/models/heron-2/setup")
+    client = changed.console.client
+    old, branch = client.get("/api/models/heron").json(), client.get("/api/models/heron-2").json()
+    assert branch["reward"] == old["stretches"][0]["reward"] != old["reward"]
+    info = json.loads((changed.console.runs / "heron-2" / "run.json").read_text())
+    taken = next(one for one in old["checkpoints"] if one["step"] == info["parent"]["step"])
+    assert taken["stretch"] == 1
+    assert client.delete("/api/models/heron-2").status_code < 300
+
+
+def test_the_log_is_searched_narrowed_and_kept(changed: Visit) -> None:
+    page = changed.open("/models/heron/watch")
+    log = page.get_by_role("region", name="Log", exact=True)
+    log.locator("tbody tr").first.wait_for()
+    everything = log.locator("tbody tr").count()
+    page.get_by_role("button", name="Best", exact=True).click()
+    best = log.locator("tbody tr").all_inner_texts()
+    assert 1 <= len(best) < everything
+    assert all("★" in row for row in best)
+    page.get_by_role("button", name="All", exact=True).click()
+    page.get_by_role("searchbox", name="Search the log").fill("BEST")
+    page.wait_for_function("count => document.querySelectorAll('tr.best').length === count", arg=len(best))
+    page.locator("tr.evaluation").first.wait_for(state="detached")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Download", exact=True).click()
+    assert download.value.suggested_filename == "heron-log.txt"
+    assert len(Path(download.value.path()).read_text().splitlines()) == len(best)
+    page.get_by_role("searchbox", name="Search the log").fill("nothing like that")
+    page.get_by_text("Nothing in the log is like that.").wait_for()
 
 
 def test_what_the_last_change_made_of_it_is_said_in_a_sentence(changed: Visit) -> None:

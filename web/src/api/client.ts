@@ -104,7 +104,8 @@ export const api = {
   create: (model: NewModel) => ask<ModelCard>("POST", "/models", model),
   change: (run: string, change: { name?: string; tags?: string[] }) =>
     ask<ModelCard>("PATCH", `/models/${name(run)}`, change),
-  clone: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/clone`, {}),
+  clone: (run: string, step?: number) =>
+    ask<ModelCard>("POST", `/models/${name(run)}/clone`, step === undefined ? {} : { step }),
   remove: (run: string) => ask<void>("DELETE", `/models/${name(run)}`),
   restore: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/restore`),
   importModel: (file: File, track?: string) =>

@@ -146,7 +146,7 @@ export interface LogEntry {
 }
 
 /** What happened, newest first. */
-export function logOf(curves: Curves, most = 60): LogEntry[] {
+export function logOf(curves: Curves): LogEntry[] {
   const entries: LogEntry[] = [
     ...curves.evaluations.map((point): LogEntry => ({
       kind: point["is_best"] ? "best" : "evaluation",
@@ -156,5 +156,5 @@ export function logOf(curves: Curves, most = 60): LogEntry[] {
     })),
     ...curves.notes.map((point): LogEntry => ({ kind: "note", step: point.step, seconds: point.seconds, point })),
   ];
-  return entries.sort((a, b) => b.seconds - a.seconds).slice(0, most);
+  return entries.sort((a, b) => b.seconds - a.seconds);
 }

@@ -12,7 +12,17 @@ export const colorOf = (number: number): string => COLORS[(number - 1) % COLORS.
 export const stretchAt = <S extends { step: number }>(stretches: S[], step: number): S =>
   stretches.findLast((stretch) => stretch.step < step) ?? stretches[0]!;
 
+/** The checkpoint to branch off from: of those of a stretch the best, else the last. */
+export const branchOf = <C extends { step: number; stretch: number; is_best: boolean }>(
+  checkpoints: C[],
+  number: number,
+): C | undefined => {
+  const own = checkpoints.filter((one) => one.stretch === number).sort((a, b) => a.step - b.step);
+  return own.find((one) => one.is_best) ?? own[own.length - 1];
+};
+
 export interface Band {
+  /** Of the stretch. */ number: number;
   from: number;
   to: number;
   color: string;
@@ -33,7 +43,13 @@ export function bandsOf(
     if (!own.length) return;
     const before = found[found.length - 1];
     const from = index === 0 || !before ? at(own[0]!) : before.to;
-    found.push({ from, to: at(own[own.length - 1]!), color: colorOf(stretch.number), label: label(stretch) });
+    found.push({
+      number: stretch.number,
+      from,
+      to: at(own[own.length - 1]!),
+      color: colorOf(stretch.number),
+      label: label(stretch),
+    });
   });
   return found;
 }

@@ -13,7 +13,7 @@ from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.errors import ConfigError
 from racecraft.learn import PPOConfig
 from racecraft.reward import load_preset, preset_names
-from racecraft.run import RunFolder
+from racecraft.run import RunFolder, read_stretches, stretch_at
 from racecraft.run.history import read_history
 from racecraft.serve.context import Context, InContext
 from racecraft.serve.jobs.schemas import JobInfo, job_info
@@ -33,8 +33,9 @@ from racecraft.sim import Objects
 from racecraft.sim.objects import objects_for_race
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.training import Until
+from racecraft.training.parent import open_parent
 from racecraft.training.regimes import TIME_TRIAL
-from racecraft.training.settings import make_settings
+from racecraft.training.settings import TrainSettings, make_settings
 from racecraft.training.start import read_settings, replace_reward, start_run
 
 router = APIRouter(prefix="/api/models", tags=["models"])
@@ -148,15 +149,25 @@ def restore_model(name: str, context: InContext) -> ModelCard:
 
 @router.post("/{name}/clone", status_code=201)
 def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard:
-    """A new model with the same settings, untrained."""
+    """A new model with the same settings, untrained, or a branch from one of its checkpoints."""
     folder = context.garage.folder(name)
     if request.name is not None:
         context.garage.require_new(request.name)
+    settings, reward, metadata = read_settings(folder), folder.read_reward_function(), folder.read_model_metadata()
+    hyperparameters, parent = folder.read_hyperparameters(), None
+    if request.step is not None:
+        parent = open_parent(f"{folder.path}@{request.step}")
+        stretch = stretch_at(read_stretches(folder), request.step)
+        reward, metadata = stretch.reward_function, ModelMetadata.from_dict(stretch.model_metadata)
+        given = stretch.hyperparameters
+        hyperparameters = None if given is None else Hyperparameters.from_dict(given)
+        settings = TrainSettings.from_dict({**settings.to_dict(), **stretch.settings, "track": stretch.track})
     copy = start_run(
-        read_settings(folder),
-        reward=folder.read_reward_function(),
-        metadata=folder.read_model_metadata(),
-        hyperparameters=folder.read_hyperparameters(),
+        settings,
+        reward=reward,
+        metadata=metadata,
+        hyperparameters=hyperparameters,
+        parent=parent,
         root=context.garage.runs,
         name=request.name or context.garage.name_beside(name),
         foreign=folder.read_info().foreign,

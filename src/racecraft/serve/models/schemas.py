@@ -160,6 +160,8 @@ class CloneModel(Message):
     """A copy of a model's settings under another name."""
 
     name: RunName | None = None
+    step: int | None = Field(None, ge=0)
+    """Of a checkpoint: the copy begins with its weights, and with what its stretch of training learned with."""
 
 
 class TrainOn(Message):
