@@ -150,9 +150,9 @@ def test_a_newcomers_path_to_a_lap_on_video(visited: tuple[RunningConsole, Any])
         assert len(_colours(page.locator(drawn).screenshot())) > 20
     page.get_by_role("button", name="From above").click()
     page.locator(".badge.finished").wait_for()
-    page.get_by_role("tab", name="Race").click()
+    page.get_by_role("tab", name="Evaluation").click()
     page.get_by_role("spinbutton", name="Laps").fill("1")
-    page.get_by_role("button", name="Start a race").click()
+    page.get_by_role("button", name="Start an evaluation").click()
     video = page.locator("video")
     video.wait_for()
     assert console.client.get(str(video.get_attribute("src"))).headers["content-type"] == "video/mp4"

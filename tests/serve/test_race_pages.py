@@ -109,7 +109,7 @@ def test_every_page_has_a_title_and_wrong_addresses_lead_on(visit: Visit) -> Non
     titles = {
         "/": "Garage",
         "/create": "New model",
-        "/models/ada/race": "ada: Race",
+        "/models/ada/race": "ada: Evaluation",
         "/tracks": "Tracks",
         "/drive/oval": "Drive: oval",
         "/races/new": "New race",
