@@ -1,7 +1,6 @@
 #include "learner.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <tuple>
 
@@ -12,7 +11,6 @@ constexpr size_t kMaxGroups = 16;    // of samples, each with a gradient of its 
 constexpr size_t kMinGroupSize = 8;  // likewise
 constexpr size_t kBlock = 4096;      // parameters of a task that works on them one by one
 constexpr size_t kDenseRows = 128;   // inputs of a task that sums up a dense layer's gradient
-constexpr size_t kChunk = 8;  // samples that pass through a layer together, so that they fit an L2 cache
 constexpr double kBeta1 = 0.9, kBeta2 = 0.999;
 
 size_t num_blocks(size_t count) {
@@ -87,6 +85,14 @@ Learner::Learner(const NetworkSpec& spec, int num_threads)
             }
         }
     }
+    for (const Tower* tower : {&network_.policy, &network_.critic}) {
+        if (tower->wide == 0) continue;
+        const LayerShape& shape = tower->layers[tower->wide].shape;
+        for (size_t i = 0; i < static_cast<size_t>(shape.out_channels); i += kPanel)
+            wide_forward_tasks_.push_back({tower, i / kPanel});
+        for (size_t i = 0; i < shape.num_inputs(); i += kPanel)
+            wide_backward_tasks_.push_back({tower, i / kPanel});
+    }
     squares_.resize(num_blocks(network_.num_grouped) + dense_tasks_.size());
     for (Worker& worker : workers_) {
         worker.input = FloatBuffer(kChunk * spec.image_size());
@@ -101,14 +107,6 @@ Learner::Learner(const NetworkSpec& spec, int num_threads)
             at.grad.resize(tower.layers.size());
         }
     }
-}
-
-template <typename Body>
-void Learner::for_each_task(size_t count, const Body& body) {
-    std::atomic<size_t> next{0};
-    pool_.for_each(workers_.size(), [&](size_t worker) {
-        for (size_t task = next++; task < count; task = next++) body(workers_[worker], task);
-    });
 }
 
 ActorCriticShape Learner::shape() const {
@@ -155,7 +153,7 @@ void Learner::policy(const uint8_t* observations, const float* states, size_t co
         const Inputs in{worker.input.data(), worker.lidar.data(),
                         states + first * static_cast<size_t>(spec.is_blind() ? spec.state_size : 0)};
         point(network_.policy, worker.policy, nullptr, 0, worker.policy_at);
-        forward(network_.policy, in, samples, worker.policy_at);
+        forward(network_.policy, in, samples, worker.policy_at, 0, network_.policy.layers.size());
         for (size_t i = 0; i < samples; ++i) {
             float* outputs = out + (first + i) * spec.policy_size();
             std::copy_n(worker.policy_at.out.back() + i * stride, num_actions, outputs);
@@ -179,7 +177,7 @@ void Learner::values(const uint8_t* observations, const float* states, size_t co
         const Inputs in{worker.input.data(), worker.lidar.data(),
                         states + first * static_cast<size_t>(spec.state_size)};
         point(network_.critic, worker.critic, nullptr, 0, worker.critic_at);
-        forward(network_.critic, in, samples, worker.critic_at);
+        forward(network_.critic, in, samples, worker.critic_at, 0, network_.critic.layers.size());
         for (size_t i = 0; i < samples; ++i) out[first + i] = worker.critic_at.out.back()[i * stride];
     });
 }
@@ -191,9 +189,11 @@ UpdateStats Learner::update(const Minibatch& minibatch, const Objective& objecti
     gather(minibatch);
     transpose();
     const size_t num_groups = std::clamp((size + kMinGroupSize - 1) / kMinGroupSize, size_t{1}, kMaxGroups);
+    forward_to_wide(minibatch, num_groups);
     for_each_task(num_groups, [&](Worker& worker, size_t group) {
         run_group(worker, minibatch, objective, group, num_groups);
     });
+    backward_from_wide(minibatch, num_groups);
     // as a float, so that a norm whose squares Adam could not hold counts as infinite
     const double norm = std::sqrt(static_cast<double>(static_cast<float>(sum_over_tasks(num_groups, size))));
 
@@ -249,8 +249,9 @@ void Learner::prepare_training(size_t size) {
             const Layer& layer = tower.layers[l];
             const bool feeds_dense = l + 1 < tower.layers.size() && tower.layers[l + 1].is_dense &&
                                      !tower.layers[l + 1].is_first();
-            kept.out.emplace_back(feeds_dense || layer.is_dense ? size * layer.shape.out_size() : 0);
-            kept.grad.emplace_back(layer.is_dense ? size * layer.shape.out_size() : 0);
+            kept.out.emplace_back(
+                feeds_dense || layer.is_dense || l < tower.wide ? size * layer.shape.out_size() : 0);
+            kept.grad.emplace_back(layer.is_dense || l + 1 == tower.wide ? size * layer.shape.out_size() : 0);
         }
     }
 }
@@ -267,8 +268,10 @@ void Learner::point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kep
     }
 }
 
-void Learner::forward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at) const {
-    for (size_t l = 0; l < tower.layers.size(); ++l) {
+// Layers [from_layer, to_layer).
+void Learner::forward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at,
+                      size_t from_layer, size_t to_layer) const {
+    for (size_t l = from_layer; l < to_layer; ++l) {
         const Layer& layer = tower.layers[l];
         if (layer.is_join()) {
             const size_t camera = tower.camera_end - 1;
@@ -282,11 +285,12 @@ void Learner::forward(const Tower& tower, const Inputs& in, size_t samples, cons
     }
 }
 
-// From the gradient at the head's outputs to those of all biases and of the convolutions' weights, which are
-// added to `gradient`; the dense layers' gradients stay behind in `at`.
+// Layers [from_layer, to_layer) from behind: from the gradient at the last one's outputs to those of all
+// biases and of the convolutions' weights, which are added to `gradient`; the dense layers' gradients stay
+// behind in `at`, and a wide layer hands on none.
 void Learner::backward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at,
-                       float* gradient) const {
-    for (size_t l = tower.layers.size(); l-- > 0;) {
+                       float* gradient, size_t from_layer, size_t to_layer) const {
+    for (size_t l = to_layer; l-- > from_layer;) {
         const Layer& layer = tower.layers[l];
         if (layer.is_join()) {
             const size_t camera = tower.camera_end - 1;
@@ -301,7 +305,7 @@ void Learner::backward(const Tower& tower, const Inputs& in, size_t samples, con
             RC_DISPATCH(layer_weight_gradient, layer.shape, panel, 0, layer.shape.num_inputs(), input,
                         at.grad[l], samples, gradient + layer.weights);
         }
-        if (!layer.is_first()) {
+        if (!layer.is_first() && (l == 0 || l != tower.wide)) {
             RC_DISPATCH(layer_input_gradient, layer.shape, transposed_.data() + layer.transposed, at.grad[l],
                         samples, at.grad[l - 1]);
         }
@@ -322,11 +326,29 @@ void Learner::gather(const Minibatch& minibatch) {
     }
 }
 
+void Learner::read_samples(Worker& worker, const Minibatch& minibatch, size_t first, size_t samples) const {
+    const size_t image_size = network_.spec.image_size();
+    for (size_t i = 0; image_size > 0 && i < samples; ++i) {
+        RC_DISPATCH(bytes_to_unit,
+                    minibatch.observations + minibatch.row(first + i) * network_.spec.observation_size(),
+                    image_size, worker.input.data() + i * image_size);
+    }
+}
+
+Learner::Inputs Learner::inputs_of(const Worker& worker, size_t first) const {
+    return {worker.input.data(), kept_lidar_.data() + first * static_cast<size_t>(network_.spec.lidar_size),
+            kept_states_.data() + first * static_cast<size_t>(network_.spec.state_size)};
+}
+
+// Everything but what lies before a wide layer, and such a layer itself.
 void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
                         size_t num_groups) {
     const NetworkSpec& spec = network_.spec;
     const size_t num_actions = static_cast<size_t>(spec.num_actions);
-    const size_t observation_size = spec.observation_size(), image_size = spec.image_size();
+    const auto reads_camera = [](const Tower& tower) { return tower.sees_camera && tower.wide == 0; };
+    const bool is_camera_needed = reads_camera(network_.policy) || reads_camera(network_.critic);
+    const auto behind_wide = [](const Tower& tower) { return tower.wide == 0 ? 0 : tower.wide + 1; };
+    const size_t policy_end = network_.policy.layers.size(), critic_end = network_.critic.layers.size();
     const size_t policy_stride = static_cast<size_t>(network_.policy.layers.back().shape.out_channels);
     const size_t critic_stride = static_cast<size_t>(network_.critic.layers.back().shape.out_channels);
     const double weight = 1.0 / static_cast<double>(minibatch.size);
@@ -336,18 +358,13 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
     const size_t end = (group + 1) * minibatch.size / num_groups;
     for (size_t first = group * minibatch.size / num_groups; first < end; first += kChunk) {
         const size_t samples = std::min(kChunk, end - first);
-        for (size_t i = 0; image_size > 0 && i < samples; ++i) {
-            RC_DISPATCH(bytes_to_unit, minibatch.observations + minibatch.row(first + i) * observation_size,
-                        image_size, worker.input.data() + i * image_size);
-        }
-        const Inputs in{worker.input.data(),
-                        kept_lidar_.data() + first * static_cast<size_t>(spec.lidar_size),
-                        kept_states_.data() + first * static_cast<size_t>(spec.state_size)};
+        if (is_camera_needed) read_samples(worker, minibatch, first, samples);
+        const Inputs in = inputs_of(worker, first);
         TowerPointers &policy = worker.policy_at, &critic = worker.critic_at;
         point(network_.policy, worker.policy, &kept_policy_, first, policy);
         point(network_.critic, worker.critic, &kept_critic_, first, critic);
-        forward(network_.policy, in, samples, policy);
-        forward(network_.critic, in, samples, critic);
+        forward(network_.policy, in, samples, policy, behind_wide(network_.policy), policy_end);
+        forward(network_.critic, in, samples, critic, behind_wide(network_.critic), critic_end);
 
         std::fill_n(policy.grad.back(), samples * policy_stride, 0.0f);  // padding included
         std::fill_n(critic.grad.back(), samples * critic_stride, 0.0f);
@@ -368,8 +385,8 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
             critic.grad.back()[i * critic_stride] = critic_loss(
                 critic.out.back()[i * critic_stride], minibatch.returns[row], weight, objective, terms);
         }
-        backward(network_.policy, in, samples, policy, gradient);
-        backward(network_.critic, in, samples, critic, gradient);
+        backward(network_.policy, in, samples, policy, gradient, network_.policy.wide, policy_end);
+        backward(network_.critic, in, samples, critic, gradient, network_.critic.wide, critic_end);
     }
 }
 

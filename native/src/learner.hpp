@@ -4,12 +4,16 @@
 //
 //     weights ─transpose─▶ groups of samples: forward, loss, backward ─▶ sums over samples and groups ─▶ Adam
 //
+// A dense layer whose weights fit no cache (Tower::wide) takes all samples at once, a panel a task, so that
+// its weights are read once in a step. There, groups stop, forwards and backwards, and go on behind it.
+//
 // A group is a fixed share of the minibatch and sums up its own gradient of convolutions and biases, sample
 // by sample; the groups are then added in order. Dense layers have many weights and few activations, so their
 // inputs and gradients are kept for the whole minibatch and each part of their weight matrix is summed up by
 // one task. Hence the same bits for any number of threads.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <vector>
@@ -20,6 +24,8 @@
 #include "thread_pool.hpp"
 
 namespace racecraft {
+
+constexpr size_t kChunk = 8;  // samples that pass through a layer together, so that they fit an L2 cache
 
 class Learner : public ActorCritic {
   public:
@@ -68,6 +74,10 @@ class Learner : public ActorCritic {
         int panel;
         size_t first, last;  // inputs
     };
+    struct WideTask {
+        const Tower* tower;
+        size_t panel;  // of outputs, or of inputs
+    };
     struct TransposeTask {
         const Layer* layer;
         int run;
@@ -80,11 +90,18 @@ class Learner : public ActorCritic {
     void point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kept, size_t first,
                TowerPointers& at);
     void read_sample(Worker& worker, const uint8_t* observation, size_t sample) const;
-    void forward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at) const;
+    void read_samples(Worker& worker, const Minibatch& minibatch, size_t first, size_t samples) const;
+    Inputs inputs_of(const Worker& worker, size_t first) const;
+    void forward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at,
+                 size_t from_layer, size_t to_layer) const;
     void backward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at,
-                  float* gradient) const;
+                  float* gradient, size_t from_layer, size_t to_layer) const;
     void run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
                    size_t num_groups);
+    template <typename Body>
+    void for_each_group_before_wide(const Minibatch& minibatch, size_t num_groups, const Body& body);
+    void forward_to_wide(const Minibatch& minibatch, size_t num_groups);
+    void backward_from_wide(const Minibatch& minibatch, size_t num_groups);
     void sum_dense(const DenseTask& task, size_t size);
     double sum_over_tasks(size_t num_groups, size_t size);
     void gather(const Minibatch& minibatch);
@@ -107,7 +124,16 @@ class Learner : public ActorCritic {
     std::vector<LossTerms> terms_;    // (B,)
     std::vector<double> squares_;     // of the gradient, one sum per task
     std::vector<DenseTask> dense_tasks_;
+    std::vector<WideTask> wide_forward_tasks_, wide_backward_tasks_;
     std::vector<TransposeTask> transpose_tasks_;
 };
+
+template <typename Body>
+void Learner::for_each_task(size_t count, const Body& body) {
+    std::atomic<size_t> next{0};
+    pool_.for_each(workers_.size(), [&](size_t worker) {
+        for (size_t task = next++; task < count; task = next++) body(workers_[worker], task);
+    });
+}
 
 }  // namespace racecraft

@@ -17,6 +17,8 @@ void require(bool is_met, const std::string& message) {
     if (!is_met) throw std::invalid_argument(message);
 }
 
+constexpr size_t kWideWeights = size_t{1} << 18;  // 1 MB: what an L2 cache holds
+
 LayerShape shape_of(int in_width, int channels, int kernel_height, int kernel_width, int stride,
                     int out_height, int out_width, int outputs, size_t in_size) {
     const size_t row = static_cast<size_t>(in_width) * channels;
@@ -263,6 +265,10 @@ void Network::place() {
             layer.weights = num_packed;
             num_packed += layer.shape.num_weights();
         }
+        const auto wide = std::find_if(tower->layers.begin(), tower->layers.end(), [](const Layer& layer) {
+            return layer.is_dense && !layer.is_first() && layer.shape.num_weights() > kWideWeights;
+        });
+        if (wide != tower->layers.end()) tower->wide = static_cast<size_t>(wide - tower->layers.begin());
     }
 }
 

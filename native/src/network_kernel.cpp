@@ -274,63 +274,89 @@ bool fits_doubled_sums([[maybe_unused]] const Numbers& x, [[maybe_unused]] const
 #endif
 }
 
+void forward_panel(const LayerShape& shape, Activation activation, size_t panel, const float* weights,
+                   const float* bias, const float* in, size_t samples, float* out, bool fits_doubled) {
+    const size_t length = static_cast<size_t>(shape.run_length);
+    const size_t segment = shape.num_runs == 1 ? std::min(kSegment, length) : length;
+    const size_t width = panel_width(panel, static_cast<size_t>(shape.out_channels));
+    const float* panel_weights = weights + panel * kPanel * shape.num_inputs();
+    for (size_t first = 0; first < length; first += segment) {
+        const size_t last = std::min(length, first + segment);
+        for_each_vector_pair(width, [&]<int kVectors>(size_t lane) {
+            const size_t channel = panel * kPanel + lane;
+            const ForwardTerms terms{shape,          panel_weights + first * width + lane,
+                                     width,          bias + channel,
+                                     in + first,     out + channel,
+                                     last - first,   first == 0,
+                                     last == length, activation == Activation::relu,
+                                     fits_doubled};
+            forward_lanes<kVectors>(terms, samples * shape.num_positions());
+        });
+    }
+}
+
+// Adds to the panel of inputs that begins with `first` of a run.
+void input_gradient_panel(const LayerShape& shape, size_t run, size_t first, const float* transposed,
+                          const float* grad_out, size_t samples, float* grad_in, bool fits_doubled) {
+    const size_t length = static_cast<size_t>(shape.run_length);
+    // Neighbouring positions that share inputs within a panel would be added in an order that depends on the
+    // width of vectors.
+    const bool is_narrow = shape.num_positions() > 1 && shape.column_step < kPanel;
+    const size_t width = std::min<size_t>(kPanel, length - first);
+    const float* panel = transposed + (run * length + first) * static_cast<size_t>(shape.out_channels);
+    for_each_vector_pair(
+        width,
+        [&]<int kVectors>(size_t lane) {
+            const InputGradientTerms terms{
+                shape,       panel + lane, width, grad_out, grad_in + run * shape.run_stride + first + lane,
+                fits_doubled};
+            input_gradient_lanes<kVectors>(terms, samples * shape.num_positions());
+        },
+        is_narrow);
+}
+
 }  // namespace
 
 void layer_forward(const LayerShape& shape, Activation activation, const float* weights, const float* bias,
                    const float* in, size_t samples, float* out) {
-    const size_t channels = static_cast<size_t>(shape.out_channels);
-    const size_t length = static_cast<size_t>(shape.run_length);
-    const size_t segment = shape.num_runs == 1 ? std::min(kSegment, length) : length;
-    const bool fits_doubled = fits_doubled_sums({in, samples * shape.in_size, 0, 1},
-                                                {weights, shape.num_weights(), 0, 1}, {bias, channels, 0, 1});
-    for (size_t panel = 0; panel * kPanel < channels; ++panel) {
-        const size_t width = panel_width(panel, channels);
-        const float* panel_weights = weights + panel * kPanel * shape.num_inputs();
-        for (size_t first = 0; first < length; first += segment) {
-            const size_t last = std::min(length, first + segment);
-            for_each_vector_pair(width, [&]<int kVectors>(size_t lane) {
-                const size_t channel = panel * kPanel + lane;
-                const ForwardTerms terms{shape,          panel_weights + first * width + lane,
-                                         width,          bias + channel,
-                                         in + first,     out + channel,
-                                         last - first,   first == 0,
-                                         last == length, activation == Activation::relu,
-                                         fits_doubled};
-                forward_lanes<kVectors>(terms, samples * shape.num_positions());
-            });
-        }
-    }
+    const bool fits_doubled =
+        fits_doubled_sums({in, samples * shape.in_size, 0, 1}, {weights, shape.num_weights(), 0, 1},
+                          {bias, static_cast<size_t>(shape.out_channels), 0, 1});
+    for (size_t panel = 0; panel * kPanel < static_cast<size_t>(shape.out_channels); ++panel)
+        forward_panel(shape, activation, panel, weights, bias, in, samples, out, fits_doubled);
     if (activation == Activation::tanh) apply_tanh(out, samples * shape.out_size());
+}
+
+void dense_forward(const LayerShape& shape, Activation activation, int panel, const float* weights,
+                   const float* bias, const float* in, size_t samples, float* out) {
+    const size_t at = static_cast<size_t>(panel);
+    const size_t first = at * kPanel, width = panel_width(at, static_cast<size_t>(shape.out_channels));
+    const bool fits_doubled =
+        fits_doubled_sums({in, samples * shape.in_size, 0, 1},
+                          {weights + first * shape.num_inputs(), width * shape.num_inputs(), 0, 1},
+                          {bias + first, width, 0, 1});
+    forward_panel(shape, activation, at, weights, bias, in, samples, out, fits_doubled);
 }
 
 void layer_input_gradient(const LayerShape& shape, const float* transposed, const float* grad_out,
                           size_t samples, float* grad_in) {
-    const size_t length = static_cast<size_t>(shape.run_length);
     std::fill_n(grad_in, samples * shape.in_size, 0.0f);
-    // Neighbouring positions that share inputs within a panel would be added in an order that depends on the
-    // width of vectors.
-    const bool is_narrow = shape.num_positions() > 1 && shape.column_step < kPanel;
     const bool fits_doubled = fits_doubled_sums({grad_out, samples * shape.out_size(), 0, 1},
                                                 {transposed, shape.num_weights(), 0, 1}, {});
     for (size_t run = 0; run < static_cast<size_t>(shape.num_runs); ++run) {
-        for (size_t first = 0; first < length; first += kPanel) {
-            const size_t width = std::min<size_t>(kPanel, length - first);
-            const float* panel =
-                transposed + (run * length + first) * static_cast<size_t>(shape.out_channels);
-            for_each_vector_pair(
-                width,
-                [&]<int kVectors>(size_t lane) {
-                    const InputGradientTerms terms{shape,
-                                                   panel + lane,
-                                                   width,
-                                                   grad_out,
-                                                   grad_in + run * shape.run_stride + first + lane,
-                                                   fits_doubled};
-                    input_gradient_lanes<kVectors>(terms, samples * shape.num_positions());
-                },
-                is_narrow);
-        }
+        for (size_t first = 0; first < static_cast<size_t>(shape.run_length); first += kPanel)
+            input_gradient_panel(shape, run, first, transposed, grad_out, samples, grad_in, fits_doubled);
     }
+}
+
+void dense_input_gradient(const LayerShape& shape, size_t first, const float* transposed,
+                          const float* grad_out, size_t samples, float* grad_in) {
+    const size_t width = std::min(static_cast<size_t>(kPanel), shape.num_inputs() - first);
+    for (size_t i = 0; i < samples; ++i) std::fill_n(grad_in + i * shape.in_size + first, width, 0.0f);
+    const size_t channels = static_cast<size_t>(shape.out_channels);
+    const bool fits_doubled = fits_doubled_sums({grad_out, samples * shape.out_size(), 0, 1},
+                                                {transposed + first * channels, width * channels, 0, 1}, {});
+    input_gradient_panel(shape, 0, first, transposed, grad_out, samples, grad_in, fits_doubled);
 }
 
 void layer_weight_gradient(const LayerShape& shape, int panel, size_t first, size_t last, const float* in,

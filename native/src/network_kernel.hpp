@@ -25,11 +25,12 @@ struct AdamStep {
 
 // layer_forward: out (samples, out_size) = activation(in * weights + bias).
 // layer_input_gradient: writes grad_in (samples, in_size); `transposed` as transpose_weights() makes it.
-// layer_weight_gradient: adds to rows [first, last) of one panel of `gradient`; rows are the layer's inputs.
-// activation_gradient: multiplies grad by the activation's slope at `out`, and adds the positions' sum to
-// bias_gradient. transpose_weights: one panel of one run; panels of run_length lanes, (out_channels, lanes of
-// the panel) within each, run by run. fold_frame: pools the rows of one lens's image that are seen and folds
-// blocks of pixels into channels.
+// dense_forward, dense_input_gradient: the same for one panel of a dense layer's outputs (without tanh), and
+// for one panel of its inputs, which begins with `first`. layer_weight_gradient: adds to rows [first, last)
+// of one panel of `gradient`; rows are the layer's inputs. activation_gradient: multiplies grad by the
+// activation's slope at `out`, and adds the positions' sum to bias_gradient. transpose_weights: one panel of
+// one run; panels of run_length lanes, (out_channels, lanes of the panel) within each, run by run.
+// fold_frame: pools the rows of one lens's image that are seen and folds blocks of pixels into channels.
 // sum_gradients: out = parts[0] + parts[1] + ..., each `stride` apart.
 // sum_of_squares: in double.
 // orthonormalize: makes `count` independent vectors orthonormal, each from itself and those before it (Gram
@@ -40,6 +41,10 @@ struct AdamStep {
                        const float* bias, const float* in, size_t samples, float* out);                  \
     void layer_input_gradient(const LayerShape& shape, const float* transposed, const float* grad_out,   \
                               size_t samples, float* grad_in);                                           \
+    void dense_forward(const LayerShape& shape, Activation activation, int panel, const float* weights,  \
+                       const float* bias, const float* in, size_t samples, float* out);                  \
+    void dense_input_gradient(const LayerShape& shape, size_t first, const float* transposed,            \
+                              const float* grad_out, size_t samples, float* grad_in);                    \
     void layer_weight_gradient(const LayerShape& shape, int panel, size_t first, size_t last,            \
                                const float* in, const float* grad_out, size_t samples, float* gradient); \
     void activation_gradient(Activation activation, const float* out, size_t positions, int channels,    \
