@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 import threading
 import time
 from collections.abc import Iterator
@@ -86,6 +87,20 @@ def test_what_may_hold_a_secret_is_not_compressed(league: RunningLeague) -> None
     assert all(len(reply.content) > 1024 and reply.status_code in (200, 201) for reply in told)
     assert ["content-encoding" in reply.headers for reply in told] == [False] * 4
     assert league.owner.get("/api/tracks").headers["content-encoding"] == "gzip"
+
+
+def test_a_supervisor_learns_whether_it_works_and_nothing_else(league: RunningLeague) -> None:
+    with league.stranger() as stranger:
+        found = stranger.get("/api/health")
+        assert (found.status_code, found.content) == (204, b"")
+        refused(stranger.post("/api/health"), 401)
+        assert stranger.get("/api/health", headers={"host": "evil.example"}).status_code == 421
+        with sqlite3.connect(league.console.runs / ".racecraft" / "console.db") as database:
+            database.execute("ALTER TABLE alembic_version RENAME TO away")
+        assert "does not answer" in refused(stranger.get("/api/health"), 503)
+        with sqlite3.connect(league.console.runs / ".racecraft" / "console.db") as database:
+            database.execute("ALTER TABLE away RENAME TO alembic_version")
+        ok(stranger.get("/api/health"), 204)
 
 
 def test_twenty_wrong_passwords_on_one_account_are_stopped_and_the_others_come_in(league: RunningLeague) -> None:

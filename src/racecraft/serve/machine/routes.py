@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import os
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 
 from racecraft.serve.context import InConsoles, InContext, InUser, OnlyAdmin
 from racecraft.serve.machine.machine import Console, Machine, describe_machine
 from racecraft.serve.settings import OWNER, version
 
-router = APIRouter(prefix="/api/console", tags=["console"])
+router = APIRouter(prefix="/api", tags=["console"])
 
 
-@router.get("")
+@router.get("/console")
 def get_console(context: InContext, consoles: InConsoles, user: InUser) -> Console:
     """What this console is; where it lies on the disk is for who runs it."""
     runs = str(context.settings.runs) if user == OWNER else ""
     return Console(version=version(), runs=runs, cores=os.cpu_count() or 1, user=consoles.people.get(user).name)
 
 
-@router.get("/machine", dependencies=[OnlyAdmin])
+@router.get("/console/machine", dependencies=[OnlyAdmin])
 def get_machine(context: InContext) -> Machine:
     """Where its work is done and kept."""
     return describe_machine(context.settings)
+
+
+@router.get("/health", status_code=204)
+def get_health(consoles: InConsoles) -> Response:
+    """Whether the server works, for a supervisor, who needs no account: 204, and 503 where its database fails."""
+    consoles.owner.database.answers()
+    return Response(status_code=204)

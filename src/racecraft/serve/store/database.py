@@ -115,6 +115,15 @@ class Database:
         found: datetime = session.execute(sa.select(sa.func.now())).scalar_one()
         return found
 
+    def answers(self) -> None:
+        """Read something.
+
+        Raises:
+            DBAPIError: It cannot be read.
+        """
+        with self.engine.connect() as connection:
+            connection.execute(sa.text("SELECT version_num FROM alembic_version"))
+
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
