@@ -75,6 +75,8 @@ FACADE = ("__init__", "__main__")
 TORCH = ("learn/torch_",)
 CORE = ("sim/", "learn/native_")
 MAX_LINES = 500
+DATA = ("starters",)
+"""Folders of files that are no modules: runs, with their reward functions."""
 
 
 def modules(source: Path) -> dict[str, Path]:
@@ -82,6 +84,8 @@ def modules(source: Path) -> dict[str, Path]:
     names = {}
     for path in sorted(source.rglob("*.py")):
         parts = ("racecraft", *path.relative_to(source).with_suffix("").parts)
+        if parts[1] in DATA:
+            continue
         names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return names
 

@@ -154,6 +154,28 @@ def test_the_metres_gained_since_the_last_step_of_the_same_episode_are_paid_for(
     assert namespace["reward_function"](crash) == mistake
 
 
+def test_touring_pays_for_metres_and_not_for_haste_in_a_bend():
+    namespace: dict = {}
+    exec(compile(load_preset("touring"), "touring", "exec"), namespace)
+
+    def paid(**params) -> float:
+        """For a metre, gained between two steps."""
+        for steps, progress in ((2.0, 10.0), (3.0, 15.0)):
+            state = {"steps": steps, "progress": progress, "track_length": 20.0, "speed": 2.0, "steering_angle": 0.0}
+            last = namespace["reward_function"](TEMPLATE | ROAD | state | params)
+        return last
+
+    assert paid() == pytest.approx(1.0)
+    assert paid(distance_from_center=0.25) == pytest.approx(1.0 - 0.5 * 0.25)
+    assert paid(distance_from_center=0.7) == pytest.approx(0.5)
+    at_the_limit = math.degrees(math.atan(0.165 * 2.0 / 2.0**2))  # 2 m/s2 across at 2 m/s
+    assert paid(steering_angle=at_the_limit) == pytest.approx(1.0)
+    assert paid(steering_angle=-at_the_limit, speed=2.0 * math.sqrt(2.0)) == pytest.approx(0.95)
+    assert paid(steering_angle=at_the_limit, speed=4.0) == pytest.approx(1.0 - 0.05 * 3.0)
+    assert paid(is_offtrack=True) == paid(is_crashed=True) == -1.0
+    assert namespace["reward_function"](TEMPLATE | ROAD | {"steps": 90.0, "progress": 50.0}) == 0.0
+
+
 @pytest.mark.parametrize("name", preset_names())
 def test_every_preset_is_small_and_finite(name):
     for speed in (0.1, 4.0):

@@ -24,6 +24,7 @@ def test_the_presets():
         "racing",
         "speed_gate",
         "stay_inside",
+        "touring",
     ]
     for name in preset_names():
         assert "def reward_function(params):" in load_preset(name)

@@ -26,10 +26,10 @@ SETTINGS = TrainSettings(track="oval", until=Until(steps=1000), evaluation_trial
 Judge = Callable[..., EvaluationReport]
 
 
-def evaluator_for(settings: TrainSettings) -> Evaluator:
+def evaluator_for(settings: TrainSettings, *tracks: str) -> Evaluator:
     space = action_space("default")
     learner = make_learner(NetworkSpec(num_actions=space.size), num_threads=1)
-    return Evaluator(NetworkPolicy(learner, space), [load_track("oval")], settings)
+    return Evaluator(NetworkPolicy(learner, space), [load_track(track) for track in tracks or ("oval",)], settings)
 
 
 @pytest.fixture
@@ -39,6 +39,10 @@ def judged() -> Evaluator:
 
 @pytest.fixture
 def judge(judged: Evaluator, monkeypatch: pytest.MonkeyPatch) -> Judge:
+    return judge_of(judged, monkeypatch)
+
+
+def judge_of(judged: Evaluator, monkeypatch: pytest.MonkeyPatch) -> Judge:
     """One evaluation whose two trials end as told: how far each came, or the time of its whole lap."""
 
     def tell(*trials: float, step: int = 0) -> EvaluationReport:
@@ -67,6 +71,14 @@ def test_more_completion_is_better_and_then_a_faster_lap(judge: Judge, judged: E
     assert not judge(16.0, 14.5).is_best
     assert judge(13.0, 20.0).is_best  # the fastest lap of an evaluation counts
     assert judged.best_score == (1.0, -13.0)
+
+
+def test_on_several_tracks_the_mean_of_the_laps_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = judge_of(evaluator_for(SETTINGS, "oval", "bowtie"), monkeypatch)
+    assert judge(13.0, 20.0).is_best
+    assert not judge(12.0, 22.0).is_best  # the fastest lap, but of one road only
+    assert judge(14.0, 18.0).is_best
+    assert not judge(0.9, 9.0).is_best
 
 
 def test_of_two_that_are_as_good_the_later_one_has_learned_longer_and_is_the_best(judge: Judge) -> None:

@@ -29,6 +29,12 @@ _OPTIONS_OF: Final = {
 @app.command()
 def train(
     context: typer.Context,
+    recipe: Annotated[
+        str,
+        typer.Option(
+            "--recipe", help="Options under one name, for roads it has never seen: everywhere, or slower steady."
+        ),
+    ] = "",
     track: Annotated[
         list[str],
         typer.Option("--track", "-t", help="Track, file, folder, library or generated:0..99; several by repeating it."),
@@ -126,9 +132,10 @@ def train(
         text().say_progress(slower)
     race, rivals = race_options.opponents_of(race, opponents=opponents, cars=cars)
     on_track = race_options.objects_of(race, context.params)
-    reward = reward or regime_of(objects=on_track, opponents=rivals).reward
+    if not recipe:
+        reward = reward or regime_of(objects=on_track, opponents=rivals).reward
     where = Path(track[0]).stem if len(track) == 1 else f"{len(track)} tracks"
-    title = f"Racecraft · {resume}" if resume else f"Racecraft · {where} · {Path(reward).stem}"
+    title = f"Racecraft · {resume}" if resume else f"Racecraft · {recipe or where + ' · ' + Path(reward).stem}"
     if parent is not None:
         title = f"Racecraft · from {parent}"
     with SilentReporter() if is_quiet else _terminal(title) as reporter:
@@ -163,14 +170,15 @@ def train(
                 "device": device,
                 "evaluate_every": evaluate_every,
             }
-            # What is not given is the parent's, or follows from the rest.
+            # What is not given is the recipe's or the parent's, or follows from the rest.
             given = {
                 name: value for name, value in options.items() if is_given(context, *_OPTIONS_OF.get(name, (name,)))
             }
-            if parent is None:
+            if parent is None and not recipe:
                 given = {**options, "evaluate_every": 0, **given}
             result = training.train(
                 **given,
+                recipe=recipe,
                 until=until,
                 seed=seed,
                 parent=parent,

@@ -32,6 +32,7 @@ from racecraft.json_file import read_json_object, read_text
 from racecraft.run.atomic import write_file, write_json
 from racecraft.run.checkpoint import CheckpointStore
 from racecraft.run.lock import exclusive_lock
+from racecraft.run.starters import STARTER, unpack_starter
 
 if TYPE_CHECKING:
     from racecraft.agent import Hyperparameters, ModelMetadata
@@ -107,11 +108,13 @@ class RunFolder:
 
     @classmethod
     def open(cls, path: str | Path) -> RunFolder:
-        """Find a run by its folder.
+        """Find a run by its folder, or a starter as ``starter:quick``, which is put into ``runs/`` first.
 
         Raises:
             RunError: There is none, or it holds no run.
         """
+        if str(path).startswith(STARTER):
+            path = unpack_starter(str(path).removeprefix(STARTER), "runs")
         path = Path(path)
         if not path.is_dir():
             siblings = [run.path.name for run in list_runs(path.parent)]

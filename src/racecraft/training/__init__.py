@@ -58,6 +58,7 @@ def train(
     reporter: Reporter | None = None,
     aws_log: str | Path | None = None,
     started: float | None = None,
+    recipe: str = "",
     **settings: Any,
 ) -> TrainResult:
     """Train a car from camera pixels with a reward function.
@@ -84,6 +85,8 @@ def train(
         reporter: Is told how it goes.
         aws_log: File for the log lines that AWS's tools read, ``-`` for stdout.
         started: `time.monotonic()` of when the clock began to run; by default now.
+        recipe: Name of several of these arguments together, one of `racecraft.training.recipes.RECIPES`; what is given
+            besides goes before it.
         settings: Other fields of `racecraft.training.settings.TrainSettings`, and ``num_envs``.
 
     Raises:
@@ -93,19 +96,17 @@ def train(
 
     from racecraft.training.job import Training
     from racecraft.training.plan import make_plan
+    from racecraft.training.recipes import with_recipe
 
     started = time.monotonic() if started is None else started
+    given = {"track": track, "reward": reward, "until": until, "actions": actions, **settings}
     plan = make_plan(
-        track,
-        reward=reward,
-        until=until,
-        actions=actions,
+        **with_recipe(recipe, given),
         sensors=sensors,
         model_metadata=model_metadata,
         hyperparameters=hyperparameters,
         seed=seed,
         parent=parent,
-        **settings,
     )
     if plan.settings.device != "cpu":
         from racecraft.gpu import open_device

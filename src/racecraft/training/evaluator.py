@@ -42,7 +42,8 @@ class Evaluator:
         self._seed = (settings.seed + SEED) % 2**32
         direction = "reverse" if settings.direction == "reverse" else "forward"
         self._rules = replace(RULE_SETS["first_lap"], direction=direction)
-        driven = _evenly(tracks, settings) if len(tracks) > 1 else tracks[:1]
+        self._is_far = len(tracks) > 1
+        driven = _evenly(tracks, settings) if self._is_far else tracks[:1]
         self._patience = max(track.length for track in driven) / SLOWEST
         self._trials = trial_simulation(
             driven,
@@ -67,10 +68,15 @@ class Evaluator:
 
     @property
     def score(self) -> tuple[float, float] | None:
-        """What makes a checkpoint the best, most important first: completion, then a fast lap."""
+        """What makes a checkpoint the best, most important first: completion, then a fast lap.
+
+        On several tracks a lap of one says nothing of the others, so there it is the mean of all laps.
+        """
         if self.last is None:
             return None
-        return self.last.completion, -(self.last.best_lap or NO_LAP)
+        laps = self.last.lap_times
+        lap = float(np.mean(laps)) if self._is_far and laps else self.last.best_lap
+        return self.last.completion, -(lap or NO_LAP)
 
     @property
     def was_good(self) -> bool:

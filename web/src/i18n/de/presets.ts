@@ -22,6 +22,7 @@ export const presets: Record<keyof typeof english, string> = {
   preset_speed_gate: "Auf der Strecke bleiben und nicht trödeln: Unter einem Mindesttempo ist die halbe Belohnung weg.",
   preset_stay_inside:
     "Innerhalb der Ränder bleiben: Jede Linie ist recht, solange alle Räder mit etwas Luft auf der Straße sind.",
+  preset_touring: "Fremde Straßen fahren: zahlt für jeden wirklich gewonnenen Meter, aber nicht für eine Kurve am Limit.",
   space_default: "Fünf Lenkwinkel bei 1 und 2 m/s: lernt in Sekunden.",
   space_aws: "Wie bei AWS: fünf Lenkwinkel bei 0,5 und 1 m/s.",
   space_fast: "Sieben Lenkwinkel bei bis zu 4 m/s: für Rekorde.",
@@ -40,6 +41,7 @@ export const presets: Record<keyof typeof english, string> = {
   preset_name_racing: "Rennen",
   preset_name_speed_gate: "Mindesttempo",
   preset_name_stay_inside: "Drinnen bleiben",
+  preset_name_touring: "touring",
   space_name_default: "Standard",
   space_name_aws: "AWS",
   space_name_fast: "Schnell",

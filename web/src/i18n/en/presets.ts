@@ -18,6 +18,7 @@ export const presets = {
   preset_speed_gate: "Stay on the track and do not dawdle: below a speed threshold half of the reward is gone.",
   preset_stay_inside:
     "Stay inside the borders: any line will do, as long as all wheels are on the road with room to spare.",
+  preset_touring: "Tour roads never seen: pay for every metre really gained, but not for taking a bend at the limit.",
   space_default: "Five steering angles at 1 and 2 m/s: learns in seconds.",
   space_aws: "AWS's own: five steering angles at 0.5 and 1 m/s.",
   space_fast: "Seven steering angles at up to 4 m/s: for records.",
@@ -36,6 +37,7 @@ export const presets = {
   preset_name_racing: "racing",
   preset_name_speed_gate: "speed gate",
   preset_name_stay_inside: "stay inside",
+  preset_name_touring: "touring",
   space_name_default: "default",
   space_name_aws: "aws",
   space_name_fast: "fast",

@@ -1,0 +1,75 @@
+"""Trains the starters and writes them into the package, `src/racecraft/starters/`: small run folders of weights alone.
+
+    .venv/bin/python benchmarks/starters.py                    # all, some minutes of CPU time each
+    .venv/bin/python benchmarks/starters.py quick -o /tmp/here
+
+The same version gives the same weights to the bit: trainings end after so many steps, not at a time. The last line on
+stdout is JSON: file and SHA-256 of the weights by starter.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+from racecraft import train
+from racecraft.learn.learner import below
+from racecraft.run import RunFolder
+from racecraft.run.starters import FOLDER
+from racecraft.training.parent import WEIGHTS
+
+STARTERS = {"quick": ("everywhere", "1500000 steps"), "steady": ("steady", "400000 steps")}
+"""Recipe and length of the training."""
+SEED = 1
+CREATED = "2026-11-23T00:00:00+00:00"
+FILES = ("reward_function.py", "model_metadata.json", "training_params.yaml")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(STARTERS)}; by default all")
+    parser.add_argument("--until", help="another limit, for a trial")
+    parser.add_argument("--num-threads", type=int, default=0)
+    parser.add_argument("-o", "--output", type=Path, default=FOLDER)
+    options = parser.parse_args()
+    if unknown := set(options.names) - set(STARTERS):
+        parser.error(f"there is no starter {', '.join(sorted(unknown))}")
+    digests = {}
+    for name in options.names or STARTERS:
+        recipe, until = STARTERS[name]
+        with tempfile.TemporaryDirectory() as scratch:
+            trained = train(
+                recipe=recipe,
+                until=options.until or until,
+                seed=SEED,
+                num_threads=options.num_threads,
+                root=scratch,
+                name=name,
+            )
+            digests[name] = write_starter(RunFolder.open(trained.run), options.output / name)
+    print(json.dumps(digests))
+
+
+def write_starter(run: RunFolder, path: Path) -> dict[str, str]:
+    """The best checkpoint's weights, without anything of its training, as a run of its own; file and digest of them."""
+    shutil.rmtree(path, ignore_errors=True)
+    path.mkdir(parents=True)
+    for name in FILES:
+        shutil.copyfile(run.path / name, path / name)
+    saved = run.checkpoints.load("best")
+    weights = {f"{WEIGHTS}{name}": array for name, array in below(WEIGHTS, saved.arrays).items()}
+    starter = RunFolder(path)
+    origin = {"format": "racecraft", "recipe": path.name, "step": saved.step}
+    starter.checkpoints.save(0, weights, metadata={"network": saved.metadata["network"], "origin": origin})
+    info = run.read_info()
+    starter.write_info(replace(info, created=CREATED, versions={"racecraft": info.versions["racecraft"]}))
+    (entry,) = starter.checkpoints.entries()
+    return {"file": entry.file, "sha256": entry.sha256}
+
+
+if __name__ == "__main__":
+    main()

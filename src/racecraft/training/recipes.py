@@ -1,0 +1,56 @@
+"""Recipes: several settings under one name, for what takes more than one of them to learn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from racecraft.checks import check_choice
+from racecraft.learn import DistillConfig
+
+ROADS: Final = ("library", "generated:0..47,radius=0.45,difficulty=0.9")
+"""Many and tight, none of them official."""
+
+RECIPES: Final[Mapping[str, Mapping[str, Any]]] = {
+    # Once round every road, at a walk: AWS's own default reward pays for being on the road, not for haste.
+    "steady": {
+        "track": ROADS,
+        "reward": "centerline",
+        "actions": "safe",
+        "direction": "alternate",
+        "randomize": "strong",
+        "until": "5 minutes",
+    },
+    # Fast on roads it has never seen: a teacher that knows the road, on many of them and both ways, and a student that
+    # sees it, under conditions that differ from episode to episode. docs/log/generalisation.md has what led here.
+    "everywhere": {
+        "track": ROADS,
+        "reward": "touring",
+        "actions": "continuous",
+        "algorithm": "distill",
+        "direction": "alternate",
+        "randomize": "strong",
+        "until": "15 minutes",
+        "evaluate_every": 100_000,
+        "evaluation_trials": 48,  # roads differ more than laps do
+        "distill": DistillConfig(teacher_steps=2_000_000, student_steps=400_000, buffer_size=64_000),
+    },
+}
+"""Arguments of `racecraft.training.train`, by name."""
+
+
+def with_recipe(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """A recipe's arguments, and in their place what is given.
+
+    Args:
+        name: One of `RECIPES`; without a name it is what is given.
+        given: Arguments of `racecraft.training.train`; what is empty or None there is not given.
+
+    Raises:
+        ConfigError: There is no such recipe.
+    """
+    if not name:
+        return dict(given)
+    check_choice("recipe", name, tuple(RECIPES))
+    is_given = {key: value for key, value in given.items() if value not in (None, "", ())}
+    return {**given, **RECIPES[name], **is_given}

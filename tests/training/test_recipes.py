@@ -1,0 +1,45 @@
+"""Recipes: a name for settings, which what is given besides goes before."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from racecraft.cli import every_verb
+from racecraft.errors import ConfigError
+from racecraft.learn import DistillConfig
+from racecraft.reward import load_reward
+from racecraft.run import RunFolder
+from racecraft.training import train
+from racecraft.training.recipes import RECIPES, with_recipe
+from racecraft.training.start import read_settings
+
+
+def test_what_is_given_goes_before_the_recipe() -> None:
+    made = with_recipe("everywhere", {"track": "oval", "reward": None, "until": "", "seed": 3})
+    assert made == {**RECIPES["everywhere"], "track": "oval", "seed": 3}
+    assert with_recipe("", {"track": None}) == {"track": None}
+
+
+def test_a_recipe_that_does_not_exist() -> None:
+    with pytest.raises(ConfigError, match="recipe is 'everwhere'; allowed are steady, everywhere") as caught:
+        train(recipe="everwhere")
+    assert "everywhere" in caught.value.hint
+
+
+def test_the_command_trains_with_what_the_recipe_says(tmp_path: Path) -> None:
+    command = ["train", "--recipe", "everywhere", "--track", "oval", "--track", "kidney", "--direction", "forward"]
+    done = CliRunner().invoke(
+        every_verb(), [*command, "--until", "1 second", "--num-threads", "1", "--runs", str(tmp_path), "--json"]
+    )
+    assert done.exit_code == 0, done.output
+    folder = RunFolder.open(json.loads(done.stdout.splitlines()[-1])["run"])
+    settings = read_settings(folder)
+    assert (settings.algorithm, settings.direction, settings.track) == ("distill", "forward", "oval + kidney")
+    assert settings.distill == RECIPES["everywhere"]["distill"] != DistillConfig()
+    assert settings.randomize.friction == (0.6, 1.3)  # strong
+    assert folder.read_reward_function() == load_reward("touring")
+    assert folder.read_model_metadata().action_space.kind == "continuous"
