@@ -133,7 +133,7 @@ def make_build(programs: list[str]) -> Build:
         command = shlex.split(entry["command"])
         part = command[command.index("-o") + 1]
         if "/native/" in part and (CLEAN / part).exists():
-            build.commands[part] = command[1:] if Path(command[0]).name == "ccache" else command
+            build.commands[part] = command[_compiler(command) :]
             build.lines[part] = _lines_of(CLEAN / part)
     for block in _must(["ninja", "-t", "deps"]).split("\n\n"):
         part, *paths = block.splitlines() or [""]
@@ -143,6 +143,11 @@ def make_build(programs: list[str]) -> Build:
     for target in (*programs, MODULE):
         build.links[target] = _link_of(target, members)
     return build
+
+
+def _compiler(command: list[str]) -> int:
+    """Where the compiler stands in a command, behind what keeps its objects."""
+    return next((place for place, word in enumerate(command, 1) if Path(word).name == "ccache"), 0)
 
 
 def _lines_of(path: Path) -> dict[str, set[int]]:
