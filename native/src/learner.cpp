@@ -50,6 +50,14 @@ void split_rows(const float* in, size_t rows, float* first, size_t first_width, 
     }
 }
 
+// Whether a layer's outputs are needed for the whole minibatch: a dense layer's weights are summed up over
+// it.
+bool is_kept_whole(const Tower& tower, size_t l) {
+    const bool feeds_dense =
+        l + 1 < tower.layers.size() && tower.layers[l + 1].is_dense && !tower.layers[l + 1].is_first();
+    return feeds_dense || tower.layers[l].is_dense;
+}
+
 // base to the power of a whole number, by squaring: the same bits everywhere, unlike pow().
 double power(double base, int64_t exponent) {
     double result = 1.0;
@@ -152,7 +160,7 @@ void Learner::policy(const uint8_t* observations, const float* states, size_t co
         }
         const Inputs in{worker.input.data(), worker.lidar.data(),
                         states + first * static_cast<size_t>(spec.is_blind() ? spec.state_size : 0)};
-        point(network_.policy, worker.policy, nullptr, 0, worker.policy_at);
+        point(network_.policy, worker.policy, nullptr, 0, 0, worker.policy_at);
         forward(network_.policy, in, samples, worker.policy_at, 0, network_.policy.layers.size());
         for (size_t i = 0; i < samples; ++i) {
             float* outputs = out + (first + i) * spec.policy_size();
@@ -176,7 +184,7 @@ void Learner::values(const uint8_t* observations, const float* states, size_t co
         }
         const Inputs in{worker.input.data(), worker.lidar.data(),
                         states + first * static_cast<size_t>(spec.state_size)};
-        point(network_.critic, worker.critic, nullptr, 0, worker.critic_at);
+        point(network_.critic, worker.critic, nullptr, 0, 0, worker.critic_at);
         forward(network_.critic, in, samples, worker.critic_at, 0, network_.critic.layers.size());
         for (size_t i = 0; i < samples; ++i) out[first + i] = worker.critic_at.out.back()[i * stride];
     });
@@ -185,15 +193,19 @@ void Learner::values(const uint8_t* observations, const float* states, size_t co
 UpdateStats Learner::update(const Minibatch& minibatch, const Objective& objective) {
     const std::lock_guard lock(mutex_);
     const size_t size = minibatch.size;
-    prepare_training(size);
+    const size_t num_groups = std::clamp((size + kMinGroupSize - 1) / kMinGroupSize, size_t{1}, kMaxGroups);
+    prepare_training(size, num_groups);
     gather(minibatch);
     transpose();
-    const size_t num_groups = std::clamp((size + kMinGroupSize - 1) / kMinGroupSize, size_t{1}, kMaxGroups);
-    forward_to_wide(minibatch, num_groups);
-    for_each_task(num_groups, [&](Worker& worker, size_t group) {
-        run_group(worker, minibatch, objective, group, num_groups);
-    });
-    backward_from_wide(minibatch, num_groups);
+    const size_t portion = groups_of_portion(size, num_groups);
+    for (size_t first = 0; first < num_groups; first += portion) {
+        const Groups groups{first, std::min(num_groups, first + portion), num_groups, size};
+        forward_to_wide(minibatch, groups);
+        for_each_task(groups.last - groups.first, [&](Worker& worker, size_t task) {
+            run_group(worker, minibatch, objective, groups, groups.first + task);
+        });
+        backward_from_wide(minibatch, groups);
+    }
     // as a float, so that a norm whose squares Adam could not hold counts as infinite
     const double norm = std::sqrt(static_cast<double>(static_cast<float>(sum_over_tasks(num_groups, size))));
 
@@ -225,7 +237,13 @@ void Learner::write(Part part, const float* published) {
     if (part == Part::weights) is_transposed_ = false;
 }
 
-void Learner::prepare_training(size_t size) {
+// Groups that go through a wide layer together.
+size_t Learner::groups_of_portion(size_t size, size_t num_groups) const {
+    if (wide_forward_tasks_.empty()) return num_groups;
+    return std::clamp(kPortion * num_groups / size, std::min(workers_.size(), num_groups), num_groups);
+}
+
+void Learner::prepare_training(size_t size, size_t num_groups) {
     if (gradient_.size() == 0) {
         gradient_ = FloatBuffer(network_.num_packed);
         transposed_ = FloatBuffer(network_.num_transposed);
@@ -239,32 +257,39 @@ void Learner::prepare_training(size_t size) {
             }
         }
     }
-    if (size <= kept_size_) return;
-    kept_size_ = size;
-    terms_.resize(size);
+    const size_t most = groups_of_portion(size, num_groups) * ((size + num_groups - 1) / num_groups);
+    if (size <= kept_size_ && most <= kept_portion_) return;
+    kept_size_ = std::max(kept_size_, size);
+    kept_portion_ = std::max(kept_portion_, most);
+    terms_.resize(kept_size_);
     for (const auto& [tower, kept] :
          {std::tie(network_.policy, kept_policy_), std::tie(network_.critic, kept_critic_)}) {
         kept = {};
         for (size_t l = 0; l < tower.layers.size(); ++l) {
             const Layer& layer = tower.layers[l];
-            const bool feeds_dense = l + 1 < tower.layers.size() && tower.layers[l + 1].is_dense &&
-                                     !tower.layers[l + 1].is_first();
-            kept.out.emplace_back(
-                feeds_dense || layer.is_dense || l < tower.wide ? size * layer.shape.out_size() : 0);
-            kept.grad.emplace_back(layer.is_dense || l + 1 == tower.wide ? size * layer.shape.out_size() : 0);
+            const size_t of_portion = l < tower.wide ? kept_portion_ : 0;
+            kept.out.emplace_back((is_kept_whole(tower, l) ? kept_size_ : of_portion) *
+                                  layer.shape.out_size());
+            const size_t rows = layer.is_dense ? kept_size_ : l + 1 == tower.wide ? kept_portion_ : 0;
+            kept.grad.emplace_back(rows * layer.shape.out_size());
         }
     }
 }
 
-// Scratch for what only the samples at hand need; `kept` for what outlives them, where there is such.
+// Scratch for what only the samples at hand need; `kept` for what outlives them, where there is such: of all
+// samples, or of the portion that begins with sample `portion`.
 void Learner::point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kept, size_t first,
-                    TowerPointers& at) {
+                    size_t portion, TowerPointers& at) {
     for (size_t l = 0; l < tower.layers.size(); ++l) {
-        const size_t offset = first * tower.layers[l].shape.out_size();
+        const size_t size = tower.layers[l].shape.out_size();
+        const auto place = [&](FloatBuffer& buffer, bool is_whole) {
+            return buffer.data() + (is_whole ? first : first - portion) * size;
+        };
         const bool is_kept = kept != nullptr && kept->out[l].size() > 0;
-        at.out[l] = is_kept ? kept->out[l].data() + offset : scratch.out[l].data();
+        at.out[l] = is_kept ? place(kept->out[l], is_kept_whole(tower, l)) : scratch.out[l].data();
         if (kept == nullptr) continue;
-        at.grad[l] = kept->grad[l].size() > 0 ? kept->grad[l].data() + offset : scratch.grad[l].data();
+        at.grad[l] = kept->grad[l].size() > 0 ? place(kept->grad[l], tower.layers[l].is_dense)
+                                              : scratch.grad[l].data();
     }
 }
 
@@ -341,8 +366,8 @@ Learner::Inputs Learner::inputs_of(const Worker& worker, size_t first) const {
 }
 
 // Everything but what lies before a wide layer, and such a layer itself.
-void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
-                        size_t num_groups) {
+void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective,
+                        const Groups& groups, size_t group) {
     const NetworkSpec& spec = network_.spec;
     const size_t num_actions = static_cast<size_t>(spec.num_actions);
     const auto reads_camera = [](const Tower& tower) { return tower.sees_camera && tower.wide == 0; };
@@ -355,14 +380,14 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
     float* gradient = group_gradients_.data() + group * network_.num_grouped;
     std::fill_n(gradient, network_.num_grouped, 0.0f);
 
-    const size_t end = (group + 1) * minibatch.size / num_groups;
-    for (size_t first = group * minibatch.size / num_groups; first < end; first += kChunk) {
+    const size_t end = groups.begin(group + 1);
+    for (size_t first = groups.begin(group); first < end; first += kChunk) {
         const size_t samples = std::min(kChunk, end - first);
         if (is_camera_needed) read_samples(worker, minibatch, first, samples);
         const Inputs in = inputs_of(worker, first);
         TowerPointers &policy = worker.policy_at, &critic = worker.critic_at;
-        point(network_.policy, worker.policy, &kept_policy_, first, policy);
-        point(network_.critic, worker.critic, &kept_critic_, first, critic);
+        point(network_.policy, worker.policy, &kept_policy_, first, groups.begin(groups.first), policy);
+        point(network_.critic, worker.critic, &kept_critic_, first, groups.begin(groups.first), critic);
         forward(network_.policy, in, samples, policy, behind_wide(network_.policy), policy_end);
         forward(network_.critic, in, samples, critic, behind_wide(network_.critic), critic_end);
 

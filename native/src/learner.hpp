@@ -4,8 +4,9 @@
 //
 //     weights ─transpose─▶ groups of samples: forward, loss, backward ─▶ sums over samples and groups ─▶ Adam
 //
-// A dense layer whose weights fit no cache (Tower::wide) takes all samples at once, a panel a task, so that
-// its weights are read once in a step. There, groups stop, forwards and backwards, and go on behind it.
+// A dense layer whose weights fit no cache (Tower::wide) takes a portion of samples at once, a panel a task,
+// so that its weights are read once for each. There, groups stop, forwards and backwards, and go on behind
+// it.
 //
 // A group is a fixed share of the minibatch and sums up its own gradient of convolutions and biases, sample
 // by sample; the groups are then added in order. Dense layers have many weights and few activations, so their
@@ -25,7 +26,8 @@
 
 namespace racecraft {
 
-constexpr size_t kChunk = 8;  // samples that pass through a layer together, so that they fit an L2 cache
+constexpr size_t kPortion = 64;  // samples that pass through a wide layer together
+constexpr size_t kChunk = 8;     // samples that pass through a layer together, so that they fit an L2 cache
 
 class Learner : public ActorCritic {
   public:
@@ -74,6 +76,11 @@ class Learner : public ActorCritic {
         int panel;
         size_t first, last;  // inputs
     };
+    // Groups [first, last) of all, and the sample that a group begins with.
+    struct Groups {
+        size_t first, last, count, size;
+        size_t begin(size_t group) const { return group * size / count; }
+    };
     struct WideTask {
         const Tower* tower;
         size_t panel;  // of outputs, or of inputs
@@ -86,8 +93,9 @@ class Learner : public ActorCritic {
 
     template <typename Body>
     void for_each_task(size_t count, const Body& body);  // body(worker, task)
-    void prepare_training(size_t size);
-    void point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kept, size_t first,
+    size_t groups_of_portion(size_t size, size_t num_groups) const;
+    void prepare_training(size_t size, size_t num_groups);
+    void point(const Tower& tower, TowerBuffers& scratch, TowerBuffers* kept, size_t first, size_t portion,
                TowerPointers& at);
     void read_sample(Worker& worker, const uint8_t* observation, size_t sample) const;
     void read_samples(Worker& worker, const Minibatch& minibatch, size_t first, size_t samples) const;
@@ -96,12 +104,12 @@ class Learner : public ActorCritic {
                  size_t from_layer, size_t to_layer) const;
     void backward(const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at,
                   float* gradient, size_t from_layer, size_t to_layer) const;
-    void run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective, size_t group,
-                   size_t num_groups);
+    void run_group(Worker& worker, const Minibatch& minibatch, const Objective& objective,
+                   const Groups& groups, size_t group);
     template <typename Body>
-    void for_each_group_before_wide(const Minibatch& minibatch, size_t num_groups, const Body& body);
-    void forward_to_wide(const Minibatch& minibatch, size_t num_groups);
-    void backward_from_wide(const Minibatch& minibatch, size_t num_groups);
+    void for_each_group_before_wide(const Minibatch& minibatch, const Groups& groups, const Body& body);
+    void forward_to_wide(const Minibatch& minibatch, const Groups& groups);
+    void backward_from_wide(const Minibatch& minibatch, const Groups& groups);
     void sum_dense(const DenseTask& task, size_t size);
     double sum_over_tasks(size_t num_groups, size_t size);
     void gather(const Minibatch& minibatch);
@@ -118,11 +126,11 @@ class Learner : public ActorCritic {
     std::vector<Worker> workers_;
     TowerBuffers kept_policy_,
         kept_critic_;  // of the whole minibatch: what dense layers saw, and their gradients
-    size_t kept_size_ = 0;
-    std::vector<float> kept_states_;  // (B, state_size)
-    std::vector<float> kept_lidar_;   // (B, lidar_size)
-    std::vector<LossTerms> terms_;    // (B,)
-    std::vector<double> squares_;     // of the gradient, one sum per task
+    size_t kept_size_ = 0, kept_portion_ = 0;  // samples that there is room for
+    std::vector<float> kept_states_;           // (B, state_size)
+    std::vector<float> kept_lidar_;            // (B, lidar_size)
+    std::vector<LossTerms> terms_;             // (B,)
+    std::vector<double> squares_;              // of the gradient, one sum per task
     std::vector<DenseTask> dense_tasks_;
     std::vector<WideTask> wide_forward_tasks_, wide_backward_tasks_;
     std::vector<TransposeTask> transpose_tasks_;
