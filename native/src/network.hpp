@@ -112,7 +112,7 @@ struct Tower {
     bool sees_camera;
     std::vector<Layer> layers;
     size_t camera_end =
-        0;  // layers of the camera's branch, which come first; 0 where there is no other branch
+        0;            // layers of the camera's branch, which come first; 0 where there is no other branch
     size_t wide = 0;  // the first dense layer whose weights fit no cache; 0 where there is none
 };
 
