@@ -22,7 +22,8 @@ export const presets: Record<keyof typeof english, string> = {
   preset_speed_gate: "Auf der Strecke bleiben und nicht trödeln: Unter einem Mindesttempo ist die halbe Belohnung weg.",
   preset_stay_inside:
     "Innerhalb der Ränder bleiben: Jede Linie ist recht, solange alle Räder mit etwas Luft auf der Straße sind.",
-  preset_touring: "Fremde Straßen fahren: zahlt für jeden wirklich gewonnenen Meter, aber nicht für eine Kurve am Limit.",
+  preset_touring:
+    "Fremde Straßen fahren: zahlt für jeden wirklich gewonnenen Meter, aber nicht für eine Kurve am Limit.",
   space_default: "Fünf Lenkwinkel bei 1 und 2 m/s: lernt in Sekunden.",
   space_aws: "Wie bei AWS: fünf Lenkwinkel bei 0,5 und 1 m/s.",
   space_fast: "Sieben Lenkwinkel bei bis zu 4 m/s: für Rekorde.",
