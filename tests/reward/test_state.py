@@ -53,6 +53,7 @@ STATEFUL = [
     body("return reward.step()", top=CLASS.format("self.__dict__.update(n=1)")),
     load_preset("duel"),
     load_preset("lap_time"),
+    load_preset("touring"),
     load_preset("overtake"),
 ]
 STATELESS = [
@@ -86,7 +87,7 @@ STATELESS = [
     body("memory = {}", "memory['x'] = 1", RETURN),
     body("return LINE[0]", top="LINE = []\nLINE.append(1.0)\nLINE[0] = 2.0\n"),
     body("import random", "random.shuffle(params['waypoints'])", RETURN, top="LINE = [1]\n"),
-    *(load_preset(name) for name in preset_names() if name not in ("duel", "lap_time", "overtake")),
+    *(load_preset(name) for name in preset_names() if name not in ("duel", "lap_time", "overtake", "touring")),
 ]
 
 

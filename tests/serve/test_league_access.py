@@ -36,6 +36,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "GET /api/ghosts": ("own", "?track=adas-track"),
     "GET /api/ghosts/{key}": ("own", "?track=oval"),
     "GET /api/rewards": ("each", None),
+    "GET /api/rewards/pictures": ("each", None),
     "GET /api/actions": ("each", None),
     "POST /api/rewards/check": (
         "own",

@@ -13,6 +13,8 @@ import pytest
 from browsers import Visit, needs_browser, needs_pages, visiting
 from running_consoles import PATIENCE, running_console
 
+from racecraft.reward import preset_names
+
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 
@@ -185,7 +187,7 @@ def test_files_of_the_original_are_taken_over_on_a_new_model(visit: Visit) -> No
 def test_a_reward_is_chosen_by_its_picture_and_brings_what_it_needs(visit: Visit) -> None:
     page = _fresh(visit, "/create")
     cards = page.get_by_role("radiogroup", name="Preset").get_by_role("radio")
-    assert cards.count() == 12
+    assert cards.count() == len(preset_names())
     assert cards.filter(has_text="racing").first.get_attribute("aria-checked") == "true"
     page.locator(".cards svg path").first.wait_for()
     colours = (
