@@ -16,17 +16,20 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from racecraft import train
+from racecraft import load_track, train
 from racecraft.learn.learner import below
 from racecraft.run import RunFolder
 from racecraft.run.starters import FOLDER
+from racecraft.track import joint_digest
 from racecraft.training.parent import WEIGHTS
 
 STARTERS = {"quick": ("everywhere", "1500000 steps"), "steady": ("steady", "400000 steps")}
 """Recipe and length of the training."""
 SEED = 1
 CREATED = "2026-11-23T00:00:00+00:00"
-FILES = ("reward_function.py", "model_metadata.json", "training_params.yaml")
+TRACK = "reinvent_2018"
+"""Where a starter drives unless told otherwise: one road says more than all that it learned on."""
+FILES = ("reward_function.py", "model_metadata.json")
 
 
 def main() -> None:
@@ -65,8 +68,11 @@ def write_starter(run: RunFolder, path: Path) -> dict[str, str]:
     starter = RunFolder(path)
     origin = {"format": "racecraft", "recipe": path.name, "step": saved.step}
     starter.checkpoints.save(0, weights, metadata={"network": saved.metadata["network"], "origin": origin})
-    info = run.read_info()
-    starter.write_info(replace(info, created=CREATED, versions={"racecraft": info.versions["racecraft"]}))
+    info, track = run.read_info(), load_track(TRACK)
+    versions = {"racecraft": info.versions["racecraft"]}
+    starter.write_info(
+        replace(info, track=track.name, track_digest=joint_digest([track]), created=CREATED, versions=versions)
+    )
     (entry,) = starter.checkpoints.entries()
     return {"file": entry.file, "sha256": entry.sha256}
 

@@ -49,7 +49,7 @@ def test_it_is_unpacked_once_and_then_a_run_like_any_other(here: Path) -> None:
     assert (first.path / "notes.txt").read_text() == "mine"
     assert [path.name for path in Path("runs").iterdir()] == ["starter-quick"]  # and no half of one
     first.path.rename("runs/renamed")
-    assert RunFolder.open("runs/renamed").read_info().track.startswith("library")
+    assert RunFolder.open("runs/renamed").read_info().track == "reinvent_2018"
 
 
 @pytest.mark.parametrize(

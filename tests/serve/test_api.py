@@ -150,6 +150,19 @@ def test_models_are_cloned_renamed_tagged_deleted_and_restored(console: RunningC
     error(client.post("/api/models/nothing/restore"), 404)
 
 
+def test_a_starter_is_brought_once_and_is_a_model_like_any_other(console: RunningConsole) -> None:
+    client = console.client
+    card = client.post("/api/models/starters/quick").json()
+    assert card["name"] == "starter-quick"
+    assert client.post("/api/models/starters/quick").json() == card
+    assert [model["name"] for model in client.get("/api/models").json()].count("starter-quick") == 1
+    assert client.get("/api/models/starter-quick").json()["checkpoints"]
+    assert client.delete("/api/models/starter-quick").status_code == 204
+    assert client.post("/api/models/starters/quick").json()["name"] == "starter-quick"
+    for nothing in ("quik", "starter-quick", "x" * 300):
+        error(client.post(f"/api/models/starters/{nothing}"), 404)
+
+
 @pytest.mark.parametrize(
     ("settings", "status", "text"),
     [

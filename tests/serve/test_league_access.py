@@ -46,6 +46,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "POST /api/models/import": ("each", None),
     "GET /api/models": ("each", None),
     "POST /api/models": ("each", None),
+    "POST /api/models/starters/{starter}": ("each", None),
     **{
         label: ("own", body)
         for label, body in {
@@ -184,6 +185,7 @@ class School:
         self.objects = {
             "track": "adas-track",
             "name": "adas-model",
+            "starter": "quick",
             "drive_id": ok(ada.post("/api/drives", json={"track": "adas-track"}), 201)["id"],
             "key": "model:adas-model",
             "path": "metrics/x.json",

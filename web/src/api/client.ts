@@ -106,6 +106,7 @@ export const api = {
     ask<ModelCard>("PATCH", `/models/${name(run)}`, change),
   clone: (run: string, step?: number) =>
     ask<ModelCard>("POST", `/models/${name(run)}/clone`, step === undefined ? {} : { step }),
+  bring: (starter: string) => ask<ModelCard>("POST", `/models/starters/${name(starter)}`),
   remove: (run: string) => ask<void>("DELETE", `/models/${name(run)}`),
   restore: (run: string) => ask<ModelCard>("POST", `/models/${name(run)}/restore`),
   importModel: (file: File, track?: string) =>

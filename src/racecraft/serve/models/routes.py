@@ -15,6 +15,7 @@ from racecraft.learn import PPOConfig
 from racecraft.reward import load_preset, preset_names
 from racecraft.run import RunFolder, read_stretches, stretch_at
 from racecraft.run.history import read_history
+from racecraft.run.starters import starter_names, unpack_starter
 from racecraft.serve.context import Context, InContext
 from racecraft.serve.jobs.schemas import JobInfo, job_info
 from racecraft.serve.models.garage import finite
@@ -95,6 +96,16 @@ def create_model(request: NewModel, context: InContext) -> ModelCard:
         context.garage.tag(folder.name, request.tags)
         card = card.model_copy(update={"tags": request.tags})
     return card
+
+
+@router.post("/starters/{starter}", status_code=201)
+def bring_starter(starter: str, context: InContext) -> ModelCard:
+    """A policy that comes with Racecraft, as a model of one's own; the one there is, if it was brought before."""
+    if starter not in starter_names():
+        raise NotFound(f"There is no starter {starter[:80]!r}.")
+    folder = unpack_starter(starter, context.garage.runs)
+    context.mirror.copy(folder.name)
+    return context.garage.card(folder.name)
 
 
 @router.get("/{name}")

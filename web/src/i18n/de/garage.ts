@@ -6,6 +6,7 @@ export const garage: Record<keyof typeof english, string> = {
   garage_empty: "Noch kein Modell",
   garage_empty_lead: "Das erste dauert keine Minute: Alles ist schon sinnvoll eingestellt.",
   garage_first: "Das erste Modell anlegen",
+  garage_starter: "Einem zusehen, das schon gelernt hat",
   search: "Suche nach Name, Strecke oder Stichwort",
   sort: "Ordnen nach",
   sort_new: "Neueste",

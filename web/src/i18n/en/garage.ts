@@ -4,6 +4,7 @@ export const garage = {
   garage_empty: "No model yet",
   garage_empty_lead: "The first one takes less than a minute: everything has a good default.",
   garage_first: "Make the first model",
+  garage_starter: "Watch one that has learned already",
   search: "Search by name, track or tag",
   sort: "Sort by",
   sort_new: "Newest",
