@@ -206,16 +206,16 @@ def _drive_of(replay: Replay) -> str:
 
 def _places_checked(rows: list[CheckedRow], standings: list[Standing | None]) -> list[CheckedRow]:
     """The same, each with its place held against what all replays together lead to, as far as there are any."""
-    found = [(row, standing) for row, standing in zip(rows, standings, strict=True) if standing is not None]
-    due = dict(zip((row.submission for row, _ in found), places([_key(one) for _, one in found]), strict=True))
-    ranked = {row.submission for row, standing in found if standing.score is not None}
-    if len(found) < len(rows):
+    known = [standing for standing in standings if standing is not None]
+    if len(known) < len(rows):
         return rows  # a place says nothing where somebody's drive is not known
+    ranks = places([_key(standing) for standing in known])
+    due = [None if standing.score is None else rank for standing, rank in zip(known, ranks, strict=True)]
     return [
         row
-        if row.foul or row.place == (place := due[row.submission] if row.submission in ranked else None)
+        if row.foul or row.place == place
         else replace(row, foul=f"its place is {_nth(row.place)} on the board, {_nth(place)} by the race's rules")
-        for row in rows
+        for row, place in zip(rows, due, strict=True)
     ]
 
 

@@ -42,8 +42,8 @@ class Evaluator:
         self._seed = (settings.seed + SEED) % 2**32
         direction = "reverse" if settings.direction == "reverse" else "forward"
         self._rules = replace(RULE_SETS["first_lap"], direction=direction)
-        self._is_far = len(tracks) > 1
-        driven = _evenly(tracks, settings) if self._is_far else tracks[:1]
+        self._is_of_many = len(tracks) > 1
+        driven = _evenly(tracks, settings) if self._is_of_many else tracks[:1]
         self._patience = max(track.length for track in driven) / SLOWEST
         self._trials = trial_simulation(
             driven,
@@ -75,7 +75,7 @@ class Evaluator:
         if self.last is None:
             return None
         laps = self.last.lap_times
-        lap = float(np.mean(laps)) if self._is_far and laps else self.last.best_lap
+        lap = float(np.mean(laps)) if self._is_of_many and laps else self.last.best_lap
         return self.last.completion, -(lap or NO_LAP)
 
     @property

@@ -9,7 +9,7 @@ from racecraft.checks import check_choice
 from racecraft.learn import DistillConfig
 
 ROADS: Final = ("library", "generated:0..47,radius=0.45,difficulty=0.9")
-"""Many and tight, none of them official."""
+"""Many and tight; of the official routes only `reinvent_2018`'s shape is among them."""
 
 RECIPES: Final[Mapping[str, Mapping[str, Any]]] = {
     # Once round every road, at a walk: AWS's own default reward pays for being on the road, not for haste.

@@ -1,8 +1,8 @@
 """Tour roads it has never seen: pay for every metre really gained, but not for taking a bend at the limit of the tyres.
 
 As `lap_time`, with two margins. Metres near the border are worth half of those in the middle, and accelerating across
-the road harder than COMFORT costs: that leaves half of the grip for what a driver could not know. It remembers where
-the car was a step ago. Best with `--recipe everywhere`.
+the road harder than COMFORT costs: that leaves a third of the front tyres' grip for what a driver could not know. It
+remembers where the car was a step ago. Best with `--recipe everywhere`.
 """
 
 import math
