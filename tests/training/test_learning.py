@@ -11,9 +11,9 @@ import pytest
 from tiny_runs import Recorder
 
 from racecraft import evaluate, train
+from racecraft.agent import SensorSuite
 from racecraft.judging.ladder import rate_models
 from racecraft.learn import PPOConfig
-from racecraft.learn.native_learner import NativeLearner
 from racecraft.sim import Bots, Objects
 from racecraft.training import Opponents, resume
 
@@ -42,8 +42,8 @@ def test_without_learning_it_does_not(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_blind_car_does_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The control of the control: what it learns, it learns from what it sees."""
-    encode = NativeLearner.encode
-    monkeypatch.setattr(NativeLearner, "encode", lambda learner, frames: encode(learner, np.zeros_like(frames)))
+    read = SensorSuite.read
+    monkeypatch.setattr(SensorSuite, "read", lambda sensors, cars: np.zeros_like(read(sensors, cars)))
     result = train("oval", until="5 laps or 30000 steps", seed=1, root=tmp_path)
     assert (result.reason, result.laps_completed) == ("steps", 0)
 

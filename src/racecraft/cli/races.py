@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeVar
 
 import typer
 
@@ -203,54 +203,47 @@ def verify(
 
     Of a race all replays, and that its starts were drawn beforehand and its result is theirs.
     """
-    from racecraft.judging.board_verification import is_address, published_at
+    from racecraft.cli import verify_text
+    from racecraft.judging.board_verification import is_address, published_at, verify_board
 
     if replay is None:
         if not is_address(race):
             context.fail("Give a replay, or the address of a league's race with --race.")
-        _verify_board(race, commitment, as_json=as_json)
+        _tell(verify_board(race, commitment=commitment), verify_text.say_board_verified, as_json=as_json)
         return
     if commitment:
         context.fail("--commitment goes with the address of a race alone; with a replay --race takes it.")
     if replay.is_dir() or replay.suffix == ".json":
         from racecraft.judging.verification import verify_race
 
-        whole = verify_race(replay, race=race)
-        if as_json:
-            print_json(whole.to_dict())
-        else:
-            from racecraft.cli.verify_text import say_race_verified
-
-            say_race_verified(whole)
-        if not whole.is_genuine:
-            raise typer.Exit(1)
+        _tell(verify_race(replay, race=race), verify_text.say_race_verified, as_json=as_json)
         return
     from racecraft.judging.verification import published
     from racecraft.replay import read_replay
     from racecraft.replay import verify as drive_again
 
     of = published_at(race) if is_address(race) else published(race) if race else None
-    found = drive_again(read_replay(replay), race=of)
+    _tell(drive_again(read_replay(replay), race=of), verify_text.say_verified, as_json=as_json)
+
+
+class _Verified(Protocol):
+    """What one of the ways to verify found."""
+
+    @property
+    def is_genuine(self) -> bool: ...
+
+    def to_dict(self) -> dict[str, Any]: ...
+
+
+_V = TypeVar("_V", bound=_Verified)
+
+
+def _tell(found: _V, say: Callable[[_V], None], *, as_json: bool) -> None:
+    """Print it; what is not genuine is an error."""
     if as_json:
         print_json(found.to_dict())
     else:
-        from racecraft.cli.verify_text import say_verified
-
-        say_verified(found)
-    if not found.is_genuine:
-        raise typer.Exit(1)
-
-
-def _verify_board(address: str, commitment: str, *, as_json: bool) -> None:
-    from racecraft.judging.board_verification import verify_board
-
-    found = verify_board(address, commitment=commitment)
-    if as_json:
-        print_json(found.to_dict())
-    else:
-        from racecraft.cli.verify_text import say_board_verified
-
-        say_board_verified(found)
+        say(found)
     if not found.is_genuine:
         raise typer.Exit(1)
 
