@@ -1,16 +1,16 @@
 #include "camera_model.hpp"
 
-#include <stdexcept>
 #include <string>
 
 #include "camera_kernel.hpp"
 #include "racecraft/camera_tables.hpp"
+#include "refuse.hpp"
 
 namespace racecraft {
 namespace {
 
 void check(const CameraSpec& spec) {
-    const auto fail = [](const std::string& what) { throw std::invalid_argument("Camera " + what); };
+    const auto fail = [](const std::string& what) { refuse("Camera " + what); };
     if (spec.width < 1 || spec.width > kMaxImageWidth || spec.height < 1 || spec.height > kMaxImageWidth) {
         fail("size " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " must be 1 to " +
              std::to_string(kMaxImageWidth) + " pixels in each direction.");

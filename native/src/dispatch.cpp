@@ -1,7 +1,8 @@
 #include "dispatch.hpp"
 
 #include <atomic>
-#include <stdexcept>
+
+#include "refuse.hpp"
 
 #if defined(__x86_64__)
 #include <cpuid.h>
@@ -87,8 +88,7 @@ void set_isa(const std::string& name) {
         }
         allowed += std::string(allowed.empty() ? "'" : ", '") + isa_name(isa) + "'";
     }
-    throw std::invalid_argument("Instruction set '" + name + "' cannot run here; choose one of " + allowed +
-                                ".");
+    refuse("Instruction set '" + name + "' cannot run here; choose one of " + allowed + ".");
 }
 
 }  // namespace racecraft

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <stdexcept>
 
 #include "exposure_kernel.hpp"
 #include "lens_kernel.hpp"
@@ -11,6 +10,7 @@
 #include "object_painter_kernel.hpp"
 #include "object_rule.hpp"
 #include "racecraft/folds.hpp"
+#include "refuse.hpp"
 #include "vehicle_kernel.hpp"
 
 namespace racecraft {
@@ -242,7 +242,7 @@ void Engine::for_chunks(size_t most, Work&& work) {
 }
 
 void Engine::reset(const bool* mask, const uint64_t* seeds) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     for_chunks(kLanes, [&](int32_t begin, int32_t end, DriveHere& here) {
         for (int32_t first = begin; first < end; first += batch_.cars_per_race) {
             uint32_t who = 0;
@@ -258,7 +258,7 @@ void Engine::reset(const bool* mask, const uint64_t* seeds) {
 }
 
 void Engine::step(const float* actions) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const Commands commands{steering_command_.data(), speed_command_.data(), is_moving_.data(), 0};
     // With a camera a car costs microseconds, without one nanoseconds: hand out work in matching portions.
     for_chunks(camera_ != nullptr ? kLanes : 64 * kLanes, [&](int32_t begin, int32_t end, DriveHere& here) {
@@ -267,7 +267,7 @@ void Engine::step(const float* actions) {
 }
 
 void Engine::set_pose(size_t car, float x, float y, float heading, float speed) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const int32_t env = static_cast<int32_t>(car);
     VehicleState state{};
     state.x = x;
@@ -289,7 +289,7 @@ void Engine::set_pose(size_t car, float x, float y, float heading, float speed) 
 }
 
 void Engine::freeze(size_t car, int steps) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     episodes_[car].frozen_steps = steps;
     show_others(static_cast<int32_t>(car));
 }
@@ -323,7 +323,7 @@ size_t Engine::num_bytes() const {
 }
 
 std::vector<uint8_t> Engine::save() const {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     return snapshot();
 }
 
@@ -337,19 +337,18 @@ std::vector<uint8_t> Engine::snapshot() const {
 }
 
 void Engine::load(const uint8_t* bytes, size_t size) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     size_t expected = 0;
     visit_saved([&](const void*, size_t part) { expected += part; });
     if (size != expected) {
-        throw std::invalid_argument("Saved simulation state has " + std::to_string(size) +
-                                    " bytes, this simulation needs " + std::to_string(expected) +
-                                    ": it must have the same number of cars and version.");
+        refuse("Saved simulation state has " + std::to_string(size) + " bytes, this simulation needs " +
+               std::to_string(expected) + ": it must have the same number of cars and version.");
     }
     const std::vector<uint8_t> before = snapshot();
     restore(bytes);
     if (const char* fault = find_fault()) {
         restore(before.data());
-        throw std::invalid_argument(std::string("Saved simulation state ") + fault);
+        refuse(std::string("Saved simulation state ") + fault);
     }
     DriveHere here{*this};
     for (int32_t env = 0; env < batch_.num_envs; ++env) restore_car(batch_, env, here);

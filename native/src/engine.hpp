@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera_model.hpp"
+#include "lock.hpp"
 #include "racecraft/race.hpp"
 #include "thread_pool.hpp"
 #include "track_store.hpp"
@@ -107,7 +108,7 @@ class Engine {
     const char* find_fault() const;  // null if the state is one that this engine can go on from
 
     uint64_t seed_;
-    mutable std::mutex mutex_;  // held by every public call that reads or writes cars
+    mutable Mutex mutex_;  // held by every public call that reads or writes cars
     std::vector<TrackStore> tracks_;
     std::vector<TrackGeometry> geometries_;  // of the tracks, side by side
     std::vector<std::shared_ptr<const GroundMap>> grounds_;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string>
+
+#include "refuse.hpp"
 
 namespace racecraft {
 namespace {
@@ -19,8 +20,8 @@ std::vector<Point> read_points(const double* values, int count, const char* name
     for (int i = 0; i < count; ++i) {
         const Point p = {values[2 * i], values[2 * i + 1]};
         if (!std::isfinite(p.x) || !std::isfinite(p.y)) {
-            throw std::invalid_argument("Track " + std::string(name) + "[" + std::to_string(i) +
-                                        "] is not finite; every coordinate must be a number in metres.");
+            refuse("Track " + std::string(name) + "[" + std::to_string(i) +
+                   "] is not finite; every coordinate must be a number in metres.");
         }
         if (points.empty() || p.x != points.back().x || p.y != points.back().y) points.push_back(p);
     }
@@ -28,7 +29,7 @@ std::vector<Point> read_points(const double* values, int count, const char* name
         points.pop_back();
     }
     if (points.size() < 2) {
-        throw std::invalid_argument("Track " + std::string(name) + " has fewer than two different points.");
+        refuse("Track " + std::string(name) + " has fewer than two different points.");
     }
     return points;
 }

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "ground_lines.hpp"
+#include "refuse.hpp"
 
 namespace racecraft {
 namespace {
@@ -335,8 +335,8 @@ class Painter {
 GroundMap::GroundMap(const TrackOutline& outline, const GroundOptions& options) {
     GroundLines lines = read_lines(outline);
     if (!(options.texel >= 0.001f && options.texel <= 1.0f)) {
-        throw std::invalid_argument("Ground texel = " + std::to_string(options.texel) +
-                                    " m must lie between 0.001 and 1 m; 0.01 is usual.");
+        refuse("Ground texel = " + std::to_string(options.texel) +
+               " m must lie between 0.001 and 1 m; 0.01 is usual.");
     }
 
     view_.min_x = static_cast<float>(lines.low.x) - kRoomMargin;

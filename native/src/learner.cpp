@@ -124,7 +124,7 @@ ActorCriticShape Learner::shape() const {
 }
 
 void Learner::encode(const uint8_t* sight, size_t count, uint8_t* out) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const NetworkSpec& spec = network_.spec;
     pool_.for_each(count, [&](size_t i) {
         const uint8_t* from = sight + i * spec.sight_size();
@@ -148,7 +148,7 @@ void Learner::read_sample(Worker& worker, const uint8_t* observation, size_t sam
 }
 
 void Learner::policy(const uint8_t* observations, const float* states, size_t count, float* out) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const NetworkSpec& spec = network_.spec;
     const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, kChunk);
     const size_t num_actions = static_cast<size_t>(spec.num_actions);
@@ -173,7 +173,7 @@ void Learner::policy(const uint8_t* observations, const float* states, size_t co
 }
 
 void Learner::values(const uint8_t* observations, const float* states, size_t count, float* out) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const NetworkSpec& spec = network_.spec;
     const size_t chunk = std::clamp((count + workers_.size() - 1) / workers_.size(), size_t{1}, kChunk);
     const size_t stride = static_cast<size_t>(network_.critic.layers.back().shape.out_channels);
@@ -191,7 +191,7 @@ void Learner::values(const uint8_t* observations, const float* states, size_t co
 }
 
 UpdateStats Learner::update(const Minibatch& minibatch, const Objective& objective) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const size_t size = minibatch.size;
     const size_t num_groups = std::clamp((size + kMinGroupSize - 1) / kMinGroupSize, size_t{1}, kMaxGroups);
     prepare_training(size, num_groups);
@@ -225,13 +225,13 @@ UpdateStats Learner::update(const Minibatch& minibatch, const Objective& objecti
 }
 
 void Learner::read(Part part, float* published) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     const FloatBuffer& from = part == Part::weights ? weights_ : part == Part::moment1 ? moment1_ : moment2_;
     network_.publish(from.data(), published);
 }
 
 void Learner::write(Part part, const float* published) {
-    const std::lock_guard lock(mutex_);
+    const Lock lock(mutex_);
     FloatBuffer& to = part == Part::weights ? weights_ : part == Part::moment1 ? moment1_ : moment2_;
     network_.pack(published, to.data());
     if (part == Part::weights) is_transposed_ = false;

@@ -16,10 +16,10 @@
 
 #include <atomic>
 #include <cstdint>
-#include <mutex>
 #include <vector>
 
 #include "actor_critic.hpp"
+#include "lock.hpp"
 #include "network.hpp"
 #include "network_kernel.hpp"
 #include "thread_pool.hpp"
@@ -118,7 +118,7 @@ class Learner : public ActorCritic {
 
     Network network_;
     ThreadPool pool_;
-    std::mutex mutex_;  // one caller at a time
+    Mutex mutex_;  // one caller at a time
     FloatBuffer weights_, moment1_, moment2_, gradient_, transposed_;
     FloatBuffer group_gradients_;  // (groups, num_grouped)
     int64_t num_updates_ = 0;

@@ -1,8 +1,9 @@
 #include "network.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
+
+#include "refuse.hpp"
 
 namespace racecraft {
 namespace {
@@ -14,7 +15,7 @@ int padded(int channels) {
 }
 
 void require(bool is_met, const std::string& message) {
-    if (!is_met) throw std::invalid_argument(message);
+    if (!is_met) refuse(message);
 }
 
 constexpr size_t kWideWeights = size_t{1} << 18;  // 1 MB: what an L2 cache holds

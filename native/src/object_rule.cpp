@@ -1,13 +1,14 @@
 #include "object_rule.hpp"
 
 #include <cmath>
-#include <stdexcept>
+
+#include "refuse.hpp"
 
 namespace racecraft {
 namespace {
 
 void check(bool is_fine, const char* text) {
-    if (!is_fine) throw std::invalid_argument(text);
+    if (!is_fine) refuse(text);
 }
 
 void check_group(const ObjectGroup& group) {

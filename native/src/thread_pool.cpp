@@ -1,5 +1,11 @@
 #include "thread_pool.hpp"
 
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <vector>
+
 #if defined(__linux__)
 #include <sched.h>
 #endif
@@ -18,30 +24,49 @@ int available_cores() {
 
 }  // namespace
 
-ThreadPool::ThreadPool(int num_threads) {
-    const int threads = num_threads > 0 ? num_threads : available_cores();
-    for (int i = 1; i < threads; ++i) workers_.emplace_back([this] { work(); });
-}
+class ThreadPool::Workers {
+  public:
+    explicit Workers(int count) {
+        for (int i = 0; i < count; ++i) threads_.emplace_back([this] { work(); });
+    }
+    ~Workers();
 
-ThreadPool::~ThreadPool() {
+    void run(const Loop& loop);
+
+  private:
+    void work();
+    void drain(const Loop& loop);
+
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    std::condition_variable finished_;
+    Loop loop_{};
+    size_t generation_ = 0;  // guarded by mutex_; counts loops, so that a worker joins each once
+    size_t busy_ = 0;        // guarded by mutex_; workers that have not left the current loop
+    bool stopping_ = false;  // guarded by mutex_
+    std::atomic<size_t> next_{0};
+    std::vector<std::thread> threads_;
+};
+
+ThreadPool::Workers::~Workers() {
     {
         const std::lock_guard lock(mutex_);
         stopping_ = true;
     }
     wake_.notify_all();
-    for (std::thread& worker : workers_) worker.join();
+    for (std::thread& thread : threads_) thread.join();
 }
 
-void ThreadPool::drain(const Loop& loop) {
+void ThreadPool::Workers::drain(const Loop& loop) {
     for (size_t i = next_.fetch_add(1); i < loop.count; i = next_.fetch_add(1)) loop.call(loop.context, i);
 }
 
-void ThreadPool::run(const Loop& loop) {
+void ThreadPool::Workers::run(const Loop& loop) {
     {
         const std::lock_guard lock(mutex_);
         loop_ = loop;
         next_.store(0);
-        busy_ = workers_.size();
+        busy_ = threads_.size();
         ++generation_;
     }
     wake_.notify_all();
@@ -50,7 +75,7 @@ void ThreadPool::run(const Loop& loop) {
     finished_.wait(lock, [this] { return busy_ == 0; });
 }
 
-void ThreadPool::work() {
+void ThreadPool::Workers::work() {
     size_t joined = 0;
     std::unique_lock lock(mutex_);
     while (true) {
@@ -63,6 +88,16 @@ void ThreadPool::work() {
         lock.lock();
         if (--busy_ == 0) finished_.notify_one();
     }
+}
+
+ThreadPool::ThreadPool(int num_threads) : num_threads_(num_threads > 0 ? num_threads : available_cores()) {
+    if (num_threads_ > 1) workers_ = std::make_shared<Workers>(num_threads_ - 1);
+}
+
+ThreadPool::~ThreadPool() = default;
+
+void ThreadPool::run(const Loop& loop) {
+    workers_->run(loop);
 }
 
 }  // namespace racecraft

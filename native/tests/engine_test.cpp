@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 #include <stdexcept>
+#include <thread>
 
 #include "check.hpp"
 #include "dispatch.hpp"

@@ -2,8 +2,11 @@
 // well.
 #include "thread_pool.hpp"
 
+#include <atomic>
 #include <memory>
 #include <set>
+#include <thread>
+#include <vector>
 
 #include "check.hpp"
 
