@@ -16,10 +16,13 @@ PAGES := src/racecraft/serve/pages/index.html
 NODE := web/node_modules/.package-lock.json
 WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/* web/src/*/*/*)
 
+# The compiler of WebAssembly, in a folder of its own: nothing else needs it.
+ZIG := build/zig/ziglang/zig
+
 # Without bytecode kept, every process of a test compiles what it imports anew: most of the time of a server's start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help train console wheel test test-fast mutants lint format bench setup build stub clean requirements
+.PHONY: FORCE help train console site wheel test test-fast mutants lint format bench setup build stub clean requirements
 
 help:  ## show this list
 	@grep -hE '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | awk -F'\t' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -29,6 +32,15 @@ train: $(VENV)/.built  ## set up if needed, then train a car from camera pixels 
 
 console: $(VENV)/.built $(VENV)/.serve $(PAGES)  ## set up if needed, build the console's pages, and open it in a browser
 	$(BIN)/racecraft serve
+
+WASM = $(MAKE) --no-print-directory -j$$($(BIN)/python -c 'import os; print(os.cpu_count() or 1)') -f native/wasm/Makefile ZIG=$(CURDIR)/$(ZIG)
+site: $(ZIG)  ## compile the core to WebAssembly, into build/wasm, for a page that needs no installation
+	@$(WASM)
+
+build/wasm/%.wasm: $(ZIG) FORCE
+	@$(WASM) $@
+
+FORCE:
 
 wheel: $(VENV)/.train $(PAGES)  ## build dist/: an sdist, and a wheel for this Python and machine with the console's pages inside
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(UV) build -q --sdist --wheel --python $(BIN)/python --no-build-isolation --out-dir dist
@@ -47,13 +59,13 @@ lint: $(VENV)/.built $(VENV)/.dev $(NODE)  ## ruff, mypy --strict, clang-format,
 	$(BIN)/ruff check --no-cache .  # whose key knows nothing of files that moved
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/clang-format --dry-run --Werror native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/tests/*.cpp
+	$(BIN)/clang-format --dry-run --Werror native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/wasm/*.[ch]pp native/tests/*.cpp
 	cd web && npm run --silent lint
 
 format: $(VENV)/.dev $(NODE)  ## apply ruff, clang-format and prettier
 	$(BIN)/ruff check --fix-only -q .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/tests/*.cpp
+	$(BIN)/clang-format -i native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/wasm/*.[ch]pp native/tests/*.cpp
 	cd web && npm run --silent format
 
 bench: $(VENV)/.built $(VENV)/.dev  ## measure everything, rivals included, and print the table
@@ -74,6 +86,7 @@ requirements: $(UV)  ## pin the newest allowed versions again
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/dev.in -o requirements/dev.txt
 	$(UV) pip compile -q --universal --python-version 3.11 --generate-hashes --no-header --extra serve --extra tune -c requirements/dev.txt pyproject.toml -o requirements/serve.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/uv.in -o requirements/uv.txt
+	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/site.in -o requirements/site.txt
 
 $(UV): requirements/uv.txt
 	@test -n "$(PYTHON)" || { echo "Racecraft needs Python 3.11 or newer; none was found on PATH."; exit 1; }
@@ -96,6 +109,11 @@ $(VENV)/.dev: $(UV) $(VENV)/.train requirements/dev.txt
 $(VENV)/.serve: $(UV) $(VENV)/.train requirements/serve.txt
 	@echo "Packages of the console's server ..."
 	@$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/serve.txt
+	@touch $@
+
+$(ZIG): $(UV) requirements/site.txt
+	@echo "A compiler of WebAssembly from PyPI, some 90 MB ..."
+	@$(UV) pip install -q --python $(BIN)/python --target build/zig --require-hashes -r requirements/site.txt
 	@touch $@
 
 $(NODE): web/package.json web/package-lock.json

@@ -1,12 +1,15 @@
 // Vectors of 32-bit integers for kernels, one definition per instruction set: 16 lanes with AVX-512, 8 with
-// AVX2. Include only from *_kernel.cpp. Without RC_HAS_LANES a kernel runs its scalar code, which gives the
-// same bits.
+// AVX2, 4 with WebAssembly's SIMD. Include only from *_kernel.cpp. Without RC_HAS_LANES a kernel runs its
+// scalar code, which gives the same bits.
 #pragma once
 
 #include "racecraft/platform.hpp"
 
 #if defined(__AVX2__)
 #include <immintrin.h>
+#define RC_HAS_LANES 1
+#elif defined(__wasm_simd128__)
+#include <wasm_simd128.h>
 #define RC_HAS_LANES 1
 #endif
 
@@ -165,6 +168,90 @@ RC_HD void store_halves(uint8_t* out, Lanes a) {
     const __m256i packed = _mm256_packus_epi32(a.v, a.v);
     const __m256i ordered = _mm256_permute4x64_epi64(packed, 0x08);
     _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm256_castsi256_si128(ordered));
+}
+
+#elif defined(__wasm_simd128__)
+
+struct Lanes {
+    static constexpr int kCount = 4;
+    v128_t v;
+};
+using LaneMask = v128_t;
+
+RC_HD Lanes splat(int32_t value) {
+    return {wasm_i32x4_splat(value)};
+}
+RC_HD Lanes lane_numbers() {
+    return {wasm_i32x4_const(0, 1, 2, 3)};
+}
+RC_HD LaneMask first_lanes(int count) {
+    return wasm_i32x4_gt(wasm_i32x4_splat(count), lane_numbers().v);
+}
+RC_HD Lanes operator+(Lanes a, Lanes b) {
+    return {wasm_i32x4_add(a.v, b.v)};
+}
+RC_HD Lanes operator-(Lanes a, Lanes b) {
+    return {wasm_i32x4_sub(a.v, b.v)};
+}
+RC_HD Lanes operator*(Lanes a, Lanes b) {
+    return {wasm_i32x4_mul(a.v, b.v)};
+}
+RC_HD Lanes operator&(Lanes a, Lanes b) {
+    return {wasm_v128_and(a.v, b.v)};
+}
+RC_HD Lanes operator|(Lanes a, Lanes b) {
+    return {wasm_v128_or(a.v, b.v)};
+}
+RC_HD Lanes shift_left(Lanes a, int bits) {
+    return {wasm_i32x4_shl(a.v, static_cast<uint32_t>(bits))};
+}
+RC_HD Lanes shift_right(Lanes a, int bits) {
+    return {wasm_u32x4_shr(a.v, static_cast<uint32_t>(bits))};
+}
+RC_HD Lanes shift_right_signed(Lanes a, int bits) {
+    return {wasm_i32x4_shr(a.v, static_cast<uint32_t>(bits))};
+}
+RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
+    return {wasm_i32x4_min(wasm_i32x4_max(a.v, low.v), high.v)};
+}
+// Bytes 0 and 2 of each lane as halves, then bytes 1 and 3: there is no product of bytes.
+RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
+    const v128_t first = wasm_i32x4_dot_i16x8(wasm_v128_and(a.v, wasm_i16x8_const_splat(255)),
+                                              wasm_i16x8_shr(wasm_i16x8_shl(b.v, 8), 8));
+    const v128_t second = wasm_i32x4_dot_i16x8(wasm_u16x8_shr(a.v, 8), wasm_i16x8_shr(b.v, 8));
+    return {wasm_i32x4_add(first, second)};
+}
+RC_HD Lanes dot_halves(Lanes a, Lanes b) {
+    return {wasm_i32x4_dot_i16x8(a.v, b.v)};
+}
+// The table as two vectors of bytes; where a byte's number is not one of the vector's, a swizzle gives 0.
+RC_HD Lanes look_up(const int32_t* table, Lanes index) {
+    const v128_t first_byte = wasm_i32x4_mul(index.v, wasm_i32x4_const_splat(0x04040404));
+    const v128_t byte = wasm_v128_or(first_byte, wasm_i32x4_const_splat(0x03020100));
+    const v128_t low = wasm_i8x16_swizzle(wasm_v128_load(table), byte);
+    const v128_t high =
+        wasm_i8x16_swizzle(wasm_v128_load(table + 4), wasm_i8x16_sub(byte, wasm_i8x16_const_splat(16)));
+    return {wasm_v128_or(low, high)};
+}
+RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
+    v128_t all = wasm_v128_load32_zero(base + wasm_u32x4_extract_lane(index.v, 0));
+    all = wasm_v128_load32_lane(base + wasm_u32x4_extract_lane(index.v, 1), all, 1);
+    all = wasm_v128_load32_lane(base + wasm_u32x4_extract_lane(index.v, 2), all, 2);
+    return {wasm_v128_load32_lane(base + wasm_u32x4_extract_lane(index.v, 3), all, 3)};
+}
+// Lanes outside the mask read the first entry.
+RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
+    return {wasm_v128_and(gather_all(base, {wasm_v128_and(index.v, mask)}).v, mask)};
+}
+RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
+    wasm_v128_store(sums, wasm_i32x4_add(wasm_v128_load(sums), wasm_v128_and(value.v, mask)));
+}
+RC_HD Lanes load(const int32_t* values) {
+    return {wasm_v128_load(values)};
+}
+RC_HD void store_halves(uint8_t* out, Lanes a) {
+    const v128_t packed = wasm_i16x8_shuffle(a.v, a.v, 0, 2, 4, 6, 0, 2, 4, 6);
+    wasm_v128_store64_lane(out, packed, 0);
 }
 
 #endif

@@ -1,5 +1,5 @@
 // Vectors of floats for the network's kernels, one definition per instruction set: 16 lanes with AVX-512, 8
-// with AVX2, 4 with SSE2 or otherwise. Include only from *_kernel.cpp.
+// with AVX2, 4 with SSE2, WebAssembly's SIMD or otherwise. Include only from *_kernel.cpp.
 //
 // Lanes never meet: every operation works on each lane by itself, in IEEE 754 arithmetic with an explicit
 // fused multiply-add, so the width of a vector cannot change a result.
@@ -13,6 +13,8 @@
 #include <immintrin.h>
 #elif defined(__SSE2__)
 #include <emmintrin.h>
+#elif defined(__wasm_simd128__)
+#include <wasm_simd128.h>
 #endif
 
 #if defined(__GNUC__) && !defined(__clang__)
@@ -165,6 +167,71 @@ RC_HD FloatLanes relu(FloatLanes a) {
 }
 RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
     return {_mm_and_ps(_mm_cmpgt_ps(a.v, _mm_setzero_ps()), b.v)};
+}
+
+#elif defined(__wasm_simd128__)
+
+struct FloatLanes {
+    static constexpr int kCount = 4;
+    v128_t v;
+};
+
+RC_HD FloatLanes splat(float value) {
+    return {wasm_f32x4_splat(value)};
+}
+RC_HD FloatLanes load(const float* from) {
+    return {wasm_v128_load(from)};
+}
+RC_HD void store(float* to, FloatLanes a) {
+    wasm_v128_store(to, a.v);
+}
+RC_HD FloatLanes operator+(FloatLanes a, FloatLanes b) {
+    return {wasm_f32x4_add(a.v, b.v)};
+}
+RC_HD FloatLanes operator-(FloatLanes a, FloatLanes b) {
+    return {wasm_f32x4_sub(a.v, b.v)};
+}
+RC_HD FloatLanes operator*(FloatLanes a, FloatLanes b) {
+    return {wasm_f32x4_mul(a.v, b.v)};
+}
+#if defined(__wasm_relaxed_simd__)
+// Whether the product is rounded before the sum is the machine's choice: native/wasm/fused_kernel.cpp asks.
+RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
+    return {wasm_f32x4_relaxed_madd(a.v, b.v, c.v)};
+}
+#else
+// As add_rounding_to_odd() of SSE2, above.
+RC_HD v128_t add_rounding_to_odd(v128_t a, v128_t b) {
+    const v128_t sum = wasm_f64x2_add(a, b);
+    const v128_t b_part = wasm_f64x2_sub(sum, a);
+    const v128_t error =
+        wasm_f64x2_add(wasm_f64x2_sub(a, wasm_f64x2_sub(sum, b_part)), wasm_f64x2_sub(b, b_part));
+    const v128_t zero = wasm_f64x2_const_splat(0.0);
+    const v128_t one = wasm_i64x2_const_splat(1);
+    // false for NaN, which is the error of an infinite sum
+    const v128_t inexact = wasm_v128_or(wasm_f64x2_lt(error, zero), wasm_f64x2_lt(zero, error));
+    const v128_t even = wasm_i64x2_eq(wasm_v128_and(sum, one), wasm_i64x2_const_splat(0));
+    const v128_t step = wasm_v128_or(wasm_i64x2_shr(wasm_v128_xor(sum, error), 63), one);
+    return wasm_i64x2_add(sum, wasm_v128_and(step, wasm_v128_and(even, inexact)));
+}
+RC_HD v128_t fused_pair(v128_t a, v128_t b, v128_t c) {  // of the lower two lanes
+    const v128_t product = wasm_f64x2_mul(wasm_f64x2_promote_low_f32x4(a), wasm_f64x2_promote_low_f32x4(b));
+    return wasm_f32x4_demote_f64x2_zero(add_rounding_to_odd(product, wasm_f64x2_promote_low_f32x4(c)));
+}
+RC_HD v128_t upper_pair(v128_t a) {
+    return wasm_i64x2_shuffle(a, a, 1, 1);
+}
+RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
+    const v128_t lower = fused_pair(a.v, b.v, c.v);
+    const v128_t upper = fused_pair(upper_pair(a.v), upper_pair(b.v), upper_pair(c.v));
+    return {wasm_i64x2_shuffle(lower, upper, 0, 2)};
+}
+#endif
+RC_HD FloatLanes relu(FloatLanes a) {
+    return {wasm_f32x4_pmax(a.v, wasm_f32x4_const_splat(0.0f))};
+}
+RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
+    return {wasm_v128_and(wasm_f32x4_gt(a.v, wasm_f32x4_const_splat(0.0f)), b.v)};
 }
 
 #else

@@ -432,25 +432,30 @@ def native_camera(camera: CameraSpec) -> _native.CameraSpec:
 
 def native_track(track: Track) -> _native.NativeTrack:
     """The core's form of a track: both directions, with tables of width and curvature."""
+    return _native.NativeTrack(**track_arrays(track))
+
+
+def track_arrays(track: Track) -> dict[str, Any]:
+    """What the core is told of a track, by the names of its arguments; a browser's tab gets the same."""
     twin = track.reversed()
     count = max(2, int(np.ceil(track.length / TABLE_SPACING)))
     # On a closed track the sample after the last is the first again; an open one needs both ends.
     steps = count if track.is_closed else count - 1
     s = np.arange(count) * (track.length / steps)
     widths = track.width_at(s).astype(np.float32)
-    return _native.NativeTrack(
-        track.centerline,
-        track.inner,
-        track.outer,
-        twin.centerline,
-        twin.inner,
-        twin.outer,
-        widths,
-        track.curvature_at(s).astype(np.float32),
-        np.roll(widths[::-1], 1 if track.is_closed else 0),
-        twin.curvature_at(s).astype(np.float32),
-        steps / track.length,
-        track.is_closed,
-        track.waypoint_indices,
-        twin.waypoint_indices,
-    )
+    return {
+        "centerline": track.centerline,
+        "inner": track.inner,
+        "outer": track.outer,
+        "reversed_centerline": twin.centerline,
+        "reversed_inner": twin.inner,
+        "reversed_outer": twin.outer,
+        "widths": widths,
+        "curvatures": track.curvature_at(s).astype(np.float32),
+        "reversed_widths": np.roll(widths[::-1], 1 if track.is_closed else 0),
+        "reversed_curvatures": twin.curvature_at(s).astype(np.float32),
+        "samples_per_metre": steps / track.length,
+        "is_closed": track.is_closed,
+        "waypoints": track.waypoint_indices,
+        "reversed_waypoints": twin.waypoint_indices,
+    }

@@ -1,0 +1,147 @@
+// Drives and trains what cases.json says with the core's WebAssembly, through the pages' own face of it, and prints the
+// hashes of all that came out:  node bits.mjs WEB CORE.wasm CASES.json
+import { createHash } from "node:crypto";
+import { readFileSync } from "node:fs";
+import { dirname, join } from "node:path";
+import { pathToFileURL } from "node:url";
+
+const [pages, code, cases] = process.argv.slice(2);
+const { build } = await import(
+  pathToFileURL(join(pages, "node_modules/vite/dist/node/index.js")).href
+);
+
+/** A TypeScript file of the pages, bundled as they are. */
+async function load(file) {
+  const lib = { entry: join(pages, file), formats: ["es"] };
+  const bundled = await build({
+    configFile: false,
+    root: pages,
+    logLevel: "error",
+    build: { lib, write: false },
+  });
+  return import(
+    `data:text/javascript,${encodeURIComponent(bundled[0].output[0].code)}`
+  );
+}
+
+const KINDS = {
+  float64: Float64Array,
+  float32: Float32Array,
+  int32: Int32Array,
+  uint8: Uint8Array,
+};
+// An array as {dtype, data in base64}.
+const read = ({ dtype, data }) =>
+  new KINDS[dtype](new Uint8Array(Buffer.from(data, "base64")).buffer);
+const digest = (...arrays) => {
+  const hash = createHash("sha256");
+  for (const a of arrays)
+    hash.update(new Uint8Array(a.buffer, a.byteOffset, a.byteLength));
+  return hash.digest("hex");
+};
+
+function track(core, { lines, tables, waypoints, ...rest }) {
+  return core.track({
+    ...rest,
+    lines: read(lines),
+    tables: read(tables),
+    waypoints: read(waypoints),
+  });
+}
+
+function drive(core, { track: of, settings, vehicle, actions }) {
+  const cars = track(core, of).cars(settings, vehicle);
+  const all = read(actions);
+  const seen = { frames: [], rows: [], state: [], vehicles: [] };
+  for (let at = 0; at < all.length; at += 2 * cars.count) {
+    cars.step(all.slice(at, at + 2 * cars.count));
+    for (const [name, list] of Object.entries(seen))
+      list.push(cars[name].slice());
+    const { terminated, truncated } = cars;
+    cars.reset(terminated.map((flag, car) => flag | truncated[car]));
+  }
+  return Object.fromEntries(
+    Object.entries(seen).map(([name, list]) => [name, digest(...list)]),
+  );
+}
+
+function train(
+  core,
+  {
+    track: of,
+    settings,
+    vehicle,
+    network,
+    layers,
+    ppo,
+    table,
+    seed,
+    weights,
+    iterations,
+    pay,
+  },
+) {
+  const cars = track(core, of).cars(settings, vehicle);
+  const learner = core.learner(network);
+  learner.write("weights", read(weights));
+  const training = learner.train(cars, ppo, read(table));
+  const columns = core.names("row");
+  const [offset, width] = [
+    columns.indexOf(pay.distance),
+    columns.indexOf(pay.width),
+  ];
+  const ended = [];
+  for (let iteration = 0; iteration < iterations; ++iteration) {
+    training.begin(seed, iteration, training.totalSteps);
+    for (let isFull = false; !isFull;) {
+      if (!training.drive()) throw new Error("not finite");
+      const { rows, rowWidth } = cars;
+      const share = (car) =>
+        Math.abs(rows[car * rowWidth + offset]) / rows[car * rowWidth + width];
+      isFull = training.pay(
+        Float64Array.from({ length: cars.count }, (_, car) => 1 - share(car)),
+      );
+    }
+    if (!training.learn()) throw new Error("not finite");
+    ended.push(...training.ended().map(({ total, length }) => [total, length]));
+  }
+  return {
+    weights: digest(learner.read("weights")),
+    moment1: digest(learner.read("moment1")),
+    moment2: digest(learner.read("moment2")),
+    initial: digest(core.orthogonalWeights(seed, layers)),
+    best: digest(learner.best(cars, read(table))),
+    steps: training.totalSteps,
+    ended,
+  };
+}
+
+function refuse(core, { track: of }) {
+  const before = core.module.stack.value;
+  try {
+    track(core, of);
+  } catch (error) {
+    return { sentence: error.message, stack: before - core.module.stack.value };
+  }
+}
+
+const { Core, loadCore } = await load("src/tab/core.ts");
+const core = await Core.load(readFileSync(code));
+const run = { drive, train, refuse };
+const results = JSON.parse(readFileSync(cases, "utf8")).map(
+  ({ what, ...rest }) => run[what](core, rest),
+);
+// What a page takes where the first builds it asks for do not run.
+const bytes = readFileSync(code);
+const taken = async (broken) => {
+  const files = [];
+  const { isSlow } = await loadCore(async (file) => {
+    files.push(file);
+    return broken.includes(file) ? new Uint8Array(8) : bytes;
+  });
+  return [files.at(-1), isSlow];
+};
+const doors = core.isFused
+  ? [await taken(["core.wasm"]), await taken(["core.wasm", "exact.wasm"])]
+  : [];
+console.log(JSON.stringify({ isFused: core.isFused, doors, results }));

@@ -1,0 +1,275 @@
+// The native core in a tab, as objects: cars on a track, a network, and PPO's loop over both. The other side is
+// native/wasm/interface.cpp, where shapes and units are said.
+import { type Address, CoreModule } from "./module";
+
+/** A track as `racecraft.sim.simulation.native_track` gives it, both directions. */
+export interface TrackArrays {
+  lines: Float64Array; // (6, count, 2) m: centre, inner and outer, then the reversed twin's
+  count: number;
+  tables: Float32Array; // (4, samples): widths and curvatures, then the twin's
+  waypoints: Int32Array; // (2, count - 1)
+  samplesPerMetre: number;
+  isClosed: boolean;
+}
+
+/** Numbers by name: every one that the core names, and no other. */
+export type Settings = Record<string, number>;
+
+export interface NetworkSettings {
+  numbers: Settings;
+  convs: number[][]; // filters, kernel, stride
+  dense: number[];
+  criticUnits: number[];
+}
+
+export interface Episode {
+  total: number;
+  length: number;
+}
+
+const LISTS = { cars: 0, ppo: 1, network: 2, vehicle: 3, row: 4, state: 5 } as const;
+const PARTS = { weights: 0, moment1: 1, moment2: 2 } as const;
+const MOST_EPISODES = 4096;
+
+export interface LoadedCore {
+  core: Core;
+  /** Whether the learner works without this machine's multiply-add, right but many times slower. */
+  isSlow: boolean;
+}
+
+/** The fast build where its sums keep every bit, else the exact one, or without SIMD the scalar one. `read` gets a file
+ * of the site. */
+export async function loadCore(read: (file: string) => Promise<BufferSource>): Promise<LoadedCore> {
+  for (const file of ["core.wasm", "exact.wasm", "scalar.wasm"]) {
+    const code = await read(file);
+    if (!WebAssembly.validate(code)) continue;
+    const core = await Core.load(code);
+    if (core.isFused) return { core, isSlow: file !== "core.wasm" };
+  }
+  throw new Error("This browser runs no build of the core.");
+}
+
+export class Core {
+  private constructor(readonly module: CoreModule) {}
+
+  static async load(code: BufferSource): Promise<Core> {
+    return new Core(await CoreModule.load(code));
+  }
+
+  get isFused(): boolean {
+    return this.module.call("is_fused") !== 0;
+  }
+
+  names(list: keyof typeof LISTS): string[] {
+    return this.module.names(LISTS[list]);
+  }
+
+  track(track: TrackArrays): Track {
+    const { lines, count, tables, waypoints, samplesPerMetre, isClosed } = track;
+    const sizes: [string, number, number][] = [
+      ["lines", lines.length, 12 * count],
+      ["tables", tables.length % 4, 0],
+      ["waypoints", waypoints.length, 2 * (count - 1)],
+    ];
+    for (const [name, size, expected] of sizes) {
+      if (size !== expected) throw new Error(`The track's ${name} have a wrong size.`);
+    }
+    const at = this.module.with([lines, tables, waypoints], (atLines, atTables, atWaypoints) =>
+      this.module.call(
+        "make_track",
+        ...[atLines, count, atTables, tables.length / 4, atWaypoints, samplesPerMetre],
+        isClosed ? 1 : 0,
+      ),
+    );
+    return new Track(this, at);
+  }
+
+  learner(network: NetworkSettings): Learner {
+    const settings = [
+      ...this.ordered("network", network.numbers),
+      ...[network.convs.length, ...network.convs.flat()],
+      ...[network.dense.length, ...network.dense],
+      ...[network.criticUnits.length, ...network.criticUnits],
+    ];
+    const at = this.module.with([Float64Array.from(settings)], (from) => this.module.call("make_learner", from));
+    return new Learner(this, at);
+  }
+
+  /** Matrices that an untrained network begins with; layers are rows, columns and gain. */
+  orthogonalWeights(seed: number, layers: number[][]): Float32Array {
+    const size = layers.reduce((sum, [rows = 0, columns = 0]) => sum + rows * columns, 0);
+    return this.module.with([Float64Array.from(layers.flat()), new Float32Array(size)], (from, to) => {
+      this.module.call("orthogonal_weights", seed, from, layers.length, to);
+      return this.module.view(Float32Array, to, size).slice();
+    });
+  }
+
+  /** Settings as the core takes them; an Error where a name is missing or unknown. */
+  ordered(list: keyof typeof LISTS, settings: Settings): Float64Array {
+    const names = this.names(list);
+    const wrong = [
+      ...names.filter((name) => !Number.isFinite(settings[name])),
+      ...Object.keys(settings).filter((name) => !names.includes(name)),
+    ];
+    if (wrong.length) throw new Error(`These settings of ${list} are missing or unknown: ${wrong.join(", ")}.`);
+    return Float64Array.from(names, (name) => settings[name] ?? 0);
+  }
+}
+
+class Held {
+  constructor(
+    readonly core: Core,
+    readonly at: Address,
+  ) {}
+
+  protected call(name: string, ...args: number[]): number {
+    return this.core.module.call(name, this.at, ...args);
+  }
+}
+
+export class Track extends Held {
+  cars(settings: Settings, vehicle: Settings): Cars {
+    const { module } = this.core;
+    const arrays = [this.core.ordered("cars", settings), Float32Array.from(this.core.ordered("vehicle", vehicle))];
+    const at = module.with(arrays, (atSettings, atVehicle) => module.call("make_cars", this.at, atSettings, atVehicle));
+    return new Cars(this.core, at);
+  }
+
+  free(): void {
+    this.call("free_track");
+  }
+}
+
+export class Cars extends Held {
+  readonly count = this.call("num_envs");
+  readonly numPixels = this.call("num_pixels");
+  readonly rowWidth = this.call("row_width");
+  readonly stateWidth = this.call("state_width");
+
+  /** Steering angle in rad and speed in m/s, (N, 2). */
+  step(actions: Float32Array): void {
+    if (actions.length !== 2 * this.count) throw new Error(`${this.count} cars take as many pairs of commands.`);
+    this.core.module.with([actions], (at) => this.call("step_cars", at));
+  }
+
+  reset(mask?: Uint8Array): void {
+    if (!mask) this.call("reset_cars", 0);
+    else this.core.module.with([mask], (at) => this.call("reset_cars", at));
+  }
+
+  setPose(car: number, x: number, y: number, heading: number, speed = 0): void {
+    this.call("set_pose", car, x, y, heading, speed);
+  }
+
+  freeze(car: number, steps: number): void {
+    this.call("freeze_car", car, steps);
+  }
+
+  // Views of what is now: good until the next call.
+  get rows(): Float64Array {
+    return this.core.module.view(Float64Array, this.call("rows_of"), this.count * this.rowWidth);
+  }
+  get state(): Float32Array {
+    return this.core.module.view(Float32Array, this.call("state_of"), this.count * this.stateWidth);
+  }
+  get frames(): Uint8Array {
+    return this.core.module.view(Uint8Array, this.call("frames_of"), this.count * this.numPixels);
+  }
+  get vehicles(): Float32Array {
+    return this.core.module.view(Float32Array, this.call("vehicles_of"), 7 * this.count);
+  }
+  get terminated(): Uint8Array {
+    return this.core.module.view(Uint8Array, this.call("terminated_of"), this.count);
+  }
+  get truncated(): Uint8Array {
+    return this.core.module.view(Uint8Array, this.call("truncated_of"), this.count);
+  }
+
+  free(): void {
+    this.call("free_cars");
+  }
+}
+
+export class Learner extends Held {
+  readonly numParameters = this.call("num_parameters");
+
+  read(part: keyof typeof PARTS): Float32Array {
+    return this.core.module.with([new Float32Array(this.numParameters)], (to) => {
+      this.call("read_part", PARTS[part], to);
+      return this.core.module.view(Float32Array, to, this.numParameters).slice();
+    });
+  }
+
+  write(part: keyof typeof PARTS, values: Float32Array): void {
+    if (values.length !== this.numParameters) throw new Error("These weights are of another network.");
+    this.core.module.with([values], (from) => this.call("write_part", PARTS[part], from));
+  }
+
+  get numUpdates(): number {
+    return this.call("num_updates");
+  }
+  set numUpdates(count: number) {
+    this.call("set_num_updates", count);
+  }
+
+  /** What the policy likes best for each car, as commands (N, 2). `table` as for a training. */
+  best(cars: Cars, table: Float64Array): Float32Array {
+    return this.core.module.with([table, new Float32Array(2 * cars.count)], (from, to) => {
+      this.call("choose_best", cars.at, from, to);
+      return this.core.module.view(Float32Array, to, 2 * cars.count).slice();
+    });
+  }
+
+  /** PPO's loop; `table` are commands (A, 2), or the lowest and the highest of continuous actions (2, 2). */
+  train(cars: Cars, settings: Settings, table: Float64Array): Training {
+    const at = this.core.module.with([this.core.ordered("ppo", settings), table], (atSettings, atTable) =>
+      this.core.module.call("make_training", this.at, cars.at, atSettings, atTable),
+    );
+    return new Training(this.core, at);
+  }
+
+  free(): void {
+    this.call("free_learner");
+  }
+}
+
+export class Training extends Held {
+  begin(seed: number, iteration: number, totalSteps: number): void {
+    this.call("begin_iteration", seed, iteration, totalSteps);
+  }
+
+  /** One step of all cars; false where the policy's outputs are not finite, and nothing moved. */
+  drive(): boolean {
+    return this.call("drive") !== 0;
+  }
+
+  /** Pays that step; true where the rollout is full. */
+  pay(rewards: Float64Array): boolean {
+    return this.core.module.with([rewards], (at) => this.call("pay", at)) !== 0;
+  }
+
+  /** False where loss or gradient is not finite; that step was not taken. */
+  learn(): boolean {
+    return this.call("learn") !== 0;
+  }
+
+  get totalSteps(): number {
+    return this.call("total_steps");
+  }
+
+  /** Episodes that ended since begin(). */
+  ended(): Episode[] {
+    return this.core.module.with([new Float64Array(2 * MOST_EPISODES)], (to) => {
+      const count = Math.min(this.call("ended_episodes", to, MOST_EPISODES), MOST_EPISODES);
+      const numbers = this.core.module.view(Float64Array, to, 2 * count);
+      return Array.from({ length: count }, (_, i) => ({
+        total: numbers[2 * i] ?? NaN,
+        length: numbers[2 * i + 1] ?? 0,
+      }));
+    });
+  }
+
+  free(): void {
+    this.call("free_training");
+  }
+}
