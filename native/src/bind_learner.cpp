@@ -89,6 +89,24 @@ std::tuple<double, double, double, double, double, double> update(
     return {s.policy_loss, s.value_loss, s.entropy, s.approx_kl, s.clip_fraction, s.grad_norm};
 }
 
+double descend(Learner& self, const In<uint8_t, 2>& observations, const In<float, 2>& slopes,
+               const Objective& objective) {
+    const Network& network = self.network();
+    const size_t count = checked_count(network, observations);
+    require(count > 0, "A minibatch needs at least one sample.");
+    require(!network.spec.is_blind(), "A network that sees states alone learns by PPO alone.");
+    require(slopes.shape(0) == count && slopes.shape(1) == static_cast<size_t>(network.spec.num_actions),
+            "The slopes are not of this network's outputs.");
+    const std::vector<float> states(count * static_cast<size_t>(network.spec.state_size));
+    Minibatch minibatch{};
+    minibatch.size = count;
+    minibatch.observations = observations.data();
+    minibatch.states = states.data();
+    minibatch.slopes = slopes.data();
+    nb::gil_scoped_release release;
+    return self.update(minibatch, objective).grad_norm;
+}
+
 Learner::Part part_of(const std::string& name) {
     if (name == "weights") return Learner::Part::weights;
     if (name == "moment1") return Learner::Part::moment1;
@@ -174,6 +192,8 @@ void bind_learner(nb::module_& m) {
             "observations"_a, "states"_a)
         .def("update", &update, "observations"_a, "states"_a, "action_indices"_a, "actions"_a, "log_probs"_a,
              "advantages"_a, "returns"_a, "rows"_a, "objective"_a)
+        .def("descend", &descend, "observations"_a, "slopes"_a, "objective"_a,
+             "One gradient step on another loss, given by its slopes at the policy's outputs; the gradient's norm.")
         .def(
             "read",
             [](Learner& self, const std::string& part) {

@@ -396,6 +396,13 @@ void Learner::run_group(Worker& worker, const Minibatch& minibatch, const Object
         for (size_t i = 0; i < samples; ++i) {
             const size_t row = minibatch.row(first + i);
             LossTerms& terms = terms_[first + i];
+            if (minibatch.slopes != nullptr) {
+                const float* given = minibatch.slopes + row * num_actions;
+                float* slope = policy.grad.back() + i * policy_stride;
+                for (size_t k = 0; k < num_actions; ++k) slope[k] = static_cast<float>(weight) * given[k];
+                terms = {};
+                continue;
+            }
             const PolicySample sample{minibatch.log_probs[row], minibatch.advantages[row], weight};
             const float* outputs = policy.out.back() + i * policy_stride;
             float* slope = policy.grad.back() + i * policy_stride;

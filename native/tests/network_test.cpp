@@ -291,7 +291,7 @@ TEST(gradients_agree_with_finite_differences) {
 
             Values exact(parameters.begin(), parameters.end());
             double squares = 0.0;
-            for (size_t i = 0; i < count; i += count > 400 ? 7 : 1) {
+            for (size_t i = 0; i<count; i += count> 400 ? 7 : 1) {
                 constexpr double kStep = 1e-6;
                 const double before = exact[i];
                 exact[i] = before + kStep;
@@ -308,6 +308,50 @@ TEST(gradients_agree_with_finite_differences) {
             CHECK_NEAR(stats.policy_loss + kObjective.vf_coef * stats.value_loss -
                            kObjective.ent_coef * stats.entropy,
                        loss, 1e-5 * (1.0 + std::abs(loss)));
+        }
+    }
+}
+
+TEST(slopes_of_another_loss_reach_the_policy_alone) {
+    for (const NetworkSpec& spec : odd_networks()) {
+        if (spec.is_blind()) continue;
+        constexpr size_t kSize = 11;
+        Learner learner(spec, 2);
+        const size_t count = learner.network().num_public;
+        const std::vector<float> parameters = random_parameters(count, 9);
+        learner.write(Learner::Part::weights, parameters.data());
+        const Samples samples(spec, kSize, 10);
+        Minibatch minibatch{};
+        minibatch.size = kSize;
+        minibatch.observations = samples.observations.data();
+        minibatch.states = samples.states.data();
+        minibatch.slopes = samples.actions.data();  // as many numbers of that size
+        learner.update(minibatch, kObjective);
+        std::vector<float> gradient(count);
+        learner.read(Learner::Part::moment1, gradient.data());
+        // the loss is linear: the mean over samples of slopes times outputs
+        const auto loss = [&](const Values& exact) {
+            double sum = 0.0;
+            for (size_t row = 0; row < kSize; ++row) {
+                const Outputs outputs = reference_outputs(learner.network(), exact, samples, row);
+                for (size_t i = 0; i < static_cast<size_t>(spec.num_actions); ++i) {
+                    sum +=
+                        outputs.policy[i] * static_cast<double>(samples.actions[row * spec.num_actions + i]);
+                }
+            }
+            return sum / kSize;
+        };
+        Values exact(parameters.begin(), parameters.end());
+        const size_t stride = count > 400 ? 7 : 1;
+        for (size_t i = 0; i < count; i += stride) {
+            constexpr double kStep = 1e-6;
+            const double before = exact[i];
+            exact[i] = before + kStep;
+            const double above = loss(exact);
+            exact[i] = before - kStep;
+            const double slope = (above - loss(exact)) / (2.0 * kStep);
+            exact[i] = before;
+            CHECK_NEAR(gradient[i] * 10.0, slope, 2e-5 * (1.0 + std::abs(slope)));
         }
     }
 }

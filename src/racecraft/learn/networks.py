@@ -91,6 +91,10 @@ TEACHER_UNITS = (64, 64)
 TEACHER_LOG_STD = -1.0
 """Log standard deviation that it begins with where actions are continuous."""
 
+PERCEIVER = "PERCEIVER"
+"""The network behind `racecraft.perception`, which tells what a frame shows and drives nothing."""
+_PERCEIVER = Architecture((Conv(16, 4, 2), Conv(32, 3, 2), Conv(40, 3, 2)), (192,), pool=2, sky=0.2)
+
 
 def network_names() -> tuple[str, ...]:
     """Every name ``NetworkSpec`` accepts, the default first."""
@@ -109,6 +113,8 @@ def architecture(name: str, *, lenses: int = 1) -> Architecture:
     """
     if lenses == 2 and name in STEREO:
         return STEREO[name]
+    if name == PERCEIVER:
+        return _PERCEIVER
     check_choice("network", name, ARCHITECTURES)
     return ARCHITECTURES[name]
 
