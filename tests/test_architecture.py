@@ -26,6 +26,7 @@ LAYERS = (
     "race",
     "replay",
     "film",
+    "perception",
     "contest",
     "judging",
     "fidelity",

@@ -25,6 +25,7 @@ VERBS = (
     "film",
     "verify",
     "report",
+    "perceive",
     "tracks",
     "tracks show",
     "tracks sheet",
@@ -47,7 +48,9 @@ def test_every_verb_explains_itself_in_80_columns(racecraft: Run, verb: str) -> 
     assert outcome.status == 0
     assert outcome.out.startswith(f"Usage: racecraft {verb}".rstrip())
     assert all(len(line) <= 80 for line in outcome.out.splitlines())
-    assert "..." not in re.sub(r"(ARGS\]|TRACKS\]|MODELS\}?|logs[\]}]?)\.\.\.", "", outcome.out)  # nothing is cut
+    assert "..." not in re.sub(
+        r"(ARGS\]|TRACKS\]|MODELS\}?|logs[\]}]?|sources\]?)\.\.\.", "", outcome.out
+    )  # nothing is cut
     assert racecraft(*verb.split(), "-h").out == outcome.out
 
 

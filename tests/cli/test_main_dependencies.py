@@ -80,6 +80,12 @@ COMMANDS: dict[str, list[str]] = {
         "car calibrate --circle-left 0.8 --circle-right 0.9 --servo 1.7,1.45,1.2 --speed 40=1.1 --slider 40"
         " --latency 0.05 -o car.json --json",
     ],
+    "perceive": [
+        "perceive G -o seen --json",
+        "perceive R/b -o seen.mp4",
+        "perceive --train E --updates 2 --roads 1 --store 256 -s 2",
+        "perceive G --weights E",
+    ],
     "import": ["import R/b -t oval -r racing --network RACECRAFT_SMALL -n k --runs R -c best --json"],
     "replay": [
         "replay S -t oval -r racing --vehicle v5 -o S.png --rows S.csv --json",

@@ -26,6 +26,7 @@ VERBS = (
     "report",
     "export",
     "car",
+    "perceive",
     "tracks",
     "reward",
     "tune",
@@ -36,7 +37,7 @@ VERBS = (
     "machine",
 )
 """Files of verbs in the order of ``--help``; to import one is to register its verbs."""
-ALONE = frozenset({"train", "evaluate", "report", "export", "learn", "tune"})
+ALONE = frozenset({"train", "evaluate", "report", "export", "learn", "perceive", "tune"})
 """Verbs that are all that the file of their name holds: who types one waits for no other."""
 
 

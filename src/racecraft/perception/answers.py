@@ -1,0 +1,44 @@
+"""What perception is asked of every picture, in the order of its network's outputs, and in which units.
+
+    numbers    how much, and how far off that may be           offset, heading, width, curvature, what is in the way
+    middles    which column, how far off, whether it is there  of the road's middle in some rows
+    regions    whether there is road                           in a grid over the lower part of the picture
+    on_road    whether there is road below the lens
+
+Offset and heading are those of the lens, as a picture shows of how its camera is mounted on the car it shows of
+nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+NUMBERS: Final = {
+    "offset": 0.25,
+    "heading": 0.25,
+    "half_width": 0.25,
+    "curvature_near": 1.0,
+    "curvature": 1.0,
+    "curvature_far": 1.0,
+    "closeness": 0.5,
+}
+"""Names, and what 1 of the network is: m left of the road's middle, rad turned left against it, m, 1/m to the left
+where `CURVATURE_AT` says, and 1 / (1 + m to the next object ahead), 0 where there is none."""
+CURVATURE_AT: Final = (0.5, 1.0, 2.0)
+"""m ahead where curvature is told."""
+ROWS: Final = (45, 52, 60, 67, 75, 82, 90, 97, 105, 112)
+"""Rows of a picture of 160 x 120 in which the road's middle is told."""
+HALF: Final = 80.0
+"""Pixels from a picture's middle to its side: what 1 of the network is for a column."""
+REGION_ROWS: Final = (38, 50, 62, 76, 92, 110)
+"""Rows of the middles of regions."""
+REGION_COLUMNS: Final = tuple(range(10, 160, 20))
+"""Columns of the middles of regions."""
+
+NUM_REGIONS: Final = len(REGION_ROWS) * len(REGION_COLUMNS)
+NUM_TARGETS: Final = len(NUMBERS) + 2 * len(ROWS) + NUM_REGIONS + 1
+"""Numbers, columns, whether each is there, regions, on_road."""
+NUM_CONTINUOUS: Final = len(NUMBERS) + len(ROWS)
+"""Those that are told with how far off they may be; the other targets are yes or no."""
+NUM_OUTPUTS: Final = NUM_TARGETS + NUM_CONTINUOUS
+"""Of the network: an answer to each target, then the logarithm of the mean error of each continuous one."""

@@ -1,0 +1,79 @@
+"""`racecraft perceive`: pictures looked at, told and painted, a few at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import RunError
+from racecraft.perception.network import Perceiver
+from racecraft.perception.painting import paint, write_film
+from racecraft.perception.reading import is_sequence, read_pictures
+from racecraft.perception.telling import tell
+
+TOGETHER: Final = 64
+"""Pictures that are looked at, and kept in memory, together."""
+
+
+def perceive(
+    sources: Sequence[str | Path],
+    *,
+    output: Path | None = None,
+    perceiver: Perceiver | None = None,
+    num_threads: int = 0,
+) -> list[dict[str, Any]]:
+    """Look at pictures.
+
+    Args:
+        sources: Files, folders, a video, a replay or a run.
+        output: Where to paint what is believed: of a single video, replay or run a video ending in ``.mp4``, otherwise
+            a folder of PNGs; None paints nothing.
+        perceiver: Who looks; by default with the weights that the package brings along.
+        num_threads: 0 takes every core.
+
+    Returns:
+        What `tell` says of every picture, in order.
+
+    Raises:
+        ConfigError: A source is not something to look at.
+        RunError: The painted pictures cannot be written.
+    """
+    looker = perceiver or Perceiver(num_threads=num_threads)
+    told: list[dict[str, Any]] = []
+    if output is None:
+        for _ in _looked_at(looker, sources, told, paints=False):
+            pass
+    elif is_sequence(sources) and output.suffix.lower() == ".mp4":
+        write_film((pixels for _, pixels in _looked_at(looker, sources, told)), output)
+    else:
+        _write_pictures(_looked_at(looker, sources, told), output)
+    return told
+
+
+def _looked_at(
+    looker: Perceiver, sources: Sequence[str | Path], told: list[dict[str, Any]], *, paints: bool = True
+) -> Iterator[tuple[str, NDArray[np.uint8]]]:
+    """Name and painted picture, one after the other; `told` grows with them."""
+    pictures = read_pictures(sources)
+    while some := list(islice(pictures, TOGETHER)):
+        belief = looker(np.stack([picture.seen for picture in some]))
+        for index, picture in enumerate(some):
+            told.append(tell(picture.file, belief, index))
+            yield picture.file, paint(picture.shown, belief, index) if paints else picture.shown
+
+
+def _write_pictures(painted: Iterator[tuple[str, NDArray[np.uint8]]], folder: Path) -> None:
+    from PIL import Image
+
+    try:
+        for number, (file, pixels) in enumerate(painted):
+            folder.mkdir(parents=True, exist_ok=True)
+            name = Path(file.partition("#")[0]).stem
+            Image.fromarray(pixels).save(folder / f"{number:05d}-{name}.png")
+    except OSError as error:
+        raise RunError(f"{folder} cannot be written: {error.strerror or error}.") from error

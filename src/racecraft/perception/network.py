@@ -1,0 +1,170 @@
+"""The network that looks: pictures in, beliefs out.
+
+pictures ──observe──▶ observations ──native core──▶ outputs ──believe──▶ Belief
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors.numpy import load as load_tensors
+from safetensors.numpy import save as save_tensors
+
+from racecraft.errors import CheckpointError
+from racecraft.learn.native_regressor import NativeRegressor
+from racecraft.learn.networks import PERCEIVER
+from racecraft.perception.answers import (
+    HALF,
+    NUM_CONTINUOUS,
+    NUM_OUTPUTS,
+    NUM_REGIONS,
+    NUM_TARGETS,
+    NUMBERS,
+    REGION_COLUMNS,
+    REGION_ROWS,
+    ROWS,
+)
+
+WEIGHTS: Final = Path(__file__).with_name("weights.safetensors")
+"""What `racecraft perceive --train` made and the package brings along: float16."""
+MEAN, SPREAD = 112.0, 48.0
+"""Mean and standard deviation that a picture's brightness is brought to, in levels of 255."""
+LEAST_SPREAD: Final = 4.0
+"""Standard deviation, in levels, that the picture of a wall has: less is noise, and is not made more of."""
+LOG_LIMITS: Final = (-6.0, 2.0)
+"""Of the logarithm of an error, in units of the network."""
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is believed of N pictures; every ``*_error`` is the mean distance to the truth that is expected."""
+
+    on_road: NDArray[np.float32]
+    """Probability that there is road below the lens  (N,)."""
+    offset: NDArray[np.float32]
+    """m, of the lens from the road's middle, left positive  (N,)."""
+    offset_error: NDArray[np.float32]
+    """m  (N,)."""
+    heading: NDArray[np.float32]
+    """rad, of the lens against the road beside it, turned left positive  (N,)."""
+    heading_error: NDArray[np.float32]
+    """rad  (N,)."""
+    half_width: NDArray[np.float32]
+    """m, half the road's width  (N,)."""
+    curvature: NDArray[np.float32]
+    """1/m, of the road's middle 0.5, 1 and 2 m ahead, to the left positive  (N, 3)."""
+    curvature_error: NDArray[np.float32]
+    """1/m  (N, 3)."""
+    closeness: NDArray[np.float32]
+    """1 / (1 + m to the next object ahead), 0 where there is none  (N,)."""
+    closeness_error: NDArray[np.float32]
+    """The same  (N,)."""
+    middle: NDArray[np.float32]
+    """Column of a picture of 160 x 120 where the road's middle is in each of `ROWS`  (N, R)."""
+    middle_error: NDArray[np.float32]
+    """Columns  (N, R)."""
+    is_middle: NDArray[np.float32]
+    """Probability that it is in the picture in that row  (N, R)."""
+    regions: NDArray[np.float32]
+    """Probability that there is road at `REGION_ROWS` and `REGION_COLUMNS`  (N, 6, 8)."""
+
+    def __len__(self) -> int:
+        return len(self.on_road)
+
+
+class Perceiver:
+    """Looks at pictures.
+
+    Args:
+        weights: A file of weights; None begins untrained, from `seed`.
+        seed: Of untrained weights.
+        num_threads: 0 takes every core. Results are the same for any number.
+
+    Raises:
+        CheckpointError: The file is missing, damaged, or not of this network.
+    """
+
+    def __init__(self, weights: Path | None = WEIGHTS, *, seed: int = 0, num_threads: int = 0) -> None:
+        self.network = NativeRegressor(
+            PERCEIVER, NUM_OUTPUTS, seed=seed if weights is None else None, num_threads=num_threads
+        )
+        if weights is not None:
+            self._load(weights)
+
+    def __call__(self, frames: NDArray[np.uint8]) -> Belief:
+        """What is believed of some pictures, grey uint8 (N, 120, 160).
+
+        Raises:
+            ShapeError: They are not of this type and shape.
+        """
+        return believe(self.network.policy(self.observe(frames)))
+
+    def observe(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """What the network sees of pictures: without their sky, pooled, and of one brightness and contrast.
+
+        Raises:
+            ShapeError: They are not uint8 (N, 120, 160).
+        """
+        return of_one_brightness(self.network.encode(frames))
+
+    def save(self, path: Path) -> None:
+        """Write the weights, in float16."""
+        weights = {name: array for name, array in self.network.weights().items() if name.startswith("policy.")}
+        path.write_bytes(save_tensors({name: array.astype(np.float16) for name, array in weights.items()}))
+
+    def _load(self, path: Path) -> None:
+        try:
+            stored: Mapping[str, NDArray[np.float16]] = load_tensors(path.read_bytes())
+        except Exception as error:  # whatever the reader makes of what is no such file
+            raise CheckpointError(f"The weights of perception in {path} cannot be read: {error}.") from error
+        needed = self.network.weights()
+        weights = {name: np.asarray(array, np.float32) for name, array in stored.items()}
+        critic = {name: array for name, array in needed.items() if name.startswith("critic.")}
+        self.network.load_weights(weights | critic)
+
+
+def of_one_brightness(observations: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Each with a mean of `MEAN` and a standard deviation of `SPREAD`, from sums of whole numbers.
+
+    Args:
+        observations: (N, ...).
+    """
+    flat = observations.reshape(len(observations), -1)
+    size = flat.shape[1]
+    wide = flat.astype(np.uint32)
+    sums, squares = wide.sum(axis=1, dtype=np.int64), (wide * wide).sum(axis=1, dtype=np.int64)
+    variance = (squares * size - sums * sums) / (size * size)
+    gain = SPREAD / np.maximum(np.sqrt(variance), LEAST_SPREAD)
+    levels = (np.arange(256) - (sums / size)[:, None]) * gain[:, None] + MEAN
+    table = np.rint(levels).clip(0, 255).astype(np.uint8)
+    return np.take_along_axis(table, flat.astype(np.intp), axis=1).reshape(observations.shape)
+
+
+def believe(outputs: NDArray[np.float32]) -> Belief:
+    """What the outputs of the network mean  (N, NUM_OUTPUTS)."""
+    units = np.array([*NUMBERS.values(), *[HALF] * len(ROWS)], np.float32)
+    told = outputs[:, :NUM_CONTINUOUS] * units
+    errors = np.exp(outputs[:, NUM_TARGETS:].clip(*LOG_LIMITS)) * units
+    yes = 1.0 / (1.0 + np.exp(-outputs[:, NUM_CONTINUOUS:NUM_TARGETS].clip(-30.0, 30.0)))
+    rows, numbers = len(ROWS), len(NUMBERS)
+    return Belief(
+        on_road=yes[:, -1],
+        offset=told[:, 0],
+        offset_error=errors[:, 0],
+        heading=told[:, 1],
+        heading_error=errors[:, 1],
+        half_width=told[:, 2],
+        curvature=told[:, 3:6],
+        curvature_error=errors[:, 3:6],
+        closeness=told[:, 6].clip(0.0, 1.0),
+        closeness_error=errors[:, 6],
+        middle=told[:, numbers:] + np.float32(HALF - 0.5),
+        middle_error=errors[:, numbers:],
+        is_middle=yes[:, :rows],
+        regions=yes[:, rows : rows + NUM_REGIONS].reshape(-1, len(REGION_ROWS), len(REGION_COLUMNS)),
+    )

@@ -1,0 +1,158 @@
+"""Pictures from wherever they are: files, folders, videos, replays and the last evaluation of a run.
+
+Everybody's files: what is no picture, too large or too many is refused in a sentence before it is decoded.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.errors import ConfigError, printable
+from racecraft.replay.replay import read_replay
+from racecraft.sim.camera import CameraSpec
+from racecraft.sim.views import Scene
+
+PICTURES: Final = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
+VIDEOS: Final = (".mp4", ".mkv", ".mov", ".avi", ".webm")
+MAX_BYTES: Final = 20_000_000
+"""Of a picture's file."""
+MAX_PIXELS: Final = 4096 * 4096
+"""Of a picture, or of a video's frame."""
+MAX_PICTURES: Final = 20_000
+"""Of one call; 22 minutes of video."""
+SHAPE: Final = (160, 120)
+"""What the network gets, width and height."""
+SHOWN: Final = (640, 480)
+"""What is painted on, width and height."""
+LUMA: Final = (0.2989, 0.587, 0.114)
+"""Weights of red, green and blue in grey, as the original's (ITU-R BT.601)."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One frame."""
+
+    file: str
+    """Where it is from: a path, and behind ``#`` the frame's number in a video or replay."""
+    shown: NDArray[np.uint8]
+    """RGB (480, 640, 3)."""
+    seen: NDArray[np.uint8]
+    """What the network gets, grey (120, 160)."""
+
+
+def read_pictures(sources: Sequence[str | Path]) -> Iterator[Picture]:
+    """The pictures of files, folders of files, videos, replays and runs, one after the other.
+
+    Args:
+        sources: Paths.
+
+    Raises:
+        ConfigError: There is nothing at a path, it is not a picture or a video, or there are too many.
+        ReplayError: A replay is damaged.
+    """
+    if not sources:
+        raise ConfigError("No pictures are given.", hint="Give files, folders of pictures, a video or a run folder.")
+    count = 0
+    for source in sources:
+        for picture in _pictures_of(Path(source)):
+            count += 1
+            if count > MAX_PICTURES:
+                raise ConfigError(f"There are more than {MAX_PICTURES:,} pictures.", hint="Give a part of them.")
+            yield picture
+
+
+def is_sequence(sources: Sequence[str | Path]) -> bool:
+    """Whether the sources are one film: a single video, replay or run."""
+    if len(sources) != 1:
+        return False
+    path = Path(sources[0])
+    return path.suffix.lower() in (*VIDEOS, ".replay") or (path / "run.json").is_file()
+
+
+def _pictures_of(path: Path) -> Iterator[Picture]:
+    if not path.exists():
+        raise ConfigError(f"There is nothing at {_named(path)}.", hint="Give pictures, a video or a run folder.")
+    if (path / "run.json").is_file():
+        replays = sorted(path.glob("evaluation-*/evaluation.replay"))
+        if not replays:
+            raise ConfigError(f"Run {_named(path)} was never evaluated.", hint=f"First racecraft evaluate {path}")
+        yield from _from_replay(replays[-1])
+    elif path.is_dir():
+        files = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURES)
+        if not files:
+            hint = f"Pictures end in {', '.join(PICTURES)}; a run folder has a run.json."
+            raise ConfigError(f"There is no picture in {_named(path)}.", hint=hint)
+        for file in files:
+            yield _from_file(file)
+    elif path.suffix.lower() in VIDEOS:
+        yield from _from_video(path)
+    elif path.suffix.lower() == ".replay":
+        yield from _from_replay(path)
+    else:
+        yield _from_file(path)
+
+
+def _from_file(path: Path) -> Picture:
+    from PIL import Image
+
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ConfigError(f"Picture {_named(path)} is larger than {MAX_BYTES // 1_000_000} MB.")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(path, formats=("PNG", "JPEG", "WEBP", "BMP")) as image:
+                width, height = image.size
+                if width * height > MAX_PIXELS:
+                    raise ConfigError(f"Picture {_named(path)} has {width} x {height} pixels, more than 4096 x 4096.")
+                return _picture(str(path), np.asarray(image.convert("RGB")))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+        if isinstance(error, ConfigError):
+            raise
+        hint = f"Pictures are PNG, JPEG, WebP or BMP; videos end in {', '.join(VIDEOS)}."
+        raise ConfigError(f"{_named(path)} is no picture that can be read.", hint=hint) from error
+
+
+def _from_video(path: Path) -> Iterator[Picture]:
+    import av
+
+    try:
+        with av.open(str(path)) as container:
+            if not container.streams.video:
+                raise ConfigError(f"There is no picture in the video {_named(path)}.")
+            for number, frame in enumerate(container.decode(container.streams.video[0])):
+                if frame.width * frame.height > MAX_PIXELS:
+                    raise ConfigError(f"The frames of {_named(path)} have more than 4096 x 4096 pixels.")
+                yield _picture(f"{path}#{number}", np.asarray(frame.to_ndarray(format="rgb24"), np.uint8))
+    except (av.error.FFmpegError, OSError) as error:
+        raise ConfigError(f"{_named(path)} is no video that can be read.") from error
+
+
+def _from_replay(path: Path) -> Iterator[Picture]:
+    """What the driver of its best car saw."""
+    replay = read_replay(path)
+    recording = replay.evaluation.best_trial.recording
+    camera = CameraSpec(width=SHOWN[0], height=SHOWN[1], palette=replay.conditions.palette)
+    view = Scene(recording.track, palette=camera.palette).driver_view(camera, lit_walls=False)
+    for step, (x, y, heading) in enumerate(recording.poses.tolist()):
+        yield _picture(f"{path}#{step}", view.draw(x, y, heading, cars=recording.objects(step)))
+
+
+def _picture(name: str, pixels: NDArray[np.uint8]) -> Picture:
+    """Resized as the original does it: bilinear, then grey."""
+    from PIL import Image
+
+    image = Image.fromarray(pixels)
+    small = np.asarray(image.resize(SHAPE, Image.Resampling.BILINEAR))
+    grey = np.rint(small @ np.array(LUMA)).astype(np.uint8)
+    return Picture(name, np.asarray(image.resize(SHOWN, Image.Resampling.BILINEAR)), grey)
+
+
+def _named(path: Path) -> str:
+    return printable(str(path))[:200]

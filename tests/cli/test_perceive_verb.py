@@ -1,0 +1,62 @@
+"""`racecraft perceive`: what it prints and writes, and its wrong options."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from command_line import Run
+from PIL import Image
+
+from racecraft.perception import Perceiver
+
+
+def test_a_picture(racecraft: Run) -> None:
+    Image.new("RGB", (160, 120), (90, 90, 90)).save("a.png")
+    outcome = racecraft("perceive", "a.png", "-o", "seen")
+    assert outcome.status == 0, outcome.err
+    assert "a.png" in outcome.out
+    assert "Painted in seen." in outcome.out
+    assert [path.name for path in Path("seen").iterdir()] == ["00000-a.png"]
+
+
+def test_as_json(racecraft: Run) -> None:
+    Image.new("RGB", (160, 120), (90, 90, 90)).save("a.png")
+    (one,) = racecraft("perceive", "a.png", "--json").document["pictures"]
+    assert one["file"] == "a.png"
+    assert len(one["middle"]) == 4
+    assert isinstance(one["on_road"], bool)
+    assert {"offset_m", "heading_rad", "offset_error_m", "heading_error_rad"} <= one.keys()
+
+
+def test_a_run_by_its_last_evaluation(racecraft: Run, trained: Path) -> None:
+    short = ("-l", "1", "--trials", "1", "--max-resets", "0", "--no-video")
+    assert racecraft("evaluate", str(trained), *short).status == 0
+    outcome = racecraft("perceive", str(trained), "--json")
+    assert outcome.status == 0, outcome.err
+    pictures = outcome.document["pictures"]
+    assert len(pictures) > 5
+    assert pictures[0]["on_road"]
+    assert pictures[0]["middle"][1] is not None
+
+
+def test_learning(racecraft: Run) -> None:
+    learn = ("--train", "w.safetensors", "--updates", "2", "--roads", "1", "--store", "256", "--seed", "3")
+    document = racecraft("perceive", *learn, "--json").document
+    assert document == {"weights": "w.safetensors", "bytes": Path("w.safetensors").stat().st_size, "updates": 2}
+    Image.new("RGB", (160, 120), (90, 90, 90)).save("a.png")
+    outcome = racecraft("perceive", "a.png", "--weights", "w.safetensors")
+    assert outcome.status == 0, outcome.err
+    Perceiver(Path("w.safetensors"), num_threads=1)
+
+
+def test_mistakes(racecraft: Run) -> None:
+    outcome = racecraft("perceive", "nowhere")
+    assert (outcome.status, outcome.out) == (1, "")
+    assert "There is nothing at nowhere." in outcome.err
+    assert racecraft("perceive").status == 1
+    assert racecraft("perceive", "a.png", "--train", "w").status == 2
+    Path("w").write_text("no weights")
+    Image.new("RGB", (160, 120)).save("a.png")
+    outcome = racecraft("perceive", "a.png", "--weights", "w")
+    assert outcome.status == 1
+    assert "cannot be read" in outcome.err

@@ -1,0 +1,126 @@
+"""Where pictures come from, what is refused, and what is told and painted of them."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from racecraft.errors import ConfigError, ShapeError
+from racecraft.learn.native_regressor import NativeRegressor
+from racecraft.learn.networks import PERCEIVER
+from racecraft.perception import Belief, Perceiver, perceive
+from racecraft.perception.answers import NUM_OUTPUTS, NUMBERS
+from racecraft.perception.network import believe
+from racecraft.perception.painting import paint, write_film
+from racecraft.perception.reading import read_pictures
+from racecraft.perception.telling import tell
+
+
+@pytest.fixture(scope="module")
+def perceiver() -> Perceiver:
+    return Perceiver(num_threads=1)
+
+
+def belief_of(**numbers: float) -> Belief:
+    """Of one picture: all zero but for some of `NUMBERS`, in their units."""
+    outputs = np.zeros((1, NUM_OUTPUTS), np.float32)
+    for name, value in numbers.items():
+        outputs[0, list(NUMBERS).index(name)] = value / NUMBERS[name]
+    return believe(outputs)
+
+
+def road(width: int = 320, height: int = 240) -> Image.Image:
+    """Something that has light and shade."""
+    levels = np.add.outer(np.arange(height), np.arange(width)) % 251
+    return Image.fromarray(np.stack([levels] * 3, axis=2).astype(np.uint8))
+
+
+def test_pictures_of_every_kind_and_size(tmp_path: Path, perceiver: Perceiver) -> None:
+    road().save(tmp_path / "a.png")
+    road(160, 120).convert("L").save(tmp_path / "b.jpg")
+    road(99, 77).convert("RGBA").save(tmp_path / "c.webp")
+    (tmp_path / "notes.txt").write_text("no picture")
+    told = perceive([tmp_path, tmp_path / "a.png"], output=tmp_path / "seen", perceiver=perceiver)
+    assert [Path(one["file"]).name for one in told] == ["a.png", "b.jpg", "c.webp", "a.png"]
+    assert told[0] == told[3]
+    painted = sorted((tmp_path / "seen").iterdir())
+    assert [path.name for path in painted] == ["00000-a.png", "00001-b.png", "00002-c.png", "00003-a.png"]
+    with Image.open(painted[0]) as image:
+        assert image.size == (640, 480)
+
+
+def test_a_video_is_painted_as_one(tmp_path: Path, perceiver: Perceiver) -> None:
+    frames = [np.asarray(road(640, 480).rotate(turn)) for turn in range(5)]
+    write_film(frames, tmp_path / "in.mp4")
+    told = perceive([tmp_path / "in.mp4"], output=tmp_path / "out.mp4", perceiver=perceiver)
+    assert [one["file"].rpartition("#")[2] for one in told] == ["0", "1", "2", "3", "4"]
+    painted = [picture.shown.astype(int) for picture in read_pictures([tmp_path / "out.mp4"])]
+    assert len(painted) == 5
+    assert np.abs(painted[0] - frames[0]).mean() > 2.0
+
+
+def test_what_is_no_picture_is_refused(tmp_path: Path, perceiver: Perceiver) -> None:
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40))
+    (tmp_path / "b.jpg").write_text("text")
+    (tmp_path / "c.mp4").write_bytes(bytes(1000))
+    (tmp_path / "d").mkdir()
+    # a picture of 60,000 x 60,000 pixels in a file of 100 bytes
+    header = (60_000).to_bytes(4, "big") * 2 + b"\x08\x02\x00\x00\x00"
+    chunk = b"IHDR" + header
+    bomb = b"\x89PNG\r\n\x1a\n" + (13).to_bytes(4, "big") + chunk + zlib.crc32(chunk).to_bytes(4, "big")
+    (tmp_path / "e.png").write_bytes(bomb + bytes(40))
+    with (tmp_path / "f.png").open("wb") as large:
+        large.truncate(30_000_000)
+    says = {
+        "a.png": "no picture", "b.jpg": "no picture", "c.mp4": "no video", "d": "no picture in", "e.png": "picture",
+        "f.png": "larger than 20 MB", "g": "nothing at",
+    }  # fmt: skip
+    for name, sentence in says.items():
+        with pytest.raises(ConfigError, match=sentence):
+            perceive([tmp_path / name], perceiver=perceiver)
+    with pytest.raises(ConfigError, match="No pictures are given"):
+        perceive([], perceiver=perceiver)
+
+
+def test_every_truncation_of_a_picture_is_refused_or_read(tmp_path: Path, perceiver: Perceiver) -> None:
+    road(40, 30).save(tmp_path / "whole.png")
+    whole = (tmp_path / "whole.png").read_bytes()
+    refused = 0
+    for length in range(0, len(whole), max(len(whole) // 40, 1)):
+        (tmp_path / "cut.png").write_bytes(whole[:length])
+        try:
+            perceive([tmp_path / "cut.png"], perceiver=perceiver)
+        except ConfigError:
+            refused += 1
+    assert refused > 30
+
+
+def test_what_is_told() -> None:
+    told = tell("a", belief_of(offset=0.1, heading=-0.2, closeness=0.5), 0)
+    assert told["offset_m"] == pytest.approx(0.1)
+    assert told["heading_rad"] == pytest.approx(-0.2)
+    assert told["distance_m"] == pytest.approx(1.0)
+    assert told["middle"] == [None] * 4  # as likely there as not
+    assert tell("a", belief_of(), 0)["distance_m"] is None
+
+
+def test_an_offset_to_the_left_is_painted_on_the_left() -> None:
+    plain = np.full((480, 640, 3), 90, np.uint8)
+    for side, columns in ((0.2, slice(190, 320)), (-0.2, slice(321, 450))):
+        painted = paint(plain, belief_of(offset=side, half_width=0.4), 0)
+        white = np.asarray((painted[440:476] > 240).all(axis=2))
+        assert white[:, columns].sum() > 0.95 * white.sum() > 50
+
+
+def test_slopes_of_another_shape_are_refused() -> None:
+    network = NativeRegressor(PERCEIVER, 4, num_threads=1)
+    seen = network.encode(np.zeros((3, 120, 160), np.uint8))
+    before = network.policy(seen)
+    with pytest.raises(ShapeError, match=r"\(3, 5\), expected \(3, 4\)"):
+        network.descend(seen, np.zeros((3, 5), np.float32), learning_rate=0.1)
+    network.descend(seen, np.ones((3, 4), np.float32), learning_rate=0.01)
+    assert (network.policy(seen) < before).all()

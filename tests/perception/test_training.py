@@ -1,0 +1,108 @@
+"""How perception learns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from racecraft.errors import CheckpointError, ConfigError
+from racecraft.perception import Lessons, Perceiver, train
+from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS
+from racecraft.perception.network import WEIGHTS
+from racecraft.perception.training import slopes_of
+
+FEW = Lessons(updates=60, minibatch_size=32, store=1024, roads=2, learning_rate=1e-3)
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[float]]:
+    """Weights after a few lessons, and the losses on the way."""
+    losses: list[float] = []
+    path = tmp_path_factory.mktemp("lessons") / "a.safetensors"
+    train(FEW, tell=lambda _, loss: losses.append(loss)).save(path)
+    return path, losses
+
+
+def test_the_same_lessons_give_the_same_bits(learned: tuple[Path, list[float]], tmp_path: Path) -> None:
+    train(FEW).save(tmp_path / "b.safetensors")
+    assert (tmp_path / "b.safetensors").read_bytes() == learned[0].read_bytes()
+
+
+def test_it_learns(learned: tuple[Path, list[float]]) -> None:
+    _, losses = learned
+    assert np.isfinite(losses).all()
+    untaught = np.zeros((64, NUM_OUTPUTS), np.float32)
+    assert losses[-1] < 0.8 * slopes_of(untaught, _targets(64))[1] + 10.0
+
+
+def test_slopes_are_those_of_the_loss() -> None:
+    rng = np.random.default_rng(7)
+    targets = _targets(6)
+    outputs = rng.normal(0.0, 0.5, (6, NUM_OUTPUTS)).astype(np.float32)
+    slopes, _ = slopes_of(outputs, targets)
+    for column in range(NUM_TARGETS):  # the expected error's slope is another likelihood's, below
+        above, below = outputs.copy(), outputs.copy()
+        above[:, column] += 1e-2
+        below[:, column] -= 1e-2
+        numeric = (slopes_of(above, targets)[1] - slopes_of(below, targets)[1]) / 2e-2
+        assert slopes[:, column].mean() == pytest.approx(numeric, abs=0.03), column
+
+
+def test_expected_errors_settle_where_they_are_right() -> None:
+    targets = np.zeros((1, NUM_TARGETS), np.float32)
+    targets[:, NUM_CONTINUOUS:] = 1.0
+    outputs = np.zeros((1, NUM_OUTPUTS), np.float32)
+    outputs[:, :NUM_CONTINUOUS] = 0.3
+    for log, sign in ((np.log(0.3), 0.0), (np.log(0.1), -1.0), (np.log(0.9), 1.0)):
+        outputs[:, NUM_TARGETS:] = log
+        slopes = slopes_of(outputs, targets)[0][:, NUM_TARGETS:]
+        assert np.allclose(np.sign(np.where(np.abs(slopes) < 1e-6, 0.0, slopes)), sign)
+
+
+def test_a_column_that_is_not_there_teaches_nothing() -> None:
+    targets = np.zeros((1, NUM_TARGETS), np.float32)
+    outputs = np.full((1, NUM_OUTPUTS), 0.7, np.float32)
+    slopes, _ = slopes_of(outputs, targets)
+    assert not slopes[0, 7:NUM_CONTINUOUS].any()
+    assert slopes[0, :7].all()
+
+
+def test_the_weights_brought_along_are_small_and_of_16_bits() -> None:
+    from safetensors.numpy import load_file
+
+    assert WEIGHTS.stat().st_size < 1_000_000
+    arrays = load_file(WEIGHTS)
+    assert {array.dtype for array in arrays.values()} == {np.dtype(np.float16)}
+    assert all(np.isfinite(array).all() for array in arrays.values())
+
+
+def test_weights_that_are_none_are_refused(learned: tuple[Path, list[float]], tmp_path: Path) -> None:
+    stored = learned[0].read_bytes()
+    (tmp_path / "cut").write_bytes(stored[: len(stored) // 2])
+    (tmp_path / "text").write_text("no weights")
+    for name in ("cut", "text", "missing"):
+        with pytest.raises(CheckpointError, match="cannot be read"):
+            Perceiver(tmp_path / name, num_threads=1)
+
+
+def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
+    from safetensors.numpy import save_file
+
+    save_file({"policy.conv1.weight": np.zeros((2, 2), np.float16)}, tmp_path / "w")
+    with pytest.raises(CheckpointError):
+        Perceiver(tmp_path / "w", num_threads=1)
+
+
+def test_lessons_have_limits() -> None:
+    for wrong in ({"updates": 0}, {"roads": 0}, {"store": 8}, {"learning_rate": 2.0}):
+        with pytest.raises(ConfigError):
+            Lessons(**wrong)
+
+
+def _targets(count: int) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    targets = rng.normal(0.0, 0.5, (count, NUM_TARGETS)).astype(np.float32)
+    targets[:, NUM_CONTINUOUS:] = targets[:, NUM_CONTINUOUS:] > 0.0
+    return targets
