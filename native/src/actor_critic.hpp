@@ -21,8 +21,8 @@ struct Minibatch {
     const float* log_probs;         // (M,)
     const float* advantages;        // (M,)
     const float* returns;           // (M,)
-    // (M, num_actions): derivatives of another loss at the policy's outputs, log_std apart, in place of PPO's;
-    // then nothing behind `states` is read, and the critic learns nothing. Null: none.
+    // (M, num_actions): derivatives of another loss at the policy's outputs, log_std apart, in place of
+    // PPO's; then nothing behind `states` is read, and the critic learns nothing. Null: none.
     const float* slopes = nullptr;
 
     size_t row(size_t sample) const { return rows == nullptr ? sample : static_cast<size_t>(rows[sample]); }

@@ -193,7 +193,8 @@ void bind_learner(nb::module_& m) {
         .def("update", &update, "observations"_a, "states"_a, "action_indices"_a, "actions"_a, "log_probs"_a,
              "advantages"_a, "returns"_a, "rows"_a, "objective"_a)
         .def("descend", &descend, "observations"_a, "slopes"_a, "objective"_a,
-             "One gradient step on another loss, given by its slopes at the policy's outputs; the gradient's norm.")
+             "One gradient step on another loss, given by its slopes at the policy's outputs; the gradient's "
+             "norm.")
         .def(
             "read",
             [](Learner& self, const std::string& part) {

@@ -291,7 +291,7 @@ TEST(gradients_agree_with_finite_differences) {
 
             Values exact(parameters.begin(), parameters.end());
             double squares = 0.0;
-            for (size_t i = 0; i<count; i += count> 400 ? 7 : 1) {
+            for (size_t i = 0; i < count; i += count > 400 ? 7 : 1) {
                 constexpr double kStep = 1e-6;
                 const double before = exact[i];
                 exact[i] = before + kStep;
