@@ -85,6 +85,7 @@ COMMANDS: dict[str, list[str]] = {
         "perceive R/b -o seen.mp4",
         "perceive --train E --updates 2 --roads 1 --store 256 -s 2",
         "perceive G --weights E",
+        "perceive --drive oval --speed 1.4 --vehicle v4 --randomize light --trials 1",
     ],
     "import": ["import R/b -t oval -r racing --network RACECRAFT_SMALL -n k --runs R -c best --json"],
     "replay": [

@@ -49,6 +49,16 @@ def test_learning(racecraft: Run) -> None:
     Perceiver(Path("w.safetensors"), num_threads=1)
 
 
+def test_driving(racecraft: Run) -> None:
+    document = racecraft("perceive", "--drive", "oval", "--speed", "1.6", "--randomize", "light", "--json").document
+    assert (document["laps"], document["trials"], document["speed"]) == (2, 2, 1.6)
+    outcome = racecraft("perceive", "--drive", "oval")
+    assert outcome.status == 0, outcome.err
+    assert "2 of 2 laps completed" in outcome.out
+    assert racecraft("perceive", "a.png", "--drive", "oval").status == 2
+    assert "nowhere" in racecraft("perceive", "--drive", "nowhere").err
+
+
 def test_mistakes(racecraft: Run) -> None:
     outcome = racecraft("perceive", "nowhere")
     assert (outcome.status, outcome.out) == (1, "")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from racecraft.judging.generalization import RunGeneralization
     from racecraft.judging.race import RunRace
     from racecraft.limits import TrackLimit
+    from racecraft.race.generalization import Generalization
     from racecraft.reward import Outcome, Problem
     from racecraft.track import Track
     from racecraft.training import TrainResult
@@ -219,10 +220,16 @@ def say_limit(name: str, limit: TrackLimit) -> None:
 
 
 def say_generalized(outcome: RunGeneralization) -> None:
+    """A line for each track, the sum, and where the table is."""
+    say_laps(outcome.generalization, title=f"{outcome.run.name} after {outcome.step:,} camera steps")
+    _say(Console(), "  table        ", (str(outcome.path), "bold"))
+
+
+def say_laps(found: Generalization, *, title: str) -> None:
     """A line for each track and the sum."""
-    console, found = Console(), outcome.generalization
+    console = Console()
     directions = tuple(dict.fromkeys(result.direction for result in found.results))
-    table = _table(title=f"{outcome.run.name} after {outcome.step:,} camera steps")
+    table = _table(title=title)
     table.add_column("track", style="bold", overflow="ellipsis", no_wrap=True)
     table.add_column("length", justify="right", no_wrap=True)
     for direction in directions:
@@ -246,7 +253,6 @@ def say_generalized(outcome: RunGeneralization) -> None:
         f" (95 % interval {100 * low:.0f} to {100 * high:.0f} %); "
         f"mean {100 * found.completion:.1f} % of a lap; {len(found.mastered)} of {len(by_track)} tracks mastered.",
     )
-    _say(console, "  table        ", (str(outcome.path), "bold"))
 
 
 def say_tracks(listed: list[tuple[Track, Any]], limits: list[TrackLimit | None]) -> None:

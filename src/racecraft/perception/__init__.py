@@ -1,12 +1,14 @@
 """Perception: a picture of a driver's camera becomes what a driver needs to know of the road.
 
 pictures ──reading──▶ frames ──network──▶ Belief ──telling, painting──▶ numbers, pictures
+                                             └────driving──▶ commands
 simulator's state ──truth──▶ targets ──training──▶ weights of the network
 """
 
+from racecraft.perception.driving import PerceptionDriver
 from racecraft.perception.lessons import Lessons
 from racecraft.perception.looking import perceive
 from racecraft.perception.network import Belief, Perceiver
 from racecraft.perception.training import train
 
-__all__ = ["Belief", "Lessons", "Perceiver", "perceive", "train"]
+__all__ = ["Belief", "Lessons", "Perceiver", "PerceptionDriver", "perceive", "train"]

@@ -1,0 +1,71 @@
+"""A driver that sees only what perception tells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from racecraft import load_track
+from racecraft.perception import PerceptionDriver
+from racecraft.perception.answers import NUM_OUTPUTS, NUM_TARGETS, NUMBERS
+from racecraft.perception.driving import state_of
+from racecraft.perception.network import Belief, believe
+from racecraft.race.autopilot import Autopilot
+from racecraft.race.generalization import generalize
+from racecraft.sim.columns import STATE_COLUMNS
+
+
+def belief_of(*, error: float = 0.01, **numbers: float) -> Belief:
+    """Of one picture of a road that is 0.8 m wide."""
+    outputs = np.zeros((1, NUM_OUTPUTS), np.float32)
+    for name, value in {"half_width": 0.4, **numbers}.items():
+        outputs[0, list(NUMBERS).index(name)] = value / NUMBERS[name]
+    outputs[0, NUM_TARGETS] = np.log(error / NUMBERS["offset"])
+    return believe(outputs)
+
+
+class Seen:
+    """Sees what it is told to."""
+
+    def __init__(self, belief: Belief) -> None:
+        self.belief = belief
+
+    def __call__(self, _: object) -> Belief:
+        return self.belief
+
+
+def commands_of(belief: Belief) -> tuple[float, float]:
+    steering, speed = PerceptionDriver(Seen(belief))(np.zeros((1, 120, 160), np.uint8))[0]  # type: ignore[arg-type]
+    return float(steering), float(speed)
+
+
+@pytest.mark.parametrize("randomize", ["strong", "real"])
+def test_it_laps_roads_that_perception_never_learned_from(randomize: str) -> None:
+    driver = PerceptionDriver(autopilot=Autopilot(speed=1.8))
+    found = generalize(driver, [load_track("kidney"), load_track("bowtie")], num_trials=2, randomize=randomize, seed=3)
+    assert (found.laps, found.trials) == (8, 8)
+    slowest = max(time / result.length for result in found.results for time in result.lap_times)
+    assert slowest < 1 / 1.2
+
+
+def test_it_steers_back_to_the_middle_and_into_bends() -> None:
+    straight, _ = commands_of(belief_of())
+    assert straight == pytest.approx(0.0, abs=1e-6)
+    assert commands_of(belief_of(offset=0.1))[0] < -0.05
+    assert commands_of(belief_of(offset=-0.1))[0] > 0.05
+    assert commands_of(belief_of(heading=0.2))[0] < -0.05
+    assert commands_of(belief_of(curvature_near=0.8, curvature=0.8))[0] > 0.05
+
+
+def test_it_slows_for_bends_and_where_it_is_not_sure() -> None:
+    fast = commands_of(belief_of())[1]
+    assert commands_of(belief_of(curvature_near=2.0, curvature=2.0))[1] < 0.8 * fast
+    assert commands_of(belief_of(error=0.2))[1] < 0.5 * fast
+
+
+def test_a_belief_becomes_the_state_that_the_simulator_would_tell() -> None:
+    state = dict(zip(STATE_COLUMNS, state_of(belief_of(offset=0.2, heading=0.3, curvature=0.5))[0], strict=True))
+    assert state["offset"] == pytest.approx(0.5)
+    assert state["sin_heading_error"] == pytest.approx(np.sin(0.3))
+    assert state["cos_heading_error"] == pytest.approx(np.cos(0.3))
+    assert [state[f"curvature_{i}"] for i in range(8)] == pytest.approx([0, 0, 0, 0.25, 0.5, 0.25, 0, 0])
