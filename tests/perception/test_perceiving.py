@@ -10,10 +10,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from racecraft.errors import ShapeError
-from racecraft.perception import Belief, Perceiver, perceive
+from racecraft.perception import Belief, Perceiver, PerceptionDriver, perceive
 from racecraft.perception.answers import NUM_CONTINUOUS, NUM_TARGETS, NUMBERS, ROWS
 from racecraft.perception.network import of_one_brightness
 from racecraft.perception.training import World
+from racecraft.perception.truth import Truth
+from racecraft.race.autopilot import Autopilot
+from racecraft.sim import Simulation, Start
+from racecraft.track import load_tracks
 
 FLOOR = Path(__file__).parents[3] / "shared" / "frames" / "car"
 TOLD = (60, 75, 90, 105)
@@ -57,21 +61,36 @@ def test_the_middle_of_a_real_road(perceiver: Perceiver) -> None:
 
 @pytest.fixture(scope="module")
 def unseen(perceiver: Perceiver) -> tuple[Belief, NDArray[np.float32]]:
-    """Roads that were never learned from, driven near their middle under strong conditions; belief and truth."""
-    tracks = ["kidney", "bowtie", "lakeside", "trefoil", "serpent", "boomerang"]
-    world = World(tracks, num_envs=96, seed=11, randomize="strong", lateral=0.1, turned=0.15, sway=0.08)
-    looks = []
-    for _ in range(12):
-        frames, targets = [world.look() for _ in range(3)][-1]
-        looks.append((frames.copy(), targets))
-    return perceiver(np.concatenate([frames for frames, _ in looks])), np.concatenate([truth for _, truth in looks])
+    """Roads that were never learned from, driven by what is seen under strong conditions; belief and truth."""
+    simulation = Simulation(
+        load_tracks(["kidney", "bowtie", "lakeside", "trefoil", "serpent", "boomerang"]),
+        num_envs=96,
+        seed=5,
+        start=Start(mode="random", lateral_jitter=0.1, heading_jitter=0.15),
+        direction="alternate",
+        track_order="random",
+        randomize="strong",
+        max_steps=60,
+        num_threads=2,
+    )
+    truth, driver = Truth(simulation), PerceptionDriver(perceiver, autopilot=Autopilot(speed=1.5))
+    frames, targets = [], []
+    for step in range(80):
+        simulation.step(driver(simulation.frames))
+        simulation.reset(simulation.terminated | simulation.truncated)
+        if step % 5 == 0:
+            frames.append(simulation.frames.copy())
+            targets.append(truth.targets())
+    return perceiver(np.concatenate(frames)), np.concatenate(targets)
 
 
 def test_offset_and_heading_on_roads_never_seen(unseen: tuple[Belief, NDArray[np.float32]]) -> None:
     belief, truth = unseen
     offset = np.abs(belief.offset - truth[:, 0] * NUMBERS["offset"])
     heading = np.abs(belief.heading - truth[:, 1] * NUMBERS["heading"])
-    assert np.percentile(offset, 90) <= 0.025
+    assert np.percentile(offset, 90) <= 0.02
+    # 2 degrees were hoped for: what of a road lies under the lens and behind it no single picture shows
+    assert np.degrees(np.median(heading)) <= 2.0
     assert np.degrees(np.percentile(heading, 90)) <= 5.5
 
 
@@ -95,6 +114,20 @@ def test_regions_and_rows_on_roads_never_seen(unseen: tuple[Belief, NDArray[np.f
     regions = truth[:, NUM_CONTINUOUS + rows : NUM_TARGETS - 1] > 0.5
     assert ((belief.regions.reshape(len(truth), -1) > 0.5) == regions).mean() > 0.97
     assert ((belief.on_road > 0.5) == (truth[:, -1] > 0.5)).mean() > 0.95
+
+
+def test_what_stands_in_the_way(perceiver: Perceiver) -> None:
+    boxed = World(["lakeside"], num_envs=64, seed=4, randomize="real", objects=8, lateral=0.1, turned=0.1)
+    looks = []
+    for _ in range(8):
+        frames, targets = boxed.look()
+        looks.append((frames.copy(), targets))
+    belief = perceiver(np.concatenate([frames for frames, _ in looks]))
+    truth = np.concatenate([targets for _, targets in looks])[:, list(NUMBERS).index("closeness")] * 0.5
+    near, far = truth > 1 / (1 + 0.8), truth < 1 / (1 + 3.0)
+    assert near.sum() > 20
+    assert far.sum() > 20
+    assert np.median(belief.closeness[near]) > np.median(belief.closeness[far]) + 0.2
 
 
 def test_light_and_threads_change_nothing(perceiver: Perceiver) -> None:

@@ -126,3 +126,19 @@ def test_regions_are_where_rays_meet_the_road(straight: Simulation) -> None:
                     assert told[car, line, place] == (lateral < half_width)
                     seen.append(lateral < half_width)
     assert 0.3 < np.mean(seen) < 0.95
+
+
+def test_a_lens_in_its_place_is_the_point_that_the_state_speaks_of() -> None:
+    simulation = Simulation(
+        [load_track("delta")],
+        num_envs=128,
+        seed=3,
+        start=Start(mode="random", lateral_jitter=0.2, heading_jitter=0.3),
+        num_threads=1,
+    )
+    targets, state = Truth(simulation).targets(), dict(zip(STATE_COLUMNS, simulation.state.T, strict=True))
+    assert targets[:, 0] * NUMBERS["offset"] == pytest.approx(state["offset"] * state["half_width"], abs=0.01)
+    heading = np.arctan2(state["sin_heading_error"], state["cos_heading_error"])
+    assert targets[:, 1] * NUMBERS["heading"] == pytest.approx(heading, abs=0.12)
+    assert np.median(np.abs(targets[:, 1] * NUMBERS["heading"] - heading)) < 0.02
+    assert targets[:, 3] == pytest.approx(state["curvature_2"], abs=1e-3)

@@ -17,7 +17,7 @@ from racecraft.perception.lessons import Lessons
 from racecraft.perception.network import LOG_LIMITS, Perceiver
 from racecraft.perception.truth import Truth
 from racecraft.sim import STATE_COLUMNS, Objects, Obstacles, Simulation, Start
-from racecraft.track import load_track
+from racecraft.track import load_tracks
 
 Floats = NDArray[np.float32]
 
@@ -37,7 +37,7 @@ class World:
     """Cars that drive badly: near the middle or not, straight or not, fast or slow, and now and then away.
 
     Args:
-        tracks: Names.
+        tracks: Names, as of `load_tracks`.
         num_envs: Cars, N.
         seed: Decides everything.
         randomize: Preset of the conditions.
@@ -62,7 +62,7 @@ class World:
         steps: int = 30,
     ) -> None:
         self.simulation = Simulation(
-            [load_track(track) for track in tracks],
+            load_tracks(tracks),
             num_envs=num_envs,
             seed=seed,
             start=Start(mode="random", lateral_jitter=lateral, heading_jitter=turned),
