@@ -34,8 +34,11 @@ console: $(VENV)/.built $(VENV)/.serve $(PAGES)  ## set up if needed, build the 
 	$(BIN)/racecraft serve
 
 WASM = $(MAKE) --no-print-directory -j$$($(BIN)/python -c 'import os; print(os.cpu_count() or 1)') -f native/wasm/Makefile ZIG=$(CURDIR)/$(ZIG)
-site: $(ZIG)  ## compile the core to WebAssembly, into build/wasm, for a page that needs no installation
+site: $(ZIG) $(VENV)/.built $(VENV)/.serve $(NODE)  ## build build/site: a page where cars learn in a browser's tab, for any static host
 	@$(WASM)
+	@cd web && npm run --silent site
+	@mkdir -p build/site/core && cp build/wasm/*.wasm build/site/core
+	@$(BIN)/python -m racecraft.site build/site/data
 
 build/wasm/%.wasm: $(ZIG) FORCE
 	@$(WASM) $@

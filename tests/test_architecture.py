@@ -38,6 +38,7 @@ LAYERS = (
     "analysis",
     "course",
     "serve",
+    "site",
     "bench",
     "cli",
 )

@@ -6,7 +6,6 @@ time, so nothing is built where that was not run.
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
 import shutil
@@ -21,15 +20,16 @@ from numpy.typing import NDArray
 
 from racecraft import _native
 from racecraft.agent import action_space
-from racecraft.learn import PPO, NetworkSpec, PPOConfig, networks
+from racecraft.learn import PPO, NetworkSpec, PPOConfig
 from racecraft.learn.flat_weights import join_weights
 from racecraft.learn.learner import Weights, below
 from racecraft.learn.native_learner import NativeLearner
 from racecraft.sim import CameraSpec, Simulation, Start
 from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import ROW_COLUMNS, STATE_COLUMNS
-from racecraft.sim.simulation import CONTROL_DT, DIRECTIONS, START_MODES, track_arrays
+from racecraft.sim.simulation import DIRECTIONS, START_MODES, track_arrays
 from racecraft.sim.vehicle import load_vehicle
+from racecraft.site.plan import packed, told_cars, told_layers, told_network, told_ppo, told_track
 from racecraft.track import Track, load_track
 
 pytestmark = pytest.mark.slow
@@ -58,57 +58,12 @@ AWS = PPOConfig(
 TRAININGS = {"plain": (PLAIN, "default"), "aws": (AWS, "default"), "continuous": (PLAIN, "continuous")}
 
 
-def packed(array: NDArray[Any]) -> dict[str, str]:
-    return {"dtype": str(array.dtype), "data": base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()}
-
-
 def digest(*arrays: NDArray[Any]) -> str:
     return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
 
 
-def told(arrays: dict[str, Any]) -> dict[str, Any]:
-    """A track, from `track_arrays`, as web/src/tab/core.ts takes it."""
-    sides = ("", "reversed_")
-    lines = np.stack([arrays[side + name] for side in sides for name in ("centerline", "inner", "outer")])
-    tables = np.stack([arrays[side + name] for side in sides for name in ("widths", "curvatures")])
-    return {
-        "lines": packed(lines),
-        "count": lines.shape[1],
-        "tables": packed(tables),
-        "waypoints": packed(np.stack([arrays["waypoints"], arrays["reversed_waypoints"]]).astype(np.int32)),
-        "samplesPerMetre": arrays["samples_per_metre"],
-        "isClosed": bool(arrays["is_closed"]),
-    }
-
-
 def settings_of(camera: CameraSpec | None, start: Start, num_envs: int, direction: str) -> dict[str, float]:
-    """What `Simulation` was told, by the core's names; the rest are its defaults."""
-    eye = camera or CameraSpec()
-    return {
-        "num_envs": num_envs,
-        "seed": SEED,
-        "substeps": 8,
-        "laps": 1,
-        "max_steps": 40,
-        "time_limit": 0.0,
-        "start_mode": START_MODES.index(start.mode),
-        "start_offset": start.offset,
-        "start_advance": start.advance,
-        "start_spread": int(start.spread),
-        "lateral_jitter": start.lateral_jitter,
-        "heading_jitter": start.heading_jitter,
-        "direction": DIRECTIONS.index(direction),
-        "picture_age": round(eye.age / CONTROL_DT * 8),
-        "palette": ("2018", "2020", "2026").index(eye.palette),
-        "has_camera": int(camera is not None),
-        "width": eye.width,
-        "height": eye.height,
-        "hfov": eye.horizontal_fov,
-        "forward": eye.forward,
-        "left": eye.left,
-        "above": eye.above_ground,
-        "pitch": eye.pitch,
-    }
+    return told_cars(camera, start, num_envs, seed=SEED, direction=direction, max_steps=40)
 
 
 def simulation_of(track: Track, camera: CameraSpec | None, start: Start, num_envs: int, direction: str) -> Simulation:
@@ -136,7 +91,7 @@ def driven() -> list[tuple[dict[str, Any], dict[str, str]]]:
             simulation.reset(simulation.terminated | simulation.truncated)
         case = {
             "what": "drive",
-            "track": told(track_arrays(track)),
+            "track": told_track(track_arrays(track)),
             "settings": settings_of(*shape),
             "vehicle": asdict(load_vehicle("v5")),
             "actions": packed(actions),
@@ -180,22 +135,15 @@ def trained(name: str) -> tuple[dict[str, Any], dict[str, Any]]:
     outputs = learner.policy(learner.encode(road.simulation.frames))
     best = outputs.argmax(axis=1) if is_discrete else outputs[:, : space.size]
     table = space.to_commands(np.arange(space.size)) if is_discrete else np.stack([space.low, space.high])
-    matrices = [(name, w) for name, w in initial.items() if name.endswith(".weight")]
-    gains = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}
-    objective = config.objective
+    matrices = [w for name, w in initial.items() if name.endswith(".weight")]
     case = {
         "what": "train",
-        "track": told(track_arrays(track)),
+        "track": told_track(track_arrays(track)),
         "settings": settings_of(*shape),
         "vehicle": asdict(load_vehicle("v5")),
-        "network": network_of(spec),
-        "layers": [[len(w), w[0].size, gains.get(name, 2.0**0.5)] for name, w in matrices],
-        "ppo": {
-            **{name: float(getattr(config, name)) for name in PPO_SETTINGS},
-            "is_greedy": int(config.exploration == "e-greedy"),
-            "is_huber": int(config.value_loss == "huber"),
-            "adam_eps": objective.adam_eps,
-        },
+        "network": told_network(spec),
+        "layers": told_layers(spec),
+        "ppo": told_ppo(config),
         "table": packed(table.astype(np.float64)),
         "seed": SEED,
         "weights": packed(join_weights(initial, spec)),
@@ -211,38 +159,10 @@ def trained(name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         "weights": flat(learner.weights()),
         "moment1": flat(below("moment1/", optimizer)),
         "moment2": flat(below("moment2/", optimizer)),
-        "initial": digest(*(w for _, w in matrices)),
+        "initial": digest(*(w for w in matrices)),
         "best": digest(space.to_commands(best)),
         "steps": ppo.total_steps,
         "ended": ended,
-    }
-
-
-PPO_SETTINGS = (
-    *("num_envs", "num_steps", "episodes_per_iteration", "max_steps_per_iteration", "rate_steps", "gamma"),
-    *("gae_lambda", "minibatch_size", "update_epochs", "normalize_returns", "epsilon_start", "epsilon_end"),
-    *("epsilon_steps", "learning_rate", "clip_coef", "ent_coef", "vf_coef", "max_grad_norm", "is_eps_hat"),
-)
-
-
-def network_of(spec: NetworkSpec) -> dict[str, Any]:
-    """The network as web/src/tab/core.ts takes it."""
-    arch = networks.architecture_of(spec)
-    height, width = spec.frame_shape
-    return {
-        "numbers": {
-            "height": height,
-            "width": width,
-            "top": networks.sky_rows(spec),
-            "pool": arch.pool,
-            "block": networks.block_size(spec),
-            "num_actions": spec.num_actions,
-            "is_discrete": int(spec.is_discrete),
-            "state_size": spec.state_size,
-        },
-        "convs": [[conv.filters, conv.kernel, conv.stride] for conv in arch.convs],
-        "dense": list(arch.dense),
-        "criticUnits": list(networks.CRITIC_UNITS),
     }
 
 
@@ -270,7 +190,9 @@ def found(request: pytest.FixtureRequest, expected: Any, tmp_path_factory: pytes
         pytest.skip("Zig's compiler is not installed: make site")
     subprocess.run(["make", "-s", str(code.relative_to(ROOT))], cwd=ROOT, check=True, capture_output=True)
     cases = tmp_path_factory.mktemp("bits") / "cases.json"
-    cases.write_text(json.dumps([*(case for case, _ in expected), {"what": "refuse", "track": told(broken_lines())}]))
+    cases.write_text(
+        json.dumps([*(case for case, _ in expected), {"what": "refuse", "track": told_track(broken_lines())}])
+    )
     options = ["--experimental-wasm-relaxed-simd"] if needs_flag(node) else []
     command = [node, *options, str(Path(__file__).with_name("bits.mjs")), str(ROOT / "web"), str(code), str(cases)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)

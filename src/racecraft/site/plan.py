@@ -1,0 +1,183 @@
+"""The training that the page runs, as numbers: the same car, network, PPO and evaluation as `racecraft train`."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import asdict
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.agent import ModelMetadata
+from racecraft.learn import NetworkSpec, PPOConfig, networks
+from racecraft.race.placement import start_pose
+from racecraft.race.rules import RULE_SETS
+from racecraft.run.folder import RunInfo
+from racecraft.serve.tracks.courses import geometry
+from racecraft.sim.camera import CAMERAS, CameraSpec
+from racecraft.sim.columns import STATUS_NAMES
+from racecraft.sim.simulation import CONTROL_DT, DIRECTIONS, START_MODES, Start, track_arrays
+from racecraft.track import Track, joint_digest, load_track
+from racecraft.training.evaluator import SEED, SLOWEST
+from racecraft.training.settings import TrainSettings, make_settings
+
+SEEDS: Final = range(1, 9)
+"""Seeds that the page trains with, one after the other; the evaluation's starts of each are among a track's files."""
+SUBSTEPS, MAX_STEPS = 8, 100_000  # the defaults of `Simulation`
+PALETTES: Final = ("2018", "2020", "2026")
+PPO_SETTINGS: Final = (
+    *("num_envs", "num_steps", "episodes_per_iteration", "max_steps_per_iteration", "rate_steps", "gamma"),
+    *("gae_lambda", "minibatch_size", "update_epochs", "normalize_returns", "epsilon_start", "epsilon_end"),
+    *("epsilon_steps", "learning_rate", "clip_coef", "ent_coef", "vf_coef", "max_grad_norm", "is_eps_hat"),
+)
+GAINS: Final = {"policy.head.weight": 0.01, "critic.head.weight": 1.0}  # of all others √2, see `initial_weights`
+
+
+def packed(array: NDArray[Any]) -> dict[str, str]:
+    """An array as JSON: its type, and its bytes in base64."""
+    return {"dtype": str(array.dtype), "data": base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()}
+
+
+def told_track(arrays: dict[str, Any]) -> dict[str, Any]:
+    """A track, from `racecraft.sim.simulation.track_arrays`, as web/src/tab/core.ts takes it."""
+    sides = ("", "reversed_")
+    lines = np.stack([arrays[side + name] for side in sides for name in ("centerline", "inner", "outer")])
+    tables = np.stack([arrays[side + name] for side in sides for name in ("widths", "curvatures")])
+    return {
+        "lines": packed(lines),
+        "count": lines.shape[1],
+        "tables": packed(tables),
+        "waypoints": packed(np.stack([arrays["waypoints"], arrays["reversed_waypoints"]]).astype(np.int32)),
+        "samplesPerMetre": arrays["samples_per_metre"],
+        "isClosed": bool(arrays["is_closed"]),
+    }
+
+
+def told_cars(
+    camera: CameraSpec | None, start: Start, num_envs: int, *, seed: int, direction: str, max_steps: int = MAX_STEPS
+) -> dict[str, float]:
+    """What `racecraft.sim.Simulation` would be told, by the core's names; the rest are its defaults."""
+    eye = camera or CameraSpec()
+    return {
+        "num_envs": num_envs,
+        "seed": seed,
+        "substeps": SUBSTEPS,
+        "laps": 1,
+        "max_steps": max_steps,
+        "time_limit": 0.0,
+        "start_mode": START_MODES.index(start.mode),
+        "start_offset": start.offset,
+        "start_advance": start.advance,
+        "start_spread": int(start.spread),
+        "lateral_jitter": start.lateral_jitter,
+        "heading_jitter": start.heading_jitter,
+        "direction": DIRECTIONS.index(direction),
+        "picture_age": round(eye.age / CONTROL_DT * SUBSTEPS),
+        "palette": PALETTES.index(eye.palette),
+        "has_camera": int(camera is not None),
+        "width": eye.width,
+        "height": eye.height,
+        "hfov": eye.horizontal_fov,
+        "forward": eye.forward,
+        "left": eye.left,
+        "above": eye.above_ground,
+        "pitch": eye.pitch,
+    }
+
+
+def told_network(spec: NetworkSpec) -> dict[str, Any]:
+    """A network, as web/src/tab/core.ts takes it."""
+    arch = networks.architecture_of(spec)
+    height, width = spec.frame_shape
+    return {
+        "numbers": {
+            "height": height,
+            "width": width,
+            "top": networks.sky_rows(spec),
+            "pool": arch.pool,
+            "block": networks.block_size(spec),
+            "num_actions": spec.num_actions,
+            "is_discrete": int(spec.is_discrete),
+            "state_size": spec.state_size,
+        },
+        "convs": [[conv.filters, conv.kernel, conv.stride] for conv in arch.convs],
+        "dense": list(arch.dense),
+        "criticUnits": list(networks.CRITIC_UNITS),
+    }
+
+
+def told_layers(spec: NetworkSpec) -> list[list[float]]:
+    """Rows, columns and gain of every matrix that an untrained network begins with."""
+    shapes = networks.weight_shapes(spec).items()
+    return [
+        [shape[0], int(np.prod(shape[1:])), GAINS.get(name, 2.0**0.5)]
+        for name, shape in shapes
+        if name.endswith(".weight")
+    ]
+
+
+def told_ppo(config: PPOConfig) -> dict[str, float]:
+    """PPO's settings by the core's names."""
+    return {
+        **{name: float(getattr(config, name)) for name in PPO_SETTINGS},
+        "is_greedy": int(config.exploration == "e-greedy"),
+        "is_huber": int(config.value_loss == "huber"),
+        "adam_eps": config.objective.adam_eps,
+    }
+
+
+def plan() -> dict[str, Any]:
+    """The default training, whatever the track, the reward and the seed; those of a run are filled in by the page."""
+    metadata = ModelMetadata(neural_network="RACECRAFT_SMALL")
+    settings = make_settings(metadata=metadata)
+    spec = settings.network_spec(metadata)
+    space = metadata.action_space
+    rules = RULE_SETS["first_lap"]
+    camera = CAMERAS[settings.camera]
+    trials = settings.evaluation_trials
+    line = Start(mode="fixed", offset=rules.start_offset)
+    return {
+        "cars": told_cars(camera, settings.start, settings.num_envs, seed=0, direction=settings.direction),
+        "trials": told_cars(camera, line, trials, seed=0, direction="forward"),
+        "vehicle": asdict(settings.vehicle),
+        "network": told_network(spec),
+        "layers": told_layers(spec),
+        "weights": [[name, list(shape)] for name, shape in networks.weight_shapes(spec).items()],
+        "ppo": told_ppo(settings.ppo),
+        "averageShare": settings.ppo.average_share,
+        "table": space.to_commands(np.arange(space.size)).astype(np.float64).ravel().tolist(),
+        "evaluateEvery": settings.evaluate_every,
+        "slowest": SLOWEST,
+        "seeds": list(SEEDS),
+        "statuses": list(STATUS_NAMES),
+        "run": _run(settings),
+        "modelMetadata": metadata.to_dict(),
+        "spec": asdict(spec),
+    }
+
+
+def track_file(name: str) -> dict[str, Any]:
+    """One track of the library: for the core, for the page to draw, and where evaluations start."""
+    track = load_track(name)
+    return {
+        "told": told_track(track_arrays(track)),
+        "waypoints": [one.waypoints.tolist() for one in (track, track.reversed())],
+        "geometry": geometry(name, track).model_dump(),
+        "digest": joint_digest([track]),
+        "starts": {str(seed): _starts(track, seed) for seed in SEEDS},
+    }
+
+
+def _run(settings: TrainSettings) -> dict[str, Any]:
+    """``run.json`` without what the page fills in: seed, track, its digest, when it began."""
+    document = settings.to_dict()
+    del document["seed"], document["track"]
+    info = asdict(RunInfo(seed=0, track="", track_digest="", settings=document))
+    return {"format": 1, **{name: info[name] for name in ("settings", "versions", "parent", "foreign")}}
+
+
+def _starts(track: Track, seed: int) -> list[list[float]]:
+    """X, y in m and heading in rad of every trial but the first, which starts at the line itself."""
+    rules, trials = RULE_SETS["first_lap"], TrainSettings().evaluation_trials
+    return [list(start_pose(track, rules, seed=(seed + SEED) % 2**32, trial=trial)) for trial in range(1, trials)]

@@ -1,0 +1,114 @@
+"""The page in a tab, in real headless Chromium, from a host that knows nothing but files: Train, and a car drives.
+
+Needs `make site`, and skips where that was not run.
+"""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import re
+import shutil
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from racecraft import evaluate
+from racecraft.importing import import_run
+from racecraft.training.evaluator import SEED
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+ROOT = Path(__file__).parents[2]
+SITE = ROOT / "build" / "site"
+AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"]
+PATIENCE = 120_000  # ms
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (SITE / "data" / "plan.json").exists(), reason="the page is not built: make site"),
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
+]
+
+
+class Files(http.server.SimpleHTTPRequestHandler):
+    """A static host, below a path of its own."""
+
+    def log_message(self, *_: object) -> None:
+        """Says nothing."""
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    from playwright.sync_api import sync_playwright
+
+    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE.parent)))
+    threading.Thread(target=host.serve_forever, daemon=True).start()
+    complaints: list[str] = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+        page.goto(f"http://127.0.0.1:{host.server_port}/site/")
+        page.get_by_role("button", name="Train").wait_for()
+        yield page
+        browser.close()
+    host.shutdown()
+    host.server_close()
+    assert complaints == []
+
+
+def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_program(page: Page, tmp_path: Path) -> None:
+    page.get_by_label("Track").select_option("oval")
+    page.get_by_role("button", name="Train").click()
+    page.get_by_text(re.compile("64 cars learning at once")).wait_for(timeout=PATIENCE)
+    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    shown = page.get_by_text(re.compile(r"oval, 5 of 5 laps, best \d+\.\d\d s")).inner_text()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Download: oval-racing-1").click()
+    archive = tmp_path / download.value.suggested_filename
+    download.value.save_as(archive)
+    imported = import_run(archive, root=tmp_path / "runs")
+    rules, seed = "first_lap", (1 + SEED) % 2**32  # as the evaluations of a training with seed 1
+    driven = evaluate(imported.run, rules=rules, seed=seed, video=False).evaluation
+    laps = [lap for trial in driven.trials for lap in trial.lap_times]
+    assert len(laps) == 5
+    assert f"best {min(laps):.2f} s" in shown
+
+
+def test_a_model_stays_when_the_page_is_closed_and_goes_when_it_is_deleted(page: Page) -> None:
+    page.reload()
+    page.get_by_role("button", name="Delete: oval-racing-1").click()
+    page.get_by_text("Nothing yet.").wait_for()
+
+
+def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
+    page.get_by_label("Track").select_option("hairpin")
+    page.get_by_label("What it is paid for").select_option("stay_inside")
+    page.get_by_role("button", name="Train").click()
+    page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_text("Stopped after").wait_for()
+    page.get_by_role("button", name="Train").click()
+    page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Stop").click()
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="web/node_modules is not installed")
+def test_the_page_is_accessible_in_both_themes_and_fits_a_phone(page: Page) -> None:
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    for theme in ("light", "dark"):
+        page.get_by_label("Theme").select_option(theme)
+        page.wait_for_timeout(300)
+        found = page.evaluate("axe.run().then((found) => found.violations.map((one) => [one.id, one.nodes[0].html]))")
+        assert found == []
+    for width in (390, 768):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") == 0

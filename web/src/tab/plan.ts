@@ -1,0 +1,66 @@
+/** What the page is told of the training that it runs: the files that `python -m racecraft.site` writes beside it. */
+import type { TrackGeometry } from "../api/client";
+import type { NetworkSettings, Settings, TrackArrays } from "./core";
+
+export interface RewardPreset {
+  name: string;
+  description: string;
+  source: string;
+}
+
+export interface Plan {
+  cars: Settings;
+  trials: Settings;
+  vehicle: Settings;
+  network: NetworkSettings;
+  layers: number[][]; // rows, columns, gain of every matrix
+  weights: [string, number[]][]; // name and shape of every array, in the order of a flat vector
+  ppo: Settings;
+  averageShare: number;
+  table: number[]; // (A, 2) steering angle in rad, speed in m/s
+  evaluateEvery: number; // camera steps
+  slowest: number; // m/s
+  seeds: number[];
+  statuses: string[]; // of a car, by the number in its row
+  run: Record<string, unknown>; // run.json, but for seed, track and time
+  modelMetadata: Record<string, unknown>;
+  spec: Record<string, unknown>;
+  tracks: string[];
+  rewards: RewardPreset[];
+}
+
+interface Packed {
+  dtype: "float64" | "float32" | "int32";
+  data: string; // base64
+}
+
+export interface TrackFile {
+  told: {
+    lines: Packed;
+    tables: Packed;
+    waypoints: Packed;
+    count: number;
+    samplesPerMetre: number;
+    isClosed: boolean;
+  };
+  waypoints: [number, number][][]; // (2, K, 2) m: forward, reversed
+  geometry: TrackGeometry;
+  digest: string;
+  starts: Record<string, [number, number, number][]>; // by seed: x, y, heading of every trial but the first
+}
+
+const bytesOf = ({ data }: Packed) => Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0)).buffer;
+
+export const arraysOf = ({ told }: TrackFile): TrackArrays => ({
+  ...told,
+  lines: new Float64Array(bytesOf(told.lines)),
+  tables: new Float32Array(bytesOf(told.tables)),
+  waypoints: new Int32Array(bytesOf(told.waypoints)),
+});
+
+/** A file of the site, wherever the site lies. */
+export async function read(site: string, file: string): Promise<Response> {
+  const answer = await fetch(new URL(file, site));
+  if (!answer.ok) throw new Error(`${file} of this site cannot be read (${answer.status}).`);
+  return answer;
+}
