@@ -62,6 +62,17 @@ def test_a_video_is_painted_as_one(tmp_path: Path, perceiver: Perceiver) -> None
     assert np.abs(painted[0] - frames[0]).mean() > 2.0
 
 
+def test_a_video_may_be_badly_labelled(tmp_path: Path, perceiver: Perceiver) -> None:
+    write_film([np.asarray(road(640, 480))], tmp_path / "in.mp4")
+    film = (tmp_path / "in.mp4").read_bytes()
+    assert film.count(b"VideoHandler") == 1
+    (tmp_path / "in.mp4").write_bytes(film.replace(b"VideoHandler", b"Video\xbfandler"))
+    assert len(perceive([tmp_path / "in.mp4"], perceiver=perceiver)) == 1
+    (tmp_path / "in.mp4").write_bytes(film.replace(b"avc1", b"none"))
+    with pytest.raises(ConfigError, match="no video"):
+        perceive([tmp_path / "in.mp4"], perceiver=perceiver)
+
+
 def test_what_is_no_picture_is_refused(tmp_path: Path, perceiver: Perceiver) -> None:
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40))
     (tmp_path / "b.jpg").write_text("text")

@@ -95,6 +95,16 @@ def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
         Perceiver(tmp_path / "w", num_threads=1)
 
 
+def test_weights_that_are_no_numbers_are_refused(learned: tuple[Path, list[float]], tmp_path: Path) -> None:
+    from safetensors.numpy import load_file, save_file
+
+    arrays = load_file(learned[0])
+    next(iter(arrays.values())).flat[3] = np.nan
+    save_file(arrays, tmp_path / "w")
+    with pytest.raises(CheckpointError, match="not all finite"):
+        Perceiver(tmp_path / "w", num_threads=1)
+
+
 def test_lessons_have_limits() -> None:
     for wrong in ({"updates": 0}, {"roads": 0}, {"store": 8}, {"learning_rate": 2.0}):
         with pytest.raises(ConfigError):

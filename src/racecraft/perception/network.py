@@ -122,6 +122,8 @@ class Perceiver:
             stored: Mapping[str, NDArray[np.float16]] = load_tensors(path.read_bytes())
         except Exception as error:  # whatever the reader makes of what is no such file
             raise CheckpointError(f"The weights of perception in {path} cannot be read: {error}.") from error
+        if not all(np.isfinite(array).all() for array in stored.values()):
+            raise CheckpointError(f"The weights of perception in {path} are not all finite.")
         needed = self.network.weights()
         weights = {name: np.asarray(array, np.float32) for name, array in stored.items()}
         critic = {name: array for name, array in needed.items() if name.startswith("critic.")}

@@ -108,9 +108,7 @@ def _from_file(path: Path) -> Picture:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(path, formats=("PNG", "JPEG", "WEBP", "BMP")) as image:
-                width, height = image.size
-                if width * height > MAX_PIXELS:
-                    raise ConfigError(f"Picture {_named(path)} has {width} x {height} pixels, more than 4096 x 4096.")
+                _check_size(path, *image.size)
                 return _picture(str(path), np.asarray(image.convert("RGB")))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         if isinstance(error, ConfigError):
@@ -123,12 +121,15 @@ def _from_video(path: Path) -> Iterator[Picture]:
     import av
 
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(path), metadata_errors="ignore") as container:
             if not container.streams.video:
                 raise ConfigError(f"There is no picture in the video {_named(path)}.")
-            for number, frame in enumerate(container.decode(container.streams.video[0])):
-                if frame.width * frame.height > MAX_PIXELS:
-                    raise ConfigError(f"The frames of {_named(path)} have more than 4096 x 4096 pixels.")
+            stream = container.streams.video[0]
+            if stream.codec_context is None:  # of a codec that there is not
+                raise ConfigError(f"{_named(path)} is no video that can be read.")
+            _check_size(path, stream.codec_context.width, stream.codec_context.height)
+            for number, frame in enumerate(container.decode(stream)):
+                _check_size(path, frame.width, frame.height)
                 yield _picture(f"{path}#{number}", np.asarray(frame.to_ndarray(format="rgb24"), np.uint8))
     except (av.error.FFmpegError, OSError) as error:
         raise ConfigError(f"{_named(path)} is no video that can be read.") from error
@@ -152,6 +153,11 @@ def _picture(name: str, pixels: NDArray[np.uint8]) -> Picture:
     small = np.asarray(image.resize(SHAPE, Image.Resampling.BILINEAR))
     grey = np.rint(small @ np.array(LUMA)).astype(np.uint8)
     return Picture(name, np.asarray(image.resize(SHOWN, Image.Resampling.BILINEAR)), grey)
+
+
+def _check_size(path: Path, width: int, height: int) -> None:
+    if width * height > MAX_PIXELS:
+        raise ConfigError(f"{_named(path)} has pictures of {width} x {height} pixels, more than 4096 x 4096.")
 
 
 def _named(path: Path) -> str:
