@@ -54,6 +54,7 @@ CONSOLE = (
     "jobs",
     "streams",
     "door",
+    "audit",
     "tracks",
     "evaluations",
     "models",

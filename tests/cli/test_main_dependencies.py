@@ -130,6 +130,7 @@ COMMANDS: dict[str, list[str]] = {
     "login": ["login http://127.0.0.1:9 --token rc_none --json"],
     "races": ["races --json"],
     "submit": ["submit R/a --race 1 --checkpoint best --wait --json"],
+    "league": ["league audit --runs R --database sqlite:///D.db --count 5 --json"],
     "worker": [
         "worker --runs W --database sqlite:///D.db --artifacts file:///tmp/none --trainings 1 --others 1 --machine w"
         " --json"
@@ -288,6 +289,7 @@ def test_what_needs_no_extra_works(told: dict[str, tuple[int, str]]) -> None:
         "tune ",
         "serve ",
         "worker ",
+        "league ",
         *ELSEWHERE,
         "learn --resume R/w --watch",
         "learn ALE/",

@@ -34,6 +34,7 @@ VERBS = (
     "lessons",
     "logs",
     "serve",
+    "operate",
     "machine",
 )
 """Files of verbs in the order of ``--help``; to import one is to register its verbs."""

@@ -15,6 +15,7 @@ from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
 
 from racecraft.serve import problems
+from racecraft.serve.audit import routes as audit
 from racecraft.serve.compression import CODINGS, Compressed, accepts
 from racecraft.serve.context import Consoles, Context
 from racecraft.serve.door import routes as door
@@ -124,9 +125,11 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.add_middleware(guard.middleware)
     problems.install(app)
     parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, races]
-    parts += [jobs, events, door, account, groups, league]
+    parts += [jobs, events, door, audit]
     for part in parts:
         app.include_router(part.router)
+    for part in (account, groups, league):
+        app.include_router(part.router, dependencies=[audit.Audited])
 
     @app.get("/assets/{name}", include_in_schema=False)
     def asset(name: str, request: Request) -> Response:

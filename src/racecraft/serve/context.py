@@ -9,6 +9,7 @@ from typing import Annotated, Final
 
 from fastapi import Depends, Request
 
+from racecraft.serve.audit.audit import Audit
 from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
 from racecraft.serve.groups.groups import Groups
@@ -62,6 +63,7 @@ class Consoles:
     def __init__(self, owner: Context, keys: Keys) -> None:
         self.owner, self.keys = owner, keys
         self.people, self.groups = People(owner.database), Groups(owner.database)
+        self.audit = Audit(owner.database)
         self.league = League(owner.database, owner.settings.state, self._courses)
         self._others: dict[int, Context] = {}
         self._lock = threading.Lock()

@@ -134,6 +134,20 @@ class Invitation(Table):
     expires: Mapped[datetime]
 
 
+class Deed(Table):
+    """Something that somebody did with power; see racecraft.serve.audit."""
+
+    __tablename__ = "deeds"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
+    what: Mapped[str] = mapped_column(String(64))
+    target: Mapped[str] = mapped_column(String(200))
+    details: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    is_done: Mapped[bool] = mapped_column(default=False)
+    created: Mapped[datetime] = mapped_column(default=now)
+
+
 class Model(Table):
     """What people say about a run, and a summary of its folder that is as old as its `fingerprint`."""
 

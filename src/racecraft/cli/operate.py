@@ -1,0 +1,47 @@
+"""`racecraft league`: what whoever runs a league does beside the server."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from racecraft.cli.app import Json, app, print_json
+from racecraft.cli.serve import Database
+from racecraft.extras import needed_for
+
+league_app = typer.Typer(help="Look after a league that runs here.", rich_markup_mode=None, no_args_is_help=True)
+app.add_typer(league_app, name="league")
+
+Runs = Annotated[Path, typer.Option("--runs", help="Folder that the league's server was given.")]
+
+
+@league_app.command()
+def audit(
+    runs: Runs = Path("runs"),
+    database: Database = "",
+    count: Annotated[int, typer.Option("--count", min=1, help="How many of the latest lines.")] = 100,
+    as_json: Json = False,
+) -> None:
+    """Who did what with power, oldest first; the server may be running."""
+    with needed_for("A league"):
+        from racecraft.serve.audit.audit import Audit
+        from racecraft.serve.settings import ServeSettings
+        from racecraft.serve.store.database import Database as Tables
+
+    tables = Tables(ServeSettings(runs=runs, database=database).database_url)
+    tables.require_current()
+    lines = Audit(tables).latest(count)[::-1]
+    tables.close()
+    if as_json:
+        print_json({"lines": [{**asdict(line), "when": line.when.isoformat()} for line in lines]})
+        return
+    for line in lines:
+        told = " ".join(f"{key}={value}" for key, value in line.details.items())
+        mark = "" if line.is_done else "  (not known to be done)"
+        when = f"{line.when:%Y-%m-%d %H:%M:%S}"
+        typer.echo(f"{when}  {line.name} ({line.who})  {line.what}  {line.target}  {told}{mark}".rstrip())
+    if not lines:
+        typer.echo("Nobody has done anything with power yet.")
