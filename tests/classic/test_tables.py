@@ -74,6 +74,28 @@ def test_beside_the_cliff_q_learning_walks_along_the_edge_and_sarsa_does_not(see
     assert -17.0 <= careful.mean_return < -13.0
 
 
+def stumbling(share: float) -> tuple[float, float]:
+    """Exact return beside the cliff of the best that takes this share of its steps by lot, and of it without them."""
+    going, rewards, ending = model("CliffWalking-v1")
+    values = np.zeros_like(rewards)
+    for _ in range(500):
+        values = rewards + going @ ((1.0 - share) * values.max(axis=1) + share * values.mean(axis=1))
+    place, start, steps, is_over = 36, values[36], 0, False
+    while not is_over and steps < 100:
+        action = int(values[place].argmax())
+        is_over, steps = bool(ending[place, action].any()), steps + 1
+        place = int(going[place, action].argmax())
+    return (1.0 - share) * float(start.max()) + share * float(start.mean()), float(-steps)
+
+
+def test_who_stumbles_enough_to_earn_minus_17_keeps_off_the_edge() -> None:
+    """What SARSA would end at if it were exact: -17 while learning and -13 without exploring are two walkers."""
+    exact = {share: stumbling(share) for share in (0.0, 0.007, 0.01, 0.03, 0.04, 0.07, 0.2)}
+    assert exact[0.0] == (-13.0, -13.0)
+    assert [greedy for _, greedy in exact.values()] == [-13.0, -13.0, -15.0, -15.0, -15.0, -15.0, -17.0]
+    assert [round(earned, 1) for earned, _ in exact.values()] == [-13.0, -15.1, -15.4, -16.4, -17.0, -18.7, -28.6]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("environment", "algorithm"), [("FrozenLake-v1", "q-table"), ("CliffWalking-v1", "sarsa")])
 def test_without_learning_nothing_is_learned(environment: str, algorithm: str) -> None:
