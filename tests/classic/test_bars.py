@@ -1,6 +1,7 @@
-"""What the plain command must reach, for three seeds, within a fixed number of steps; and what must not reach it.
+"""What the plain command's settings must reach, for three seeds, within a fixed number of steps; and what must not.
 
 `benchmarks/classic.py` measures the time. A bar is met by 100 greedy episodes that had no part in choosing the policy.
+Learning ends here as soon as the bar is reached; the plain command goes on to a goal above it, on the same steps.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from racecraft.classic import Learned, find_recipe, learn
+from racecraft.classic import Learned, find_recipe, job, learn
+from racecraft.classic.algorithms import find_algorithm
 from racecraft.classic.evaluation import play
-from racecraft.classic.job import JUDGE, view_of, worlds_of
+from racecraft.classic.job import JUDGE, LEARN, view_of, worlds_of
 
 SEEDS = (1, 2, 3)
 BARS = {
@@ -33,8 +35,8 @@ BARS = {
 
 @cache
 def learned_by(environment: str, algorithm: str, seed: int) -> Learned:
-    """What the plain command learns, once for all tests."""
-    return learn(environment, algorithm, seed=seed)
+    """What the plain command has learned when it reaches the bar, once for all tests."""
+    return learn(environment, algorithm, seed=seed, until=f"{BARS[environment, algorithm]:g} return")
 
 
 @pytest.mark.slow
@@ -44,7 +46,9 @@ def learned_by(environment: str, algorithm: str, seed: int) -> Learned:
 def test_the_plain_command_reaches_the_bar(environment: str, algorithm: str, seed: int) -> None:
     learned = learned_by(environment, algorithm, seed)
     assert learned.mean_return >= BARS[environment, algorithm]
-    assert learned.steps <= find_recipe(environment, algorithm).settings.steps * 1.01
+    recipe = find_recipe(environment, algorithm)
+    assert learned.steps <= recipe.settings.steps * 1.01
+    assert recipe.goal > BARS[environment, algorithm]
 
 
 @pytest.mark.slow
@@ -52,7 +56,7 @@ def test_the_plain_command_reaches_the_bar(environment: str, algorithm: str, see
 def test_asynchronous_processes_learn_as_well() -> None:
     # which of the processes comes first is chance, so one seed alone may be further off
     alone = [learned_by("Acrobot-v1", "a2c", seed).mean_return for seed in SEEDS]
-    together = [learn("Acrobot-v1", "a3c", seed=seed) for seed in SEEDS]
+    together = [learn("Acrobot-v1", "a3c", seed=seed, until="-100 return") for seed in SEEDS]
     assert all(one.returns and one.mean_return >= -100.0 for one in together)
     assert np.median([one.mean_return for one in together]) == pytest.approx(np.median(alone), abs=10.0)
 
@@ -94,27 +98,40 @@ class ByLot(gymnasium.Wrapper[Any, Any, Any, Any]):
 
 
 CONTROLS = {
-    ("CartPole-v1", "dqn"): 8_000,
-    ("MountainCar-v0", "dqn"): 8_000,
-    ("CartPole-v1", "reinforce"): 20_000,
-    ("CartPole-v1", "ppo"): 20_000,
+    ("CartPole-v1", "dqn"): 4_000,
+    ("MountainCar-v0", "dqn"): 4_000,
+    ("CartPole-v1", "reinforce"): 12_000,
+    ("CartPole-v1", "ppo"): 8_000,
     ("Pendulum-v1", "sac"): 4_000,
-    ("Acrobot-v1", "a2c"): 20_000,
-    ("Acrobot-v1", "ppo"): 20_000,
+    ("Acrobot-v1", "a2c"): 5_000,
+    ("Acrobot-v1", "ppo"): 5_000,
 }
-"""Steps."""
+"""Steps; REINFORCE, PPO and SAC reach the bar within so many where they may learn, on CartPole and Pendulum."""
+
+
+@pytest.fixture
+def judged_briefly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is far below a bar needs no hundred episodes."""
+    monkeypatch.setattr(job, "EPISODES", 5)
+    monkeypatch.setattr(job, "JUDGED", 5)
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
+@pytest.mark.usefixtures("judged_briefly")
 @pytest.mark.parametrize(("environment", "algorithm"), list(CONTROLS))
 def test_without_a_learning_rate_nothing_reaches_the_bar(environment: str, algorithm: str) -> None:
     still = {"learning_rate": 0.0, **({"critic_learning_rate": 0.0} if algorithm == "reinforce" else {})}
-    until = f"{CONTROLS[environment, algorithm]} steps"
-    assert learn(environment, algorithm, seed=1, settings=still, until=until).mean_return < BARS[environment, algorithm]
+    learned = learn(environment, algorithm, seed=1, settings=still, until="2500 steps")
+    assert learned.mean_return < BARS[environment, algorithm]
+    worlds = worlds_of(learned.lesson, num_envs=learned.lesson.settings.num_envs, purpose=LEARN)
+    begun = find_algorithm(algorithm).begin(worlds, learned.lesson.settings, np.random.default_rng((1, 0)))
+    worlds.close()
+    for name, array in learned.policy.arrays.items():
+        assert np.array_equal(array, begun.arrays[name]), name
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("judged_briefly")
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(("environment", "algorithm"), list(CONTROLS))
 def test_rewards_by_lot_teach_nothing(environment: str, algorithm: str) -> None:
@@ -130,5 +147,5 @@ def test_rewards_by_lot_teach_nothing(environment: str, algorithm: str) -> None:
         )
     finally:
         del gymnasium.registry["ByLot-v0"]
-    judged = worlds_of(replace(learned.lesson, environment=environment), num_envs=50, purpose=JUDGE)
+    judged = worlds_of(replace(learned.lesson, environment=environment), num_envs=20, purpose=JUDGE)
     assert play(judged, learned.policy).mean() < BARS[environment, algorithm]
