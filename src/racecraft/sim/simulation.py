@@ -408,7 +408,7 @@ def slower_than_could_be() -> str:
     return f"The native core runs on the instruction set {isa} and not on this machine's {best}: {why}."
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=32)  # a training and its evaluations share them; some 8 MB each
 def ground_map(track: Track, *, texel: float = 0.01) -> _native.GroundMap:
     """The ground of a track as the cameras see it, with texels of about `texel` metres."""
     return _native.GroundMap(track.centerline, track.inner, track.outer, track.is_closed, texel)
