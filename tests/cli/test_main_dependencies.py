@@ -130,7 +130,11 @@ COMMANDS: dict[str, list[str]] = {
     "login": ["login http://127.0.0.1:9 --token rc_none --json"],
     "races": ["races --json"],
     "submit": ["submit R/a --race 1 --checkpoint best --wait --json"],
-    "league": ["league audit --runs R --database sqlite:///D.db --count 5 --json"],
+    "league": [
+        "league audit --runs R --database sqlite:///D.db --count 5 --json",
+        "league backup B.tar --runs R --database sqlite:///D.db --json",
+        "league restore B.tar --runs B --database sqlite:///E.db --json",
+    ],
     "worker": [
         "worker --runs W --database sqlite:///D.db --artifacts file:///tmp/none --trainings 1 --others 1 --machine w"
         " --json"

@@ -19,6 +19,44 @@ Runs = Annotated[Path, typer.Option("--runs", help="Folder that the league's ser
 
 
 @league_app.command()
+def backup(
+    to: Annotated[Path, typer.Argument(help="File to write; keep it where only you can read it.")],
+    runs: Runs = Path("runs"),
+    database: Database = "",
+    as_json: Json = False,
+) -> None:
+    """Write the database and the folder into one file; the server may be running."""
+    with needed_for("A league"):
+        from racecraft.serve.settings import ServeSettings
+        from racecraft.serve.store.backup import back_up
+
+    made = back_up(ServeSettings(runs=runs, database=database), to)
+    if as_json:
+        print_json({"file": str(to), **asdict(made)})
+    else:
+        typer.echo(f"{to}: {sum(made.rows.values())} rows and {made.files} files.")
+
+
+@league_app.command()
+def restore(
+    source: Annotated[Path, typer.Argument(help="File that racecraft league backup wrote.")],
+    runs: Runs = Path("runs"),
+    database: Database = "",
+    as_json: Json = False,
+) -> None:
+    """Put a league where there is none: an empty folder and an empty database; everybody signs in anew."""
+    with needed_for("A league"):
+        from racecraft.serve.settings import ServeSettings
+        from racecraft.serve.store.backup import restore as put_back
+
+    found = put_back(ServeSettings(runs=runs, database=database), source)
+    if as_json:
+        print_json({"runs": str(runs), **asdict(found)})
+    else:
+        typer.echo(f"{runs}: {sum(found.rows.values())} rows and {found.files} files of {found.created[:19]}.")
+
+
+@league_app.command()
 def audit(
     runs: Runs = Path("runs"),
     database: Database = "",

@@ -42,7 +42,8 @@ class Database:
         try:
             version = self._version()
             if version == "":
-                self._make(_newest())
+                with self.engine.begin() as connection:
+                    _make(connection, _newest())
             elif version != _newest():
                 self._upgrade()
             with self.transaction() as session:
@@ -51,8 +52,11 @@ class Database:
         except SQLAlchemyError as error:
             raise RunError(f"The console's database cannot be opened: {_reason(error)}.") from error
 
-    def require_current(self) -> None:
+    def require_current(self) -> str:
         """Refuse a database that another version of Racecraft made; nothing is changed.
+
+        Returns:
+            Its version.
 
         Raises:
             RunError: It is one, or it cannot be opened.
@@ -69,6 +73,32 @@ class Database:
                 f"The console's database is of version {version}, this worker's is {_newest()}.",
                 hint="Install the same version of Racecraft on both machines.",
             )
+        return str(version)
+
+    @contextmanager
+    def fresh(self, version: str) -> Iterator[sa.Connection]:
+        """A transaction in which the tables are made, without a row, where there are none; kept if the block ends well.
+
+        Args:
+            version: Of the tables that are meant.
+
+        Raises:
+            RunError: There are tables, they cannot be made, or this Racecraft's are of another version.
+        """
+        if version != _newest():
+            raise RunError(
+                f"The tables are of version {version[:20]}, this Racecraft's are {_newest()}.",
+                hint="Install the version of Racecraft that wrote them; a newer one brings them up to date later.",
+            )
+        try:
+            with self.engine.begin() as connection:
+                names = sa.inspect(connection).get_table_names()
+                if names:
+                    raise RunError(f"The database is not empty: it has a table {names[0]!r}.")
+                _make(connection, version)
+                yield connection
+        except SQLAlchemyError as error:
+            raise RunError(f"The database does not take this: {_reason(error)}.") from error
 
     def _version(self) -> str:
         """Of the tables; empty for a fresh database."""
@@ -76,13 +106,6 @@ class Database:
             if not sa.inspect(connection).has_table("alembic_version"):
                 return ""
             return str(connection.scalar(sa.text("SELECT version_num FROM alembic_version")))
-
-    def _make(self, version: str) -> None:
-        """All tables as they are now; tests hold the migrations to giving the same."""
-        with self.engine.begin() as connection:
-            Table.metadata.create_all(connection)
-            connection.execute(sa.text("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
-            connection.execute(sa.text("INSERT INTO alembic_version VALUES (:version)"), {"version": version})
 
     def _upgrade(self) -> None:
         from alembic import command  # takes its time to load, and most starts do without
@@ -127,6 +150,13 @@ class Database:
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+def _make(connection: sa.Connection, version: str) -> None:
+    """All tables as they are now; tests hold the migrations to giving the same."""
+    Table.metadata.create_all(connection)
+    connection.execute(sa.text("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
+    connection.execute(sa.text("INSERT INTO alembic_version VALUES (:version)"), {"version": version})
 
 
 def _reason(error: SQLAlchemyError) -> str:
