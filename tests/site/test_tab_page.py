@@ -101,6 +101,19 @@ def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
     page.get_by_role("button", name="Stop").click()
 
 
+def test_the_page_opens_and_trains_without_a_network_after_the_first_visit(page: Page) -> None:
+    late = "new Promise((_, failed) => setTimeout(() => failed(new Error('no service worker')), 30_000))"
+    page.evaluate(f"Promise.race([navigator.serviceWorker.ready, {late}]).then(() => 0)")
+    page.reload()  # what the service worker has kept now comes from it
+    page.context.set_offline(True)
+    page.reload()
+    page.get_by_label("Track").select_option("needle")  # never opened before
+    page.get_by_role("button", name="Train").click()
+    page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Stop").click()
+    page.context.set_offline(False)
+
+
 @pytest.mark.skipif(not AXE.exists(), reason="web/node_modules is not installed")
 def test_the_page_is_accessible_in_both_themes_and_fits_a_phone(page: Page) -> None:
     page.evaluate(AXE.read_text(encoding="utf-8"))

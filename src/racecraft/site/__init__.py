@@ -2,5 +2,6 @@
 
     tracks, settings, presets -> *plan*, *javascript* -> build/site/data -> web/src/tab
 
-`python -m racecraft.site FOLDER` writes them; `make site` does. docs/tab.md says what the page makes of them.
+`python -m racecraft.site build/site` writes them, and which files there are; `make site` does.
+docs/tab.md says what the page makes of them.
 """
