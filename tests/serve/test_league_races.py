@@ -346,15 +346,17 @@ def test_films_of_an_open_race_tell_no_driver_apart(cup: Cup, run: RunFolder) ->
     number = ok(cup.ada.post(f"{address}/submissions?model=novice", content=pack_entry(run)), 202)["id"]
     cup.league.console.wait_for(lambda: ok(cup.ada.get(f"{address}/submissions/{number}"))["state"] == "done")
 
-    def poses() -> np.ndarray[Any, Any]:
-        return np.array(ok(cup.bob.get(f"/api/boards/{practice}/film?submissions={number}"))["cars"][0]["trace"])
+    def poses(*, sectors: int) -> np.ndarray[Any, Any]:
+        film = ok(cup.bob.get(f"/api/boards/{practice}/film?submissions={number}"))
+        assert len(film["sectors"]) == sectors  # by which it would be told who brakes where
+        return np.array(film["cars"][0]["trace"])
 
     assert "when the race is over" in refused(cup.bob.get(f"/api/boards/{practice}/replays/{number}"), 409)
     assert ok(cup.bob.get(f"/api/boards/{practice}/race.json"))["board"] == []
-    coarse = poses()
+    coarse = poses(sectors=0)
     assert (coarse % 50 == 0).all()
     ok(owner.patch(address, json={"closes": now().isoformat()}))
-    exact = poses()
+    exact = poses(sectors=2)
     assert (np.abs(exact - coarse) <= 26).all()
     assert (exact % 50 != 0).any()
     assert cup.bob.get(f"/api/boards/{practice}/replays/{number}").status_code == 200

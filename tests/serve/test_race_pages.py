@@ -43,8 +43,8 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     page.get_by_role("checkbox", name="ada").check()
     page.get_by_role("checkbox", name="bob").check()
     page.get_by_role("button", name="Enter 2 and drive").click()
-    page.get_by_role("row", name="ada").wait_for()
-    page.get_by_role("row", name="bob").wait_for()
+    page.get_by_role("link", name="ada", exact=True).wait_for()
+    page.get_by_role("link", name="bob", exact=True).wait_for()
     assert page.get_by_title("Driven again from its actions").count() == 2
 
     # while it is open nobody sees where it starts, only what was promised of it
@@ -63,6 +63,8 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
 
     page.get_by_role("button", name="Replay all together").click()
     page.locator(".stage canvas").wait_for()
+    page.get_by_role("img", name="Time behind").wait_for()
+    assert page.get_by_role("button", name="Why is").count() == 1
     clock = page.locator(".controls .number")
     visit.console.wait_for(lambda: float(clock.inner_text().split()[0]) > 0.5)
     page.get_by_role("button", name="Pause").click()
@@ -77,7 +79,7 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("heading", name="No race yet").wait_for()
     page.get_by_role("button", name="Undo").click()
-    page.get_by_role("row", name="ada").wait_for()
+    page.get_by_role("link", name="ada", exact=True).wait_for()
 
 
 def test_a_race_for_practice_shows_everything_and_opens_again(visit: Visit) -> None:

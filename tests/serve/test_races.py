@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
+from racecraft.analysis import sectors_of
 from racecraft.contest.classification import classify
 from racecraft.contest.terms import announced_terms
 from racecraft.errors import ConfigError
@@ -25,7 +26,8 @@ from racecraft.serve.models.garage import Garage
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races import races as races_module
 from racecraft.serve.races.races import Races
-from racecraft.serve.races.schemas import Enter, NewRace, RaceChange
+from racecraft.serve.races.replays import replay_of
+from racecraft.serve.races.schemas import Enter, NewRace, RaceChange, ReplayCar
 from racecraft.serve.store.database import MIGRATIONS, Database
 from racecraft.serve.store.tables import Entry, Job, Race
 from racecraft.serve.tracks.courses import Courses
@@ -386,3 +388,17 @@ def _upgrade_to(database: Database, revision: str) -> None:
 def _row(stewards: Stewards, race: int) -> Race:
     with stewards.database.transaction() as session:
         return session.get_one(Race, race)
+
+
+@pytest.mark.parametrize("is_reversed", [False, True])
+def test_a_film_knows_the_corners_as_they_are_driven(is_reversed: bool) -> None:
+    track = load_track("delta")
+    driven = track.reversed() if is_reversed else track
+    points = driven.point_at(np.arange(5.0, 12.0, 0.1))
+    trace = [[round(1000 * float(x)), round(1000 * float(y)), 0] for x, y in points]
+    cars = [ReplayCar(entry=1, model="ada", trace=trace, laps=[])]
+    film = replay_of("delta", track, cars, trial=0)
+    assert film.is_reversed is is_reversed
+    assert [sector.apex for sector in film.sectors] == [sector.apex for sector in sectors_of(driven)]
+    assert film.geometry.center[1] == pytest.approx(track.centerline[1], abs=1e-4)
+    assert replay_of("delta", track, cars, trial=0, is_coarse=True).sectors == []

@@ -93,6 +93,7 @@ def test_a_race_from_beginning_to_end(console: RunningConsole, tmp_path: Path) -
         assert replay.conditions.vehicle == PRESETS["v5"]
     film = client.get(f"/api/races/{race['id']}/replay", params={"entries": entries, "trial": 1}).json()
     assert film["trial"] == 1
+    assert (film["is_reversed"], [sector["number"] for sector in film["sectors"]]) == (False, [1, 2])
     assert [car["model"] for car in film["cars"]] == [row["model"] for row in closed["standings"]]
     begin = [car["trace"][0] for car in film["cars"]]
     assert begin[0] == begin[1]  # everybody from the same place

@@ -110,6 +110,7 @@ def test_a_lap_is_scrubbed_with_a_ghost_beside_it(studio: tuple[RunningConsole, 
     page.get_by_role("button", name="Pause", exact=True).wait_for()
     page.get_by_role("region", name="Results").locator("tbody tr").nth(1).wait_for()
     assert page.get_by_role("region", name="Results").locator("tbody tr").count() == 2
+    page.get_by_role("heading", name="Why is").or_(page.get_by_text("To say why")).wait_for()
 
 
 @pytest.mark.parametrize(("kind", "begins"), [("CSV", b'"Place'), ("SVG", b"<svg"), ("PNG", b"\x89PNG")])

@@ -125,11 +125,11 @@ def start_place(track: Track, lap: TracedLap) -> float:
     return place - float(lap.share[0]) * track.length
 
 
-def driven_direction(track: Track, laps: Sequence[TracedLap]) -> Track:
-    """The track in the direction in which most of the laps drive it."""
+def driven_direction(track: Track, paths: Sequence[Floats]) -> Track:
+    """The track in the direction in which most of some paths drive it; m, each (R, 2)."""
     forward = 0.0
-    for lap in laps:
-        places = track.project(lap.points)[0]
+    for points in paths:
+        places = track.project(points)[0]
         step = np.diff(places)
         forward += float(np.sign(step[np.abs(step) < JUMP]).sum())
     return track if forward >= 0 else track.reversed()

@@ -89,7 +89,7 @@ def _race(folder: RunFolder, stamp: str, summary: dict[str, Any], trained_on: Tr
     name = str(summary.get("track", ""))
     track = trained_on if name in ("", trained_on.name) else load_track(name)
     laps = read_laps(folder.evaluation(stamp) / "evaluation-simtrace" / "0-iteration.csv")
-    driven = driven_direction(track, laps)
+    driven = driven_direction(track, [lap.points for lap in laps])
     whole = sorted((lap for lap in laps if lap.is_complete), key=lambda lap: lap.seconds)
     best = whole[0] if whole else max(laps, key=lambda lap: lap.share[-1])
     sectors = sectors_of(driven)

@@ -126,3 +126,9 @@ export function cornerReport(laps: EvaluationLaps, lap: LapTrace): CornerRow[] {
     };
   });
 }
+
+/** A lap as what compares laps has it: by places along the centre line of so many metres. */
+export const placed = (lap: LapTrace, length: number) => ({
+  place: lap.share.map((share) => lap.start + share * length),
+  ...{ time: lap.time, speed: lap.speed, x: lap.x, y: lap.y, puts: lap.puts },
+});

@@ -39,10 +39,10 @@ from racecraft.serve.evaluations.schemas import (
     LapPassage,
     LapTrace,
     SaliencyPicture,
-    TrackSector,
     TrainingMaps,
 )
 from racecraft.serve.problems import NotFound
+from racecraft.serve.tracks.schemas import TrackSector
 from racecraft.sim.views import driver_frames
 from racecraft.track import Track, load_tracks
 
@@ -61,7 +61,7 @@ def get_laps(name: str, stamp: str, context: InContext) -> EvaluationLaps:
     track = evaluation_track(context, folder, stamp)
     trace = trace_of(folder, stamp)
     laps = read_laps(trace)
-    driven = driven_direction(track, laps)
+    driven = driven_direction(track, [lap.points for lap in laps])
     sectors = sectors_of(driven)
     objects = objects_of(folder, stamp, laps)
     reward, paid = rewards_of(folder, stamp, driven, trace, laps)
@@ -70,7 +70,7 @@ def get_laps(name: str, stamp: str, context: InContext) -> EvaluationLaps:
         track=track.name,
         length=track.length,
         is_reversed=driven is not track,
-        sectors=[TrackSector(number=s.number, start=s.start, end=s.end, apex=s.apex, turn=s.turn) for s in sectors],
+        sectors=[TrackSector.of(sector) for sector in sectors],
         laps=[
             _lap(
                 driven,
@@ -103,7 +103,7 @@ def get_saliency(
     step, spec, weights = _network(folder, summary.get("step"))
     heading = float(found.heading[row])
     origin = found.points[row] - AHEAD * np.array([math.cos(heading), math.sin(heading)])
-    driven = driven_direction(track, [found])
+    driven = driven_direction(track, [found.points])
     frame = driver_frames(driven, [[*origin.tolist(), heading]], trained_camera(folder.read_info()))[0]
     if target is not None and target >= spec.num_actions:
         raise NotFound(f"The policy of {name!r} has no output {target}; allowed are 0 to {spec.num_actions - 1}.")

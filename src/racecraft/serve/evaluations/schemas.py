@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from racecraft.serve.schemas import Message
+from racecraft.serve.tracks.schemas import TrackSector
 
 # ---- races against the clock
 
@@ -92,16 +93,6 @@ class LapPassage(Message):
     entry_speed: float
     slowest: float
     exit_speed: float
-
-
-class TrackSector(Message):
-    """A corner with half of the straights around it, metres along the centre line; turn in radians, left positive."""
-
-    number: int
-    start: float
-    end: float
-    apex: float
-    turn: float
 
 
 class RewardOfLaps(Message):

@@ -15,6 +15,7 @@ from racecraft.judging.race import FORMAT
 from racecraft.serve.context import InContext, InUser
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
+from racecraft.serve.races.replays import replay_of, trial_poses
 from racecraft.serve.races.schemas import (
     MAX_CARS,
     Enter,
@@ -25,10 +26,9 @@ from racecraft.serve.races.schemas import (
     RaceReplay,
     ReplayCar,
 )
-from racecraft.serve.races.standings import replay_trace, trial_poses
+from racecraft.serve.races.standings import replay_trace
 from racecraft.serve.races.tasks import REPLAY, VIDEO, entry_folder
 from racecraft.serve.store.tables import Job
-from racecraft.serve.tracks.courses import geometry
 
 router = APIRouter(prefix="/api/races", tags=["races"])
 
@@ -131,7 +131,7 @@ def get_replay(
         for entry, job in driven
         for trace, ends in [_old_steps(job, runs) if race.is_old else _steps(job, runs, chosen)]
     ]
-    return RaceReplay(trial=chosen, geometry=geometry(race.track, context.courses.load(race.track)), cars=cars)
+    return replay_of(race.track, context.courses.load(race.track), cars, trial=chosen)
 
 
 def _file(context: InContext, race_id: int, entry_id: int, name: str, *, media_type: str) -> FileResponse:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AwareDatetime, Field
 
 from racecraft.serve.schemas import Message, RunName
-from racecraft.serve.tracks.schemas import TrackGeometry
+from racecraft.serve.tracks.schemas import TrackGeometry, TrackSector
 
 RaceKind = Literal["time-trial", "object-avoidance", "head-to-bot"]
 Ranking = Literal["total", "best", "average"]
@@ -172,4 +172,8 @@ class RaceReplay(Message):
     trial: int
     """From 0."""
     geometry: TrackGeometry
+    is_reversed: bool
+    """Whether they drive against the geometry's direction."""
+    sectors: list[TrackSector]
+    """In driving direction; none where the steps are too coarse to say why one is faster."""
     cars: list[ReplayCar]

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.contest import Key, median_score, places, ranking_key, ranking_score
-from racecraft.replay.replay import read_replay
 from racecraft.serve.races.schemas import Standing
 from racecraft.serve.races.tasks import REPLAY, VIDEO, entry_folder
 from racecraft.serve.store.tables import Entry, Job, Race
@@ -79,19 +78,6 @@ def replay_trace(job: Job, *, runs: Path) -> Path | None:
     place = _relative(job.result or {}, "summary") if job.state == "done" else None
     path = None if place is None else (runs / job.run / place).parent / "evaluation-simtrace" / "0-iteration.csv"
     return path if path is not None and path.is_file() else None
-
-
-def trial_poses(path: Path, trial: int, *, grain: int = 1) -> tuple[list[list[int]], list[int]]:
-    """Poses of one trial of a replay file in whole mm and mrad, and the steps after which its laps ended.
-
-    Args:
-        path: The file.
-        trial: From 0.
-        grain: mm and mrad that poses are rounded to.
-    """
-    recording = read_replay(path).cars[trial].recording
-    ends = [step + 1 for step, event in recording.events if event == "lap_complete"]
-    return ((1000 / grain * recording.poses).round().astype(int) * grain).tolist(), ends
 
 
 def _standing(race: Race, entered: Entered, *, place: int, score: float, first: float, attempts: int) -> Standing:

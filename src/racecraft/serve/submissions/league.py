@@ -36,9 +36,9 @@ from racecraft.serve.submissions.board import NONE, Board, read_board
 from racecraft.serve.submissions.judge import ENTRY
 from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, Stage, SubmissionInfo
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
-from racecraft.serve.tracks.courses import Courses, geometry
-from racecraft.serve.tracks.schemas import TrackGeometry
+from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.vehicle import load_vehicle
+from racecraft.track import Track
 
 Part = Literal["organiser", "racer", "spectator"]
 KIND: Final = "judge"
@@ -374,11 +374,11 @@ class League:
         with self._database.transaction() as session:
             return {row[0]: row[1] for row in session.execute(query.where(Submission.id.in_(submissions)))}
 
-    def track(self, race_id: int) -> TrackGeometry:
-        """Everything to draw a race's track; it may be on its maker's own."""
+    def track(self, race_id: int) -> tuple[str, Track]:
+        """A race's track by its name; it may be its maker's own."""
         with self._database.transaction() as session:
             race = session.get_one(Race, race_id)
-        return geometry(race.track, self._courses(race.owner_id).load(race.track))
+        return race.track, self._courses(race.owner_id).load(race.track)
 
     def counted_trial(self, submission_id: int) -> int:
         """The trial that a judged submission is ranked by; the first where it has no score."""

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from racecraft.analysis.corners import Sector
 from racecraft.serve.schemas import Message, Problem
 from racecraft.track.sketch import FARTHEST, MAX_POINTS, WIDEST, Sketch
 
@@ -37,6 +38,21 @@ class TrackGeometry(Message):
     center: list[list[float]]
     inner: list[list[float]]
     outer: list[list[float]]
+
+
+class TrackSector(Message):
+    """A corner with half of the straights around it, metres along the centre line; turn in radians, left positive."""
+
+    number: int
+    start: float
+    end: float
+    apex: float
+    turn: float
+
+    @classmethod
+    def of(cls, sector: Sector) -> TrackSector:
+        """From the analysis'."""
+        return cls(number=sector.number, start=sector.start, end=sector.end, apex=sector.apex, turn=sector.turn)
 
 
 class ControlPoint(Message):

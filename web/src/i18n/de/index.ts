@@ -15,10 +15,12 @@ import { shell } from "./shell";
 import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
+import { why } from "./why";
 
 export const de: Record<Key, string> = {
   ...shell,
   ...replay,
+  ...why,
   ...analysis,
   ...create,
   ...params,

@@ -14,10 +14,12 @@ import { shell } from "./shell";
 import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
+import { why } from "./why";
 
 export const en = {
   ...shell,
   ...replay,
+  ...why,
   ...analysis,
   ...create,
   ...params,

@@ -1,0 +1,23 @@
+/** Why one lap is faster than another. */
+export const why = {
+  why_than: "Why is {who} faster than {whom}?",
+  why_lead: "Corner by corner, by {lap}: what gained or lost the most time comes first.",
+  why_laps: "the fastest lap of each",
+  why_shown: "the two laps chosen above",
+  why_faster: "{who} is {seconds} s faster over the lap than {whom}.",
+  why_same: "{who} and {whom} take the same time.",
+  why_brakes: "{who} brakes {amount} m later into corner {corner}",
+  why_lifts: "{who} need not brake into corner {corner}",
+  why_arrives: "{who} is {amount} m/s faster on the way to corner {corner}",
+  why_middle: "{who} is {amount} m/s faster in the middle of corner {corner}",
+  why_accelerates: "{who} accelerates {amount} m earlier out of corner {corner}",
+  why_leaves: "{who} is {amount} m/s faster out of corner {corner}",
+  why_way: "{who} takes a line through corner {corner} that is {amount} m shorter",
+  why_puts: "{who} stays on the road in corner {corner}, {whom} does not",
+  why_pace: "{who} is faster through corner {corner}",
+  why_close: "In no corner do they differ by more than 0.02 s.",
+  why_none: "To say why, both need a complete lap in an evaluation on the same track.",
+  why_button: "Why?",
+  gaps: "Time behind {who}, s",
+  gaps_place: "Metres from the start",
+} as const;
