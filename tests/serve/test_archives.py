@@ -115,6 +115,14 @@ def test_a_model_goes_out_and_comes_back(console: RunningConsole) -> None:
     assert ended["result"]["steps"] >= old.step + 1000
 
 
+def test_a_model_with_weights_from_elsewhere_is_no_new_one(console: RunningConsole) -> None:
+    """What AWS trained has driven no step here, and drives."""
+    console.create(name="given", train=False, track="oval")
+    assert console.client.get("/api/models/given").json()["status"] == "new"
+    RunFolder(console.runs / "given").checkpoints.save(0, {"w": np.arange(4.0)})
+    assert console.client.get("/api/models/given").json()["status"] == "finished"
+
+
 @pytest.fixture(scope="module")
 def own_archive(console: RunningConsole, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """The files of an archive of ours, untrained, with a checkpoint that is whole."""

@@ -34,7 +34,7 @@ TRASH: Final = "trash"  # inside the state folder
 PICTURE: Final = "racing-line.png"
 NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
 SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
-SUMMARY: Final = "3"
+SUMMARY: Final = "4"
 """Changes with what a summary says, so that those kept by an earlier version are made anew."""
 Status = Literal["training", "queued", "stopped", "finished", "failed", "new"]
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -119,8 +119,9 @@ class Garage:
         cards = []
         for name, (words, summary) in ((folder.name, tags[folder.name]) for folder in folders if folder.name in tags):
             if summary:
-                status = _status(*trainings.get(name, ("", "")), has_steps=bool(summary["steps"]))
-                cards.append(ModelCard(name=name, tags=words, status=status, **summary))
+                shown = {key: value for key, value in summary.items() if key != "has_policy"}
+                status = _status(*trainings.get(name, ("", "")), has_policy=summary["has_policy"])
+                cards.append(ModelCard(name=name, tags=words, status=status, **shown))
         return cards
 
     def require_new(self, name: str) -> None:
@@ -325,6 +326,7 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
         "track": Path(info.track).stem,
         "race": race_of(info),
         "created": created,
+        "has_policy": last is not None,  # weights from elsewhere have no steps
         "steps": last.step if last is not None else 0,
         "seconds": _seconds(folder),
         "completion": metrics.get("completion"),
@@ -373,11 +375,11 @@ def _insert(session: Session) -> sa.Insert:
     return sqlite.insert(Model).values(**_FRESH).on_conflict_do_nothing()
 
 
-def _status(state: str, reason: str, *, has_steps: bool) -> Status:
+def _status(state: str, reason: str, *, has_policy: bool) -> Status:
     if state in ("queued", "running"):
         return "training" if state == "running" else "queued"
     if state == "failed":
         return "failed"
     if state == "cancelled" or reason == "interrupted":
         return "stopped"
-    return "finished" if has_steps else "new"
+    return "finished" if has_policy else "new"
