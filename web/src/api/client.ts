@@ -5,8 +5,6 @@ import type { components } from "./schema";
 
 type Schemas = components["schemas"];
 export type ModelCard = Schemas["ModelCard"];
-/** Whether it has a policy: one that was learned here, or elsewhere, in no steps of ours. */
-export const canDrive = (model: ModelCard) => model.steps > 0 || model.status === "finished";
 export type ModelDetail = Schemas["ModelDetail"];
 export type TrainingStretch = Schemas["TrainingStretch"];
 export type ImportedModel = Schemas["ImportedModel"];
