@@ -1,10 +1,9 @@
-/** Every script and style of the built pages once more as .br and .gz, which the server sends to browsers that take them. */
+/** Every script and style of the built pages once more as .br, which the server sends to browsers that take them. */
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
-import { brotliCompressSync, gzipSync } from "node:zlib";
+import { brotliCompressSync } from "node:zlib";
 
 const folder = new URL("../src/racecraft/serve/pages/assets/", import.meta.url);
 for (const name of readdirSync(folder).filter((one) => /\.(js|css|svg)$/.test(one))) {
   const data = readFileSync(new URL(name, folder));
   writeFileSync(new URL(`${name}.br`, folder), brotliCompressSync(data));
-  writeFileSync(new URL(`${name}.gz`, folder), gzipSync(data, { level: 9 }));
 }

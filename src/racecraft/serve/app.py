@@ -16,7 +16,7 @@ from fastapi.responses import FileResponse, HTMLResponse, Response
 
 from racecraft.serve import problems
 from racecraft.serve.audit import routes as audit
-from racecraft.serve.compression import CODINGS, Compressed, accepts
+from racecraft.serve.compression import BROTLI, Compressed, accepts, gzipped
 from racecraft.serve.context import Consoles, Context
 from racecraft.serve.door import routes as door
 from racecraft.serve.door.guard import Guard, content_policy
@@ -137,13 +137,13 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         if "/" in name or path.suffix not in KINDS or not path.is_file():
             return problems.problem(404, "NotFound", f"There is no file {name[:80]!r}.")
         headers = {"Cache-Control": "public, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
-        for coding, ending in CODINGS.items():
-            small = path.with_name(name + ending)
-            if accepts(request.headers.get("accept-encoding", ""), coding) and small.is_file():
-                return FileResponse(
-                    small, media_type=KINDS[path.suffix], headers={**headers, "Content-Encoding": coding}
-                )
-        return FileResponse(path, media_type=KINDS[path.suffix], headers=headers)
+        small, wanted = path.with_name(name + BROTLI), request.headers.get("accept-encoding", "")
+        kind = KINDS[path.suffix]
+        if small.is_file() and accepts(wanted, "br"):
+            return FileResponse(small, media_type=kind, headers={**headers, "Content-Encoding": "br"})
+        if small.is_file() and accepts(wanted, "gzip"):
+            return Response(gzipped(path), media_type=kind, headers={**headers, "Content-Encoding": "gzip"})
+        return FileResponse(path, media_type=kind, headers=headers)
 
     rooms = "league" if settings.league else "console"
 
