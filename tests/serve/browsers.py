@@ -103,6 +103,11 @@ def violations_by_theme(page: Page) -> dict[str, list[Any]]:
     return found
 
 
+def complaints_of(message: Any) -> list[str]:
+    """What a page's console says of an error, and of which address."""
+    return [f"{message.text} {message.location['url']}"] if message.type == "error" else []
+
+
 @contextmanager
 def visiting(console: RunningConsole) -> Iterator[Visit]:
     from playwright.sync_api import sync_playwright
@@ -114,7 +119,7 @@ def visiting(console: RunningConsole) -> Iterator[Visit]:
         cookie = console.client.cookies["racecraft_session"]
         page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
         visit = Visit(console, page)
-        page.on("console", lambda message: visit.complaints.append(message.text) if message.type == "error" else None)
+        page.on("console", lambda message: visit.complaints.extend(complaints_of(message)))
         page.on("pageerror", lambda error: visit.complaints.append(str(error)))
         yield visit
         browser.close()
