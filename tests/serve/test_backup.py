@@ -19,7 +19,7 @@ from racecraft.errors import RunError
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.backup import back_up, restore
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Race
+from racecraft.serve.store.tables import Group, Member, Race
 
 
 def league_verb(*words: str) -> subprocess.CompletedProcess[str]:
@@ -111,6 +111,32 @@ def test_what_a_row_refers_to_may_come_later(tmp_path: Path) -> None:
     assert (made.files, found) == (0, [("first", 2, None, {}), ("second", None, None, {})])
     with pytest.raises(RunError, match="exists already"):
         back_up(ServeSettings(runs=tmp_path / "b"), tmp_path / "a.tar")
+
+
+def test_the_rows_are_of_one_moment(database_url: str, tmp_path: Path) -> None:
+    """Somebody makes a group and comes into it after the groups were read, and before the members are."""
+    database = Database(database_url)
+    database.migrate()
+    settings = ServeSettings(runs=tmp_path / "runs", database=database_url)
+    settings.runs.mkdir()
+    written: list[int] = []
+
+    def come_in(_: object, __: object, statement: str, *___: object) -> None:
+        if "FROM members" in statement and not written:
+            written.append(1)
+            with database.transaction() as session:
+                session.add(Group(id=7, title="Meanwhile"))
+                session.flush()
+                session.add(Member(group_id=7, user_id=1))
+
+    sa.event.listen(sa.Engine, "before_cursor_execute", come_in)
+    try:
+        made = back_up(settings, tmp_path / "backup.tar")
+    finally:
+        sa.event.remove(sa.Engine, "before_cursor_execute", come_in)
+        database.close()
+    assert (written, made.rows["groups"], made.rows["members"]) == ([1], 0, 0)
+    assert back_up(settings, tmp_path / "later.tar").rows["members"] == 1
 
 
 def test_what_is_no_whole_backup_leaves_nothing(tmp_path: Path) -> None:
