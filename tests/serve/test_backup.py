@@ -109,6 +109,8 @@ def test_what_a_row_refers_to_may_come_later(tmp_path: Path) -> None:
         found = [(race.title, race.after_id, race.closes, race.rules) for race in session.scalars(sa.select(Race))]
     database.close()
     assert (made.files, found) == (0, [("first", 2, None, {}), ("second", None, None, {})])
+    with pytest.raises(RunError, match="cannot be written: No such file"):
+        back_up(ServeSettings(runs=tmp_path / "b"), tmp_path / "nowhere" / "a.tar")
     with pytest.raises(RunError, match="exists already"):
         back_up(ServeSettings(runs=tmp_path / "b"), tmp_path / "a.tar")
 
@@ -156,9 +158,14 @@ def test_what_is_no_whole_backup_leaves_nothing(tmp_path: Path) -> None:
         (tar("broken", **start, **{"files/a": b"1"}), "no whole backup"),
         (tar("outside", **start, **{"files/../../x": b"1", "end": b""}), "no place in a league"),
         (tar("old", **start, **{"database.jsonl": b"", "end": b""}), "version 0001"),
+        (tar("nameless", **start, **{"": b"1", "end": b""}), "no place in a league"),
+        (tmp_path / "nowhere", "No such file"),
+        (tmp_path, "Is a directory"),
+        (tar("large", **{"manifest.json": b" " * (1 << 20) + start["manifest.json"], "end": b""}), "no backup of"),
         (tar("list", **{"manifest.json": b"[]", "end": b""}), "no backup of a league"),
     ):
-        with pytest.raises(RunError, match=told):
+        with pytest.raises(RunError, match=told) as refused:
             restore(ServeSettings(runs=tmp_path / "place"), source)
+        assert not str(refused.value).endswith(".."), "one sentence within another"
         assert not list(tmp_path.glob("place*"))
         assert not (tmp_path / "x").exists()

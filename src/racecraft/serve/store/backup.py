@@ -35,6 +35,8 @@ END: Final = "end"
 """The last member, by which a file that broke off is known."""
 LEFT_OUT: Final = (f"{STATE_FOLDER}/console.db", f"{STATE_FOLDER}/{INCOMING}/", f"{STATE_FOLDER}/uploads/")
 """Beginnings of paths: the database is in the backup by its rows, and the rest was on its way."""
+MAX_MANIFEST: Final = 1 << 20
+"""Bytes."""
 PASSING: Final = (".lock", ".live")
 """Beginnings of names of what only a running job has."""
 
@@ -58,7 +60,7 @@ def back_up(settings: ServeSettings, to: Path) -> Backup:
         to: The file, which only its owner may read, for it holds what races keep secret.
 
     Raises:
-        RunError: The file exists, or the database cannot be read.
+        RunError: The file exists or cannot be written, or the database cannot be read.
     """
     if to.exists():
         raise RunError(f"{to} exists already.", hint="Name another file.")
@@ -82,6 +84,8 @@ def back_up(settings: ServeSettings, to: Path) -> Backup:
         os.replace(partial, to)
     except SQLAlchemyError as error:
         raise RunError(f"The league's database cannot be read: {str(error).splitlines()[0]}.") from error
+    except OSError as error:
+        raise RunError(f"{to} cannot be written: {error.strerror or error}.") from error
     finally:
         partial.unlink(missing_ok=True)
         database.close()
@@ -120,8 +124,12 @@ def restore(settings: ServeSettings, source: Path) -> Backup:
             settings.runs.rmdir()
         settings.runs.parent.mkdir(parents=True, exist_ok=True)
         folder.rename(settings.runs)
+    except RunError:  # a ValueError, too, and said already
+        raise
     except (tarfile.TarError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
         raise RunError(f"{source} is no backup of a league: {error}.") from error
+    except OSError as error:
+        raise RunError(f"{source} cannot be restored: {error.strerror or error}.") from error
     finally:
         shutil.rmtree(incoming, ignore_errors=True)
     return Backup(about["created"], about["racecraft"], about["revision"], counts, files)
@@ -206,12 +214,12 @@ def _unpack(source: Path, files: Path, rows: Path) -> tuple[dict[str, Any], int]
                 raise RunError(f"{source} holds {member.name[:80]!r}, which is no file.")
             is_whole = member.name == END
             if member.name == MANIFEST:
-                about = json.loads(stream.read())
+                about = json.loads(stream.read(MAX_MANIFEST))
             elif member.name == ROWS:
                 _write(rows, stream)
             elif not is_whole:
                 path = PurePosixPath(member.name)
-                if path.parts[0] != FILES or ".." in path.parts or len(path.parts) < 2:
+                if path.parts[:1] != (FILES,) or ".." in path.parts or len(path.parts) < 2:
                     raise RunError(f"{source} holds {member.name[:80]!r}, which has no place in a league.")
                 _write(files.joinpath(*path.parts[1:]), stream)
                 count += 1
