@@ -9,12 +9,13 @@ import pytest
 from PIL import Image
 
 from racecraft.errors import ConfigError, ShapeError
+from racecraft.film.encoding import write_video
 from racecraft.learn.native_regressor import NativeRegressor
 from racecraft.learn.networks import PERCEIVER
 from racecraft.perception import Belief, Perceiver, perceive
 from racecraft.perception.answers import NUM_OUTPUTS, NUMBERS
 from racecraft.perception.network import believe
-from racecraft.perception.painting import paint, write_film
+from racecraft.perception.painting import paint
 from racecraft.perception.reading import read_pictures
 from racecraft.perception.telling import tell
 
@@ -54,7 +55,7 @@ def test_pictures_of_every_kind_and_size(tmp_path: Path, perceiver: Perceiver) -
 
 def test_a_video_is_painted_as_one(tmp_path: Path, perceiver: Perceiver) -> None:
     frames = [np.asarray(road(640, 480).rotate(turn)) for turn in range(5)]
-    write_film(frames, tmp_path / "in.mp4")
+    write_video(frames, tmp_path / "in.mp4")
     told = perceive([tmp_path / "in.mp4"], output=tmp_path / "out.mp4", perceiver=perceiver)
     assert [one["file"].rpartition("#")[2] for one in told] == ["0", "1", "2", "3", "4"]
     painted = [picture.shown.astype(int) for picture in read_pictures([tmp_path / "out.mp4"])]
@@ -63,7 +64,7 @@ def test_a_video_is_painted_as_one(tmp_path: Path, perceiver: Perceiver) -> None
 
 
 def test_a_video_may_be_badly_labelled(tmp_path: Path, perceiver: Perceiver) -> None:
-    write_film([np.asarray(road(640, 480))], tmp_path / "in.mp4")
+    write_video([np.asarray(road(640, 480))], tmp_path / "in.mp4")
     film = (tmp_path / "in.mp4").read_bytes()
     assert film.count(b"VideoHandler") == 1
     (tmp_path / "in.mp4").write_bytes(film.replace(b"VideoHandler", b"Video\xbfandler"))

@@ -10,7 +10,7 @@ import pytest
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.perception import Lessons, Perceiver, train
 from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS
-from racecraft.perception.network import WEIGHTS
+from racecraft.perception.network import MAX_WEIGHTS, WEIGHTS
 from racecraft.perception.training import slopes_of
 
 FEW = Lessons(updates=60, minibatch_size=32, store=1024, roads=2, learning_rate=1e-3)
@@ -85,6 +85,10 @@ def test_weights_that_are_none_are_refused(learned: tuple[Path, list[float]], tm
     for name in ("cut", "text", "missing"):
         with pytest.raises(CheckpointError, match="cannot be read"):
             Perceiver(tmp_path / name, num_threads=1)
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(MAX_WEIGHTS + 1)
+    with pytest.raises(CheckpointError, match="larger than 16 MB"):
+        Perceiver(tmp_path / "large", num_threads=1)
 
 
 def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:

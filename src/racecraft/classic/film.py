@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -14,11 +13,12 @@ from numpy.typing import NDArray
 from racecraft.classic.job import WATCH, Learned, worlds_of
 from racecraft.errors import ConfigError
 from racecraft.extras import not_installed
+from racecraft.film.encoding import write_video
 
 MAX_SECONDS: Final = 120
 RATES: Final = (4, 60)
 """Frames per second that are kept; others are brought within."""
-QUALITY: Final = "20"
+QUALITY: Final = 20
 """x264's constant rate factor."""
 
 
@@ -31,14 +31,12 @@ def film_learned(learned: Learned, path: str | Path) -> Path:
 
     Raises:
         ConfigError: The environment draws no pictures, or what it draws with is not installed.
+        RunError: The file cannot be written.
     """
-    import av
-
     path = Path(path)
     if path.suffix.lower() != ".mp4":
         raise ConfigError(f"Cannot write a film to {path.name!r}; the name must end in .mp4.")
     worlds = worlds_of(learned.lesson, num_envs=1, purpose=WATCH, render_mode="rgb_array")
-    unfinished = path.with_name(f".{path.stem}.part.mp4")
     rate = min(max(int(worlds.render_fps), RATES[0]), RATES[1])
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
@@ -50,20 +48,10 @@ def film_learned(learned: Learned, path: str | Path) -> Path:
             yield picture(worlds.render(), learned.lesson.environment)
 
     try:
-        with av.open(str(unfinished), "w", options={"movflags": "faststart"}) as container:
-            stream = None
-            for pixels in pictures():
-                if stream is None:
-                    stream = container.add_stream("h264", rate=rate, options={"preset": "veryfast", "crf": QUALITY})
-                    stream.height, stream.width, stream.pix_fmt = *pixels.shape[:2], "yuv420p"
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
-            if stream is not None:
-                container.mux(stream.encode())
-        os.replace(unfinished, path)
+        write_video(pictures(), path, rate=rate, quality=QUALITY)
     except gymnasium.error.DependencyNotInstalled as error:
         raise not_installed("pygame", f"A film of {learned.lesson.environment}") or error from error
     finally:
-        unfinished.unlink(missing_ok=True)
         worlds.close()
     return path
 

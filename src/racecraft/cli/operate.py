@@ -74,7 +74,7 @@ def audit(
     lines = Audit(tables).latest(count)[::-1]
     tables.close()
     if as_json:
-        print_json({"lines": [{**asdict(line), "when": line.when.isoformat()} for line in lines]})
+        print_json({"lines": [{**line.model_dump(), "when": line.when.isoformat()} for line in lines]})
         return
     for line in lines:
         told = " ".join(f"{key}={value}" for key, value in line.details.items())

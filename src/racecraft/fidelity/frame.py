@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError
-from racecraft.fidelity.likeness import LUMA, edge_offsets, mean_difference, structural_similarity
-from racecraft.sim.camera import CameraSpec
+from racecraft.fidelity.likeness import edge_offsets, mean_difference, structural_similarity
+from racecraft.sim.camera import LUMA, CameraSpec
 from racecraft.sim.views import Scene, driver_frames
 from racecraft.track.load import load_track
 from racecraft.track.track import Track
@@ -135,7 +135,7 @@ def fit_frame(frame: str | Path, *, track: str | Path | Track, palette: str = "2
 
 def network_frame(picture: NDArray[np.uint8]) -> Grey:
     """A colour frame as the original hands it to the network: bilinear to 160 x 120, then grey."""
-    return np.asarray(np.rint(_shrink_image(picture) @ LUMA), dtype=np.uint8)
+    return np.asarray(np.rint(_shrink_image(picture) @ np.array(LUMA)), dtype=np.uint8)
 
 
 def _shrink_image(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:

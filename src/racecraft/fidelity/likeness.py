@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-LUMA: Final = np.array([0.2989, 0.587, 0.114])
-"""What the original weighs red, green and blue with."""
+from racecraft.sim.camera import LUMA
+
 WINDOW: Final = 1.5  # standard deviation of the similarity's window, pixels
 WINDOW_RADIUS: Final = 5  # pixels, 11 x 11 as in the paper
 STABILISERS: Final = ((0.01 * 255) ** 2, (0.03 * 255) ** 2)
@@ -88,7 +88,7 @@ def _between(count: int) -> Picture:
 
 def _horizon(picture: Picture) -> Picture:
     """Only the first edge under the upper border, in every column."""
-    outline = _outline(picture @ LUMA, DARK)
+    outline = _outline(picture @ np.array(LUMA), DARK)
     first = np.zeros_like(outline)
     columns = np.flatnonzero(outline.any(axis=0))
     first[outline.argmax(axis=0)[columns], columns] = True

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,17 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
-from racecraft.errors import ConfigError, RunError
+from racecraft.errors import ConfigError
+from racecraft.film.encoding import FRAME_RATE, write_video
 from racecraft.film.ghost import LIVERY, Ghost, Rival
 from racecraft.film.overlay import HEIGHT, INSET, WIDTH, Overlay
 from racecraft.race.recording import Recording
 from racecraft.race.rules import RESET_STATUSES
-from racecraft.sim.camera import CameraSpec
+from racecraft.sim.camera import LUMA, CameraSpec
 from racecraft.sim.simulation import CONTROL_DT
 from racecraft.sim.views import CarView, ObjectView, ScanView, Scene
 from racecraft.track.canvas import Color
 
-FRAME_RATE: Final = 15
 END_SECONDS: Final = 2.0
 """How long the last frame stays, with the result."""
 CAMERA_LAG: Final = 0.25
@@ -35,8 +34,6 @@ BLINK_PERIOD: Final = 0.5
 """s in which a car that stands as a penalty fades and returns once."""
 BLINK_ALPHA: Final = 0.3
 """How solid it is when faded most."""
-QUALITY: Final = "22"
-"""x264's constant rate factor: 18 is near lossless, 28 is poor."""
 
 
 def film(
@@ -68,34 +65,20 @@ def film(
         ConfigError: Nothing was recorded, the palette is unknown, or the path does not end in .mp4.
         RunError: The file cannot be written.
     """
-    import av
-
     path = Path(path)
     if path.suffix.lower() != ".mp4":
         raise ConfigError(f"Cannot write a video to {path.name!r}; the name must end in .mp4.")
-    unfinished = path.with_name(f".{path.stem}.part.mp4")
-    try:
-        with av.open(str(unfinished), "w", options={"movflags": "faststart"}) as container:
-            stream = container.add_stream("h264", rate=FRAME_RATE, options={"preset": "veryfast", "crf": QUALITY})
-            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
-            pictures = frames(
-                recording,
-                name=name,
-                laps=laps,
-                color=color,
-                palette=palette,
-                ghosts=ghosts,
-                rivals=rivals,
-                sensors=sensors,
-            )
-            for pixels in pictures:
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
-            container.mux(stream.encode())
-        os.replace(unfinished, path)
-    except OSError as error:
-        raise RunError(f"{path} cannot be written: {error.strerror or error}.") from error
-    finally:
-        unfinished.unlink(missing_ok=True)
+    pictures = frames(
+        recording,
+        name=name,
+        laps=laps,
+        color=color,
+        palette=palette,
+        ghosts=ghosts,
+        rivals=rivals,
+        sensors=sensors,
+    )
+    write_video(pictures, path)
     return path
 
 
@@ -122,8 +105,7 @@ class DriverView:
             view.draw(x, y, heading, cars=objects, out=picture)
         seen = self._pictures[-1]
         if len(self._views) == 2:
-            grey = (0.2989, 0.587, 0.114)
-            left, right = (np.asarray(picture @ np.array(grey), np.uint8) for picture in self._pictures)
+            left, right = (np.asarray(picture @ np.array(LUMA), np.uint8) for picture in self._pictures)
             seen[..., 0], seen[..., 1], seen[..., 2] = left, right, right
         return seen
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import RunError
+from racecraft.film.encoding import write_video
 from racecraft.perception.network import Perceiver
-from racecraft.perception.painting import paint, write_film
+from racecraft.perception.painting import paint
 from racecraft.perception.reading import is_sequence, read_pictures
 from racecraft.perception.telling import tell
 
@@ -49,7 +50,7 @@ def perceive(
         for _ in _looked_at(looker, sources, told, paints=False):
             pass
     elif is_sequence(sources) and output.suffix.lower() == ".mp4":
-        write_film((pixels for _, pixels in _looked_at(looker, sources, told)), output)
+        write_video((pixels for _, pixels in _looked_at(looker, sources, told)), output)
     else:
         _write_pictures(_looked_at(looker, sources, told), output)
     return told

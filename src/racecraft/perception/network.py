@@ -36,6 +36,8 @@ MEAN, SPREAD = 112.0, 48.0
 """Mean and standard deviation that a picture's brightness is brought to, in levels of 255."""
 LEAST_SPREAD: Final = 4.0
 """Standard deviation, in levels, that the picture of a wall has: less is noise, and is not made more of."""
+MAX_WEIGHTS: Final = 16_000_000
+"""Bytes of a file of weights; ours has 0.8 million."""
 LOG_LIMITS: Final = (-6.0, 2.0)
 """Of the logarithm of an error, in units of the network."""
 
@@ -119,7 +121,15 @@ class Perceiver:
 
     def _load(self, path: Path) -> None:
         try:
-            stored: Mapping[str, NDArray[np.float16]] = load_tensors(path.read_bytes())
+            with path.open("rb") as file:
+                data = file.read(MAX_WEIGHTS + 1)
+        except OSError as error:
+            told = error.strerror or error
+            raise CheckpointError(f"The weights of perception in {path} cannot be read: {told}.") from error
+        if len(data) > MAX_WEIGHTS:
+            raise CheckpointError(f"The weights of perception in {path} are larger than {MAX_WEIGHTS // 10**6} MB.")
+        try:
+            stored: Mapping[str, NDArray[np.float16]] = load_tensors(data)
         except Exception as error:  # whatever the reader makes of what is no such file
             raise CheckpointError(f"The weights of perception in {path} cannot be read: {error}.") from error
         if not all(np.isfinite(array).all() for array in stored.values()):

@@ -8,15 +8,12 @@ words            offset, heading, bend ahead, what is in the way
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import RunError
 from racecraft.perception.answers import CURVATURE_AT, REGION_COLUMNS, REGION_ROWS, ROWS
 from racecraft.perception.network import Belief
 from racecraft.perception.reading import SHOWN
@@ -33,7 +30,6 @@ INK: Final[Color] = (255, 255, 255)
 SHADE: Final[Color] = (16, 20, 26)
 MOST_ROAD: Final = 110
 """Opacity, of 255, where there is road for sure."""
-FRAME_RATE: Final = 15
 
 
 def paint(picture: NDArray[np.uint8], belief: Belief, index: int) -> NDArray[np.uint8]:
@@ -57,25 +53,6 @@ def paint(picture: NDArray[np.uint8], belief: Belief, index: int) -> NDArray[np.
     _scale(draw, belief, index)
     _words(draw, belief, index)
     return np.asarray(Image.alpha_composite(image, layer).convert("RGB"))
-
-
-def write_film(frames: Iterable[NDArray[np.uint8]], path: Path) -> None:
-    """Write painted pictures as a video of 15 a second.
-
-    Raises:
-        RunError: It cannot be written.
-    """
-    import av
-
-    try:
-        with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
-            stream = container.add_stream("h264", rate=FRAME_RATE, options={"preset": "veryfast", "crf": "22"})
-            stream.width, stream.height, stream.pix_fmt = *SHOWN, "yuv420p"
-            for pixels in frames:
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
-            container.mux(stream.encode())
-    except OSError as error:
-        raise RunError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def _regions(draw: ImageDraw.ImageDraw, regions: NDArray[np.float32]) -> None:

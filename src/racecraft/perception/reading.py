@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, printable
 from racecraft.replay.replay import read_replay
-from racecraft.sim.camera import CameraSpec
+from racecraft.sim.camera import LUMA, CameraSpec
 from racecraft.sim.views import Scene
 
 PICTURES: Final = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
@@ -31,8 +31,6 @@ SHAPE: Final = (160, 120)
 """What the network gets, width and height."""
 SHOWN: Final = (640, 480)
 """What is painted on, width and height."""
-LUMA: Final = (0.2989, 0.587, 0.114)
-"""Weights of red, green and blue in grey, as the original's (ITU-R BT.601)."""
 
 
 @dataclass(frozen=True)

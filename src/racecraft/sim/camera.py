@@ -8,6 +8,8 @@ from typing import Final
 from racecraft.checks import check_choice, check_number, check_whole
 
 PALETTES: Final = ("2018", "2020", "2026")
+LUMA: Final = (0.2989, 0.587, 0.114)
+"""What the original weighs red, green and blue with to make grey (ITU-R BT.601)."""
 
 
 @dataclass(frozen=True, kw_only=True)

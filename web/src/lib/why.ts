@@ -152,21 +152,9 @@ function reasonOf(slow: Driving, fast: Driving): { reason: Reason; amount: numbe
   return { reason, amount };
 }
 
-const SENTENCES: Record<Reason, Key> = {
-  puts: "why_puts",
-  brakes: "why_brakes",
-  lifts: "why_lifts",
-  arrives: "why_arrives",
-  middle: "why_middle",
-  accelerates: "why_accelerates",
-  leaves: "why_leaves",
-  way: "why_way",
-  pace: "why_pace",
-};
-
 /** The text of a gain, and what to fill in. */
 export const sentenceOf = (gain: Gain, names: [string, string]): [Key, Record<string, string | number>] => [
-  SENTENCES[gain.reason],
+  `why_${gain.reason}`,
   {
     who: gain.seconds >= 0 ? names[1] : names[0],
     whom: gain.seconds >= 0 ? names[0] : names[1],

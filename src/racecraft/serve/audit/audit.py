@@ -7,36 +7,17 @@ The row is there before the deed: of a server that is killed in between it says 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from datetime import datetime
-from typing import Any, Final
+from typing import Final
 
 import sqlalchemy as sa
 
+from racecraft.serve.audit.schemas import AuditLine
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Deed, User
 
 TELLING: Final = ("title", "member", "members", "model", "reason", "race", "uses", "hours", "scopes", "days")
 """What is kept of what somebody sends; never a name, a password or a secret."""
 MAX_TARGET: Final = 200  # characters
-
-
-@dataclass(frozen=True)
-class Done:
-    """A line of the log."""
-
-    id: int
-    when: datetime
-    who: int
-    name: str
-    """As they are called now."""
-    what: str
-    """The operation of the API, such as ``print_cards``."""
-    target: str
-    """Its address, which holds the numbers of what it was done to."""
-    details: dict[str, Any]
-    is_done: bool
-    """False for one that is under way, or that a killed server left."""
 
 
 class Audit:
@@ -74,7 +55,7 @@ class Audit:
         with self._database.transaction() as session:
             session.execute(sa.delete(Deed).where(Deed.id == number))
 
-    def latest(self, count: int, *, before: int | None = None) -> list[Done]:
+    def latest(self, count: int, *, before: int | None = None) -> list[AuditLine]:
         """Lines, newest first.
 
         Args:
@@ -86,6 +67,15 @@ class Audit:
             query = query.where(Deed.id < before)
         with self._database.transaction() as session:
             return [
-                Done(d.id, d.created, d.user_id, name, d.what, d.target, d.details, d.is_done)
-                for d, name in session.execute(query)
+                AuditLine(
+                    id=deed.id,
+                    when=deed.created,
+                    who=deed.user_id,
+                    name=name,
+                    what=deed.what,
+                    target=deed.target,
+                    details=deed.details,
+                    is_done=deed.is_done,
+                )
+                for deed, name in session.execute(query)
             ]

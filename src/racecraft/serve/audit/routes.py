@@ -50,4 +50,4 @@ def read_audit(
     before: Annotated[int | None, Query(ge=0, lt=2**31)] = None,
 ) -> list[AuditLine]:
     """Who did what with power, newest first."""
-    return [AuditLine(**vars(line)) for line in consoles.audit.latest(count, before=before)]
+    return consoles.audit.latest(count, before=before)

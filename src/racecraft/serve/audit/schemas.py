@@ -15,7 +15,11 @@ class AuditLine(Message):
     when: datetime
     who: int
     name: str
+    """As they are called now."""
     what: str
+    """The operation of the API, such as ``print_cards``."""
     target: str
+    """Its address, which holds the numbers of what it was done to."""
     details: dict[str, Any]
     is_done: bool
+    """False for one that is under way, or that a killed server left."""
