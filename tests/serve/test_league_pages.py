@@ -139,7 +139,7 @@ def test_the_teacher_judges_and_ends_it_and_everybody_sees_the_films(lesson: Les
     teacher.get_by_role("alert").get_by_role("button", name="End the race").click()
     pupil.get_by_role("button", name="Film of the first eight").wait_for()
     pupil.locator(f"button[aria-label='Film: {'Turbo' if last == 'Comet' else 'Comet'}']").click()
-    pupil.locator("#film canvas").wait_for()
+    pupil.locator("#film").get_by_label("Live").wait_for()
     assert sorted(pupil.locator("#film li button span:first-of-type").all_inner_texts()) == ["Comet", "Turbo"]
 
 
