@@ -5,6 +5,8 @@ import type { components } from "./schema";
 type Schemas = components["schemas"];
 export type Drive = Schemas["Drive"];
 export type DriveState = Schemas["DriveState"];
+export type DrivenLap = NonNullable<DriveState["finished"]>;
+export type DriveMode = "ready" | "driving" | "paused";
 export type GhostCard = Schemas["GhostCard"];
 export type Ghost = Schemas["Ghost"];
 export type Settings = { vehicle: "v4" | "v5" | "v6"; direction: "forward" | "reverse" };

@@ -33,6 +33,9 @@ export interface Known {
   choices: Choices | undefined;
 }
 
+/** How many things stand in a race unless somebody says another number. */
+export const usualObjects = (race: string): number => (race === "head-to-bot" ? 3 : 6);
+
 /** The numbers that learning begins with unless they are changed. */
 export const defaultsOf = (learning: Learning, choices: Choices | undefined): Numbers | undefined =>
   (learning === "learning_aws" ? choices?.aws : choices?.fast) as Numbers | undefined;
