@@ -60,6 +60,7 @@ CONSOLE = (
     "models",
     "tuning",
     "races",
+    "contests",
     "driving",
     "rewards",
     "machine",

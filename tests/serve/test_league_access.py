@@ -82,11 +82,19 @@ ROWS: dict[str, tuple[str, Any]] = {
             "GET /api/races/{race_id}/entries/{entry_id}/video": None,
             "GET /api/races/{race_id}/entries/{entry_id}/replay": None,
             "GET /api/races/{race_id}/replay": "?entries=1",
+            "GET /api/contests/{contest}": None,
+            "DELETE /api/contests/{contest}": None,
+            "GET /api/contests/{contest}/video": None,
+            "GET /api/contests/{contest}/replay.file": None,
+            "GET /api/contests/{contest}/replay": None,
+            "POST /api/contests/heats": {"models": [{"model": "adas-model"}] * 2, "track": "oval"},
+            "POST /api/contests/ladders": {"models": [{"model": "adas-model"}] * 2, "tracks": ["oval"]},
             "GET /api/jobs/{job_id}": None,
             "POST /api/jobs/{job_id}/cancel": None,
             "GET /api/events/{name}": None,
         }.items()
     },
+    "GET /api/contests": ("each", None),
     "GET /api/races": ("each", None),
     "POST /api/races": ("each", None),
     "GET /api/jobs": ("each", None),
@@ -182,6 +190,7 @@ class School:
         submission = ok(ada.post(f"/api/league/races/{cup}/submissions?model=adas-model", content=data), 202)["id"]
         token = ok(ada.post("/api/account/tokens", json={"title": "adas-token"}), 201)["id"]
         race = ok(ada.post("/api/races", json=RACE), 201)["id"]
+        heat = {"models": [{"model": "adas-model"}] * 2, "track": "oval", "max_resets": 0}
         entry = ok(ada.post(f"/api/races/{race}/entries", json={"models": ["adas-model"]}), 202)["undecided"]
         self.objects = {
             "track": "adas-track",
@@ -194,6 +203,7 @@ class School:
             "tuning": "0" * 16,
             "race_id": race,
             "entry_id": entry[0]["entry"],
+            "contest": ok(ada.post("/api/contests/heats", json=heat), 202)["id"],
             "job_id": ok(ada.get("/api/jobs"))[0]["id"],
             "token_id": token,
             "session_id": ok(ada.get("/api/account/sessions"))[0]["id"],
@@ -274,6 +284,7 @@ def test_what_is_hers_ada_finds(school: School) -> None:
         "GET /api/tracks/{track}",
         "GET /api/jobs/{job_id}",
         "GET /api/races/{race_id}",
+        "GET /api/contests/{contest}",
         "GET /api/models/{name}/history",
         "GET /api/league/races/{cup}/submissions/{submission_id}",
         "GET /api/events/{name}",

@@ -94,6 +94,70 @@ def test_a_race_for_practice_shows_everything_and_opens_again(visit: Visit) -> N
     page.get_by_role("button", name="Close the race").wait_for()
 
 
+def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
+    page = visit.open("/races")
+    page.get_by_role("link", name="New heat or ladder").click()
+    add = page.get_by_role("combobox", name="Add a model")
+    assert page.get_by_role("button", name="Start the heat").is_disabled()
+    for name in ("ada", "bob", "ada"):
+        add.select_option(name)
+    page.get_by_role("combobox", name="Checkpoint of ada").nth(1).select_option("last")
+    page.get_by_role("button", name="Forward: bob").click()
+    page.get_by_role("button", name="Start the heat with 3").click()
+    page.get_by_role("heading", name="The heat in 3D").wait_for()
+    grid = page.get_by_role("region", name="Result").locator("tbody tr")
+    started = {row.locator("td").nth(1).inner_text(): row.locator("td").last.inner_text() for row in grid.all()}
+    assert started == {"bob": "1", "ada": "2", "ada@last": "3"}
+    first = grid.first.locator("td").nth(1).inner_text()
+    page.locator(".stage canvas").wait_for()
+    assert page.locator(".stage li").first.locator("span").first.inner_text() == first
+    clock = page.locator(".controls .number")
+    visit.console.wait_for(lambda: float(clock.inner_text().split()[0]) > 0.5)
+
+    page = visit.open("/contests/new")
+    page.get_by_role("button", name="Ladder").click()
+    page.get_by_role("button", name="Add all").click()
+    page.get_by_label("Starts on each track").fill("2")
+    page.get_by_label("Title").fill("Sunday ladder")
+    page.get_by_role("button", name="Start the ladder of 2").click()
+    page.get_by_role("heading", name="Sunday ladder").wait_for()
+    page.get_by_role("button", name="Watch: ").first.click()
+    page.locator(".stage canvas").wait_for()
+    assert page.get_by_role("button", name="Watch: ").count() == 2
+    ladder = page.url
+    page.get_by_role("navigation").get_by_role("link", name="Races").click()
+    page.get_by_role("link", name="Sunday ladder").wait_for()
+    page.goto(ladder)
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_role("heading", name="Models against models").wait_for()
+    page.get_by_role("link", name="Heat: ").wait_for()
+    assert page.get_by_role("link", name="Sunday ladder").count() == 0
+
+
+def test_a_model_is_made_to_learn_against_others(visit: Visit) -> None:
+    page = visit.open("/create")
+    page.get_by_role("button", name="Head to head").click()
+    page.get_by_role("checkbox", name="bob").check()
+    assert not page.get_by_role("checkbox", name="Itself").is_checked()
+    page.get_by_label("Cars on the road").fill("3")
+    page.get_by_role("button", name="In words").click()
+    page.locator("section", has_text="Until when").get_by_role("textbox").fill("1000 steps")
+    with page.expect_request("**/api/models") as sent:
+        page.get_by_role("button", name="Train now").first.click()
+    wanted = sent.value.post_data_json
+    asked = {name: wanted[name] for name in ("race", "opponents", "cars", "reward", "actions", "critic", "sensors")}
+    assert asked == {
+        "race": "head-to-head",
+        "opponents": ["bob"],
+        "cars": 3,
+        "reward": "duel",
+        "actions": "continuous",
+        "critic": "lap",
+        "sensors": ["FRONT_FACING_CAMERA", "LIDAR"],
+    }
+    page.wait_for_url("**/models/**")
+
+
 def test_the_settings_say_where_things_are(visit: Visit) -> None:
     page = visit.open("/settings")
     page.get_by_text(str(visit.console.runs), exact=True).wait_for()
@@ -115,11 +179,12 @@ def test_every_page_has_a_title_and_wrong_addresses_lead_on(visit: Visit) -> Non
         "/tracks": "Tracks",
         "/drive/oval": "Drive: oval",
         "/races/new": "New race",
+        "/contests/new": "New heat or ladder",
         "/settings": "Settings",
     }
     for path, title in titles.items():
         assert visit.open(path).title() == f"{title} · Racecraft"
-    for path in ("/nowhere", "/models/nobody", "/races/99", "/races/nonsense", "/drive/nowhere"):
+    for path in ("/nowhere", "/models/nobody", "/races/99", "/contests/0", "/races/nonsense", "/drive/nowhere"):
         page = visit.open(path)
         page.get_by_role("heading", name="There is nothing here").wait_for()
         page.locator("main").get_by_role("link").click()
@@ -135,6 +200,15 @@ def test_axe_finds_nothing_serious_and_nothing_sticks_out(visit: Visit, theme: s
     visit.look(theme, "de" if theme == "dark" else "en")
     races = visit.console.client.get("/api/races").json()
     found: dict[str, Any] = {}
-    for path in ("/races", "/races/new", "/settings", "/nowhere", *(f"/races/{race['id']}" for race in races[:1])):
+    contests = visit.console.client.get("/api/contests").json()
+    for path in (
+        "/races",
+        "/races/new",
+        "/contests/new",
+        "/settings",
+        "/nowhere",
+        *(f"/races/{race['id']}" for race in races[:1]),
+        *(f"/contests/{contest['id']}" for contest in contests[:1]),
+    ):
         found |= visit.flaws(path)
     assert found == {}

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { ActionPreset, Choices } from "../src/api/client";
-import { newModel, type Known, type Wishes } from "../src/lib/newmodel";
+import { newModel, suited, type Known, type Wishes } from "../src/lib/newmodel";
 
 const space: ActionPreset = {
   name: "default",
@@ -33,6 +33,8 @@ const wishes: Wishes = {
   critic: "privileged",
   randomize: "none",
   race: "time-trial",
+  opponents: [],
+  cars: 2,
   objects: 6,
   botSpeed: 0.2,
   laneChanges: true,
@@ -91,5 +93,36 @@ describe("the request for a new model", () => {
     const sac = made({ algorithm: "sac", learning: "learning_aws", tuned: { lr: 1e-4 } });
     expect(sac).not.toHaveProperty("hyperparameters");
     expect(sac).not.toHaveProperty("tuning");
+  });
+});
+
+describe("another race", () => {
+  const duel = { name: "duel", description: "", source: "def reward_function(params): # duel" };
+  const continuous: ActionPreset = { ...space, name: "continuous", kind: "continuous", actions: [] };
+  const all = { rewards: [...known.rewards, duel], spaces: [space, continuous] };
+
+  it("brings what suits it, and takes it back", () => {
+    const raced = suited("head-to-head", wishes, all);
+    expect(raced).toEqual({
+      source: duel.source,
+      space: continuous,
+      sensors: ["FRONT_FACING_CAMERA", "LIDAR"],
+      until: "10 minutes",
+      critic: "lap",
+    });
+    const { source, sensors, until, critic } = wishes;
+    expect(suited("time-trial", raced, all)).toEqual({ source, space, sensors, until, critic });
+  });
+
+  it("leaves alone what somebody chose", () => {
+    const chosen = { ...wishes, source: "mine", until: "3 laps", sensors: ["LEFT_CAMERA"] };
+    const raced = suited("head-to-head", chosen, all);
+    expect([raced.source, raced.until, raced.sensors]).toEqual(["mine", "3 laps", ["LEFT_CAMERA"]]);
+  });
+
+  it("says who drives the other cars, and no boxes", () => {
+    const request = made({ race: "head-to-head", opponents: ["ada"], cars: 3 });
+    expect([request.opponents, request.cars, request.objects]).toEqual([["ada"], 3, undefined]);
+    expect(made().cars).toBeUndefined();
   });
 });

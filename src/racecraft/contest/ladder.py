@@ -145,6 +145,7 @@ def hold_ladder(
     rounds: int = 0,
     seed: int = 0,
     progress: Callable[[str], None] = lambda text: None,
+    watch: Callable[[Match, Sequence[Trial]], None] = lambda match, trials: None,
     num_threads: int = 0,
 ) -> Ladder:
     """Compare models.
@@ -159,6 +160,7 @@ def hold_ladder(
         rounds: Of a Swiss schedule; by default enough to find the best, and as many as needed for every start.
         seed: Of the order in which matches count, and in which courses come.
         progress: Is told what is being driven.
+        watch: Sees every match as it is decided, with what its two models did.
         num_threads: 0 takes one per core.
 
     Raises:
@@ -179,6 +181,7 @@ def hold_ladder(
             driven = [trials.of(car, course) for car in pair]
         match = _compare(pair, driven, courses[course[0]], course[1])
         matches.append(match)
+        watch(match, driven)
         for car, rating in zip(pair, rate([ratings[car] for car in pair], match.places), strict=True):
             ratings[car] = rating
         return match

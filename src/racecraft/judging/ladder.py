@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from racecraft.contest.ladder import Ladder, check_ladder, hold_ladder
+from racecraft.contest.ladder import Ladder, Match, check_ladder, hold_ladder
 from racecraft.race.conditions import STANDARD_CAR, Conditions
 from racecraft.race.entry import load_entries
+from racecraft.race.results import Trial
 from racecraft.race.rules import RaceRules, race_rules
 from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.vehicle import Vehicle, load_vehicle
@@ -30,6 +31,7 @@ def rate_models(
     changes: dict[str, Any] | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda text: None,
+    watch: Callable[[Match, Sequence[Trial]], None] = lambda match, trials: None,
     num_threads: int = 0,
 ) -> Ladder:
     """Rate models by their races against each other.
@@ -48,6 +50,7 @@ def rate_models(
         changes: Single rules that differ, by name.
         seed: Of the starts and of the order of matches.
         progress: Is told what is being driven.
+        watch: Sees every match as it is decided, with what its two models did.
         num_threads: 0 takes one per core.
 
     Raises:
@@ -75,5 +78,6 @@ def rate_models(
         rounds=rounds,
         seed=seed,
         progress=progress,
+        watch=watch,
         num_threads=num_threads,
     )

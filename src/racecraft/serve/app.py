@@ -17,6 +17,8 @@ from fastapi.responses import FileResponse, HTMLResponse, Response
 from racecraft.serve import problems
 from racecraft.serve.audit import routes as audit
 from racecraft.serve.compression import BROTLI, Compressed, accepts, gzipped
+from racecraft.serve.contests import routes as contests
+from racecraft.serve.contests.contests import Contests
 from racecraft.serve.context import Consoles, Context
 from racecraft.serve.door import routes as door
 from racecraft.serve.door.guard import Guard, content_policy
@@ -88,6 +90,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         drives=Drives(),
         ghosts=Ghosts(settings.runs, database),
         races=Races(database, queue, garage, courses),
+        contests=Contests(settings.state, database, queue, garage, courses),
         tunings=Tunings(settings.state, queue, garage),
         mirror=Mirror(artifacts, settings=settings, queue=queue, supervisor=supervisor),
         hub=Hub(settings.runs, queue, see=follower.see),
@@ -125,7 +128,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.add_middleware(guard.middleware)
     problems.install(app)
     parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, races]
-    parts += [jobs, events, door, audit]
+    parts += [contests, jobs, events, door, audit]
     for part in parts:
         app.include_router(part.router)
     for part in (account, groups, league):

@@ -10,6 +10,7 @@ from typing import Annotated, Final
 from fastapi import Depends, Request
 
 from racecraft.serve.audit.audit import Audit
+from racecraft.serve.contests.contests import Contests
 from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
 from racecraft.serve.groups.groups import Groups
@@ -47,6 +48,7 @@ class Context:
     drives: Drives
     ghosts: Ghosts
     races: Races
+    contests: Contests
     tunings: Tunings
     mirror: Mirror
     hub: Hub
@@ -104,6 +106,7 @@ def _console(owner: Context, user_id: int) -> Context:
         courses=courses,
         ghosts=Ghosts(settings.runs, database),
         races=Races(database, queue, garage, courses, user_id=user_id),
+        contests=Contests(settings.state, database, queue, garage, courses),
         tunings=Tunings(settings.state, queue, garage),
         mirror=Mirror(None, settings=settings, queue=queue, supervisor=owner.supervisor),
         hub=Hub(settings.runs, queue),

@@ -20,6 +20,8 @@ export interface Wishes {
   critic: string;
   randomize: string;
   race: string;
+  opponents: string[]; // of a race head to head; none: itself, as it is and as it was
+  cars: number;
   objects: number;
   botSpeed: number;
   laneChanges: boolean;
@@ -35,6 +37,34 @@ export interface Known {
 
 /** How many things stand in a race unless somebody says another number. */
 export const usualObjects = (race: string): number => (race === "head-to-bot" ? 3 : 6);
+
+type Suited = Pick<Wishes, "source" | "space" | "sensors" | "until" | "critic">;
+
+/** What `racecraft train --race head-to-head` does where nothing else is said, and what other races do. */
+const USUAL = {
+  alone: { reward: "racing", space: "default", sensors: [] as string[], until: "5 laps", critic: "privileged" },
+  raced: {
+    reward: "duel",
+    space: "continuous",
+    sensors: ["FRONT_FACING_CAMERA", "LIDAR"],
+    until: "10 minutes",
+    critic: "lap",
+  },
+};
+
+/** The same wishes for another race: what nobody chose becomes what suits it. */
+export function suited(race: string, wishes: Suited, { rewards, spaces }: Pick<Known, "rewards" | "spaces">): Suited {
+  const [from, to] = race === "head-to-head" ? [USUAL.alone, USUAL.raced] : [USUAL.raced, USUAL.alone];
+  const sourceOf = (name: string) => rewards.find((preset) => preset.name === name)?.source;
+  const isUsual = presetOf(wishes.space, spaces)?.name === from.space;
+  return {
+    source: wishes.source === sourceOf(from.reward) ? (sourceOf(to.reward) ?? wishes.source) : wishes.source,
+    space: (isUsual && spaces.find((preset) => preset.name === to.space)) || wishes.space,
+    sensors: wishes.sensors.join() === from.sensors.join() ? to.sensors : wishes.sensors,
+    until: wishes.until === from.until ? to.until : wishes.until,
+    critic: wishes.critic === from.critic ? to.critic : wishes.critic,
+  };
+}
 
 /** The numbers that learning begins with unless they are changed. */
 export const defaultsOf = (learning: Learning, choices: Choices | undefined): Numbers | undefined =>
@@ -52,7 +82,8 @@ export function newModel(wishes: Wishes, known: Known): NewModel {
     ...(name ? { name } : {}),
     ...{ track, direction, until, seed, vehicle, network, algorithm, critic, randomize, race, reward },
     ...actionsOf(wishes, known),
-    ...(race === "time-trial" ? {} : { objects: wishes.objects }),
+    ...(race === "head-to-head" ? { opponents: wishes.opponents, cars: wishes.cars } : {}),
+    ...(["time-trial", "head-to-head"].includes(race) ? {} : { objects: wishes.objects }),
     ...(race === "head-to-bot" ? { bot_speed: wishes.botSpeed, lane_changes: wishes.laneChanges } : {}),
     ...numbersOf(wishes, known),
   };

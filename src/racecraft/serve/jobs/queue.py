@@ -49,6 +49,8 @@ KINDS: Final[Mapping[str, JobKind]] = {
     ),
     "evaluate": JobKind(slot="other", work="racecraft.serve.evaluations.tasks:evaluate", travels=True),
     "race": JobKind(slot="other", work="racecraft.serve.races.tasks:race"),
+    "heat": JobKind(slot="other", work="racecraft.serve.contests.tasks:heat"),
+    "ladder": JobKind(slot="other", work="racecraft.serve.contests.tasks:ladder"),
     "judge": JobKind(slot="other", work="racecraft.serve.submissions.tasks:judge"),
     "store": JobKind(slot="other", work="racecraft.serve.models.tasks:store"),
 }

@@ -14,7 +14,7 @@ from racecraft.errors import RacecraftError
 from racecraft.learn import PPOConfig
 from racecraft.learn.networks import network_names
 from racecraft.serve.context import Context, InContext
-from racecraft.serve.models.garage import race_of
+from racecraft.serve.models.garage import RACED, race_of
 from racecraft.serve.models.schemas import Choices, NumberChoice
 from racecraft.sim.objects import RACE_TYPES
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
@@ -39,7 +39,7 @@ def list_choices(context: InContext) -> Choices:
         vehicles=list(VEHICLES),
         sensors=[name for name in SENSOR_NAMES if name not in OLD_NAMES],
         algorithms=[name for name in METHODS if ":" not in name],
-        races=list(RACE_TYPES),
+        races=[*RACE_TYPES, RACED],
         critics=list(CRITICS),
         randomizations=list(RANDOMIZATIONS),
         hyperparameters=_numbers(),

@@ -30,6 +30,8 @@ from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Model, now
 from racecraft.sim.objects import RACE_TYPES, Objects
 
+RACED: Final = "head-to-head"
+"""The race of a training among other policies, which no race of models is called."""
 TRASH: Final = "trash"  # inside the state folder
 PICTURE: Final = "racing-line.png"
 NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
@@ -293,7 +295,7 @@ def finite(value: Any) -> Any:
 def race_of(info: RunInfo) -> str:
     """The type of race that a model is trained for."""
     if info.settings.get("opponents") is not None:
-        return "head-to-head"
+        return RACED
     try:
         return Objects.from_dict(info.settings["objects"]).race_type
     except (RacecraftError, KeyError, TypeError, AttributeError):

@@ -18,7 +18,7 @@ from racecraft.run.history import read_history
 from racecraft.run.starters import starter_names, unpack_starter
 from racecraft.serve.context import Context, InContext
 from racecraft.serve.jobs.schemas import JobInfo, job_info
-from racecraft.serve.models.garage import finite
+from racecraft.serve.models.garage import RACED, finite
 from racecraft.serve.models.schemas import (
     CloneModel,
     HistoryPage,
@@ -31,9 +31,10 @@ from racecraft.serve.models.schemas import (
 )
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.sim import Objects
-from racecraft.sim.objects import objects_for_race
+from racecraft.sim.objects import NO_OBJECTS, objects_for_race
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.training import Until
+from racecraft.training.opponents import SELF, Opponents
 from racecraft.training.parent import open_parent
 from racecraft.training.regimes import TIME_TRIAL
 from racecraft.training.settings import TrainSettings, make_settings
@@ -67,6 +68,7 @@ def create_model(request: NewModel, context: InContext) -> ModelCard:
         seed=request.seed,
         until=Until.parse(request.until),
         objects=_objects(request),
+        opponents=_opponents(context, request),
         randomize=_randomization(request.randomize),
         critic=request.critic,
         algorithm=request.algorithm,
@@ -254,7 +256,18 @@ def _metadata(request: NewModel) -> ModelMetadata:
     return ModelMetadata.from_dict(request.model_metadata)
 
 
+def _opponents(context: Context, request: NewModel) -> Opponents | None:
+    if request.race != RACED:
+        if request.opponents or request.cars is not None:
+            raise ConfigError(f"opponents and cars go with the race {RACED}; this one is a {request.race}.")
+        return None
+    drivers = tuple(str(context.garage.folder(name).path.resolve()) for name in request.opponents)
+    return Opponents(drivers=drivers or (SELF,), cars=request.cars or 2)
+
+
 def _objects(request: NewModel) -> Objects:
+    if request.race == RACED:
+        return NO_OBJECTS
     settings: dict[str, Any] = {} if request.race == "time-trial" else {"placement": "random"}
     if request.objects is not None:
         settings["count"] = request.objects

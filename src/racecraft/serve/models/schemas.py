@@ -43,7 +43,11 @@ class NewModel(Message):
     sensors: list[Annotated[str, Field(max_length=40)]] | None = Field(None, max_length=4)
     """AWS's names; the front camera otherwise. Not beside model_metadata, which says it itself."""
     race: str = Field("time-trial", max_length=40)
-    """``time-trial``, ``object-avoidance`` or ``head-to-bot``."""
+    """``time-trial``, ``object-avoidance``, ``head-to-bot`` or ``head-to-head``."""
+    opponents: list[RunName] = Field(default_factory=list, max_length=7)
+    """Models that drive the other cars of a head-to-head race; by default the policy as it is and as it was."""
+    cars: int | None = Field(None, ge=2, le=8)
+    """To a head-to-head race, the learner's included; 2 otherwise."""
     objects: int | None = Field(None, ge=1, le=32)
     """How many boxes or bot cars; 6 and 3 otherwise."""
     bot_speed: float | None = Field(None, ge=0, le=4)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from racecraft.analysis import driven_direction, sectors_of
+from racecraft.race.recording import Recording
 from racecraft.replay.replay import read_replay
 from racecraft.serve.races.schemas import RaceReplay, ReplayCar
 from racecraft.serve.tracks.courses import geometry
@@ -22,7 +23,11 @@ def trial_poses(path: Path, trial: int, *, grain: int = 1) -> tuple[list[list[in
         trial: From 0.
         grain: mm and mrad that poses are rounded to.
     """
-    recording = read_replay(path).cars[trial].recording
+    return poses_of(read_replay(path).cars[trial].recording, grain=grain)
+
+
+def poses_of(recording: Recording, *, grain: int = 1) -> tuple[list[list[int]], list[int]]:
+    """Poses of one drive in whole mm and mrad, and the steps after which its laps ended."""
     ends = [step + 1 for step, event in recording.events if event == "lap_complete"]
     return ((1000 / grain * recording.poses).round().astype(int) * grain).tolist(), ends
 

@@ -24,6 +24,12 @@ export const create: Record<keyof typeof english, string> = {
   race_time_trial: "Zeitfahren",
   race_object_avoidance: "Hindernisse",
   race_head_to_bot: "Gegen Bots",
+  race_head_to_head: "Gegen Modelle",
+  race_head_to_head_lead:
+    "Die anderen Autos lenken gelernte Modelle; dieses lernt, zu überholen und seinen Platz zu halten. Das dauert Minuten.",
+  race_cars: "Autos auf der Straße, das eigene dabei",
+  race_opponents: "Wer die anderen lenkt",
+  race_itself: "Es selbst, wie es ist und wie es war",
   race_boxes: "Kisten auf der Strecke",
   race_bots: "Bot-Autos",
   race_bot_speed: "Ihr Tempo, m/s",

@@ -1,6 +1,7 @@
 /** Deutsch. */
 import type { Key } from "../en";
 import { analysis } from "./analysis";
+import { contests } from "./contests";
 import { create } from "./create";
 import { draw } from "./draw";
 import { drive } from "./drive";
@@ -22,6 +23,7 @@ export const de: Record<Key, string> = {
   ...replay,
   ...why,
   ...analysis,
+  ...contests,
   ...create,
   ...params,
   ...presets,

@@ -33,6 +33,7 @@ export const races: Record<keyof typeof english, string> = {
   races_ranking_best_lead: "Die schnellste einzelne Runde zählt.",
   races_ranking_average_lead: "Der Mittelwert der schnellsten Runden hintereinander.",
   races_average_of: "Runden hintereinander",
+  races_one_lap: "1 Runde",
   races_laps_count: "{count} Runden",
   races_offtrack: "Abkommen kostet, s",
   races_off: "Abgekommen",

@@ -22,6 +22,12 @@ export const create = {
   race_time_trial: "Time trial",
   race_object_avoidance: "Object avoidance",
   race_head_to_bot: "Head to bot",
+  race_head_to_head: "Head to head",
+  race_head_to_head_lead:
+    "Other cars are driven by policies, and the model learns to overtake and to hold its place. Mind the time: this takes minutes.",
+  race_cars: "Cars on the road, its own included",
+  race_opponents: "Who drives the others",
+  race_itself: "Itself, as it is and as it was",
   race_boxes: "Boxes on the track",
   race_bots: "Bot cars",
   race_bot_speed: "Their speed, m/s",

@@ -1,5 +1,6 @@
 /** English: the complete catalogue, a file per page; other languages have the same keys. */
 import { analysis } from "./analysis";
+import { contests } from "./contests";
 import { create } from "./create";
 import { draw } from "./draw";
 import { drive } from "./drive";
@@ -21,6 +22,7 @@ export const en = {
   ...replay,
   ...why,
   ...analysis,
+  ...contests,
   ...create,
   ...params,
   ...presets,

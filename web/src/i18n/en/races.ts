@@ -31,6 +31,7 @@ export const races = {
   races_ranking_best_lead: "The fastest single lap counts.",
   races_ranking_average_lead: "The mean of the fastest laps in a row.",
   races_average_of: "Laps in a row",
+  races_one_lap: "1 lap",
   races_laps_count: "{count} laps",
   races_offtrack: "Off track costs, s",
   races_off: "Off track",

@@ -1,0 +1,1 @@
+"""Models against models: heats on one road, and ladders."""

@@ -1,0 +1,179 @@
+"""Heats and ladders: jobs whose payload is what was asked for, and a folder each with what was driven.
+
+request ──start──▶ job (kind heat or ladder) ──racecraft.serve.contests.tasks──▶ result, files
+
+A job that ends is not forgotten: it is what a page shows until somebody removes it.
+"""
+
+from __future__ import annotations
+
+import re
+import secrets
+import shutil
+from pathlib import Path
+from typing import Any, Final
+
+import sqlalchemy as sa
+
+from racecraft.contest.ladder import check_ladder
+from racecraft.contest.terms import shared_road
+from racecraft.race.conditions import Conditions
+from racecraft.race.rules import race_rules
+from racecraft.serve.contests.files import VIDEO, contest_folder, count_matches
+from racecraft.serve.contests.schemas import (
+    ContestCard,
+    ContestDetail,
+    HeatRow,
+    LadderMatch,
+    LadderPlace,
+    NewHeat,
+    NewLadder,
+    Starter,
+)
+from racecraft.serve.jobs.queue import ENDED, JobQueue
+from racecraft.serve.models.garage import Garage
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Job
+from racecraft.serve.tracks.courses import Courses
+
+KINDS: Final = ("heat", "ladder")
+"""Of the jobs."""
+MAX_CONTESTS: Final = 500
+_ID: Final = re.compile(r"[0-9a-f]{16}")
+
+
+class Contests:
+    """What somebody's models drove against each other.
+
+    Args:
+        state: The console's own folder.
+        database: Where the jobs are.
+        queue: Of jobs.
+        garage: Of models.
+        courses: Of tracks.
+    """
+
+    def __init__(self, state: Path, database: Database, queue: JobQueue, garage: Garage, courses: Courses) -> None:
+        self._state, self._database, self._queue = state, database, queue
+        self._garage, self._courses = garage, courses
+
+    def start_heat(self, request: NewHeat) -> str:
+        """Queue a heat; its id.
+
+        Raises:
+            RacecraftError: A model or the track is not usable, or there are too many contests.
+        """
+        track = self._courses.load(request.track)
+        shared_road(Conditions(track=track, rules=race_rules("drfc", {"laps": request.laps})), len(request.models))
+        payload = request.model_dump() | {
+            "kind": "head-to-model" if len(request.models) == 2 else "grid",
+            "tracks": [request.track],
+            "paths": [self._courses.path_or_name(request.track)],
+        }
+        return self._add("heat", payload, request.models)
+
+    def start_ladder(self, request: NewLadder) -> str:
+        """Queue a ladder; its id.
+
+        Raises:
+            RacecraftError: A model or a track is not usable, or there are too many contests.
+        """
+        check_ladder(len(request.models), kind=request.kind, schedule=request.schedule, starts=request.starts, rounds=0)
+        payload = request.model_dump() | {"paths": [self._courses.path_or_name(name) for name in request.tracks]}
+        return self._add("ladder", payload, request.models)
+
+    def cards(self) -> list[ContestCard]:
+        """All of them, newest first."""
+        return [self._card(job) for job in self._jobs()]
+
+    def get(self, contest: str) -> ContestDetail:
+        """A heat or a ladder with its result."""
+        job = self.job(contest)
+        payload, result = job.payload, job.result or {}
+        return ContestDetail(
+            **self._card(job).model_dump(),
+            laps=payload["laps"],
+            vehicle=payload["vehicle"],
+            seed=payload["seed"],
+            direction=payload.get("direction", ""),
+            schedule=payload.get("schedule", ""),
+            starts=payload.get("starts", 0),
+            heat=[HeatRow(**row) for row in result.get("heat", ())],
+            ladder=[LadderPlace(**row) for row in result.get("ladder", ())],
+            matches=[LadderMatch(number=number, **row) for number, row in enumerate(result.get("matches", ()))],
+            has_video=(self.folder(contest) / VIDEO).is_file(),
+        )
+
+    def remove(self, contest: str) -> None:
+        """Remove a contest with its files.
+
+        Raises:
+            Conflict: It is under way.
+        """
+        job = self.job(contest)
+        if job.state not in ENDED:
+            raise Conflict("It is being driven.", hint="Stop it first.")
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Job).where(Job.id == job.id))
+        shutil.rmtree(self.folder(contest), ignore_errors=True)
+
+    def job(self, contest: str) -> Job:
+        """The job of a contest.
+
+        Raises:
+            NotFound: There is none.
+        """
+        job = self._queue.get(contest) if _ID.fullmatch(contest) else None
+        if job is None or job.kind not in KINDS:
+            raise NotFound(f"There is no heat or ladder {contest[:40]!r}.")
+        return job
+
+    def folder(self, contest: str) -> Path:
+        """Where its files lie."""
+        return contest_folder(self._state, contest)
+
+    def file(self, contest: str, name: str) -> Path:
+        """One of its files.
+
+        Raises:
+            NotFound: It has none of that name.
+        """
+        path = self.folder(self.job(contest).id) / name
+        if not path.is_file():
+            raise NotFound("There is nothing to see of it.")
+        return path
+
+    def _jobs(self) -> list[Job]:
+        found = [job for kind in KINDS for job in self._queue.list(kind=kind, limit=MAX_CONTESTS)]
+        return sorted(found, key=lambda job: job.created, reverse=True)
+
+    def _add(self, kind: str, payload: dict[str, Any], starters: list[Starter]) -> str:
+        for starter in starters:
+            if self._garage.folder(starter.model).checkpoints.last is None:
+                raise Conflict(f"Model {starter.model!r} has no checkpoint to race with.", hint="Train it first.")
+        if len(self._jobs()) >= MAX_CONTESTS:
+            raise Conflict(f"There are {MAX_CONTESTS} heats and ladders already.", hint="Delete some first.")
+        if payload["seed"] is None:
+            payload["seed"] = secrets.randbelow(2**32)
+        return self._queue.add(kind, starters[0].model, payload).id
+
+    def _card(self, job: Job) -> ContestCard:
+        payload, result = job.payload, job.result or {}
+        is_ladder = job.kind == "ladder"
+        first = next(iter(result.get("ladder" if is_ladder else "heat", ())), None)
+        return ContestCard(
+            id=job.id,
+            is_ladder=is_ladder,
+            kind=payload["kind"],
+            title=payload["title"],
+            tracks=payload["tracks"],
+            models=[one["model"] for one in payload["models"]],
+            state=job.state,  # type: ignore[arg-type]
+            created=job.created,
+            winner=first["name"] if first and first["place"] == 1 else None,
+            driven=count_matches(self.folder(job.id))
+            if is_ladder and job.state == "running"
+            else len(result.get("matches", ())),
+            error=str((job.error or {}).get("message", "")),
+        )

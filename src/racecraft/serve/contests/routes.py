@@ -1,0 +1,93 @@
+"""Heats on one road, and ladders."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Response
+from fastapi.responses import FileResponse
+
+from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
+from racecraft.serve.contests.schemas import ContestCard, ContestDetail, NewHeat, NewLadder
+from racecraft.serve.context import InContext
+from racecraft.serve.problems import NotFound
+from racecraft.serve.races.replays import poses_of, replay_of
+from racecraft.serve.races.schemas import RaceReplay, ReplayCar
+
+router = APIRouter(prefix="/api/contests", tags=["contests"])
+
+Id = Annotated[str, Path(max_length=40)]
+
+
+@router.get("")
+def list_contests(context: InContext) -> list[ContestCard]:
+    """Heats and ladders, newest first."""
+    return context.contests.cards()
+
+
+@router.post("/heats", status_code=202)
+def start_heat(request: NewHeat, context: InContext) -> ContestDetail:
+    """Let two to eight models race on one road."""
+    contest = context.contests.start_heat(request)
+    context.supervisor.wake()
+    return context.contests.get(contest)
+
+
+@router.post("/ladders", status_code=202)
+def start_ladder(request: NewLadder, context: InContext) -> ContestDetail:
+    """Rate models by many races."""
+    contest = context.contests.start_ladder(request)
+    context.supervisor.wake()
+    return context.contests.get(contest)
+
+
+@router.get("/{contest}")
+def get_contest(contest: Id, context: InContext) -> ContestDetail:
+    """A heat or a ladder with its result."""
+    return context.contests.get(contest)
+
+
+@router.delete("/{contest}", status_code=204)
+def delete_contest(contest: Id, context: InContext) -> Response:
+    """Remove a heat or a ladder with its files."""
+    context.contests.remove(contest)
+    return Response(status_code=204)
+
+
+@router.get("/{contest}/video")
+def get_heat_video(contest: Id, context: InContext) -> FileResponse:
+    """The film of a heat."""
+    path = context.contests.file(contest, VIDEO)
+    return FileResponse(path, media_type="video/mp4", filename="heat.mp4", content_disposition_type="inline")
+
+
+@router.get("/{contest}/replay.file")
+def get_heat_file(contest: Id, context: InContext) -> FileResponse:
+    """The replay file of a heat, for `racecraft verify`."""
+    path = context.contests.file(contest, REPLAY)
+    return FileResponse(path, media_type="application/octet-stream", filename="heat.replay")
+
+
+@router.get("/{contest}/replay")
+def get_contest_replay(
+    contest: Id, context: InContext, match: Annotated[int | None, Query(ge=0, lt=100_000)] = None
+) -> RaceReplay:
+    """A heat step by step, or one race of a ladder by its number; who came in first stands first."""
+    from racecraft.replay.replay import read_replay
+
+    found = context.contests.get(contest)
+    if not found.is_ladder:
+        cars = read_replay(context.contests.file(contest, REPLAY)).cars
+        driven = [(row.car, row.name, *poses_of(cars[row.car].recording)) for row in found.heat]
+        track = found.tracks[0]
+    else:
+        document = read_match(context.contests.file(contest, MATCHES), match or 0)
+        row = next((one for one in found.matches if one.number == (match or 0)), None)
+        if row is None:
+            raise NotFound(f"The ladder has no race {match}.")
+        order = sorted(range(len(row.models)), key=lambda car: row.places[car])
+        two = document["cars"]
+        driven = [(car, row.models[car], two[car]["trace"], two[car]["laps"]) for car in order]
+        track = document["track"]
+    shown = [ReplayCar(entry=car, model=name, trace=trace, laps=laps) for car, name, trace, laps in driven]
+    return replay_of(track, context.courses.load(track), shown, trial=0)

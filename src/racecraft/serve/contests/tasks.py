@@ -1,0 +1,140 @@
+"""The jobs of heats and ladders. Both end as they would have if they are begun again: every seed is settled."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder
+from racecraft.serve.jobs.task import Task
+from racecraft.serve.settings import STATE_FOLDER
+
+if TYPE_CHECKING:
+    from racecraft.contest.ladder import Match
+    from racecraft.race.results import Trial
+    from racecraft.sim.objects import Objects
+
+FILMED = 90.0
+"""s of a heat that are filmed."""
+RULES = ("laps", "max_resets", "offtrack_penalty", "collision_penalty", "direction")
+
+
+def heat(task: Task) -> dict[str, Any]:
+    """Let two to eight models race on one road."""
+    from racecraft.contest.contest import hold_race
+    from racecraft.contest.terms import race_terms
+    from racecraft.film.ghost import LIVERY, Rival
+    from racecraft.film.video import film
+    from racecraft.race.conditions import Conditions
+    from racecraft.race.entry import load_entries
+    from racecraft.race.rules import race_rules
+    from racecraft.replay.replay import write_replay
+    from racecraft.sim.vehicle import load_vehicle
+    from racecraft.track import load_track
+
+    payload, folder = task.job.payload, _folder(task)
+    conditions = Conditions(
+        track=load_track(payload["paths"][0]),
+        rules=race_rules("drfc", {name: payload[name] for name in RULES}),
+        seed=payload["seed"],
+        vehicle=load_vehicle(payload["vehicle"]),
+        objects=_objects(payload["objects"], payload["count"]),
+    )
+    entries = load_entries(_models(task))
+    terms = race_terms(conditions, kind=payload["kind"], num_cars=len(entries))
+    contest = hold_race(entries, terms)
+    ((_, replay),) = contest.replays()
+    write_replay(replay, folder / REPLAY)
+    rows, first = contest.to_dict()["results"], contest.standings[0].car
+    recordings = [trials[0].recording for trials in contest.trials]
+    film(
+        recordings[first].until(FILMED),
+        folder / VIDEO,
+        name=contest.names[first],
+        laps=terms.conditions.rules.laps,
+        color=LIVERY[first % len(LIVERY)],
+        rivals=[
+            Rival(name, LIVERY[car % len(LIVERY)], recordings[car])
+            for car, name in enumerate(contest.names)
+            if car != first
+        ],
+        sensors=entries[first].sensors,
+    )
+    return {
+        "heat": [
+            {
+                **{name: row[name] for name in ("place", "name", "score", "gap", "best", "laps", "resets")},
+                "car": contest.names.index(row["name"]),
+                "off_tracks": row["off_track_count"],
+                "crashes": row["crash_count"],
+                "penalty": row["penalty_seconds"],
+            }
+            for row in rows
+        ]
+    }
+
+
+def ladder(task: Task) -> dict[str, Any]:
+    """Let every two models race, and rate them."""
+    from racecraft.judging.ladder import rate_models
+
+    payload, folder = task.job.payload, _folder(task)
+    names = dict(zip(payload["paths"], payload["tracks"], strict=True))
+    shown = {Path(path).stem: name for path, name in names.items()}
+    unfinished = folder / f"{MATCHES}.{os.getpid()}"
+    with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
+
+        def watch(match: Match, trials: Sequence[Trial]) -> None:
+            number = len(archive.namelist())
+            cars = [_driven(trial) for trial in trials]
+            document = {"track": shown.get(match.track, match.track), "cars": cars}
+            archive.writestr(f"{number}.json", json.dumps(document, separators=(",", ":")))
+            (folder / DRIVEN).write_text(str(number + 1), encoding="ascii")
+
+        found = rate_models(
+            _models(task),
+            tracks=payload["paths"],
+            kind=payload["kind"],
+            schedule=payload["schedule"],
+            starts=payload["starts"],
+            laps=payload["laps"],
+            objects=_objects({"object-avoidance": "boxes", "head-to-bot": "bots"}.get(payload["kind"], "none"), 0),
+            vehicle=payload["vehicle"],
+            seed=payload["seed"],
+            watch=watch,
+        )
+    unfinished.replace(folder / MATCHES)
+    document = found.to_dict()
+    table = [{name: value for name, value in row.items() if name != "floor"} for row in document["ladder"]]
+    return {"ladder": table, "matches": document["matches"]}
+
+
+def _driven(trial: Trial) -> dict[str, Any]:
+    """Poses in whole mm and mrad, and the steps after which laps ended."""
+    from racecraft.serve.races.replays import poses_of
+
+    trace, laps = poses_of(trial.recording)
+    return {"trace": trace, "laps": laps}
+
+
+def _models(task: Task) -> list[str]:
+    """Their best checkpoint unless another is asked for, which their names then say."""
+    asked = [(task.runs / one["model"], one["checkpoint"]) for one in task.job.payload["models"]]
+    return [str(run) if checkpoint == "best" else f"{run}@{checkpoint}" for run, checkpoint in asked]
+
+
+def _objects(name: str, count: int) -> Objects:
+    from racecraft.sim.objects import objects_for_race
+
+    race = {"none": "time-trial", "boxes": "object-avoidance", "bots": "head-to-bot"}[name]
+    return objects_for_race(race, settings={"count": count} if count and name != "none" else {})
+
+
+def _folder(task: Task) -> Path:
+    folder = contest_folder(task.runs / STATE_FOLDER, task.job.id)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

@@ -1,0 +1,126 @@
+"""Heats and ladders over HTTP: two untrained cars on one road, rated and filmed, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running_consoles import RunningConsole
+
+from racecraft.replay import read_replay, verify
+
+
+@pytest.fixture(scope="module")
+def cars(console: RunningConsole) -> list[dict[str, str]]:
+    for name in ("ada", "bob"):
+        console.create(name=name, track="oval", until="2000 steps", seed=ord(name[0]))
+    for job in console.client.get("/api/jobs").json():
+        assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    return [{"model": "ada"}, {"model": "bob", "checkpoint": "last"}]
+
+
+def over(console: RunningConsole, contest: str) -> Callable[[], Any]:
+    def ended() -> Any:
+        found = console.client.get(f"/api/contests/{contest}").json()
+        assert found["state"] != "failed", found
+        return found if found["state"] == "done" else None
+
+    return ended
+
+
+def started(console: RunningConsole, room: str, **settings: Any) -> dict[str, Any]:
+    reply = console.client.post(f"/api/contests/{room}", json=settings)
+    assert reply.status_code == 202, reply.text
+    return dict(console.wait_for(over(console, reply.json()["id"])))
+
+
+def test_a_heat_is_driven_on_one_road_and_can_be_verified(
+    console: RunningConsole, cars: list[dict[str, str]], tmp_path: Path
+) -> None:
+    heat = started(console, "heats", models=[*cars, cars[0]], track="oval", max_resets=1, seed=7, title="Sunday")
+    assert (heat["kind"], heat["is_ladder"], heat["title"], heat["has_video"]) == ("grid", False, "Sunday", True)
+    assert [row["place"] for row in heat["heat"]] == sorted(row["place"] for row in heat["heat"])
+    assert {row["car"] for row in heat["heat"]} == {0, 1, 2}
+    assert heat["winner"] == heat["heat"][0]["name"]
+
+    address = f"/api/contests/{heat['id']}"
+    film = console.client.get(f"{address}/replay").json()
+    assert [car["model"] for car in film["cars"]] == [row["name"] for row in heat["heat"]]
+    starts = {tuple(car["trace"][0][:2]) for car in film["cars"]}
+    assert len(starts) == 3  # a grid, and no car is in another
+    path = tmp_path / "heat.replay"
+    path.write_bytes(console.client.get(f"{address}/replay.file").content)
+    assert verify(read_replay(path)).is_genuine
+    assert console.client.get(f"{address}/video").headers["content-type"] == "video/mp4"
+
+    again = started(console, "heats", models=[*cars, cars[0]], track="oval", max_resets=1, seed=7)
+    assert again["heat"] == heat["heat"]
+    assert [card["id"] for card in console.client.get("/api/contests").json()] == [again["id"], heat["id"]]
+
+
+@pytest.mark.parametrize("kind", ["head-to-model", "time-trial"])
+def test_a_ladder_rates_and_shows_every_race(console: RunningConsole, cars: list[dict[str, str]], kind: str) -> None:
+    ladder = started(console, "ladders", models=cars, tracks=["oval"], kind=kind, starts=2, seed=3)
+    assert (ladder["is_ladder"], ladder["driven"], len(ladder["matches"])) == (True, 2, 2)
+    assert sum(row["wins"] + row["draws"] / 2 for row in ladder["ladder"]) == 2
+    if ladder["ladder"][0]["wins"] == 2:
+        assert ladder["ladder"][0]["rating"] > 25 > ladder["ladder"][1]["rating"]
+    for match in ladder["matches"]:
+        film = console.client.get(f"/api/contests/{ladder['id']}/replay?match={match['number']}").json()
+        first = match["models"][match["places"].index(min(match["places"]))]
+        assert film["cars"][0]["model"] == first
+        assert {car["model"] for car in film["cars"]} == set(match["models"])
+        assert all(len(car["trace"]) > 10 for car in film["cars"])
+    assert console.client.get(f"/api/contests/{ladder['id']}/replay?match=2").status_code == 404
+
+
+def test_what_cannot_be_driven_is_refused(console: RunningConsole, cars: list[dict[str, str]]) -> None:
+    client = console.client
+    heats: list[tuple[int, dict[str, Any]]] = [
+        (422, {"models": cars[:1]}),
+        (422, {"models": cars * 5}),
+        (404, {"models": [*cars, {"model": "nobody"}]}),
+        (404, {"models": cars, "track": "nowhere"}),
+        (404, {"models": cars, "track": "/etc/passwd.npy"}),
+        (422, {"models": [{"model": "../ada"}, cars[1]]}),
+    ]
+    for status, body in heats:
+        reply = client.post("/api/contests/heats", json=body)
+        assert reply.status_code == status, (body, reply.text)
+    assert client.post("/api/contests/ladders", json={"models": cars, "tracks": []}).status_code == 422
+    console.create(name="fresh", track="oval", train=False)
+    assert client.post("/api/contests/heats", json={"models": [*cars, {"model": "fresh"}]}).status_code == 409
+    job = client.get("/api/jobs?run=ada").json()[-1]
+    for address in ("0" * 16, "..", job["id"]):
+        assert client.get(f"/api/contests/{address}").status_code == 404
+
+
+def test_a_removed_contest_leaves_nothing(console: RunningConsole, cars: list[dict[str, str]]) -> None:
+    heat = started(console, "heats", models=cars, track="oval", max_resets=0)
+    assert heat["kind"] == "head-to-model"
+    folder = console.runs / ".racecraft" / "contests" / heat["id"]
+    assert (folder / "race.replay").is_file()
+    assert console.client.delete(f"/api/contests/{heat['id']}").status_code == 204
+    assert not folder.exists()
+    assert console.client.get(f"/api/contests/{heat['id']}").status_code == 404
+
+
+def test_a_model_learns_against_itself_or_against_others(console: RunningConsole, cars: list[dict[str, str]]) -> None:
+    wanted = {"track": "oval", "race": "head-to-head", "actions": "continuous", "critic": "lap", "until": "1000 steps"}
+    found = {}
+    for name, others in (("self-taught", []), ("pupil", [car["model"] for car in cars])):
+        console.create(name=name, opponents=others, cars=3, **wanted)
+        (job,) = console.client.get(f"/api/jobs?run={name}").json()
+        assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+        found[name] = console.client.get(f"/api/models/{name}").json()
+        assert found[name]["race"] == "head-to-head"
+    assert found["self-taught"]["settings"]["opponents"]["drivers"] == ["self"]
+    assert found["pupil"]["settings"]["opponents"]["cars"] == 3
+    assert [Path(path).name for path in found["pupil"]["settings"]["opponents"]["drivers"]] == ["ada", "bob"]
+    alone = console.client.post("/api/models", json={**wanted, "race": "time-trial", "opponents": ["ada"]})
+    assert alone.status_code == 422
+    assert "head-to-head" in alone.json()["error"]["message"]
+    nobody = console.client.post("/api/models", json={**wanted, "opponents": ["nobody"]})
+    assert nobody.status_code == 404

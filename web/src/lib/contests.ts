@@ -1,0 +1,16 @@
+/** What heats and ladders are called. */
+import type { ContestCard } from "../api/contests";
+import type { Key } from "../i18n/en";
+import { t } from "../i18n/index.svelte";
+
+/** How they race: a heat by its cars, a ladder by what it compares by. */
+export const kindOf = (contest: Pick<ContestCard, "kind" | "models">): string =>
+  contest.kind === "grid" ? t("contests_kind_grid", { count: contest.models.length }) : ladderKind(contest.kind);
+
+export const LADDER_KINDS = ["head-to-model", "time-trial", "object-avoidance", "head-to-bot"] as const;
+
+export const ladderKind = (kind: string): string =>
+  t(kind === "head-to-model" ? "contests_kind_head_to_model" : (`races_kind_${kind.replaceAll("-", "_")}` as Key));
+
+/** How many laps, in words. */
+export const lapsOf = (count: number): string => t(count === 1 ? "races_one_lap" : "races_laps_count", { count });
