@@ -126,6 +126,7 @@ COMMANDS: dict[str, list[str]] = {
         "serve --runs R -p 0 --database sqlite:///D.db --artifacts file:///tmp/none --trainings 1 --others 1"
         " --no-browser --json",
         "serve --runs R -p 0 --league --host 127.0.0.1 --address http://127.0.0.1:8321 --plain-http",
+        "serve --runs R -p 0 --league --address https://x --trusted-proxy 127.0.0.1 --certificate C.pem --key K.pem",
     ],
     "login": ["login http://127.0.0.1:9 --token rc_none --json"],
     "races": ["races --json"],

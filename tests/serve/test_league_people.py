@@ -328,7 +328,22 @@ def test_one_person_alone_notices_nothing(league: RunningLeague, tmp_path: Path)
         ({"address": "ftp://x", "league": True}, "allowed are"),
         ({"address": "https://x/path", "league": True}, "allowed are"),
         ({"host": "0.0.0.0", "league": True, "plain_http": True}, ""),
-        ({"host": "0.0.0.0", "league": True, "address": "https://school.example"}, ""),
+        ({"host": "0.0.0.0", "league": True, "address": "https://school.example"}, "beside its proxy"),
+        ({"address": "https://x", "league": True, "trusted_proxies": ("proxy.example",)}, "addresses and networks"),
+        ({"trusted_proxies": ("127.0.0.1",)}, "for a league"),
+        ({"address": "https://x", "league": True, "certificate": Path("x.pem")}, "needs its key"),
+        ({"league": True, "certificate": Path("x.pem"), "key": Path("y.pem")}, "for a name"),
+        ({"host": "0.0.0.0", "league": True, "address": "https://x", "trusted_proxies": ("10.0.0.0/24",)}, ""),
+        (
+            {
+                "host": "0.0.0.0",
+                "league": True,
+                "address": "https://x",
+                "certificate": Path("x.pem"),
+                "key": Path("y.pem"),
+            },
+            "",
+        ),
         ({"league": True, "address": "https://school.example"}, ""),
     ],
 )

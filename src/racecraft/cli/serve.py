@@ -48,6 +48,13 @@ def serve(
     plain_http: Annotated[
         bool, typer.Option("--plain-http", help="Let passwords and cards cross the network unencrypted.")
     ] = False,
+    trusted_proxy: Annotated[
+        list[str], typer.Option("--trusted-proxy", help="Address or network of a proxy that is believed who calls.")
+    ] = [],  # noqa: B006 (Typer copies it)
+    certificate: Annotated[
+        Path | None, typer.Option("--certificate", help="PEM file of your own, where no proxy has one.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option("--key", help="PEM file with the certificate's private key.")] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the link in a browser.")] = True,
     as_json: Json = False,
 ) -> None:
@@ -79,6 +86,9 @@ def serve(
         host=host,
         address=address,
         plain_http=plain_http,
+        trusted_proxies=tuple(trusted_proxy),
+        certificate=certificate,
+        key=key,
     )
     run_server(settings, on_ready=ready)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import socket
+import ssl
 from collections.abc import Callable
+from typing import Any
 
 import uvicorn
 
@@ -23,10 +25,11 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
         on_ready: Is given the one-time link as soon as connections are accepted.
 
     Raises:
-        ConfigError: The port is taken.
+        ConfigError: The port is taken, or the certificate cannot be used.
         RunError: A folder or the database cannot be opened.
     """
     check_whole("others", settings.other_slots, 1, 64)  # races and copies of runs are made here and nowhere else
+    encryption = _encryption(settings)
     # Called TCP by name, or asyncio leaves Nagle's algorithm on, and every reply waits 40 ms for an acknowledgement.
     listener = socket.socket(proto=socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -41,8 +44,28 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
     port = listener.getsockname()[1]
     app = create_app(settings, hosts={f"{name}:{port}" for name in (ADDRESS, "localhost", settings.host)})
     config = uvicorn.Config(
-        app, log_level="warning", access_log=False, server_header=False, timeout_graceful_shutdown=2
+        app,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=2,
+        proxy_headers=bool(settings.trusted_proxies),  # else by default of whoever is on this machine
+        forwarded_allow_ips=list(settings.trusted_proxies),
+        **encryption,
     )
     listener.listen(128)
-    on_ready(f"http://{ADDRESS}:{port}/?ticket={app.state.guard.ticket()}")
+    at = settings.address.rstrip("/") if settings.certificate else f"http://{ADDRESS}:{port}"
+    on_ready(f"{at}/?ticket={app.state.guard.ticket()}")
     uvicorn.Server(config).run(sockets=[listener])
+
+
+def _encryption(settings: ServeSettings) -> dict[str, Any]:
+    if settings.certificate is None:
+        return {}
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    try:
+        context.load_cert_chain(settings.certificate, settings.key)
+    except (OSError, ssl.SSLError) as error:  # before anybody is let in, and in a sentence
+        reason = error.strerror or error
+        raise ConfigError(f"The certificate {settings.certificate} with its key cannot be used: {reason}.") from error
+    return {"ssl_certfile": settings.certificate, "ssl_keyfile": settings.key}

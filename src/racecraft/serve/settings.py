@@ -6,6 +6,7 @@ import socket
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from importlib import metadata
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
@@ -60,6 +61,12 @@ class ServeSettings:
     """``https://NAME`` or ``http://NAME:PORT`` by which others call a league; by default where it listens."""
     plain_http: bool = False
     """Whether passwords and cards may cross a network unencrypted."""
+    trusted_proxies: tuple[str, ...] = ()
+    """Addresses, or networks such as ``10.0.0.0/24``, of proxies that are believed where a request comes from."""
+    certificate: Path | None = None
+    """PEM file with the chain of a league's own certificate, where no proxy has one."""
+    key: Path | None = None
+    """PEM file with its private key."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "runs", self.runs.absolute())
@@ -96,12 +103,36 @@ class ServeSettings:
                 "Passwords and cards would cross the network unencrypted.",
                 hint="Give --address https://NAME of a proxy, or say --plain-http in a network that you trust.",
             )
+        if (self.trusted_proxies or self.certificate or self.key) and not self.league:
+            raise ConfigError("Proxies and certificates are for a league.", hint="Add --league for accounts.")
+        for proxy in self.trusted_proxies:
+            try:
+                ip_network(proxy)
+            except ValueError as error:
+                raise ConfigError(
+                    f"trusted_proxy is {proxy[:80]!r}; allowed are addresses and networks, such as 10.0.0.0/24."
+                ) from error
+        if (self.certificate is None) != (self.key is None):
+            raise ConfigError("A certificate needs its key.", hint="Give both --certificate FILE and --key FILE.")
+        if self.certificate is not None and parts.scheme != "https":
+            raise ConfigError("A certificate is for a name.", hint="Give --address https://NAME:PORT that it is for.")
+        is_open = self.host not in LOOPBACK and self.certificate is None and not self.trusted_proxies
+        if is_open and not self.plain_http:
+            raise ConfigError(
+                f"At {self.host} the league would answer unencrypted beside its proxy.",
+                hint="Leave --host out where the proxy runs here, or name it with --trusted-proxy ADDRESS.",
+            )
 
     def of(self, user_id: int) -> ServeSettings:
         """The same for another person: a folder of runs of their own, on the same database, without copies."""
         if user_id == OWNER:
             return self
         return replace(self, runs=runs_of(self.runs, user_id), database=self.database_url, artifacts="")
+
+    @property
+    def needs_encryption(self) -> bool:
+        """Whether who comes from another machine has to come through an encrypted connection."""
+        return self.address.startswith("https://") and not self.plain_http
 
     @property
     def state(self) -> Path:

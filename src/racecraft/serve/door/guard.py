@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from racecraft.serve.people.keys import Keys
 from racecraft.serve.problems import problem
-from racecraft.serve.settings import COOKIE, OWNER, ServeSettings
+from racecraft.serve.settings import COOKIE, LOOPBACK, OWNER, ServeSettings
 
 MAX_BODY: Final = 8 << 20  # bytes
 MAX_SUBMISSION: Final = 32 << 20
@@ -78,6 +78,7 @@ class Guard:
         if address.netloc:
             self._origins.add(f"{address.scheme}://{address.netloc}")
         self.is_secure = address.scheme == "https"
+        self._needs_encryption = settings.needs_encryption
         self._tickets: set[str] = set()
         self._known: set[str] = set()
 
@@ -130,6 +131,8 @@ class Guard:
     def _refuse(self, request: Request) -> Response | None:
         if request.headers.get("host", "") not in self._hosts:
             return problem(421, "Refused", "The console answers only at the address that it printed.")
+        if self._needs_encryption and request.url.scheme != "https" and caller(request) not in LOOPBACK:
+            return problem(403, "Refused", "This league is called by https only.")
         origin = request.headers.get("origin")
         if origin is not None and origin not in self._origins:
             return problem(403, "Refused", "Another site's pages may not use the console.")
@@ -232,5 +235,5 @@ class Listening:
 
 
 def caller(request: Request) -> str:
-    """The address that a request comes from."""
+    """The address that a request comes from; behind a trusted proxy the one that it tells."""
     return request.client.host if request.client is not None else ""

@@ -1,0 +1,105 @@
+"""A league that others reach: behind a proxy that is trusted or not, and with a certificate of its own."""
+
+from __future__ import annotations
+
+import json
+import socket
+import ssl
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from leagues import ok, refused
+from running_consoles import PATIENCE, RunningConsole, end, running_console
+
+from racecraft.errors import ConfigError
+from racecraft.serve.server import serve
+from racecraft.serve.settings import ServeSettings
+
+ADDRESS = "https://school.example"
+PROXY = {"host": "school.example", "x-forwarded-proto": "https", "x-forwarded-for": "203.0.113.9"}
+
+
+@pytest.fixture(scope="module")
+def behind(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningConsole]:
+    """A league whose proxy is on this machine, and believed."""
+    options = ("--league", "--address", ADDRESS, "--trusted-proxy", "127.0.0.1")
+    with running_console(tmp_path_factory.mktemp("behind") / "runs", *options) as console:
+        yield console
+
+
+def free_port() -> int:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        return int(taken.getsockname()[1])
+
+
+def make_certificate(folder: Path, name: str = "localhost") -> tuple[Path, Path]:
+    certificate, key = folder / "certificate.pem", folder / "key.pem"
+    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", f"/CN={name}"]
+    command += ["-addext", f"subjectAltName=DNS:{name}", "-keyout", str(key), "-out", str(certificate)]
+    subprocess.run(command, check=True, capture_output=True)
+    return certificate, key
+
+
+def test_a_trusted_proxy_tells_who_calls(behind: RunningConsole) -> None:
+    card = {"secret": "wrong"}
+    with httpx.Client(base_url=behind.client.base_url, timeout=PATIENCE) as client:
+        for _ in range(200):
+            refused(client.post("/api/door/card", json=card, headers=PROXY), 401)
+        assert "too many" in refused(client.post("/api/door/card", json=card, headers=PROXY), 429)
+        another = {**PROXY, "x-forwarded-for": "203.0.113.10"}
+        refused(client.post("/api/door/card", json=card, headers=another), 401)
+        forged = {**PROXY, "x-forwarded-for": "203.0.113.77, 203.0.113.9"}  # the proxy adds to what it was sent
+        refused(client.post("/api/door/card", json=card, headers=forged), 429)
+
+
+def test_who_comes_unencrypted_through_the_proxy_is_refused(behind: RunningConsole) -> None:
+    with httpx.Client(base_url=behind.client.base_url, timeout=PATIENCE) as client:
+        plain = {**PROXY, "x-forwarded-proto": "http"}
+        for path in ("/", "/api/door", "/api/health"):
+            assert "https only" in refused(client.get(path, headers=plain), 403)
+        assert ok(client.get("/api/door", headers=PROXY)) == {"is_league": True, "me": None}
+        ok(client.get("/api/health"), 204)  # a supervisor on this machine
+        refused(client.get("/api/door", headers={**PROXY, "origin": "http://school.example"}), 403)
+
+
+def test_a_proxy_that_is_not_trusted_is_not_believed(tmp_path: Path) -> None:
+    with running_console(tmp_path / "runs", "--league", "--address", ADDRESS) as console:
+        plain = {**PROXY, "x-forwarded-proto": "http"}
+        ok(httpx.get(f"{console.client.base_url}/api/door", headers=plain))  # of this machine, whatever it says
+
+
+def test_a_league_with_a_certificate_of_its_own(tmp_path: Path) -> None:
+    certificate, key = make_certificate(tmp_path)
+    port = free_port()
+    command = [sys.executable, "-m", "racecraft", "serve", "--json", "--league", "--runs", str(tmp_path / "runs")]
+    command += ["--port", str(port), "--address", f"https://localhost:{port}"]
+    command += ["--certificate", str(certificate), "--key", str(key)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        link = json.loads(process.stdout.readline())["link"]
+        assert link.startswith(f"https://localhost:{port}/?ticket=")
+        trusting = ssl.create_default_context(cafile=certificate)
+        with httpx.Client(base_url=f"https://localhost:{port}", verify=trusting, timeout=PATIENCE) as client:
+            let_in = client.get(link)
+            assert "Secure" in let_in.headers["set-cookie"].split("; ")
+            assert ok(client.get("/api/account"))["role"] == "admin"
+        with pytest.raises(httpx.HTTPError):
+            httpx.get(f"http://localhost:{port}/api/door")
+    finally:
+        end(process)
+
+
+def test_files_that_are_no_certificate_are_named(tmp_path: Path) -> None:
+    certificate, _ = make_certificate(tmp_path)
+    for key, text in ((certificate, "cannot be used"), (tmp_path / "none.pem", "No such file")):
+        settings = ServeSettings(
+            runs=tmp_path, port=0, league=True, address="https://localhost:1", certificate=certificate, key=key
+        )
+        with pytest.raises(ConfigError, match=text):
+            serve(settings, on_ready=print)
