@@ -38,7 +38,7 @@ site: $(ZIG) $(VENV)/.built $(VENV)/.serve $(NODE)  ## build build/site: a page 
 	@$(WASM)
 	@cd web && npm run --silent site
 	@mkdir -p build/site/core && cp build/wasm/*.wasm build/site/core
-	@$(BIN)/python -m racecraft.site build/site
+	@$(BIN)/python -m racecraft.site build/site web/node_modules/pyodide
 
 build/wasm/%.wasm: $(ZIG) FORCE
 	@$(WASM) $@

@@ -24,6 +24,20 @@ async function load(file) {
   );
 }
 
+/** Python as the page has it, from the same package. */
+async function startPython(files) {
+  const folder = join(pages, "node_modules/pyodide/");
+  const { loadPyodide } = await import(
+    pathToFileURL(join(folder, "pyodide.mjs")).href
+  );
+  const { Python } = await load("src/tab/python.ts");
+  const outside = Object.create(null);
+  return Python.of(
+    await loadPyodide({ indexURL: folder, jsglobals: outside }),
+    files,
+  );
+}
+
 const KINDS = {
   float64: Float64Array,
   float32: Float32Array,
@@ -65,6 +79,38 @@ function drive(core, { track: of, settings, vehicle, actions }) {
   );
 }
 
+/** What a step's rows are paid: for being near the middle, or by a reward function in Python. */
+function payer(core, cars, pay, seed) {
+  const columns = core.names("row");
+  if (pay.source) {
+    const { count } = cars;
+    return python.open(pay.source, pay, count, columns.length, seed).pay;
+  }
+  const [offset, width] = [
+    columns.indexOf(pay.distance),
+    columns.indexOf(pay.width),
+  ];
+  return (rows) =>
+    Float64Array.from({ length: cars.count }, (_, car) => {
+      const row = rows.subarray(car * cars.rowWidth, (car + 1) * cars.rowWidth);
+      return 1 - Math.abs(row[offset]) / row[width];
+    });
+}
+
+/** Rewards of rows, or the sentence about a function that failed. */
+function ask(core, { rows, count, source, track: of, seed }) {
+  try {
+    const all = read(rows);
+    const width = all.length / count;
+    const { pay, printed } = python.open(source, of, count, width, seed);
+    return { rewards: digest(pay(all)), printed: printed() };
+  } catch (error) {
+    return { sentence: error.message };
+  }
+}
+
+const check = (_, { source, track: of }) => python.check(source, of);
+
 function train(
   core,
   {
@@ -85,22 +131,13 @@ function train(
   const learner = core.learner(network);
   learner.write("weights", read(weights));
   const training = learner.train(cars, ppo, read(table));
-  const columns = core.names("row");
-  const [offset, width] = [
-    columns.indexOf(pay.distance),
-    columns.indexOf(pay.width),
-  ];
+  const rewards = payer(core, cars, pay, seed);
   const ended = [];
   for (let iteration = 0; iteration < iterations; ++iteration) {
     training.begin(seed, iteration, training.totalSteps);
     for (let isFull = false; !isFull;) {
       if (!training.drive()) throw new Error("not finite");
-      const { rows, rowWidth } = cars;
-      const share = (car) =>
-        Math.abs(rows[car * rowWidth + offset]) / rows[car * rowWidth + width];
-      isFull = training.pay(
-        Float64Array.from({ length: cars.count }, (_, car) => 1 - share(car)),
-      );
+      isFull = training.pay(rewards(cars.rows));
     }
     if (!training.learn()) throw new Error("not finite");
     ended.push(...training.ended().map(({ total, length }) => [total, length]));
@@ -127,8 +164,11 @@ function refuse(core, { track: of }) {
 
 const { Core, loadCore } = await load("src/tab/core.ts");
 const core = await Core.load(readFileSync(code));
-const run = { drive, train, refuse };
-const results = JSON.parse(readFileSync(cases, "utf8")).map(
+const run = { ask, check, drive, train, refuse };
+const all = JSON.parse(readFileSync(cases, "utf8"));
+const files = all.find(({ files }) => files)?.files;
+const python = files ? await startPython(files) : undefined;
+const results = all.map(
   ({ what, ...rest }) => run[what](core, rest),
 );
 // What a page takes where the first builds it asks for do not run.

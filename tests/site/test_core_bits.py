@@ -10,6 +10,7 @@ import hashlib
 import json
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ from racecraft.site.plan import packed, told_cars, told_layers, told_network, to
 from racecraft.track import Track, load_track
 
 pytestmark = pytest.mark.slow
+Pay = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 ROOT = Path(__file__).parents[2]
 BUILDS = ("core", "exact", "scalar")
 TRACKS = (
@@ -100,11 +102,16 @@ def driven() -> list[tuple[dict[str, Any], dict[str, str]]]:
     return cases
 
 
-class Road:
-    """Cars that are paid for being near the centre line, as bits.mjs pays them."""
+def near_the_middle(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """As bits.mjs pays."""
+    return np.asarray(1.0 - np.abs(rows[:, DISTANCE]) / rows[:, WIDTH])
 
-    def __init__(self, simulation: Simulation, space: Any) -> None:
-        self.simulation, self.space, self.num_envs = simulation, space, simulation.num_envs
+
+class Road:
+    """Cars that are paid for what their rows say."""
+
+    def __init__(self, simulation: Simulation, space: Any, pay: Pay) -> None:
+        self.simulation, self.space, self.num_envs, self.pay = simulation, space, simulation.num_envs, pay
 
     def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         return self.simulation.frames, self.simulation.state
@@ -112,14 +119,13 @@ class Road:
     def step(self, actions: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.bool_]]:
         simulation = self.simulation
         simulation.step(self.space.to_commands(actions))
-        rewards = 1.0 - np.abs(simulation.rows[:, DISTANCE]) / simulation.rows[:, WIDTH]
-        return rewards, simulation.terminated.copy(), simulation.truncated.copy()
+        return self.pay(simulation.rows), simulation.terminated.copy(), simulation.truncated.copy()
 
     def reset(self, mask: NDArray[np.bool_]) -> None:
         self.simulation.reset(mask)
 
 
-def trained(name: str) -> tuple[dict[str, Any], dict[str, Any]]:
+def trained(name: str, pay: Pay = near_the_middle) -> tuple[dict[str, Any], dict[str, Any]]:
     """Two iterations of a training, and what the native core learned."""
     config, actions = TRAININGS[name]
     space = action_space(actions)
@@ -129,7 +135,7 @@ def trained(name: str) -> tuple[dict[str, Any], dict[str, Any]]:
     track = load_track("reinvent_2018")
     learner = NativeLearner(spec, seed=SEED, num_threads=1)
     initial = learner.weights()
-    road = Road(simulation_of(track, *shape), space)
+    road = Road(simulation_of(track, *shape), space, pay)
     ppo = PPO(config, learner, road, seed=SEED)
     ended = [[e.total, e.length] for _ in range(2) for e in ppo.iterate().ended]
     outputs = learner.policy(learner.encode(road.simulation.frames))
@@ -183,21 +189,26 @@ def expected() -> list[tuple[dict[str, Any], Any]]:
 @pytest.fixture(scope="module", params=BUILDS)
 def found(request: pytest.FixtureRequest, expected: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What Node makes of the cases with one build."""
-    node, code = shutil.which("node"), ROOT / "build/wasm" / f"{request.param}.wasm"
+    cases = [*(case for case, _ in expected), {"what": "refuse", "track": told_track(broken_lines())}]
+    return {"build": request.param, **in_node(request.param, cases, tmp_path_factory.mktemp("bits"))}
+
+
+def in_node(build: str, cases: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
+    """What Node makes of cases with a build."""
+    node, code = shutil.which("node"), ROOT / "build/wasm" / f"{build}.wasm"
     if node is None or not (ROOT / "web/node_modules/vite").is_dir():
         pytest.skip("Node or the pages' packages are not installed")
     if not (ROOT / "build/zig/ziglang/zig").exists():
         pytest.skip("Zig's compiler is not installed: make site")
     subprocess.run(["make", "-s", str(code.relative_to(ROOT))], cwd=ROOT, check=True, capture_output=True)
-    cases = tmp_path_factory.mktemp("bits") / "cases.json"
-    cases.write_text(
-        json.dumps([*(case for case, _ in expected), {"what": "refuse", "track": told_track(broken_lines())}])
-    )
+    file = folder / "cases.json"
+    file.write_text(json.dumps(cases))
     options = ["--experimental-wasm-relaxed-simd"] if needs_flag(node) else []
-    command = [node, *options, str(Path(__file__).with_name("bits.mjs")), str(ROOT / "web"), str(code), str(cases)]
+    command = [node, *options, str(Path(__file__).with_name("bits.mjs")), str(ROOT / "web"), str(code), str(file)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr[-4000:]
-    return {"build": request.param, **json.loads(done.stdout)}
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
 def needs_flag(node: str) -> bool:

@@ -28,7 +28,7 @@ SITE = ROOT / "build" / "site"
 AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"]
-PATIENCE = 120_000  # ms
+PATIENCE = 60_000  # ms
 
 pytestmark = [
     pytest.mark.slow,
@@ -101,12 +101,70 @@ def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
     page.get_by_role("button", name="Stop").click()
 
 
+def write(page: Page, source: str) -> None:
+    """Put a reward of one's own into the editor."""
+    page.get_by_label("What it is paid for").select_option("own")
+    page.get_by_label("The reward in Python").fill(source)
+
+
+def test_a_reward_of_ones_own_is_checked_and_trains(page: Page) -> None:
+    page.get_by_label("Track").select_option("oval")
+    write(page, "import numpy\ndef reward_function(params):\n    return params['sped']\n")
+    page.get_by_text("1: 'import numpy' is allowed, but numpy is not installed here.").wait_for(timeout=PATIENCE)
+    page.get_by_text("the installed program, Racecraft, trains with numpy").wait_for()
+    page.get_by_text("3: params has no key 'sped'. Did you mean 'speed'?").wait_for()
+    assert page.get_by_role("button", name="Train").is_disabled()
+    write(page, "#" * 2_000_000)
+    page.get_by_text("The source has 2,000,000 characters").wait_for(timeout=PATIENCE)
+    write(page, "def reward_function(params):\n    print('seen', params['steps'])\n    return params['speed']\n")
+    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("seen 95.0").wait_for()  # what it printed when it was tried
+    page.get_by_role("button", name="Train").click()
+    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+
+
+FAILS_LATE = """calls = 0
+def reward_function(params):
+    global calls
+    calls += 1
+    if calls == 150:
+        {ending}
+    return 0.001
+"""  # every car has its own globals
+
+
+def test_a_reward_that_raises_late_stops_with_its_line_and_leaves_what_was_judged(page: Page) -> None:
+    page.get_by_label("Track").select_option("kidney")
+    write(page, FAILS_LATE.format(ending="raise ValueError('enough')"))
+    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Train").click()
+    page.get_by_text("reward_function.py, line 6: the reward function raised ValueError: enough").wait_for(
+        timeout=PATIENCE
+    )
+    page.get_by_text("The reward function failed after").wait_for()
+    page.get_by_role("button", name="Delete: kidney-own-1").wait_for()
+
+
+def test_a_reward_that_hangs_is_ended_and_the_page_goes_on(page: Page) -> None:
+    write(page, FAILS_LATE.format(ending="while True: print('again')"))
+    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Train").click()
+    page.get_by_text("the reward function did not return within 5 s").wait_for(timeout=PATIENCE)
+    write(page, "def reward_function(params):\n    while True: pass\n")
+    page.get_by_text("1: The reward function did not return within 5 s.").wait_for(timeout=PATIENCE)
+    write(page, "def reward_function(params):\n    return 1.0\n")
+    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+
+
 def test_the_page_opens_and_trains_without_a_network_after_the_first_visit(page: Page) -> None:
     late = "new Promise((_, failed) => setTimeout(() => failed(new Error('no service worker')), 30_000))"
     page.evaluate(f"Promise.race([navigator.serviceWorker.ready, {late}]).then(() => 0)")
     page.reload()  # what the service worker has kept now comes from it
     page.context.set_offline(True)
     page.reload()
+    page.get_by_label("What it is paid for").select_option("own")
+    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)  # Python is kept, too
+    page.get_by_label("What it is paid for").select_option("racing")
     page.get_by_label("Track").select_option("needle")  # never opened before
     page.get_by_role("button", name="Train").click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)

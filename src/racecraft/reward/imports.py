@@ -16,6 +16,11 @@ from racecraft.errors import did_you_mean
 from racecraft.reward.names import bound_names
 from racecraft.reward.worker_process import PACKAGES
 
+INSTALLING: Final = (
+    "Install it: pip install {}"
+    if sys.platform != "emscripten"
+    else "A page has Python alone; the installed program, Racecraft, trains with {}."
+)
 Severity = Literal["error", "warning"]
 Finding = tuple[ast.expr | ast.stmt, str, str, Severity]  # where, message, hint, severity
 
@@ -234,7 +239,7 @@ def _check_installed(node: ast.stmt, module: str, *, is_guarded: bool) -> Iterat
     top = module.split(".")[0]
     if top in PACKAGES and importlib.util.find_spec(top) is None:
         message = f"'import {module}' is allowed, but {top} is not installed here."
-        yield node, message, f"Install it: pip install {top}", "warning" if is_guarded else "error"
+        yield node, message, INSTALLING.format(top), "warning" if is_guarded else "error"
 
 
 def _keywords(node: ast.Call) -> set[str | None]:

@@ -31,9 +31,10 @@ from racecraft.checks import require
 from racecraft.errors import ConfigError, RewardError, RewardTimeout, ShapeError, printable
 from racecraft.reward import launch
 from racecraft.reward import worker_process as protocol
+from racecraft.reward.failure import SHOWN_BYTES, SHOWN_WIDTH, kept_prints, told
 from racecraft.reward.modules import needed_modules, used_words
 from racecraft.reward.numeric import NotNumeric, numeric_source
-from racecraft.reward.params import format_params, make_params
+from racecraft.reward.params import make_params
 from racecraft.reward.sandbox import Confinement, find_confinement, make_plan
 from racecraft.sim.columns import ROW_COLUMNS, row_width
 
@@ -46,8 +47,6 @@ TEXT_BYTES = 8 * 1024  # longest description of a failure
 PATIENCE, MOST_PATIENCE = 10.0, 30.0  # times its limit, or s beyond it: how long a call may last by the wall
 LEAST_WAIT = 0.01  # s, between two looks at a core's time
 LOG_BYTES = 64 * 1024  # how much of the last printed text is kept
-SHOWN_LINES = 5  # of what was printed, in an error
-SHOWN_WIDTH = 200  # characters of such a line
 MAX_BATCH = 4096  # rows per doorbell; larger arrays go over in parts
 CAUSES = {
     "SIGKILL": "killed from outside, or by the system for lack of memory",
@@ -114,7 +113,7 @@ class RewardWorker:
         """Whether the source is somebody else's."""
         self.confinement = confinement
         """The walls around the process."""
-        self._source_lines = source.splitlines()
+        self._source = source
         self._waypoints = waypoints_of(tracks if isinstance(tracks, Sequence) else (tracks,))
         self._timeout_s = timeout_s
         self._failure = ""  # why the process has ended: text, as a kept error would keep this object alive
@@ -328,19 +327,11 @@ class RewardWorker:
 
     def _error(self, text: str, line: int, rows: Rows | None, row: int, *, first: int) -> RewardError:
         """One sentence, the line at fault, and the params that the function was called with."""
-        message = f"{protocol.FILENAME}, line {line}: " if line > 0 else f"{protocol.FILENAME}: "
-        message += f"the {'file' if rows is None else 'reward function'} {text}"
-        message += "" if message.endswith(".") else "."
-        if 0 < line <= len(self._source_lines):
-            message += f"\n    {printable(self._source_lines[line - 1].strip())}"
         params: dict[str, Any] | None = None
-        if rows is None:
-            message += "\nIt failed while the file was loaded, before the first call."
-        elif row < len(rows):
+        if rows is not None and row < len(rows):
             params = make_params(rows[row].tolist(), self._waypoints)
-            message += f"\nIt was called with params = {format_params(params)}"
-        if lines := self._last_lines():
-            message += "\nIt printed last:" + "".join(f"\n    {line}" for line in lines)
+        printed = kept_prints(self._log, SHOWN_BYTES)
+        message = told(text, self._source, line=line, is_loading=rows is None, params=params, printed=printed)
         return RewardError(
             message,
             line=line if line > 0 else None,
@@ -371,24 +362,7 @@ class RewardWorker:
         since = max(written - self._num_read, 0)
         self._num_read = written
         self.num_lost = max(since - LOG_BYTES, 0)
-        return self._printed(written, since)
-
-    def _printed(self, written: int, count: int) -> str:
-        """The last ``count`` bytes of all that was printed, as far as they are kept."""
-        count = min(count, written, LOG_BYTES)
-        if not count:
-            return ""
-        ring = bytes(self._log[protocol.SIZE.size :])
-        end = written % LOG_BYTES
-        data = ring[end - count : end] if count <= end else ring[LOG_BYTES - (count - end) :] + ring[:end]
-        return data.decode("utf-8", "replace")
-
-    def _last_lines(self) -> list[str]:
-        """The last lines that were printed, for an error: short, and without what could drive a terminal."""
-        (written,) = protocol.SIZE.unpack_from(self._log)
-        lines = [line for line in self._printed(written, 4 * SHOWN_LINES * SHOWN_WIDTH).splitlines() if line.strip()]
-        shown = (line[:SHOWN_WIDTH] + "…" * (len(line) > SHOWN_WIDTH) for line in lines[-SHOWN_LINES:])
-        return [printable(line) for line in shown]
+        return kept_prints(self._log, since)
 
     @property
     def process_id(self) -> int:

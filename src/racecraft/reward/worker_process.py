@@ -137,7 +137,8 @@ def main() -> None:
         del finish  # and with it the last that held ctypes
         sys.stdout = sys.stderr = prints
         replace_log_files(prints)
-        functions = load_functions(setup)
+        sys.addaudithook(guard)
+        functions = load_functions(setup["source"], seed=setup["seed"], num_cars=setup["num_cars"])
     except BaseException as error:
         server.fail(error, 0)
         return
@@ -337,17 +338,16 @@ class LockedFinder:
             raise ModuleNotFoundError(f"{name} cannot be loaded here: import it by its plain name", name=name)
 
 
-def load_functions(setup: dict[str, Any]) -> list[Reward]:
+def load_functions(source: str, *, seed: int, num_cars: int) -> list[Reward]:
     """Run the user's source once per car that keeps its own globals; each run gives one function."""
-    code = compile(setup["source"], FILENAME, "exec", dont_inherit=True)
+    code = compile(source, FILENAME, "exec", dont_inherit=True)
     if (random := sys.modules.get("random")) is not None:
-        random.seed(setup["seed"])
+        random.seed(seed)
     if (numpy_random := sys.modules.get("numpy.random")) is not None:
-        numpy_random.seed(setup["seed"])  # what users call is the global generator
-    sys.addaudithook(guard)
+        numpy_random.seed(seed)  # what users call is the global generator
 
     functions = []
-    for _ in range(setup["num_cars"]):
+    for _ in range(num_cars):
         module = type(sys)("reward_function")
         sys.modules["reward_function"] = module  # dataclasses look up their module by name
         exec(code, module.__dict__)

@@ -1,16 +1,18 @@
-"""`python -m racecraft.site SITE`: writes what the page in a tab is told beside the page, and what it keeps offline."""
+"""`python -m racecraft.site SITE PYODIDE`: what a page in a tab is told, its Python, what it keeps offline."""
 
 from __future__ import annotations
 
 import ast
 import hashlib
 import json
+import shutil
 import sys
 from pathlib import Path
 from typing import Any, Final
 
 from racecraft.reward import load_preset, preset_names
 from racecraft.reward.numeric import NotNumeric
+from racecraft.site.calls import SHIPPED
 from racecraft.site.javascript import javascript
 from racecraft.site.plan import plan, track_file
 from racecraft.track import track_names
@@ -18,9 +20,13 @@ from racecraft.track import track_names
 FALLBACKS: Final = ("core/exact.wasm", "core/scalar.wasm")  # that few browsers need: not kept by all
 
 
-def main(site: Path) -> None:
-    """Write data/plan.json, data/rewards.js, a file a track, and files.js."""
+PYTHON: Final = ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_stdlib.zip")
+
+
+def main(site: Path, pyodide: Path) -> None:
+    """Write data/plan.json, data/rewards.js, a file a track, python/, and files.js."""
     write_data(site / "data")
+    write_python(site / "python", pyodide)
     write_files(site)
 
 
@@ -50,6 +56,24 @@ def write_data(folder: Path) -> None:
     (folder / "rewards.js").write_text(javascript(offered), encoding="utf-8")
 
 
+def write_python(folder: Path, pyodide: Path) -> None:
+    """The interpreter, without the list of packages that it could load, and our files that it runs."""
+    folder.mkdir(exist_ok=True)
+    for name in PYTHON:
+        shutil.copy(pyodide / name, folder / name)
+    lock = json.loads((pyodide / "pyodide-lock.json").read_text(encoding="utf-8"))
+    write(folder / "pyodide-lock.json", {**lock, "packages": {}})
+    write(folder / "racecraft.json", python_files())
+
+
+def python_files() -> dict[str, str]:
+    """The part of Racecraft that a page runs, by path; packages are empty, as theirs import all that a page has not."""
+    source = Path(__file__).parents[1]
+    packages = sorted({Path(name).parent.as_posix() for name in SHIPPED})
+    files = {Path("racecraft", name, "__init__.py").as_posix(): "" for name in packages}
+    return files | {f"racecraft/{name}": (source / name).read_text(encoding="utf-8") for name in SHIPPED}
+
+
 def write(path: Path, document: dict[str, Any]) -> None:
     """A JSON file without blanks."""
     path.write_text(json.dumps(document, separators=(",", ":")), encoding="utf-8")
@@ -64,4 +88,4 @@ def _is_translated(source: str) -> bool:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

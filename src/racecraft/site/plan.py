@@ -13,6 +13,7 @@ from racecraft.agent import ModelMetadata
 from racecraft.learn import NetworkSpec, PPOConfig, networks
 from racecraft.race.placement import start_pose
 from racecraft.race.rules import RULE_SETS
+from racecraft.reward import situations
 from racecraft.run.folder import RunInfo
 from racecraft.serve.tracks.courses import geometry
 from racecraft.sim.camera import CAMERAS, CameraSpec
@@ -165,6 +166,9 @@ def track_file(name: str) -> dict[str, Any]:
         "waypoints": [one.waypoints.tolist() for one in (track, track.reversed())],
         "geometry": geometry(name, track).model_dump(),
         "digest": joint_digest([track]),
+        "situations": [
+            {"name": one.name, "description": one.description, "row": one.row.tolist()} for one in situations(track)
+        ],
         "starts": {str(seed): _starts(track, seed) for seed in SEEDS},
     }
 

@@ -94,7 +94,8 @@ export function openEditor(parent: HTMLElement, text: string, label: string, onC
     const found = mistakes.map((mistake) => {
       const line = view.state.doc.line(Math.min(Math.max(mistake.line, 1), lines));
       const severity = mistake.severity === "error" ? ("error" as const) : ("warning" as const);
-      return { from: line.from, to: line.to, severity, message: mistake.message };
+      const at = line.from + Math.max(mistake.column, 1) - 1;
+      return { from: at < line.to ? at : line.from, to: line.to, severity, message: mistake.message };
     });
     view.dispatch(setDiagnostics(view.state, found));
   };

@@ -8,6 +8,12 @@ export class RewardCheck {
   #of = $state<string | undefined>();
   #found = $state.raw<RewardVerdict | undefined>();
   #timer: ReturnType<typeof setTimeout> | undefined;
+  readonly #answer: typeof api.checkReward;
+
+  /** `answer`: who is asked, the server or whoever knows as much. */
+  constructor(answer: typeof api.checkReward = api.checkReward) {
+    this.#answer = answer;
+  }
 
   /** The last answer, for what may be looked at a little longer: the painting. */
   get last(): RewardVerdict | undefined {
@@ -45,7 +51,7 @@ export class RewardCheck {
   async #check(text: string, track: string, run?: string) {
     let answer: RewardVerdict | undefined;
     try {
-      answer = await api.checkReward(text, track, run);
+      answer = await this.#answer(text, track, run);
     } catch (error) {
       if (error instanceof Problem && text === this.#text) this.refuse(text, error);
       return;

@@ -1,12 +1,26 @@
-/** A training as the page sees it: the worker that runs it, and what it has told so far. */
+/** A training as the page sees it: the workers, one of them with Python, and what they have told so far. */
+import type { RewardVerdict } from "../api/client";
 import { Curves, type Point } from "../lib/curves";
 import type { Look } from "../lib/poses";
 import type { Plan, TrackFile } from "./plan";
-import type { Report, Start } from "./worker";
+import type { Check, Load, Report, Start } from "./worker";
 import TrainingWorker from "./worker?worker";
 
 const LAPS = 5;
 const MOST = 400_000; // camera steps
+const PATIENCE = 5; // s that a reward function may take for a step of all cars
+const TICKS = 2; // a second
+const MOST_PRINTED = 20_000; // characters
+
+type Kind = "plain" | "python";
+
+const refusal = (message: string): RewardVerdict => ({
+  ok: false,
+  problems: [{ line: 1, column: 1, severity: "error", message, hint: "" }],
+  situations: [],
+  painting: null,
+  laps: [],
+});
 
 export type State = "ready" | "loading" | "learning" | "reached" | "unreached" | "stopped" | "failed";
 
@@ -28,34 +42,71 @@ export class Lesson {
   seconds = $state(0);
   isSlow = $state(false);
   failure = $state("");
-  private worker: Worker | undefined;
+  failedReward = $state(""); // what a reward of one's own did wrong
+  printed = $state(""); // by it, the last of it
+  isPythonReady = $state(false);
+  private readonly workers: Partial<Record<Kind, Worker>> = {};
+  private running: Kind = "plain";
+  private asked: { answer: (verdict: RewardVerdict) => void; timer: number | undefined; post: () => void } | undefined;
+  private quiet = 0; // ticks since a running reward was heard of
+  private watch: number | undefined;
 
   constructor(
     private readonly site: string,
     private readonly plan: Plan,
   ) {
-    this.load();
+    this.load("plain");
   }
 
   get isRunning(): boolean {
     return this.state === "loading" || this.state === "learning";
   }
 
-  /** Compile the core while the user reads. */
-  private load(): Worker {
-    this.worker = new TrainingWorker();
-    this.worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data);
-    this.worker.onerror = ({ message }) => this.hear({ kind: "failed", message: message || "worker" });
-    this.worker.postMessage({ site: this.site });
-    return this.worker;
+  /** Have Python there when it is needed. */
+  preparePython(): void {
+    if (!this.workers.python) this.load("python");
   }
 
-  train(track: TrackFile, reward: string, seed: number): void {
+  /** Compile the core, or the core and Python, while the user reads. */
+  private load(kind: Kind): void {
+    this.workers[kind]?.terminate();
+    const worker = (this.workers[kind] = new TrainingWorker());
+    worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data, kind);
+    worker.onerror = ({ message }) =>
+      this.hear({ kind: "failed", message: message || "worker", isReward: false }, kind);
+    if (kind === "python") this.isPythonReady = false;
+    worker.postMessage({ kind: "load", site: this.site, hasPython: kind === "python" } satisfies Load);
+  }
+
+  /** What is wrong with a reward function; what does not answer is ended. */
+  check(source: string, track: TrackFile): Promise<RewardVerdict> {
+    this.preparePython();
+    return new Promise((answer) => {
+      const post = () => {
+        this.workers.python!.postMessage({ kind: "check", source, track: $state.snapshot(track) } satisfies Check);
+        this.asked!.timer = window.setTimeout(() => {
+          this.load("python");
+          answer(refusal(`The reward function did not return within ${PATIENCE} s.`));
+          this.asked = undefined;
+        }, 1000 * PATIENCE);
+      };
+      clearTimeout(this.asked?.timer);
+      this.asked = { answer, timer: undefined, post };
+      if (this.isPythonReady) post();
+    });
+  }
+
+  /** `source`: of a reward of one's own, instead of a preset. */
+  train(track: TrackFile, reward: string, seed: number, source?: string): void {
     [this.look, this.judged, this.seconds, this.failure] = [undefined, undefined, 0, ""];
+    [this.failedReward, this.printed] = ["", ""];
     [this.curves, this.state] = [new Curves(), "loading"];
     this.version++;
-    const start: Start = { site: this.site, plan: this.plan, track, reward, seed, laps: LAPS, most: MOST };
-    this.worker!.postMessage(start);
+    this.running = source === undefined ? "plain" : "python";
+    if (source !== undefined) this.preparePython();
+    const { plan } = this;
+    const start: Start = { kind: "train", plan, track, reward: source ?? reward, seed, laps: LAPS, most: MOST };
+    this.workers[this.running]!.postMessage(start);
   }
 
   stop(): void {
@@ -63,13 +114,43 @@ export class Lesson {
   }
 
   private end(state: State): void {
-    this.worker?.terminate();
-    this.load();
+    this.attend(false);
+    this.load(this.running);
     this.state = state;
   }
 
-  private hear(report: Report): void {
+  /** Whether a reward of one's own runs, and must be heard of. Ticks, so that the time of a sleeping computer is none. */
+  private attend(isPaying: boolean): void {
+    clearInterval(this.watch);
+    this.quiet = 0;
+    if (!isPaying || this.running === "plain") return;
+    this.watch = window.setInterval(() => {
+      if (++this.quiet < PATIENCE * TICKS) return;
+      this.failedReward = `reward_function.py: the reward function did not return within ${PATIENCE} s.`;
+      this.end("failed");
+    }, 1000 / TICKS);
+  }
+
+  private hear(report: Report, kind: Kind): void {
+    this.quiet = 0;
     switch (report.kind) {
+      case "ready":
+        if (kind === "python") {
+          this.isPythonReady = true;
+          this.asked?.post();
+        }
+        break;
+      case "checked":
+        clearTimeout(this.asked?.timer);
+        this.asked?.answer(report.verdict);
+        this.asked = undefined;
+        break;
+      case "paying":
+        this.attend(report.isPaying);
+        break;
+      case "printed":
+        this.printed = (this.printed + report.text).slice(-MOST_PRINTED);
+        break;
       case "loaded":
         [this.isSlow, this.state] = [report.isSlow, "learning"];
         break;
@@ -93,7 +174,8 @@ export class Lesson {
         this.end(report.isReached ? "reached" : "unreached");
         break;
       case "failed":
-        this.failure = report.message;
+        if (report.isReward) this.failedReward = report.message;
+        else this.failure = report.message;
         this.end("failed");
     }
   }

@@ -46,6 +46,7 @@ export interface TrackFile {
   waypoints: [number, number][][]; // (2, K, 2) m: forward, reversed
   geometry: TrackGeometry;
   digest: string;
+  situations: { name: string; description: string; row: number[] }[]; // that a reward of one's own is tried in
   starts: Record<string, [number, number, number][]>; // by seed: x, y, heading of every trial but the first
 }
 

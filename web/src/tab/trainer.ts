@@ -1,9 +1,20 @@
 /** A training in this thread: PPO's loop of the core, a reward in JavaScript, evaluations by the rules of `racecraft train`. */
 import type { Cars, Core, Episode, Learner, Training } from "./core";
 import { arraysOf, type Plan, type TrackFile } from "./plan";
+import type { Pay } from "./python";
 
 /** Reward of a row of the simulation. */
 export type Reward = (row: Float64Array, waypoints: [number, number][][]) => number;
+
+/** A preset, for the rows of a step. */
+export const payWith =
+  (reward: Reward, { waypoints }: TrackFile, numCars: number): Pay =>
+  (rows) => {
+    const width = rows.length / numCars;
+    return Float64Array.from({ length: numCars }, (_, car) =>
+      reward(rows.subarray(car * width, (car + 1) * width), waypoints),
+    );
+  };
 
 export interface Evaluation {
   completions: number[]; // 0 to 1
@@ -29,6 +40,7 @@ export class Trainer {
   private readonly training: Training;
   private readonly table: Float64Array;
   private mean: Float32Array | undefined;
+  private shares: number[] = []; // of the lap, of the episodes that ended
   private iteration = 0;
   private evaluatedAt = 0;
   private wasGood = false;
@@ -37,7 +49,7 @@ export class Trainer {
     core: Core,
     private readonly plan: Plan,
     private readonly track: TrackFile,
-    private readonly reward: Reward,
+    private readonly pay: Pay,
     readonly seed: number,
   ) {
     const road = core.track(arraysOf(track));
@@ -58,24 +70,26 @@ export class Trainer {
     return this.steps - this.evaluatedAt >= this.plan.evaluateEvery;
   }
 
-  /** Collect one rollout and improve the policy on it; `look` is called after every step. */
-  iterate(look: () => void): Iteration {
+  /** Collect one rollout; `look` is called after every step. */
+  drive(look: () => void): void {
     const { training, cars } = this;
     const [status, progress] = [this.columns.indexOf("status"), this.columns.indexOf("progress")];
-    const shares: number[] = [];
+    this.shares = [];
     training.begin(this.seed, this.iteration, this.steps);
     for (let isFull = false; !isFull;) {
       if (!training.drive()) throw new Error("The policy's outputs are no numbers any more. Try another reward.");
       const { rows, rowWidth } = cars;
-      const rewards = new Float64Array(cars.count);
-      for (let car = 0; car < cars.count; car++) {
-        const row = rows.subarray(car * rowWidth, (car + 1) * rowWidth);
-        rewards[car] = this.reward(row, this.track.waypoints);
-        if (!RUNNING.includes(this.plan.statuses[row[status]!]!)) shares.push(row[progress]!);
-      }
+      for (let at = 0; at < rows.length; at += rowWidth)
+        if (!RUNNING.includes(this.plan.statuses[rows[at + status]!]!)) this.shares.push(rows[at + progress]!);
+      const rewards = this.pay(rows);
       look();
       isFull = training.pay(rewards);
     }
+  }
+
+  /** Improve the policy on what was collected. */
+  learn(): Iteration {
+    const { training, shares } = this;
     if (!training.learn()) throw new Error("The loss is no number any more. Look for huge rewards.");
     this.iteration++;
     this.average();

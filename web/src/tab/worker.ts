@@ -1,56 +1,114 @@
-/** The thread beside the page in which cars drive and learn; it is ended by ending the worker. */
+/** The thread beside the page in which cars drive and learn, with Python where it is asked for; it is ended by ending the
+ * worker. */
+import type { RewardVerdict } from "../api/client";
 import type { Look } from "../lib/poses";
 import { loadCore, type LoadedCore } from "./core";
 import { read, type Plan, type TrackFile } from "./plan";
-import { type Evaluation, type Iteration, type Reward, Trainer } from "./trainer";
+import { type Pay, Python, RewardFailure } from "./python";
+import { type Evaluation, type Iteration, payWith, type Reward, Trainer } from "./trainer";
+
+export interface Load {
+  kind: "load";
+  site: string; // address of the site's folder
+  hasPython: boolean;
+}
+
+export interface Check {
+  kind: "check";
+  source: string;
+  track: TrackFile;
+}
 
 export interface Start {
-  site: string; // address of the site's folder
+  kind: "train";
   plan: Plan;
   track: TrackFile;
-  reward: string; // name of a preset
+  reward: string; // name of a preset, or the source where there is Python
   seed: number;
   laps: number; // of an evaluation, until it ends
   most: number; // camera steps
 }
 
 export type Report =
-  | { kind: "loaded"; isSlow: boolean; seconds: number }
+  | { kind: "ready" } // all that was asked for is loaded
+  | { kind: "checked"; verdict: RewardVerdict }
+  | { kind: "loaded"; isSlow: boolean }
+  | { kind: "paying"; isPaying: boolean } // rewards are computed from here on, or no longer
+  | { kind: "printed"; text: string }
   | { kind: "look"; look: Look }
   | { kind: "iteration"; iteration: Iteration; seconds: number }
   | { kind: "evaluation"; evaluation: Evaluation; steps: number; seconds: number }
   | { kind: "ended"; isReached: boolean }
-  | { kind: "failed"; message: string };
+  | { kind: "failed"; message: string; isReward: boolean };
 
 const OFTEN = 66; // ms between two looks
 
 const tell = (report: Report) => postMessage(report);
 
-let core: Promise<LoadedCore> | undefined;
-onmessage = ({ data }: MessageEvent<Start | { site: string }>) => {
-  core ??= loadCore(async (file) => (await read(data.site, `core/${file}`)).arrayBuffer());
-  if ("plan" in data) train(data, core).catch((error: Error) => tell({ kind: "failed", message: error.message }));
-  else core.catch(() => {}); // is told when it is needed
+interface Loaded {
+  core: LoadedCore;
+  python: Python | undefined;
+  presets: Record<string, Reward>;
+}
+
+let loading: Promise<Loaded> | undefined;
+onmessage = ({ data }: MessageEvent<Load | Check | Start>) => {
+  handle(data).catch((error: Error) =>
+    tell({ kind: "failed", message: error.message, isReward: error instanceof RewardFailure }),
+  );
 };
 
-async function train(start: Start, loading: Promise<LoadedCore>): Promise<void> {
+async function handle(asked: Load | Check | Start): Promise<void> {
+  if (asked.kind === "load") {
+    loading = load(asked);
+    loading.then(() => tell({ kind: "ready" })).catch(() => {}); // is told when it is needed
+    return;
+  }
+  const loaded = await loading!;
+  if (asked.kind === "check") tell({ kind: "checked", verdict: loaded.python!.check(asked.source, asked.track) });
+  else train(asked, loaded);
+}
+
+async function load({ site, hasPython }: Load): Promise<Loaded> {
+  const address = new URL("data/rewards.js", site).href;
+  const [core, { rewards }, python] = await Promise.all([
+    loadCore(async (file) => (await read(site, `core/${file}`)).arrayBuffer()),
+    import(/* @vite-ignore */ address) as Promise<{ rewards: Record<string, Reward> }>,
+    hasPython ? Python.load(site) : undefined,
+  ]);
+  return { core, presets: rewards, python };
+}
+
+function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded): void {
   const began = performance.now();
   const seconds = () => (performance.now() - began) / 1000;
-  const address = new URL("data/rewards.js", start.site).href;
-  const [{ core: loaded, isSlow }, { rewards }] = await Promise.all([
-    loading,
-    import(/* @vite-ignore */ address) as Promise<{ rewards: Record<string, Reward> }>,
-  ]);
-  const trainer = new Trainer(loaded, start.plan, start.track, rewards[start.reward]!, start.seed);
-  tell({ kind: "loaded", isSlow, seconds: seconds() });
+  const { plan, track, reward, seed } = start;
+  const numCars = plan.cars["num_envs"]!;
+  let pay: Pay;
+  let printed = () => "";
+  if (python) ({ pay, printed } = python.open(reward, track, numCars, core.names("row").length, seed));
+  else pay = payWith(presets[reward]!, track, numCars);
+  const trainer = new Trainer(core, plan, track, pay, seed);
+  tell({ kind: "loaded", isSlow });
   let looked = -Infinity;
   const look = () => {
     if (performance.now() - looked < OFTEN) return;
     looked = performance.now();
-    tell({ kind: "look", look: lookOf(trainer, start.plan) });
+    tell({ kind: "look", look: lookOf(trainer, plan) });
+  };
+  const say = () => {
+    const text = printed();
+    if (text) tell({ kind: "printed", text });
   };
   while (trainer.steps < start.most) {
-    tell({ kind: "iteration", iteration: trainer.iterate(look), seconds: seconds() });
+    tell({ kind: "paying", isPaying: true });
+    try {
+      trainer.drive(look);
+    } finally {
+      say();
+    }
+    tell({ kind: "paying", isPaying: false });
+    tell({ kind: "iteration", iteration: trainer.learn(), seconds: seconds() });
     if (!trainer.needsEvaluation) continue;
     const evaluation = trainer.evaluate();
     tell({ kind: "evaluation", evaluation, steps: trainer.steps, seconds: seconds() });

@@ -1,0 +1,62 @@
+"""What is said of a reward function that failed: one sentence, the line at fault, the params, the last prints.
+
+The same for a function in a worker process and for one in a browser's tab, which has only Python and no NumPy.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from racecraft.errors import printable
+from racecraft.reward.params import format_params
+from racecraft.reward.worker_process import FILENAME, SIZE
+
+SHOWN_LINES: Final = 5  # of what was printed, in an error
+SHOWN_WIDTH: Final = 200  # characters of such a line
+SHOWN_BYTES: Final = 4 * SHOWN_LINES * SHOWN_WIDTH  # that hold them
+
+
+def told(text: str, source: str, *, line: int, is_loading: bool, params: dict[str, Any] | None, printed: str) -> str:
+    """A failure in full.
+
+    Args:
+        text: What happened, such as "raised KeyError: 'x'".
+        source: Text of the user's file.
+        line: Line of it, from 1, or -1 where that is not known.
+        is_loading: The file was being loaded.
+        params: What the function was called with, where that is known.
+        printed: What it printed last.
+    """
+    lines = source.splitlines()
+    message = f"{FILENAME}, line {line}: " if line > 0 else f"{FILENAME}: "
+    message += f"the {'file' if is_loading else 'reward function'} {text}"
+    message += "" if message.endswith(".") else "."
+    if 0 < line <= len(lines):
+        message += f"\n    {printable(lines[line - 1].strip())}"
+    if is_loading:
+        message += "\nIt failed while the file was loaded, before the first call."
+    elif params is not None:
+        message += f"\nIt was called with params = {format_params(params)}"
+    if last := _last_lines(printed):
+        message += "\nIt printed last:" + "".join(f"\n    {line}" for line in last)
+    return message
+
+
+def kept_prints(ring: memoryview, count: int) -> str:
+    """The last ``count`` bytes of all that went into a `PrintRing`'s memory, as far as they are kept."""
+    (written,) = SIZE.unpack_from(ring)
+    data = bytes(ring[SIZE.size :])
+    room = len(data)
+    count = min(count, written, room)
+    if not count:
+        return ""
+    end = written % room
+    kept = data[end - count : end] if count <= end else data[room - (count - end) :] + data[:end]
+    return kept.decode("utf-8", "replace")
+
+
+def _last_lines(printed: str) -> list[str]:
+    """Short, and without what could drive a terminal."""
+    lines = [line for line in printed.splitlines() if line.strip()]
+    shown = (line[:SHOWN_WIDTH] + "…" * (len(line) > SHOWN_WIDTH) for line in lines[-SHOWN_LINES:])
+    return [printable(line) for line in shown]
