@@ -47,6 +47,7 @@ CONSOLE = (
     "settings",
     "schemas",
     "compression",
+    "tab",
     "problems",
     "store",
     "people",

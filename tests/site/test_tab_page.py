@@ -101,6 +101,13 @@ def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
     page.get_by_role("button", name="Stop").click()
 
 
+def test_what_runs_in_the_page_reaches_no_other_site(page: Page) -> None:
+    other = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Files)
+    ask = f"fetch('http://127.0.0.1:{other.server_port}/', {{mode: 'no-cors'}}).then(() => 'there', () => 'refused')"
+    assert page.workers[0].evaluate(ask) == "refused"
+    other.server_close()
+
+
 def write(page: Page, source: str) -> None:
     """Put a reward of one's own into the editor."""
     page.get_by_label("What it is paid for").select_option("own")

@@ -14,7 +14,7 @@ from typing import Final
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
 
-from racecraft.serve import problems
+from racecraft.serve import problems, tab
 from racecraft.serve.audit import routes as audit
 from racecraft.serve.compression import BROTLI, Compressed, accepts, gzipped
 from racecraft.serve.contests import routes as contests
@@ -148,6 +148,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
             return Response(gzipped(path), media_type=kind, headers={**headers, "Content-Encoding": "gzip"})
         return FileResponse(path, media_type=kind, headers=headers)
 
+    tab.offer(app)
     rooms = "league" if settings.league else "console"
 
     @app.get("/{path:path}", include_in_schema=False)

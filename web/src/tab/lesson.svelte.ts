@@ -4,7 +4,7 @@ import { Curves, type Point } from "../lib/curves";
 import type { Look } from "../lib/poses";
 import type { Plan, TrackFile } from "./plan";
 import type { Check, Load, Report, Start } from "./worker";
-import TrainingWorker from "./worker?worker";
+import workerAddress from "./worker?worker&url";
 
 const LAPS = 5;
 const MOST = 400_000; // camera steps
@@ -13,6 +13,15 @@ const TICKS = 2; // a second
 const MOST_PRINTED = 20_000; // characters
 
 type Kind = "plain" | "python";
+
+/** A worker under the page's own policy, which says what it may reach: one that is loaded by its address has none. */
+function openWorker(): Worker {
+  const text = `import ${JSON.stringify(new URL(workerAddress, document.baseURI).href)};`;
+  const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
+  const worker = new Worker(address, { type: "module" });
+  URL.revokeObjectURL(address);
+  return worker;
+}
 
 const refusal = (message: string): RewardVerdict => ({
   ok: false,
@@ -70,7 +79,7 @@ export class Lesson {
   /** Compile the core, or the core and Python, while the user reads. */
   private load(kind: Kind): void {
     this.workers[kind]?.terminate();
-    const worker = (this.workers[kind] = new TrainingWorker());
+    const worker = (this.workers[kind] = openWorker());
     worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data, kind);
     worker.onerror = ({ message }) =>
       this.hear({ kind: "failed", message: message || "worker", isReward: false }, kind);
