@@ -133,6 +133,7 @@ COMMANDS: dict[str, list[str]] = {
     "submit": ["submit R/a --race 1 --checkpoint best --wait --json"],
     "league": [
         "league audit --runs R --database sqlite:///D.db --count 5 --json",
+        "league reset you --runs R --database sqlite:///D.db --address https://x --json",
         "league backup B.tar --runs R --database sqlite:///D.db --json",
         "league restore B.tar --runs B --database sqlite:///E.db --json",
     ],

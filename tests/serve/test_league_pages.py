@@ -194,6 +194,38 @@ def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
     assert "Turbo" not in [row["name"] for row in ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"]]
 
 
+def test_a_forgotten_password_and_the_log_that_tells_of_it(lesson: Lesson, race: int) -> None:
+    page = lesson.visits["teacher"].open("/league")
+    card = page.locator("section.card", has=page.get_by_role("heading", name="A forgotten password"))
+    card.get_by_label("Nickname").fill("comet")
+    card.get_by_role("button", name="Make a link").click()
+    link = card.locator("code").inner_text()
+    forgetful = lesson.arrive("forgetful")
+    forgetful.page.goto(link)
+    forgetful.page.get_by_label("New password").fill("correct horse battery")
+    forgetful.page.get_by_role("button", name="Come in").click()
+    forgetful.page.get_by_role("link", name="Friday cup").first.wait_for()
+    forgetful.complaints.clear()  # who asks at the door is a stranger: 401
+    lesson.visits["Comet"].page.context.add_cookies(forgetful.page.context.cookies())  # she was signed out
+    lesson.visits["Comet"].complaints.clear()
+    for _ in range(60):
+        ok(lesson.league.owner.post("/api/resets", json={"person": "Comet"}), 201)
+    page.get_by_role("link", name="Audit log").click()
+    page.get_by_role("heading", name="Audit log").wait_for()
+    rows = page.locator("tbody tr")
+    rows.nth(49).wait_for()
+    assert rows.count() == 50
+    page.get_by_role("button", name="Older").click()
+    page.get_by_role("cell", name="reset_password", exact=True).wait_for()
+    page.get_by_role("button", name="To the latest").click()
+    page.get_by_label("Who").fill("omet")
+    page.get_by_role("combobox", name="What").select_option("Passwords")
+    page.wait_for_function("document.querySelectorAll('tbody tr').length === 1")
+    assert rows.inner_text().split("\t")[1:3] == ["Comet", "reset_password"]
+    page.get_by_label("Who").fill("nobody like that")
+    page.get_by_text("nothing like that").wait_for()
+
+
 @pytest.fixture(scope="module")
 def flaws(lesson: Lesson, race: int) -> dict[str, dict[str, Any]]:
     """What axe finds in each theme on narrow German pages that are opened once for both; none sticks out."""
@@ -203,7 +235,11 @@ def flaws(lesson: Lesson, race: int) -> dict[str, dict[str, Any]]:
         visit.look("system", "de")
     found: dict[str, dict[str, Any]] = {theme: {} for theme in THEMES}
     for who, visit, paths in (
-        ("teacher", teacher, ("/league", f"/groups/{group}", f"/league/{race}", f"/league/{race}/screen", "/me")),
+        (
+            "teacher",
+            teacher,
+            ("/league", f"/groups/{group}", f"/league/{race}", f"/league/{race}/screen", "/me", "/league/audit"),
+        ),
         ("pupil", pupil, ("/league", f"/groups/{group}", f"/league/{race}")),
         ("stranger", stranger, ("/",)),
     ):

@@ -80,6 +80,38 @@ def audit(
         told = " ".join(f"{key}={value}" for key, value in line.details.items())
         mark = "" if line.is_done else "  (not known to be done)"
         when = f"{line.when:%Y-%m-%d %H:%M:%S}"
-        typer.echo(f"{when}  {line.name} ({line.who})  {line.what}  {line.target}  {told}{mark}".rstrip())
+        who = f"{line.name} ({line.who})" if line.who is not None else "(nobody)"
+        typer.echo(f"{when}  {who}  {line.what}  {line.target}  {told}{mark}".rstrip())
     if not lines:
         typer.echo("Nobody has done anything with power yet.")
+
+
+@league_app.command()
+def reset(
+    name: Annotated[str, typer.Argument(help="Nickname of whose password is forgotten.")],
+    runs: Runs = Path("runs"),
+    database: Database = "",
+    address: Annotated[str, typer.Option("--address", help="By which others call the league.")] = (
+        "http://127.0.0.1:8321"
+    ),
+    as_json: Json = False,
+) -> None:
+    """Make a link by which somebody gives themselves a new password, once; the server may be running."""
+    with needed_for("A league"):
+        from racecraft.serve.audit.audit import Audit
+        from racecraft.serve.people.keys import Keys
+        from racecraft.serve.people.people import People
+        from racecraft.serve.settings import OWNER, ServeSettings
+        from racecraft.serve.store.database import Database as Tables
+
+    tables = Tables(ServeSettings(runs=runs, database=database).database_url)
+    tables.require_current()
+    person = People(tables).named(name)
+    secret = Keys(tables).make_reset(person.id)
+    Audit(tables).note(OWNER, "make_reset", "racecraft league reset", person=person.name)
+    tables.close()
+    link = f"{address.rstrip('/')}/reset#{secret}"
+    if as_json:
+        print_json({"person": person.id, "link": link})
+    else:
+        typer.echo(f"{link}\nGood once, for a day. Whoever opens it is {person.name}; give it to nobody else.")

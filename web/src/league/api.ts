@@ -17,12 +17,21 @@ export type BoardRow = Schemas["BoardRow"];
 export type SubmissionInfo = Schemas["SubmissionInfo"];
 export type SeasonRow = Schemas["SeasonRow"];
 export type SessionInfo = Schemas["SessionInfo"];
+export type AuditLine = Schemas["AuditLine"];
+export type ResetLink = Schemas["ResetLink"];
 export type TokenInfo = Schemas["TokenInfo"];
 
 export const leagueApi = {
   signIn: (name: string, password: string) => ask<Me>("POST", "/door/sign-in", { name, password }),
   showCard: (secret: string) => ask<Me>("POST", "/door/card", { secret }),
   join: (code: string, name: string) => ask<Schemas["Joined"]>("POST", "/door/join", { code, name }),
+  resetPassword: (secret: string, password: string) => ask<Me>("POST", "/door/reset", { secret, password }),
+  makeReset: (person: string) => ask<ResetLink>("POST", "/resets", { person }),
+  audit: (query: Record<string, string | number>) =>
+    ask<AuditLine[]>(
+      "GET",
+      `/audit?${new URLSearchParams(Object.entries(query).map(([key, one]) => [key, String(one)]))}`,
+    ),
   signOut: () => ask<void>("POST", "/door/sign-out"),
   joinOn: (code: string) => ask<GroupCard>("POST", "/groups/join", { code }),
 

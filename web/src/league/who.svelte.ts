@@ -28,4 +28,5 @@ export const isRoom = (parts: string[]): boolean => isLeague && ROOMS.includes(p
 
 /** Pages that stand alone, without the console around them: the door, and what a projector shows. */
 export const isAlone = (parts: string[]): boolean =>
-  isLeague && (!who.me || connection.isStranger || ["card", "join"].includes(parts[0] ?? "") || parts[2] === "screen");
+  isLeague &&
+  (!who.me || connection.isStranger || ["card", "join", "reset"].includes(parts[0] ?? "") || parts[2] === "screen");

@@ -1,7 +1,8 @@
-"""The audit log: who did what with power, on what and when. What was refused was not done, and is not in it.
+"""The audit log: who did what with power, on what and when.
 
     request ──begin──▶ a row, not done yet ──the deed──▶ done, or the row is gone
 
+What was refused was not done, and is not in it, but for who was not let in; that is written down in one go.
 The row is there before the deed: of a server that is killed in between it says that the deed may have been done.
 """
 
@@ -15,8 +16,8 @@ from racecraft.serve.audit.schemas import AuditLine
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Deed, User
 
-TELLING: Final = ("title", "member", "members", "model", "reason", "race", "uses", "hours", "scopes", "days")
-"""What is kept of what somebody sends; never a name, a password or a secret."""
+TELLING: Final = ("title", "member", "members", "model", "reason", "race", "uses", "hours", "scopes", "days", "person")
+"""What is kept of what somebody sends; never a real name, a password or a secret."""
 MAX_TARGET: Final = 200  # characters
 
 
@@ -45,6 +46,11 @@ class Audit:
             session.flush()
             return deed.id
 
+    def note(self, user_id: int | None, what: str, target: str, **details: str) -> None:
+        """Something that is done already, such as coming in; `user_id` is None of who is nobody."""
+        with self._database.transaction() as session:
+            session.add(Deed(user_id=user_id, what=what, target=target[:MAX_TARGET], details=details, is_done=True))
+
     def done(self, number: int) -> None:
         """It was done."""
         with self._database.transaction() as session:
@@ -55,14 +61,21 @@ class Audit:
         with self._database.transaction() as session:
             session.execute(sa.delete(Deed).where(Deed.id == number))
 
-    def latest(self, count: int, *, before: int | None = None) -> list[AuditLine]:
+    def latest(self, count: int, *, before: int | None = None, name: str = "", what: str = "") -> list[AuditLine]:
         """Lines, newest first.
 
         Args:
             count: How many at most.
             before: Only lines that are older than that of this number.
+            name: Only of whose name holds this.
+            what: Only of operations that are called so in part.
         """
-        query = sa.select(Deed, User.name).join(User, User.id == Deed.user_id).order_by(Deed.id.desc()).limit(count)
+        query = sa.select(Deed, User.name).outerjoin(User, User.id == Deed.user_id).order_by(Deed.id.desc())
+        query = query.limit(count)
+        if name:
+            query = query.where(User.name.icontains(name, autoescape=True))
+        if what:
+            query = query.where(Deed.what.contains(what, autoescape=True))
         if before is not None:
             query = query.where(Deed.id < before)
         with self._database.transaction() as session:
@@ -71,7 +84,7 @@ class Audit:
                     id=deed.id,
                     when=deed.created,
                     who=deed.user_id,
-                    name=name,
+                    name=name or "",
                     what=deed.what,
                     target=deed.target,
                     details=deed.details,

@@ -48,6 +48,8 @@ def read_audit(
     consoles: InLeague,
     count: Annotated[int, Query(ge=1, le=500)] = 100,
     before: Annotated[int | None, Query(ge=0, lt=2**31)] = None,
+    name: Annotated[str, Query(max_length=64)] = "",
+    what: Annotated[str, Query(max_length=64)] = "",
 ) -> list[AuditLine]:
-    """Who did what with power, newest first."""
-    return consoles.audit.latest(count, before=before)
+    """Who did what with power and who came in or did not, newest first; of names and operations that hold a text."""
+    return consoles.audit.latest(count, before=before, name=name, what=what)

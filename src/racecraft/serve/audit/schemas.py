@@ -13,9 +13,9 @@ class AuditLine(Message):
 
     id: int
     when: datetime
-    who: int
+    who: int | None
     name: str
-    """As they are called now."""
+    """As they are called now; empty of who was not let in under any name that there is."""
     what: str
     """The operation of the API, such as ``print_cards``."""
     target: str

@@ -8,8 +8,9 @@ from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
 from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.people.links import address_of, card_of
 from racecraft.serve.people.names import handle_of
-from racecraft.serve.people.schemas import Door, Join, Joined, Me, ShowCard, SignIn, me_of
-from racecraft.serve.problems import NotLetIn
+from racecraft.serve.people.passwords import hash_password
+from racecraft.serve.people.schemas import Door, Join, Joined, Me, ResetPassword, ShowCard, SignIn, me_of
+from racecraft.serve.problems import NotFound, NotLetIn
 from racecraft.serve.settings import COOKIE
 
 router = APIRouter(prefix="/api/door", tags=["door"])
@@ -30,6 +31,7 @@ def sign_in(request: Request, body: SignIn, response: Response, consoles: InLeag
     user = consoles.people.by_password(body.name, body.password)
     if user is None:
         consoles.tries.failed(account=account, address=address)
+        _write_down(request, consoles, _named(consoles, body.name), is_in=False)
         raise NotLetIn("There is nobody of that name with that password.")
     return _let_in(request, response, consoles, user)
 
@@ -40,7 +42,7 @@ def show_card(request: Request, body: ShowCard, response: Response, consoles: In
     consoles.tries.check(account="", address=caller(request))
     user = consoles.keys.card_user(body.secret)
     if user is None:
-        consoles.tries.failed(account="", address=caller(request))
+        _fail(request, consoles)
         raise NotLetIn("This card is no longer good.", hint="Ask for a new one.")
     return _let_in(request, response, consoles, user)
 
@@ -51,7 +53,7 @@ def join(request: Request, body: Join, response: Response, consoles: InLeague) -
     consoles.tries.check(account="", address=caller(request))
     user = consoles.groups.join(body.code, body.name)
     if user is None:
-        consoles.tries.failed(account="", address=caller(request))
+        _fail(request, consoles)
         raise NotLetIn("There is no such code, or it is no longer good.", hint="Look at the wall again.")
     me = _let_in(request, response, consoles, user)
     secret = consoles.keys.print_card(user)
@@ -59,9 +61,23 @@ def join(request: Request, body: Join, response: Response, consoles: InLeague) -
     return Joined(me=me, card=card_of(address, secret, user_id=user, name=me.name))
 
 
+@router.post("/reset")
+def reset_password(request: Request, body: ResetPassword, response: Response, consoles: InLeague) -> Me:
+    """In by a link for a new password, which ends every session, card and token that there was."""
+    consoles.tries.check(account="", address=caller(request))
+    user = None
+    if consoles.keys.reset_user(body.secret) is not None:
+        user = consoles.keys.use_reset(body.secret, hash_password(body.password))
+    if user is None:
+        _fail(request, consoles)
+        raise NotLetIn("This link is no longer good.", hint="Ask for a new one.")
+    return _let_in(request, response, consoles, user)
+
+
 @router.post("/sign-out", status_code=204)
-def sign_out(request: Request, consoles: InConsoles, _: InPerson) -> Response:
+def sign_out(request: Request, consoles: InConsoles, person: InPerson) -> Response:
     """Out."""
+    _write_down(request, consoles, person.id)
     consoles.keys.close_session(request.cookies.get(COOKIE, ""))
     response = Response(status_code=204)
     response.delete_cookie(COOKIE, path="/")
@@ -70,5 +86,24 @@ def sign_out(request: Request, consoles: InConsoles, _: InPerson) -> Response:
 
 def _let_in(request: Request, response: Response, consoles: Consoles, user: int) -> Me:
     guard: Guard = request.app.state.guard
+    _write_down(request, consoles, user)
     guard.give_cookie(response, consoles.keys.open_session(user))
     return me_of(consoles.people.get(user))
+
+
+def _fail(request: Request, consoles: Consoles) -> None:
+    consoles.tries.failed(account="", address=caller(request))
+    _write_down(request, consoles, None, is_in=False)
+
+
+def _write_down(request: Request, consoles: Consoles, user: int | None, *, is_in: bool = True) -> None:
+    """Keep who came and from where; of who was not let in, whom they said they were, if there is such a one."""
+    what = request.scope["route"].name + ("" if is_in else "_failed")
+    consoles.audit.note(user, what, request.url.path, address=caller(request))
+
+
+def _named(consoles: Consoles, name: str) -> int | None:
+    try:
+        return consoles.people.named(name).id
+    except NotFound:
+        return None

@@ -27,7 +27,7 @@ from racecraft.serve.groups.schemas import (
 from racecraft.serve.live.cars import NAME as LIVE
 from racecraft.serve.models.schemas import ModelCard
 from racecraft.serve.people.links import address_of, card_of, picture
-from racecraft.serve.people.schemas import JoinOn, LoginCard
+from racecraft.serve.people.schemas import JoinOn, LoginCard, NewReset, ResetLink
 from racecraft.serve.problems import NotFound, NotLetIn
 
 router = APIRouter(prefix="/api", tags=["groups"])
@@ -185,6 +185,16 @@ def invite_organisers(body: OpenGroup, request: Request, consoles: InConsoles, p
     if person.role != "admin":
         raise NotFound("Only whoever holds the league invites organisers.")
     return _joining(request, consoles, consoles.groups.open(None, role="organiser", uses=body.uses, hours=body.hours))
+
+
+@router.post("/resets", status_code=201)
+def make_reset(body: NewReset, request: Request, consoles: InConsoles, person: InPerson) -> ResetLink:
+    """A link by which somebody gives themselves a new password, once. It is a way to be them, so an admin makes it."""
+    if person.role != "admin":
+        raise NotFound("Only whoever holds the league makes such a link.")
+    found = consoles.people.named(body.person)
+    address = address_of(request, consoles.owner.settings)
+    return ResetLink(name=found.name, link=f"{address}/reset#{consoles.keys.make_reset(found.id)}")
 
 
 def _joining(request: Request, consoles: Consoles, joining: Joining) -> JoiningInfo:

@@ -16,13 +16,14 @@ from sqlalchemy.orm import Session as Transaction
 
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Card, Session, Token, User, now
+from racecraft.serve.store.tables import Card, Reset, Session, Token, User, now
 
 Scope = Literal["read", "submit"]
 SESSION_DAYS: Final = 30
 MAX_SESSIONS: Final = 20  # of a person; the oldest makes room
 SESSION_ID: Final = 16
 """Signs of a session's digest that it is known by."""
+RESET_HOURS: Final = 24
 MAX_TOKENS: Final = 20
 SIGNS: Final = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 """Of what people type, codes and cards: none of them is taken for another."""
@@ -121,6 +122,30 @@ class Keys:
         """Whose card it is."""
         return self._user(sa.select(Card.user_id).where(Card.digest == digest_of(plain_code(secret))))
 
+    def make_reset(self, user_id: int) -> str:
+        """The secret of a link for a new password; an earlier one is worth nothing from now on."""
+        secret = secrets.token_urlsafe(32)
+        with self._database.transaction() as session:
+            session.execute(sa.delete(Reset).where(Reset.user_id == user_id))
+            expires = now() + timedelta(hours=RESET_HOURS)
+            session.add(Reset(digest=digest_of(secret), user_id=user_id, expires=expires))
+        return secret
+
+    def reset_user(self, secret: str) -> int | None:
+        """Who may give themselves a new password with it."""
+        return self._user(sa.select(Reset.user_id).where(Reset.digest == digest_of(secret), Reset.expires > now()))
+
+    def use_reset(self, secret: str, password: str) -> int | None:
+        """A new password, given as its hash; all that opened the door before is worth nothing from now on."""
+        is_it = sa.and_(Reset.digest == digest_of(secret), Reset.expires > now())
+        with self._database.transaction() as session:
+            user_id: int | None = session.scalar(sa.select(Reset.user_id).where(is_it))
+            if user_id is None or session.execute(sa.delete(Reset).where(is_it)).rowcount != 1:  # type: ignore[attr-defined]
+                return None
+            revoke_all(session, user_id)
+            session.get_one(User, user_id).password = password
+        return user_id
+
     def revoke(self, user_id: int) -> None:
         """Everything that opens the door to somebody: cards, sessions, tokens."""
         with self._database.transaction() as session:
@@ -182,7 +207,7 @@ class Keys:
 
 def revoke_all(session: Transaction, user_id: int) -> None:
     """Remove all keys of somebody."""
-    for table in (Card, Session, Token):
+    for table in (Card, Reset, Session, Token):
         session.execute(sa.delete(table).where(table.user_id == user_id))
 
 

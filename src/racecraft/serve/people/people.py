@@ -53,6 +53,19 @@ class People:
                 raise NotFound(f"There is nobody with the number {user_id}.")
             return _person(user)
 
+    def named(self, name: str) -> Person:
+        """Somebody by the name that everybody sees.
+
+        Raises:
+            NotFound: There is nobody of this name.
+        """
+        query = sa.select(User).where(User.handle == handle_of(name), User.deleted.is_(None))
+        with self._database.transaction() as session:
+            user = session.scalars(query).first()
+            if user is None:
+                raise NotFound(f"There is nobody called {name[:64]!r}.")
+            return _person(user)
+
     def rename(self, user_id: int, name: str) -> None:
         """Another name.
 

@@ -46,6 +46,26 @@ class ShowCard(Message):
     secret: Secret
 
 
+class NewReset(Message):
+    """Whose password is forgotten."""
+
+    person: Name
+
+
+class ResetLink(Message):
+    """By which somebody gives themselves a new password, once."""
+
+    name: str
+    link: str
+
+
+class ResetPassword(Message):
+    """A new password, by such a link's secret."""
+
+    secret: Secret
+    password: Password
+
+
 class Join(Message):
     """By a group's code, under a name of one's own."""
 

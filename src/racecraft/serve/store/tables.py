@@ -96,6 +96,17 @@ class Token(Table):
     expires: Mapped[datetime]
 
 
+class Reset(Table):
+    """A link by which somebody gives themselves a new password, once; only a hash of its secret is kept."""
+
+    __tablename__ = "resets"
+
+    digest: Mapped[str] = mapped_column(String(64), primary_key=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
+    created: Mapped[datetime] = mapped_column(default=now)
+    expires: Mapped[datetime]
+
+
 class Group(Table):
     """A class, a club, an event."""
 
@@ -135,12 +146,13 @@ class Invitation(Table):
 
 
 class Deed(Table):
-    """Something that somebody did with power; see racecraft.serve.audit."""
+    """Something that somebody did with power, or how somebody came in; see racecraft.serve.audit."""
 
     __tablename__ = "deeds"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
+    user_id: Mapped[int | None] = mapped_column(ForeignKey("users.id"), index=True)
+    """None of who did not get in, under no name that there is."""
     what: Mapped[str] = mapped_column(String(64))
     target: Mapped[str] = mapped_column(String(200))
     details: Mapped[dict[str, Any]] = mapped_column(default=dict)
