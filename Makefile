@@ -87,7 +87,7 @@ clean:  ## remove the environment and everything built
 requirements: $(UV)  ## pin the newest allowed versions again
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header pyproject.toml requirements/build.in -o requirements/train.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/dev.in -o requirements/dev.txt
-	$(UV) pip compile -q --universal --python-version 3.11 --generate-hashes --no-header --extra serve --extra tune -c requirements/dev.txt pyproject.toml -o requirements/serve.txt
+	$(UV) pip compile -q --universal --python-version 3.11 --generate-hashes --no-header --extra serve --extra tune --extra multi -c requirements/dev.txt pyproject.toml -o requirements/serve.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/uv.in -o requirements/uv.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/site.in -o requirements/site.txt
 

@@ -14,6 +14,7 @@ from racecraft.analysis import pay_laps, write_report
 from racecraft.analysis.svg import Chart, Curve, line_chart, nice_ticks
 from racecraft.errors import RewardError, RunError
 from racecraft.judging.evaluation import evaluate_run
+from racecraft.reward import load_preset
 from racecraft.run import RunFolder
 from racecraft.track import load_track
 from racecraft.training import Until
@@ -79,6 +80,33 @@ def test_laps_are_paid_anew(run: Path) -> None:
         assert lap.rewards == pytest.approx(lap.points[:, 0], abs=1e-4)
     with pytest.raises(RewardError):
         pay_laps("def reward_function(params):\n    return 1 / 0\n", track, trace)
+
+
+@pytest.mark.parametrize("reward", ["lap_time", "touring"])
+def test_a_flying_lap_is_paid_like_any_other_at_the_line(tmp_path: Path, reward: str) -> None:
+    """Who remembers progress must not lose a lap of it there."""
+    track = load_track("oval")
+    trace = _three_flying_laps(tmp_path)
+    first, second, third = pay_laps(load_preset(reward), track, trace)
+    assert abs(first.rewards[0]) < 0.05  # from standing
+    for lap in (second, third):
+        assert lap.rewards[0] > 0.5 * lap.rewards[1]
+        assert lap.rewards.min() > 0.02
+    counted = pay_laps("def reward_function(params):\n    return params['steps']\n", track, trace)
+    assert counted[1].rewards[:3].tolist() == [3.0, 4.0, 5.0]  # of the lap, not of the trial
+
+
+def _three_flying_laps(folder: Path) -> Path:
+    from racecraft.race.artifacts import write_simtrace
+    from racecraft.race.autopilot import Autopilot
+    from racecraft.race.evaluation import evaluate
+    from racecraft.race.rules import race_rules
+
+    driver = Autopilot(speed=2.0)
+    rules = race_rules("drfc", {"laps": 3})
+    driven = evaluate(driver, load_track("oval"), rules=rules, num_trials=1, sees="state", num_threads=1)
+    write_simtrace(driven, folder, action_space=action_space("continuous"))
+    return folder / "0-iteration.csv"
 
 
 @pytest.mark.parametrize(

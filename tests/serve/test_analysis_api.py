@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import base64
+import json
+import shutil
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+from leagues import untrained_run
 from running_consoles import RunningConsole
 
 GATE = "def reward_function(params):\n    return params['speed']\n"
@@ -186,3 +189,16 @@ def test_a_race_among_bots_tuned_by_hand(console: RunningConsole) -> None:
 )
 def test_choices_that_do_not_go_together(console: RunningConsole, settings: dict[str, Any], text: str) -> None:
     refused(console.client.post("/api/models", json={"train": False, **settings}), 422, text)
+
+
+def test_a_model_of_many_tracks_names_one_that_there_is(console: RunningConsole) -> None:
+    run = untrained_run(console.runs, "one")
+    document = json.loads((run.path / "run.json").read_text())
+    for name, track, shown in (
+        ("many", "oval + generated:0..2", ("oval", 4)),
+        ("mine", str(console.runs / "my-own.npy"), ("my-own", 1)),
+    ):
+        shutil.copytree(run.path, console.runs / name, dirs_exist_ok=True)
+        (console.runs / name / "run.json").write_text(json.dumps({**document, "track": track}))
+        card = console.client.get(f"/api/models/{name}").json()
+        assert (card["track"], card["num_tracks"]) == shown

@@ -70,7 +70,14 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("slider", name="Moment of the race").fill("3")
     assert clock.inner_text() == "0.2 s"
-    page.get_by_role("button", name="Video: bob").click()
+    page.set_viewport_size({"width": 390, "height": 900})
+    button = page.get_by_role("button", name="Video: bob")
+    assert button.count() == 1
+    box = button.bounding_box()
+    assert box is not None
+    assert 0 <= box["x"] < box["x"] + box["width"] <= 390  # without a scroll sideways
+    button.click()
+    page.set_viewport_size({"width": 1440, "height": 900})
     video = page.locator("video")
     video.wait_for()
     source = str(video.get_attribute("src"))

@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 
 from racecraft.fidelity.logs import Faults, Log, read_logs
 from racecraft.fidelity.rules import TrackRules
-from racecraft.reward.worker import RewardWorker
+from racecraft.reward.worker import RewardWorker, Rows
+from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.track import Track
 
 MAX_LAPS: Final = 6
+FIRST: Final = 2
+"""Number of an episode's first step that is paid."""
+STEPS, PROGRESS = (ROW_COLUMNS.index(name) for name in ("steps", "progress"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +48,8 @@ def pay_laps(
 ) -> list[PaidLap]:
     """Ask a reward function what it pays for the laps of a sim-trace, the last few of them, in the order driven.
 
+    As in a training every lap is an episode of its own, whose first paid step is the second. Where the car came over
+    the line at speed, that is the step before it, which is called for functions that remember it and does not count.
     Objects on the track are left out: a trace does not say where they were.
 
     Args:
@@ -72,11 +78,22 @@ def pay_laps(
                             number=int(log.episode[begin]) + 1,
                             status=log.status[end - 1],
                             points=np.column_stack([log.x[rows], log.y[rows]]),
-                            rewards=worker(judged[rows]),
+                            rewards=_pay(worker, judged, rows),
                             rows=rows - begin,
                         )
                     )
     return found[-most:]
+
+
+def _pay(worker: RewardWorker, judged: Rows, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """What is paid for some rows, a lap's."""
+    first = rows[0]
+    is_flying = first > 0 and judged[first, STEPS] > FIRST and judged[first, STEPS] == judged[first - 1, STEPS] + 1
+    lap = judged[np.append(first - 1, rows) if is_flying else rows]
+    if is_flying:
+        lap[0, PROGRESS] -= 1.0  # of the lap that begins
+        lap[:, STEPS] += FIRST - judged[first - 1, STEPS]
+    return worker(lap)[-len(rows) :]
 
 
 def _driven(log: Log, begin: int, end: int) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ from racecraft.track.library import Course, course, track_names
 from racecraft.track.load import load_track
 from racecraft.track.picture import TrackPicture, describe, draw_contact_sheet, draw_track
 from racecraft.track.readers import read_centerline_csv, read_route, read_track, save_route
-from racecraft.track.selection import join_names, joint_digest, load_tracks
+from racecraft.track.selection import join_names, joint_digest, load_tracks, single_names
 from racecraft.track.sketch import Sketch, draw_road, sketch_of
 from racecraft.track.track import Track
 from racecraft.track.validate import validate
@@ -35,6 +35,7 @@ __all__ = [
     "read_route",
     "read_track",
     "save_route",
+    "single_names",
     "sketch_of",
     "track_names",
     "validate",

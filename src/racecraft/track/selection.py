@@ -11,6 +11,7 @@ a folder            every .npy route in it, or every .csv where there is no rout
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -47,6 +48,12 @@ def load_tracks(names: str | Path | Iterable[str | Path]) -> tuple[Track, ...]:
 def join_names(names: str | Path | Sequence[str | Path]) -> str:
     """One text that `load_tracks` reads as these names."""
     return str(names) if isinstance(names, str | Path) else JOINT.join(map(str, names))
+
+
+def single_names(names: str) -> list[str]:
+    """What such a text names, one track each, as a page may call it: no paths."""
+    expanded = _expand(names)
+    return [Path(name).stem if os.sep in str(name) else str(name) for name in expanded]
 
 
 def joint_digest(tracks: Sequence[Track]) -> str:

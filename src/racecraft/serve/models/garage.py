@@ -29,6 +29,7 @@ from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Model, now
 from racecraft.sim.objects import RACE_TYPES, Objects
+from racecraft.track import single_names
 
 RACED: Final = "head-to-head"
 """The race of a training among other policies, which no race of models is called."""
@@ -36,7 +37,7 @@ TRASH: Final = "trash"  # inside the state folder
 PICTURE: Final = "racing-line.png"
 NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
 SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
-SUMMARY: Final = "4"
+SUMMARY: Final = "5"
 """Changes with what a summary says, so that those kept by an earlier version are made anew."""
 Status = Literal["training", "queued", "stopped", "finished", "failed", "new"]
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -320,12 +321,14 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
         best, last = folder.checkpoints.best, folder.checkpoints.last
         fastest = best_of(judged_laps(folder))
         created = datetime.fromisoformat(info.created).isoformat()
+        tracks = _tracks(info.track)
     except (RacecraftError, ValueError, TypeError):
         return {}, True
     raced, picture, is_settled = _evaluations(folder, fastest.stamp if fastest is not None else None)
     metrics = best.metrics if best is not None else {}
     return {
-        "track": Path(info.track).stem,
+        "track": tracks[0],
+        "num_tracks": len(tracks),
         "race": race_of(info),
         "created": created,
         "has_policy": last is not None,  # weights from elsewhere have no steps
@@ -337,6 +340,14 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
         "picture": picture,
         "until": str(info.settings.get("until", "")),
     }, is_settled
+
+
+def _tracks(named: str) -> list[str]:
+    """By their names; a folder of tracks that is gone is one that nobody knows."""
+    try:
+        return single_names(named)
+    except RacecraftError:
+        return [Path(named).stem]
 
 
 def _evaluations(folder: RunFolder, fastest: str | None) -> tuple[int, str | None, bool]:

@@ -72,6 +72,8 @@ class ModelCard(Message):
 
     name: str
     track: str
+    """The first that it learns on."""
+    num_tracks: int
     race: str
     """``time-trial``, ``object-avoidance``, ``head-to-bot`` or ``head-to-head``."""
     created: datetime

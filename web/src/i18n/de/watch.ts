@@ -58,6 +58,9 @@ export const watch: Record<keyof typeof english, string> = {
   cars_unknown: "Unbekannt: Die Konsole antwortet nicht",
   queued_behind: "Wartet auf einen freien Platz: erst {names}",
   queued_next: "Wartet: Es beginnt gleich",
+  tracks_many: "{count} Strecken",
+  tracks_many_lead:
+    "Es lernt auf {count} Strecken zugleich, jedes Auto auf einer anderen. Eine Auswertung zeigt es auf einer davon.",
   starting_long: "Autos, Netz und Belohnung werden vorbereitet, seit {time}",
   cars_wait: "{count} Autos warten, während das Netz aus ihren Fahrten lernt: seit {time}",
   cars: "{count} Autos lernen zugleich",

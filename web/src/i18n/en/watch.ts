@@ -54,6 +54,9 @@ export const watch = {
   cars_unknown: "Not known: the console does not answer",
   queued_behind: "Waiting until there is room: first {names}",
   queued_next: "Waiting: it begins in a moment",
+  tracks_many: "{count} tracks",
+  tracks_many_lead:
+    "It learns on {count} tracks at once, each car on another one. An evaluation shows it on one of them.",
   starting_long: "Preparing cars, network and reward, for {time}",
   cars_wait: "{count} cars wait while the network learns from what they drove: {time} so far",
   cars: "{count} cars learning at once",
