@@ -66,10 +66,12 @@ def serve(
         from racecraft.serve import serve as run_server
 
     def ready(link: str) -> None:
+        also = f"{address.rstrip('/')}/?{link.partition('?')[2]}" if address else link
         if as_json:
-            print_json({"link": link})
+            print_json({"link": link, "by_address": also})
         else:
-            typer.echo(f"The console is open at {link}\nThe link works once. Ctrl-C stops the console.")
+            other = f"\nor, by its address, at {also}" if also != link else ""
+            typer.echo(f"The console is open at {link}{other}\nThe link works once. Ctrl-C stops the console.")
         if browser and not as_json:
             import webbrowser
 
