@@ -130,6 +130,27 @@ def test_a_reward_of_ones_own_is_checked_and_trains(page: Page) -> None:
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
 
 
+def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Page) -> None:
+    page.get_by_label("Track").select_option("hairpin")
+    write(page, "def reward_function(params):\n    print('from afar')\n    return 1.0\n")
+    page.get_by_role("button", name="Make a link").click()
+    link = page.get_by_label("Link", exact=True).input_value()
+    write(page, "def reward_function(params):\n    return 2.0\n")
+    page.get_by_label("Track").select_option("oval")
+    page.goto("about:blank")
+    page.goto(link)
+    brought = page.get_by_label("This link brings a reward")
+    brought.get_by_text("print('from afar')").wait_for()
+    page.get_by_role("button", name="Train").wait_for()
+    assert len(page.workers) == 1  # the one that has no Python
+    assert page.get_by_label("What it is paid for").input_value() == "racing"
+    brought.get_by_role("button", name="Take it").click()
+    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("from afar\n").first.wait_for()
+    assert page.get_by_label("Track").input_value() == "hairpin"
+    assert "#" not in page.url
+
+
 FAILS_LATE = """calls = 0
 def reward_function(params):
     global calls
@@ -189,4 +210,5 @@ def test_the_page_is_accessible_in_both_themes_and_fits_a_phone(page: Page) -> N
         assert found == []
     for width in (390, 768):
         page.set_viewport_size({"width": width, "height": 800})
+        page.wait_for_timeout(300)  # until the chart has followed
         assert page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") == 0
