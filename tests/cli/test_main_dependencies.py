@@ -128,7 +128,7 @@ COMMANDS: dict[str, list[str]] = {
         "serve --runs R -p 0 --league --host 127.0.0.1 --address http://127.0.0.1:8321 --plain-http",
         "serve --runs R -p 0 --league --address https://x --trusted-proxy 127.0.0.1 --certificate C.pem --key K.pem",
     ],
-    "login": ["login http://127.0.0.1:9 --token rc_none --json"],
+    "login": ["login http://127.0.0.1:9 --token rc_none --json", "login http://127.0.0.1:9"],
     "races": ["races --json"],
     "submit": ["submit R/a --race 1 --checkpoint best --wait --json"],
     "league": [

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -16,7 +19,9 @@ from leagues import RunningLeague, ok, refused, running_league
 from running_consoles import running_console
 
 from racecraft.errors import ConfigError
+from racecraft.serve.people.devices import Devices
 from racecraft.serve.people.names import checked_name, handle_of
+from racecraft.serve.problems import NotFound, NotLetIn, TooMany
 from racecraft.serve.settings import ServeSettings
 
 
@@ -124,7 +129,6 @@ def test_twenty_wrong_passwords_on_one_account_are_stopped_and_the_others_come_i
 
 def test_guessed_codes_are_stopped(tmp_path: Path) -> None:
     from racecraft.serve.people.tries import Tries
-    from racecraft.serve.problems import TooMany
 
     tries = Tries()
     for _ in range(200):
@@ -217,6 +221,53 @@ def test_tokens_do_what_they_were_made_for_and_no_more(league: RunningLeague, sc
         refused(program.get("/api/models"), 401)
     assert made["secret"] not in json.dumps(ok(ada.get("/api/account/tokens")))
     refused(school["bob"].delete(f"/api/account/tokens/{made['id']}"), 404)
+
+
+def test_a_program_is_let_in_by_a_code_that_is_typed_into_a_browser(
+    league: RunningLeague, school: dict[str, Any], tmp_path: Path
+) -> None:
+    ada, url = school["ada"], str(league.owner.base_url)
+    command = [sys.executable, "-m", "racecraft", "login", url, "--json"]
+    environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
+    environment.pop("RACECRAFT_TOKEN", None)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, env=environment, text=True, **pipes) as program:  # type: ignore[call-overload]
+        shown = program.stderr.readline()
+        code = shown.split(" let ")[1].split()[0]
+        assert f"/me#{code.replace('-', '')} " in shown
+        assert "No program shows" in refused(ada.post("/api/account/devices", json={"code": "WRNG-CODE"}), 404)
+        ok(ada.post("/api/account/devices", json={"code": code.lower()}), 204)
+        told, wrong = program.communicate(timeout=60)
+    assert (program.returncode, wrong) == (0, "")
+    assert json.loads(told)["url"] == url.rstrip("/")
+    assert "racecraft login" in [token["title"] for token in ok(ada.get("/api/account/tokens"))]
+    with league.stranger() as stranger:
+        asked = ok(stranger.post("/api/door/devices"), 201)
+        wait = {"secret": asked["secret"]}
+        assert ok(stranger.post("/api/door/devices/token", json=wait)) == {"token": ""}
+        refused(stranger.post("/api/account/devices", json={"code": asked["code"]}), 401)
+        ok(ada.post("/api/account/devices", json={"code": asked["code"]}), 204)
+        refused(ada.post("/api/account/devices", json={"code": asked["code"]}), 404)  # it is let in, and by one
+        assert ok(stranger.post("/api/door/devices/token", json=wait))["token"].startswith("rc_")
+        assert "in time" in refused(stranger.post("/api/door/devices/token", json=wait), 401)
+    for _ in range(8):
+        refused(ada.post("/api/account/devices", json={"code": "WRNG-CODE"}), 404)
+    assert "too many" in refused(ada.post("/api/account/devices", json={"code": "WRNG-CODE"}), 429)
+
+
+def test_a_program_waits_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    devices = Devices()
+    secret, code = devices.begin()
+    clock = time.monotonic()
+    monkeypatch.setattr(time, "monotonic", lambda: clock + 601)
+    with pytest.raises(NotFound):
+        devices.confirm(code, 2)
+    with pytest.raises(NotLetIn):
+        devices.take(secret)
+    for _ in range(500):
+        devices.begin()
+    with pytest.raises(TooMany):
+        devices.begin()
 
 
 def test_everybodys_models_are_their_own_and_may_have_the_same_name(

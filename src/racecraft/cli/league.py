@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from racecraft.cli.app import Json, app, print_json
+
+if TYPE_CHECKING:
+    from racecraft.judging.league import League
 
 
 @app.command()
@@ -19,23 +22,29 @@ def login(
         typer.Option(
             "--token",
             envvar="RACECRAFT_TOKEN",
-            prompt=True,
-            hide_input=True,
-            help="From your account there.",
+            help="From your account there; without one a code is shown, to be typed there.",
         ),
-    ],
+    ] = "",
     as_json: Json = False,
 ) -> None:
     """Remember a league and the token that opens it."""
     from racecraft.judging.league import League, remember_league
 
-    league = League(url, token)
+    league = League(url, token or _token_by_code(League(url)))
     races = league.races()
     remember_league(league)
     if as_json:
         print_json({"url": league.url, "races": len(races)})
     else:
         typer.echo(f"{league.url} knows you. Races that you can see: {len(races)}; racecraft races lists them.")
+
+
+def _token_by_code(league: League) -> str:
+    asked = league.begin_login()
+    typer.echo(f"Open {asked['link']} where you are signed in, and let {asked['code']} in.", err=True)
+    while not (token := league.take_token(asked["secret"])):
+        time.sleep(1.0)
+    return token
 
 
 @app.command()

@@ -25,6 +25,7 @@ from racecraft.run.folder import sanitize_name
 
 PATIENCE: Final = 60.0  # s
 MOST: Final = 1 << 25  # bytes of an answer
+WEIGHTS: Final = "application/octet-stream"
 MARK: Final = re.compile(r"[!-~]+")
 """A token is one printable word."""
 
@@ -59,6 +60,20 @@ class League:
             raise ConfigError("A token is one word, which begins with rc_.", hint="Make one on your account's page.")
         self.url, self.token = f"{parts.scheme}://{parts.netloc}", token
         self._opener = urllib.request.build_opener(_Straight)
+
+    def begin_login(self) -> dict[str, Any]:
+        """Ask to be let in: the code to show, and the secret to wait with."""
+        found: dict[str, Any] = self._ask("POST", "/api/door/devices", b"")
+        return found
+
+    def take_token(self, secret: str) -> str:
+        """The token, once somebody has typed the code; empty before.
+
+        Raises:
+            LeagueRefused: Nobody did in time.
+        """
+        data = json.dumps({"secret": secret}).encode()
+        return str(self._ask("POST", "/api/door/devices/token", data, kind="application/json")["token"])
 
     def races(self) -> list[dict[str, Any]]:
         """The races of one's groups, newest first.
@@ -102,15 +117,15 @@ class League:
         """
         return self._fetch("GET", f"/api/boards/{race}/replays/{submission}", most=MAX_FILE_BYTES + 1)
 
-    def _ask(self, method: str, path: str, data: bytes | None = None) -> Any:
-        told = self._fetch(method, path, data, most=MOST)
+    def _ask(self, method: str, path: str, data: bytes | None = None, *, kind: str = WEIGHTS) -> Any:
+        told = self._fetch(method, path, data, most=MOST, kind=kind)
         try:
             return json.loads(told)
         except ValueError as error:
             raise LeagueRefused(f"{self.url} does not answer as a league does: {str(error)[:200]}.") from error
 
-    def _fetch(self, method: str, path: str, data: bytes | None = None, *, most: int) -> bytes:
-        headers = {"Content-Type": "application/octet-stream"}
+    def _fetch(self, method: str, path: str, data: bytes | None = None, *, most: int, kind: str = WEIGHTS) -> bytes:
+        headers = {"Content-Type": kind}
         if self.token:
             headers["Authorization"] = f"Bearer {self.token}"
         request = urllib.request.Request(self.url + path, data=data, headers=headers, method=method)

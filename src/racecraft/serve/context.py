@@ -19,6 +19,7 @@ from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
+from racecraft.serve.people.devices import Devices
 from racecraft.serve.people.keys import Keys
 from racecraft.serve.people.people import People, Person
 from racecraft.serve.people.tries import Tries
@@ -65,7 +66,7 @@ class Consoles:
     def __init__(self, owner: Context, keys: Keys) -> None:
         self.owner, self.keys = owner, keys
         self.people, self.groups = People(owner.database), Groups(owner.database)
-        self.audit = Audit(owner.database)
+        self.audit, self.devices = Audit(owner.database), Devices()
         self.league = League(owner.database, owner.settings.state, self._courses)
         self._others: dict[int, Context] = {}
         self._lock = threading.Lock()

@@ -26,6 +26,7 @@ export const leagueApi = {
   showCard: (secret: string) => ask<Me>("POST", "/door/card", { secret }),
   join: (code: string, name: string) => ask<Schemas["Joined"]>("POST", "/door/join", { code, name }),
   resetPassword: (secret: string, password: string) => ask<Me>("POST", "/door/reset", { secret, password }),
+  letIn: (code: string) => ask<void>("POST", "/account/devices", { code }),
   makeReset: (person: string) => ask<ResetLink>("POST", "/resets", { person }),
   audit: (query: Record<string, string | number>) =>
     ask<AuditLine[]>(

@@ -28,7 +28,8 @@ MAX_SUBMISSION: Final = 32 << 20
 LARGE: Final = {"/api/models/import": 1 << 30}
 """Addresses that take more, as much as an archive may have; they write to disk what comes, as it comes."""
 SAFE: Final = ("GET", "HEAD", "OPTIONS")
-OPEN: Final = ("/api/door", "/api/door/sign-in", "/api/door/card", "/api/door/join", "/api/door/reset")
+DEVICES: Final = ("/api/door/devices", "/api/door/devices/token")
+OPEN: Final = ("/api/door", "/api/door/sign-in", "/api/door/card", "/api/door/join", "/api/door/reset", *DEVICES)
 """What a league answers to strangers, beside the boards of public races."""
 HEALTH: Final = "/api/health"
 """What a supervisor asks, of any console; it tells nothing but that it works."""

@@ -6,10 +6,23 @@ from fastapi import APIRouter, Request, Response
 
 from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
 from racecraft.serve.door.guard import Guard, caller
+from racecraft.serve.people.devices import SECONDS
 from racecraft.serve.people.links import address_of, card_of
 from racecraft.serve.people.names import handle_of
 from racecraft.serve.people.passwords import hash_password
-from racecraft.serve.people.schemas import Door, Join, Joined, Me, ResetPassword, ShowCard, SignIn, me_of
+from racecraft.serve.people.schemas import (
+    Device,
+    Door,
+    Join,
+    Joined,
+    Me,
+    ResetPassword,
+    ShowCard,
+    SignIn,
+    TakenToken,
+    TakeToken,
+    me_of,
+)
 from racecraft.serve.problems import NotFound, NotLetIn
 from racecraft.serve.settings import COOKIE
 
@@ -72,6 +85,32 @@ def reset_password(request: Request, body: ResetPassword, response: Response, co
         _fail(request, consoles)
         raise NotLetIn("This link is no longer good.", hint="Ask for a new one.")
     return _let_in(request, response, consoles, user)
+
+
+@router.post("/devices", status_code=201)
+def begin_device(request: Request, consoles: InLeague) -> Device:
+    """A program wants to be let in: its code is typed into somebody's browser."""
+    consoles.tries.check(account="", address=caller(request))
+    consoles.tries.failed(account="", address=caller(request))  # counted like a failure: each takes a place
+    secret, code = consoles.devices.begin()
+    link = f"{address_of(request, consoles.owner.settings)}/me#{code}"
+    return Device(secret=secret, code=f"{code[:4]}-{code[4:]}", link=link, seconds=SECONDS)
+
+
+@router.post("/devices/token")
+def take_token(request: Request, body: TakeToken, consoles: InLeague) -> TakenToken:
+    """The token of a program that was let in; empty while it waits."""
+    consoles.tries.check(account="", address=caller(request))
+    try:
+        user = consoles.devices.take(body.secret)
+    except NotLetIn:
+        _fail(request, consoles)
+        raise
+    if user is None:
+        return TakenToken(token="")
+    return TakenToken(
+        token=consoles.keys.make_token(user, title="racecraft login", scopes=["read", "submit"], days=90)[1]
+    )
 
 
 @router.post("/sign-out", status_code=204)

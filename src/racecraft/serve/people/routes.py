@@ -12,6 +12,7 @@ from racecraft.serve.context import InConsoles, InPerson
 from racecraft.serve.people.keys import SESSION_ID
 from racecraft.serve.people.schemas import (
     AccountChange,
+    LetIn,
     MadeToken,
     Me,
     NewPassword,
@@ -20,6 +21,7 @@ from racecraft.serve.people.schemas import (
     TokenInfo,
     me_of,
 )
+from racecraft.serve.problems import NotFound
 from racecraft.serve.settings import COOKIE
 
 router = APIRouter(prefix="/api/account", tags=["account"])
@@ -69,6 +71,19 @@ def end_session(
 def end_sessions(consoles: InConsoles, person: InPerson) -> Response:
     """Sign out everywhere, here too."""
     consoles.keys.close_sessions(person.id)
+    return Response(status_code=204)
+
+
+@router.post("/devices", status_code=204)
+def let_device_in(body: LetIn, consoles: InConsoles, person: InPerson) -> Response:
+    """A program that shows this code gets a token of one's own."""
+    account = f"device {person.id}"
+    consoles.tries.check(account=account, address="")
+    try:
+        consoles.devices.confirm(body.code, person.id)
+    except NotFound:
+        consoles.tries.failed(account=account, address="")
+        raise
     return Response(status_code=204)
 
 

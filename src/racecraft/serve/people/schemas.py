@@ -66,6 +66,33 @@ class ResetPassword(Message):
     password: Password
 
 
+class Device(Message):
+    """A program that wants to be let in: what it keeps, and what it shows."""
+
+    secret: str
+    code: str
+    link: str
+    seconds: int
+
+
+class TakeToken(Message):
+    """The program asks whether it is let in."""
+
+    secret: Secret
+
+
+class TakenToken(Message):
+    """Its token; empty while nobody has let it in."""
+
+    token: str
+
+
+class LetIn(Message):
+    """The code that a program shows."""
+
+    code: str = Field(min_length=1, max_length=40)
+
+
 class Join(Message):
     """By a group's code, under a name of one's own."""
 
