@@ -1,0 +1,103 @@
+"""Four people's ways through the console, each to something to show, on one server with what they train."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from browsers import Visit, needs_browser, needs_pages, visiting
+from running_consoles import running_console
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+FILES = {
+    "model_metadata.json": json.dumps(
+        {
+            "action_space": [{"steering_angle": angle, "speed": 1.0} for angle in (-25, 0, 25)],
+            "sensor": ["FRONT_FACING_CAMERA"],
+            "neural_network": "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW",
+            "version": "5",
+        }
+    ),
+    "reward_function.py": "def reward_function(params):\n    return float(params['all_wheels_on_track'])\n",
+}
+
+
+@pytest.fixture(scope="module")
+def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
+    with running_console(tmp_path_factory.mktemp("journeys") / "runs") as console, visiting(console) as visit:
+        yield visit
+        assert visit.complaints == []
+
+
+def press(page: Any, name: str) -> None:
+    """Go to what is called so by the Tab key, and press it."""
+    for _ in range(120):
+        page.keyboard.press("Tab")
+        called = "document.activeElement.getAttribute('aria-label') || document.activeElement.textContent.trim()"
+        if page.evaluate(called) == name:
+            page.keyboard.press("Enter")
+            return
+    raise AssertionError(f"The Tab key does not come by {name!r}.")
+
+
+def trained(visit: Visit) -> dict[str, Any]:
+    """The newest model, once it has learned."""
+    client = visit.console.client
+    (job, *_) = client.get("/api/jobs").json()
+    assert visit.console.wait_for(visit.console.job_ended(job["id"]))["state"] == "done"
+    return dict(client.get(f"/api/models/{job['run']}").json())
+
+
+def test_a_pupil_trains_a_car_by_keyboard_alone(visit: Visit) -> None:
+    page = visit.open("/create/oval")
+    page.get_by_role("radio", checked=True, name="Paperclip").wait_for()
+    press(page, "Train now")
+    page.wait_for_url("**/models/**")
+    card = trained(visit)
+    assert card["completion"] == 1
+    assert card["best_lap"] is not None
+
+
+def test_a_veteran_brings_files_of_aws_and_takes_an_archive_home(visit: Visit) -> None:
+    visit.look("dark", "de")
+    page = visit.open("/create/oval", width=390)
+    page.locator("input[type=file]").set_input_files(
+        [{"name": name, "mimeType": "text/plain", "buffer": text.encode()} for name, text in FILES.items()]
+    )
+    page.get_by_text("reward_function.py wurde übernommen").wait_for()
+    page.get_by_role("button", name="In Worten").click()
+    page.locator("section", has_text="Bis wann").get_by_role("textbox").fill("1500 steps")
+    page.get_by_role("button", name="Jetzt trainieren").first.click()
+    page.wait_for_url("**/models/**")
+    assert visit.overflow() <= 0
+    model = trained(visit)
+    assert model["reward"] == FILES["reward_function.py"]
+    assert len(model["model_metadata"]["action_space"]) == 3
+    archive = visit.console.client.get(f"/api/models/{model['name']}/archive")
+    assert archive.content[:2] == b"\x1f\x8b"
+
+
+def test_a_racer_lets_both_meet_and_a_spectator_watches(visit: Visit) -> None:
+    visit.look("dark", "en")
+    page = visit.open("/contests/new")
+    page.get_by_role("button", name="Add all").click()
+    page.get_by_label("Title").fill("Final")
+    page.get_by_role("button", name="Start the heat with 2").click()
+    page.get_by_role("heading", name="The heat in 3D").wait_for()
+    (heat,) = visit.console.client.get("/api/contests").json()
+    assert heat["winner"]
+
+    visit.look("light", "de")
+    page = visit.open("/races", width=390)
+    page.get_by_role("link", name="Final").click()
+    page.get_by_role("heading", name="Der Lauf in 3D").wait_for()
+    page.locator(".stage canvas").wait_for()
+    assert visit.overflow() <= 0
+    clock = page.locator(".controls .number")
+    visit.console.wait_for(lambda: float(clock.inner_text().split()[0]) > 0.5)
+    with page.expect_download() as sent:
+        page.get_by_role("link", name="Datei").click()
+    assert sent.value.path().read_bytes().startswith(b"RACECRAFTREPLAY")
