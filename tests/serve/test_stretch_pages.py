@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -143,3 +144,28 @@ def test_nothing_is_wider_than_the_window(changed: Visit, width: int, language: 
         page.wait_for_timeout(800)
         assert changed.overflow() == 0, path
     changed.look("light", "en")
+
+
+def test_ones_own_car_is_driven_against(changed: Visit) -> None:
+    """From an evaluated model's pages to its car's ghost, also where another is faster; without a lap it is said."""
+    client = changed.console.client
+    page = changed.open("/models/other/watch")
+    page.get_by_role("link", name="Change the reward and go on").wait_for()
+    assert page.get_by_role("link", name="Beat your own car").count() == 0
+    page = changed.open("/drive/oval/other")
+    page.get_by_text("other has no lap of an evaluation on this track yet").wait_for()
+
+    reply = client.post("/api/models/heron/evaluations", json={"laps": 1, "num_trials": 1})
+    assert reply.status_code == 202, reply.text
+    assert changed.console.wait_for(changed.console.job_ended(reply.json()["id"]))["state"] == "done"
+    taken = next((changed.console.runs / "heron").glob("evaluation-*/evaluation.json"))
+    faster = shutil.copytree(taken.parent, changed.console.runs / "other" / taken.parent.name) / taken.name
+    faster.write_text(json.dumps(json.loads(taken.read_text()) | {"best_lap_seconds": 0.5}))
+    page = changed.open("/drive/oval")
+    page.locator("option:checked", has_text="other · 0.50").wait_for(state="attached")
+    for tab in ("watch", "race"):
+        page = changed.open(f"/models/heron/{tab}")
+        page.get_by_role("link", name="Beat your own car").click()
+        page.wait_for_url("**/drive/oval/heron")
+        page.locator("option:checked", has_text="heron · ").wait_for(state="attached")
+        assert page.get_by_text("has no lap of an evaluation").count() == 0

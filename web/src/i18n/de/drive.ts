@@ -34,6 +34,8 @@ export const drive: Record<keyof typeof english, string> = {
   drive_view: "Die Strecke und dein Auto",
   drive_back_to_drawing: "Zurück zur Zeichnung",
   drive_no_draft: "Es gibt keine Zeichnung, auf der man fahren könnte. Zeichne erst eine Strecke.",
+  drive_beat: "Schlag dein eigenes Auto",
+  drive_not_raced: "{name} hat auf dieser Strecke noch keine Runde einer Auswertung und darum keinen Geist.",
   drive_keep: "Daran weiterzeichnen",
   drive_model_teach: "Ein Modell lernen lassen",
 };

@@ -32,6 +32,8 @@ export const drive = {
   drive_view: "The track and your car",
   drive_back_to_drawing: "Back to the drawing",
   drive_no_draft: "There is no drawing to drive on. Draw a track first.",
+  drive_beat: "Beat your own car",
+  drive_not_raced: "{name} has no lap of an evaluation on this track yet, so it has no ghost.",
   drive_keep: "Draw on it",
   drive_model_teach: "Let a model learn it",
 } as const;
