@@ -11,7 +11,10 @@ import httpx
 import pytest
 from running_consoles import RunningConsole
 
+from racecraft.limits import known_limit
 from racecraft.serve.models.names import ANIMALS, free_name
+from racecraft.sim.vehicle import load_vehicle
+from racecraft.track import load_track
 
 GATE = "def reward_function(params):\n    return 1.0 if params['all_wheels_on_track'] else 0.001\n"
 
@@ -286,6 +289,24 @@ def test_one_best_lap_for_training_and_races(console: RunningConsole) -> None:
     assert race("20260101000001", 9.6) == (9.6, "evaluation-20260101000001/racing-line.png")
     assert race("20260101000002", 10.0) == (9.6, "evaluation-20260101000001/racing-line.png")
     assert race("20260101000003", 5.0, track="hairpin")[0] == 9.6
+
+
+def test_the_medals_are_those_of_its_own_road_car_and_direction(console: RunningConsole) -> None:
+    def medals(name: str, **settings: Any) -> Any:
+        console.create(name=name, train=False, track="reinvent_2018", **settings)
+        listed = {model["name"]: model for model in console.client.get("/api/models").json()}
+        return listed[name]["medals"]
+
+    road = load_track("reinvent_2018")
+    limit = known_limit(road, load_vehicle("v5"))
+    assert limit is not None
+    assert known_limit(road.reversed(), load_vehicle("v5")) is None, "the table has one direction"
+    assert medals("there", vehicle="v5") == vars(limit.medals)
+    assert medals("back", vehicle="v5", direction="reverse") is None
+    assert medals("old", vehicle="v4") != vars(limit.medals)
+    file = console.runs / "there" / "run.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"track": "reinvent_2018 + oval"}))
+    assert console.client.get("/api/models/there").json()["medals"] is None
 
 
 def test_a_model_in_use_is_not_moved_away(console: RunningConsole) -> None:

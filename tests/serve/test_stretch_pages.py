@@ -121,6 +121,24 @@ def test_what_the_last_change_made_of_it_is_said_in_a_sentence(changed: Visit) -
     page.get_by_role("list", name="Stretches of the training").wait_for()
 
 
+def test_the_medal_of_the_best_lap_is_on_the_card_and_on_its_pages(changed: Visit) -> None:
+    model = changed.console.client.get("/api/models/other").json()
+    for stamp, medal, next_better in (("20260101000000", "silver", "gold"), ("20260101000001", "gold", "author")):
+        folder = changed.console.runs / "other" / f"evaluation-{stamp}"
+        folder.mkdir()
+        lap = {"track": "oval", "step": 500, "best_lap_seconds": model["medals"][medal]}
+        (folder / "evaluation.json").write_text(json.dumps(lap))
+        assert model["medals"][next_better] < lap["best_lap_seconds"]
+        page = changed.open("/")
+        card = page.get_by_role("listitem").filter(has=page.get_by_role("link", name="other", exact=True))
+        card.get_by_text(medal.capitalize(), exact=True).wait_for()
+        page = changed.open("/models/other/watch")
+        won = page.get_by_text(medal.capitalize(), exact=True)
+        won.wait_for()
+        assert f"Bronze {model['medals']['bronze']:.2f} s" in str(won.get_attribute("title"))
+        shutil.rmtree(folder)
+
+
 def test_compare_credits_the_lap_to_the_reward_that_drove_it(changed: Visit) -> None:
     page = changed.open("/compare/heron/other")
     chosen = page.get_by_label("Stretch: heron")

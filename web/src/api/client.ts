@@ -5,6 +5,7 @@ import type { components } from "./schema";
 
 type Schemas = components["schemas"];
 export type ModelCard = Schemas["ModelCard"];
+export type MedalTimes = Schemas["MedalTimes"];
 export type ModelDetail = Schemas["ModelDetail"];
 export type TrainingStretch = Schemas["TrainingStretch"];
 export type ImportedModel = Schemas["ImportedModel"];

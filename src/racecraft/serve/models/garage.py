@@ -20,6 +20,7 @@ from sqlalchemy.dialects import sqlite
 from sqlalchemy.orm import Session
 
 from racecraft.errors import RacecraftError, RunError
+from racecraft.limits import known_limit
 from racecraft.run import RunFolder, RunInfo, Stretch, best_of, judged_laps, list_runs, read_stretches, stretch_at
 from racecraft.run.history import read_history
 from racecraft.serve.models.names import free_name
@@ -29,7 +30,8 @@ from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Model, now
 from racecraft.sim.objects import RACE_TYPES, Objects
-from racecraft.track import single_names
+from racecraft.sim.vehicle import Vehicle
+from racecraft.track import load_track, single_names
 
 RACED: Final = "head-to-head"
 """The race of a training among other policies, which no race of models is called."""
@@ -37,7 +39,7 @@ TRASH: Final = "trash"  # inside the state folder
 PICTURE: Final = "racing-line.png"
 NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
 SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
-SUMMARY: Final = "5"
+SUMMARY: Final = "6"
 """Changes with what a summary says, so that those kept by an earlier version are made anew."""
 Status = Literal["training", "queued", "stopped", "finished", "failed", "new"]
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -336,10 +338,21 @@ def _summary(folder: RunFolder) -> tuple[dict[str, Any], bool]:
         "seconds": _seconds(folder),
         "completion": metrics.get("completion"),
         "best_lap": fastest.best_lap if fastest is not None else None,
+        "medals": _medals(info) if len(tracks) == 1 else None,
         "evaluations": raced,
         "picture": picture,
         "until": str(info.settings.get("until", "")),
     }, is_settled
+
+
+def _medals(info: RunInfo) -> dict[str, float] | None:
+    """The times of the medals on a model's road, where that and its car are known."""
+    with suppress(RacecraftError, KeyError, TypeError):
+        track, vehicle = load_track(info.track), Vehicle(**info.settings["vehicle"])
+        is_reverse = info.settings.get("direction") == "reverse"
+        limit = known_limit(track.reversed() if is_reverse else track, vehicle)
+        return None if limit is None else vars(limit.medals)
+    return None
 
 
 def _tracks(named: str) -> list[str]:

@@ -67,6 +67,16 @@ class NewModel(Message):
     """Start training at once."""
 
 
+class MedalTimes(Message):
+    """Lap times to reach on a road in a car, s."""
+
+    author: float
+    """What our line driver really drives."""
+    gold: float
+    silver: float
+    bronze: float
+
+
 class ModelCard(Message):
     """A model in the garage."""
 
@@ -85,6 +95,8 @@ class ModelCard(Message):
     """Of the best checkpoint's evaluation."""
     best_lap: float | None
     """s; the fastest whole lap with its penalties of all evaluations on its track, in training and afterwards."""
+    medals: MedalTimes | None
+    """On its track in its car and direction, where they are known; of one that learns on several, none."""
     evaluations: int
     """Races by the rules, not those during training."""
     picture: str | None

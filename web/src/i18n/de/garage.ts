@@ -16,6 +16,12 @@ export const garage: Record<keyof typeof english, string> = {
   nothing_found: "Nichts passt zur Suche.",
   best_lap_is:
     "Die schnellste ganze Runde samt Strafen aus allen Auswertungen auf ihrer Strecke: im Training und danach.",
+  medals_are:
+    "Die Zeit des Autors fährt unser Linienfahrer wirklich; Gold ist 6 % langsamer, Silber 20 %, Bronze 50 %.",
+  medal_author: "Autor",
+  medal_gold: "Gold",
+  medal_silver: "Silber",
+  medal_bronze: "Bronze",
   best_lap_race: "Beste Runde dieser Auswertung",
   best_lap_checkpoint: "In der Prüfung, mit der dieser Stand gespeichert wurde",
   import_trackless: "{name} braucht eine Strecke",

@@ -14,6 +14,11 @@ export const garage = {
   nothing_found: "Nothing fits the search.",
   best_lap_is:
     "The fastest whole lap, penalties included, of all evaluations on its track: during training and afterwards.",
+  medals_are: "The author's time is what our line driver really drives; gold is 6 % slower, silver 20 %, bronze 50 %.",
+  medal_author: "Author",
+  medal_gold: "Gold",
+  medal_silver: "Silver",
+  medal_bronze: "Bronze",
   best_lap_race: "Best lap of this evaluation",
   best_lap_checkpoint: "In the evaluation that this checkpoint was saved with",
   import_trackless: "{name} needs a track",

@@ -1,0 +1,22 @@
+import { expect, test } from "vitest";
+import { medalOf } from "./medals";
+
+const TIMES = { author: 10, gold: 10.6, silver: 12, bronze: 15 };
+
+test("a lap wins the best medal that it reaches, the very time included", () => {
+  expect([9.5, 10, 10.01, 10.6, 11, 12.5, 15, 15.01].map((seconds) => medalOf(TIMES, seconds))).toEqual([
+    "author",
+    "author",
+    "gold",
+    "gold",
+    "silver",
+    "bronze",
+    "bronze",
+    "",
+  ]);
+});
+
+test("without a lap, and where no times are known, there is none", () => {
+  expect(medalOf(TIMES, null)).toBe("");
+  expect(medalOf(null, 9)).toBe("");
+});

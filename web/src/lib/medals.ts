@@ -1,0 +1,10 @@
+import type { MedalTimes } from "../api/client";
+
+export const MEDALS = ["author", "gold", "silver", "bronze"] as const;
+export type MedalName = (typeof MEDALS)[number];
+
+/** The best medal that a lap time reaches, as the server's own: a time that equals a medal's has it. */
+export function medalOf(times: MedalTimes | null | undefined, seconds: number | null | undefined): MedalName | "" {
+  if (!times || seconds == null) return "";
+  return MEDALS.find((name) => seconds <= times[name] + 1e-9) ?? "";
+}
