@@ -58,6 +58,7 @@ ROWS: dict[str, tuple[str, Any]] = {
             "POST /api/models/{name}/clone": {},
             "POST /api/models/{name}/train": {},
             "POST /api/models/{name}/stop": None,
+            "GET /api/models/{name}/demonstration": None,
             "GET /api/models/{name}/history": None,
             "GET /api/models/{name}/files/{path}": None,
             "GET /api/models/{name}/evaluations": None,

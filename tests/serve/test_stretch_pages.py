@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from browsers import Visit, needs_browser, needs_pages, visiting
 from running_consoles import RunningConsole, running_console
@@ -137,6 +138,30 @@ def test_the_medal_of_the_best_lap_is_on_the_card_and_on_its_pages(changed: Visi
         won.wait_for()
         assert f"Bronze {model['medals']['bronze']:.2f} s" in str(won.get_attribute("title"))
         shutil.rmtree(folder)
+
+
+def test_when_nobody_trains_the_best_car_drives_its_lap(changed: Visit) -> None:
+    client = changed.console.client
+    lap = client.get("/api/models/heron/demonstration").json()
+    assert lap["step"] == next(
+        one["step"] for one in client.get("/api/models/heron").json()["checkpoints"] if one["is_best"]
+    )
+    poses = np.array(lap["poses"]) / 1000
+    assert lap["seconds"] == pytest.approx(len(poses) / 15, abs=1.0)
+    assert poses[-1, 5] > 0.98
+    moved = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    assert moved.max() < 4.0 / 15 + 0.05
+    assert np.median(moved * 15 - poses[1:, 3]) == pytest.approx(0.0, abs=0.1)
+    page = changed.open("/models/heron/watch")
+    page.get_by_text(f"The best car on its lap: {lap['seconds']:.2f} s").wait_for()
+    assert page.get_by_role("button", name="Follow").get_attribute("aria-pressed") == "true"
+    canvas = page.locator(".scene canvas")
+    canvas.wait_for()
+    first = canvas.screenshot()
+    page.wait_for_function("() => new Promise(then => setTimeout(() => then(true), 700))")
+    assert canvas.screenshot() != first, "it drives"
+    page.reload()
+    page.get_by_text("The best car on its lap").wait_for()
 
 
 def test_compare_credits_the_lap_to_the_reward_that_drove_it(changed: Visit) -> None:

@@ -5,6 +5,7 @@ import type { components } from "./schema";
 
 type Schemas = components["schemas"];
 export type ModelCard = Schemas["ModelCard"];
+export type Demonstration = Schemas["Demonstration"];
 export type MedalTimes = Schemas["MedalTimes"];
 export type ModelDetail = Schemas["ModelDetail"];
 export type TrainingStretch = Schemas["TrainingStretch"];
@@ -102,6 +103,7 @@ export const api = {
   console: () => ask<ConsoleFacts>("GET", "/console"),
   models: () => ask<ModelCard[]>("GET", "/models"),
   model: (run: string) => ask<ModelDetail>("GET", `/models/${name(run)}`),
+  demonstration: (run: string) => ask<Demonstration>("GET", `/models/${name(run)}/demonstration`),
   create: (model: NewModel) => ask<ModelCard>("POST", "/models", model),
   change: (run: string, change: { name?: string; tags?: string[] }) =>
     ask<ModelCard>("PATCH", `/models/${name(run)}`, change),

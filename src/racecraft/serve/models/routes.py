@@ -18,9 +18,11 @@ from racecraft.run.history import read_history
 from racecraft.run.starters import starter_names, unpack_starter
 from racecraft.serve.context import Context, InContext
 from racecraft.serve.jobs.schemas import JobInfo, job_info
+from racecraft.serve.models.demonstration import demonstration
 from racecraft.serve.models.garage import RACED, finite
 from racecraft.serve.models.schemas import (
     CloneModel,
+    Demonstration,
     HistoryPage,
     ModelCard,
     ModelChange,
@@ -209,6 +211,16 @@ def stop_model(name: str, context: InContext) -> JobInfo:
         raise Conflict(f"Model {name!r} is not being trained.")
     context.queue.cancel(job.id)
     return job_info(context.queue.get(job.id) or job)
+
+
+@router.get("/{name}/demonstration")
+def get_demonstration(name: str, context: InContext) -> Demonstration:
+    """The lap that a model's best checkpoint drives alone on its road."""
+    folder = context.garage.folder(name)
+    found = demonstration(folder) if context.garage.card(name).num_tracks == 1 else None
+    if found is None:
+        raise NotFound(f"Model {name!r} has no checkpoint that could drive a lap on one road.")
+    return found
 
 
 @router.get("/{name}/history")

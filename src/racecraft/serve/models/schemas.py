@@ -119,6 +119,17 @@ class ImportedModel(Message):
     notes: list[str]
 
 
+class Demonstration(Message):
+    """A lap of a model's best checkpoint, driven to be looked at."""
+
+    step: int
+    """Of the checkpoint."""
+    seconds: float | None
+    """Of the lap, where it was completed."""
+    poses: list[list[int]]
+    """X, y [mm], heading [mrad], speed [mm/s], steering [mrad] and share of the lap [1/1000], every 1/15 s."""
+
+
 class Checkpoint(Message):
     """A saved state of a policy."""
 

@@ -65,6 +65,8 @@ export const watch: Record<keyof typeof english, string> = {
   cars_wait: "{count} Autos warten, während das Netz aus ihren Fahrten lernt: seit {time}",
   cars: "{count} Autos lernen zugleich",
   not_live: "Gerade wird nicht trainiert.",
+  best_drives: "Das beste Auto auf seiner Runde: {lap}",
+  best_drives_part: "Das beste Auto; ganz herum kam es noch nicht",
   camera_orbit: "Frei",
   camera_follow: "Verfolgen",
   camera_top: "Von oben",

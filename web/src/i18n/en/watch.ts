@@ -61,6 +61,8 @@ export const watch = {
   cars_wait: "{count} cars wait while the network learns from what they drove: {time} so far",
   cars: "{count} cars learning at once",
   not_live: "No training is running.",
+  best_drives: "The best car on its lap: {lap}",
+  best_drives_part: "The best car; it has not come all the way round yet",
   camera_orbit: "Free",
   camera_follow: "Follow",
   camera_top: "From above",
