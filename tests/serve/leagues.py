@@ -57,9 +57,11 @@ class RunningLeague:
 def running_league(runs: Path, *options: str) -> Iterator[RunningLeague]:
     with running_console(runs, "--league", *options) as console:
         league = RunningLeague(console)
-        yield league
-        for client in league.strangers:
-            client.close()
+        try:
+            yield league
+        finally:
+            for client in league.strangers:
+                client.close()
 
 
 def ok(reply: httpx.Response, status: int = 200) -> Any:

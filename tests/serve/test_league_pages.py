@@ -195,6 +195,8 @@ def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
 
 
 def test_a_forgotten_password_and_the_log_that_tells_of_it(lesson: Lesson, race: int) -> None:
+    from playwright.sync_api import expect
+
     page = lesson.visits["teacher"].open("/league")
     card = page.locator("section.card", has=page.get_by_role("heading", name="A forgotten password"))
     card.get_by_label("Nickname").fill("comet")
@@ -220,7 +222,7 @@ def test_a_forgotten_password_and_the_log_that_tells_of_it(lesson: Lesson, race:
     page.get_by_role("button", name="To the latest").click()
     page.get_by_label("Who").fill("omet")
     page.get_by_role("combobox", name="What").select_option("Passwords")
-    page.wait_for_function("document.querySelectorAll('tbody tr').length === 1")
+    expect(rows).to_have_count(1, timeout=1000 * PATIENCE)
     assert rows.inner_text().split("\t")[1:3] == ["Comet", "reset_password"]
     page.get_by_label("Who").fill("nobody like that")
     page.get_by_text("nothing like that").wait_for()

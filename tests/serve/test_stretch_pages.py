@@ -102,8 +102,8 @@ def test_the_log_is_searched_narrowed_and_kept(changed: Visit) -> None:
     assert all("★" in row for row in best)
     page.get_by_role("button", name="All", exact=True).click()
     page.get_by_role("searchbox", name="Search the log").fill("BEST")
-    page.wait_for_function("count => document.querySelectorAll('tr.best').length === count", arg=len(best))
     page.locator("tr.evaluation").first.wait_for(state="detached")
+    assert page.locator("tr.best").count() == len(best)
     with page.expect_download() as download:
         page.get_by_role("button", name="Download", exact=True).click()
     assert download.value.suggested_filename == "heron-log.txt"
@@ -158,7 +158,7 @@ def test_when_nobody_trains_the_best_car_drives_its_lap(changed: Visit) -> None:
     canvas = page.locator(".scene canvas")
     canvas.wait_for()
     first = canvas.screenshot()
-    page.wait_for_function("() => new Promise(then => setTimeout(() => then(true), 700))")
+    page.wait_for_timeout(700)
     assert canvas.screenshot() != first, "it drives"
     page.reload()
     page.get_by_text("The best car on its lap").wait_for()
