@@ -87,7 +87,8 @@ def through_caddy(service: tuple[RunningConsole, str], tmp_path: Path) -> Iterat
     own = example.replace("racing.example.org {\n", f"{address} {{\n\ttls internal\n")
     own = own.replace("127.0.0.1:8321 {", f"{console.client.base_url.netloc.decode()} {{")
     path = tmp_path / "Caddyfile"
-    path.write_text("{\n\tgrace_period 1s\n\tadmin off\n\tauto_https disable_redirects\n\tskip_install_trust\n}\n" + own)
+    ours = ("grace_period 1s", "admin off", "auto_https disable_redirects", "skip_install_trust")
+    path.write_text("\n\t".join(["{", *ours]) + "\n}\n" + own)
     environment = {
         **os.environ,
         "HOME": str(tmp_path),
