@@ -71,7 +71,7 @@ def test_at_the_end_of_the_time_the_trial_under_way_is_kept_for_later(tmp_path: 
     assert [trial.state for trial in first.trials] == ["out of time"]
     assert not first.is_interrupted
     assert first.best is None
-    second = Tuning(folder).run(minutes=4 / 60)  # time for a trial to begin on a busy machine, too
+    second = Tuning(folder).run(minutes=1 / 60)
     assert second.trials[1].params == first.trials[0].params
 
 

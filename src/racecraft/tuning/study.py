@@ -101,10 +101,10 @@ class Tuning:
         """
         require("minutes", minutes, 0 < minutes <= 30 * 24 * 60, "a number above 0, up to 43,200")
         check_whole("trials", max_trials, 0, 100_000)
-        deadline = time.monotonic() + 60.0 * minutes
         with exclusive_lock(self.folder / ".lock"):
             study = self._study()
             self._take_up(study)
+            deadline = time.monotonic() + 60.0 * minutes  # however long a storage takes to open
             done, is_interrupted = 0, False
             while time.monotonic() < deadline and not is_interrupted and (not max_trials or done < max_trials):
                 if self._stop.is_set():
