@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
+from base64 import b64decode
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from running_consoles import RunningConsole
 
@@ -72,9 +74,9 @@ def test_from_a_click_to_a_race(console: RunningConsole) -> None:
     client = console.client
     name = console.create(name="first", until="2000 steps", tags=["mine"])
     job = client.get("/api/jobs", params={"run": name}).json()[0]
-    events: dict[str, list[Any]] = {"points": [], "live": [], "jobs": []}
+    events: dict[str, list[Any]] = {"points": [], "live": [], "eye": [], "jobs": []}
     identity = ""
-    with client.stream("GET", f"/api/events/{name}") as stream:
+    with client.stream("GET", f"/api/events/{name}?eye=true") as stream:
         kind = ""
         for line in stream.iter_lines():
             if line.startswith("event: "):
@@ -89,6 +91,9 @@ def test_from_a_click_to_a_race(console: RunningConsole) -> None:
     looks = events["live"]
     assert looks
     assert all(len(look["poses"]) == 64 and len(look["policy"]) == 10 for look in looks)
+    assert all(len(json.dumps(look, separators=(",", ":"))) <= 3000 for look in looks)
+    assert 0 < len(events["eye"]) <= len(looks)
+    assert all(np.prod(picture["frame_shape"]) == len(b64decode(picture["frame"])) for picture in events["eye"])
     assert looks[-1]["step"] > 0
     assert abs(sum(looks[-1]["policy"]) - 1) < 0.01
 

@@ -7,9 +7,11 @@ import json
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.live.cars import LiveReader, Look
 from racecraft.serve.streams import hub as hub_module
 from racecraft.serve.streams.hub import Hub
 
@@ -72,3 +74,40 @@ def test_a_long_history_is_not_kept_in_memory(hub: Hub, history: Path) -> None:
         assert hub._seen["car"].points == {}
 
     asyncio.run(look())
+
+
+class Moments:
+    """Stands for a training whose cars move between any two looks."""
+
+    is_live = True
+
+    def __init__(self) -> None:
+        self.number = 0
+
+    def look(self, *, after: int) -> Look:
+        self.number += 2
+        poses, frame = np.full((64, 6), 3.141, np.float32), np.full((120, 160), 7, np.uint8)
+        steps, objects, policy = np.full(64, 100, np.int32), np.zeros((0, 4), np.float32), np.full(10, 0.1, np.float32)
+        return Look(sequence=self.number, step=9, poses=poses, steps=steps, objects=objects, policy=policy,
+                    is_discrete=True, frame=frame)  # fmt: skip
+
+
+def test_pictures_are_apart_from_poses_and_made_less_often(hub: Hub, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(hub_module.time, "monotonic", lambda: now)
+    assert hub.eye("car", after=-1) is None
+    hub._of("car").reader = cast(LiveReader, Moments())
+    first = hub.live("car", after=-1)
+    assert first is not None
+    assert len(first[1]) <= 3000
+    assert b"frame" not in first[1]
+    picture = hub.eye("car", after=-1)
+    assert picture is not None
+    assert picture[0] == first[0]
+    assert len(picture[1]) > 120 * 160
+    hub.live("car", after=first[0])
+    assert hub.eye("car", after=picture[0]) is None
+    now += 0.25
+    later = hub.eye("car", after=picture[0])
+    assert later is not None
+    assert later[0] == first[0] + 2

@@ -84,7 +84,7 @@ MISSED = 0.5e6  # bytes that the others are not sent meanwhile, each
 def test_a_tab_that_never_reads_costs_no_memory(console: RunningConsole, training: str) -> None:
     host, port = str(console.client.base_url.host), console.client.base_url.port
     cookie = f"racecraft_session={console.client.cookies['racecraft_session']}"
-    request = f"GET /api/events/{training} HTTP/1.1\r\nHost: {host}:{port}\r\nCookie: {cookie}\r\n\r\n"
+    request = f"GET /api/events/{training}?eye=true HTTP/1.1\r\nHost: {host}:{port}\r\nCookie: {cookie}\r\n\r\n"
     with ExitStack() as stack:
         for _ in range(SLEEPERS):
             sleeper = stack.enter_context(socket.socket())
@@ -93,7 +93,7 @@ def test_a_tab_that_never_reads_costs_no_memory(console: RunningConsole, trainin
             sleeper.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             sleeper.connect((host, port))
             sleeper.sendall(request.encode())
-        stream = stack.enter_context(console.client.stream("GET", f"/api/events/{training}"))
+        stream = stack.enter_context(console.client.stream("GET", f"/api/events/{training}?eye=true"))
         awake = (len(part) for part in stream.iter_raw())
         _read(awake, WARM)
         before = _resident(console.process.pid)

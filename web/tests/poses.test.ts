@@ -12,8 +12,6 @@ const look = (poses: number[][], steps: number[]): Look => ({
   steps,
   policy: [],
   is_discrete: true,
-  frame: "",
-  frame_shape: [0, 0],
 });
 
 describe("cars between two looks", () => {

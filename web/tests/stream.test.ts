@@ -47,6 +47,15 @@ describe("a stream", () => {
     expect(sources[1]!.readyState).toBe(2);
   });
 
+  it("asks for pictures only where they are looked at", () => {
+    const pictures: unknown[] = [];
+    const stop = followModel("a", { ...on, eye: (picture) => void pictures.push(picture) }, open);
+    expect(sources[0]!.url).toBe("/api/events/a?offset=0&eye=true");
+    sources[0]!.send("eye", { frame: "AA==", frame_shape: [1, 1] });
+    expect(pictures).toEqual([{ frame: "AA==", frame_shape: [1, 1] }]);
+    stop();
+  });
+
   it("leaves a broken connection to the browser, and stays closed when it is closed", () => {
     const stop = followModel("a", on, open);
     sources[0]!.fail(0);

@@ -14,8 +14,6 @@ export function lookAt(lap: Demonstration, elapsed: number): Look {
     steps: [now],
     policy: [],
     is_discrete: true,
-    frame: "",
-    frame_shape: [0, 0],
     focus: 0,
   };
 }

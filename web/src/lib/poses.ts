@@ -7,10 +7,14 @@ export interface Look {
   objects?: [string, number, number, number][];
   policy: number[];
   is_discrete: boolean;
-  frame: string;
-  frame_shape: [number, number];
   focus?: number; // the car to follow; else the one that is furthest
   tints?: number[]; // colour of each car; else by how far it is
+}
+
+/** What a car sees: a byte of grey a pixel, in base64. */
+export interface Picture {
+  frame: string;
+  frame_shape: [number, number];
 }
 
 export interface Pose {

@@ -1,12 +1,14 @@
 /** A model's live events. They go on where they broke off, however long the server was away or what it answered. */
 import type { JobInfo } from "../api/client";
 import type { Point } from "./curves";
-import type { Look } from "./poses";
+import type { Look, Picture } from "./poses";
 
 export interface Handlers {
   points: (points: Point[]) => void;
   live: (look: Look) => void;
   jobs: (jobs: JobInfo[]) => void;
+  /** Asked of the server only where it is given. */
+  eye?: (picture: Picture) => void;
   /** The connection broke off. */
   broken?: () => void;
 }
@@ -19,12 +21,13 @@ export function followModel(run: string, on: Handlers, open = (url: string) => n
   let timer: ReturnType<typeof setTimeout> | undefined;
   let source: EventSource;
   const connect = () => {
-    const mine = (source = open(`/api/events/${encodeURIComponent(run)}?offset=${offset}`));
+    const mine = (source = open(`/api/events/${encodeURIComponent(run)}?offset=${offset}${on.eye ? "&eye=true" : ""}`));
     mine.addEventListener("points", (event) => {
       offset = Number(event.lastEventId) || offset;
       on.points(JSON.parse(event.data) as Point[]);
     });
     mine.addEventListener("live", (event) => on.live(JSON.parse(event.data) as Look));
+    mine.addEventListener("eye", (event) => on.eye?.(JSON.parse(event.data) as Picture));
     mine.addEventListener("jobs", (event) => on.jobs(JSON.parse(event.data) as JobInfo[]));
     mine.onerror = () => {
       on.broken?.();

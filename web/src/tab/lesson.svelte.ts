@@ -1,7 +1,7 @@
 /** A training as the page sees it: the workers, one of them with Python, and what they have told so far. */
 import type { RewardVerdict } from "../api/client";
 import { Curves, type Point } from "../lib/curves";
-import type { Look } from "../lib/poses";
+import type { Look, Picture } from "../lib/poses";
 import type { Plan, TrackFile } from "./plan";
 import type { Check, Load, Report, Start } from "./worker";
 import workerAddress from "./worker?worker&url";
@@ -45,6 +45,7 @@ export interface Judged {
 export class Lesson {
   state = $state<State>("ready");
   look = $state.raw<Look | undefined>();
+  picture = $state.raw<Picture | undefined>();
   judged = $state.raw<Judged | undefined>();
   curves = $state.raw(new Curves());
   version = $state(0); // of the curves
@@ -107,7 +108,8 @@ export class Lesson {
 
   /** `source`: of a reward of one's own, instead of a preset. */
   train(track: TrackFile, reward: string, seed: number, source?: string): void {
-    [this.look, this.judged, this.seconds, this.failure] = [undefined, undefined, 0, ""];
+    [this.look, this.picture, this.judged] = [undefined, undefined, undefined];
+    [this.seconds, this.failure] = [0, ""];
     [this.failedReward, this.printed] = ["", ""];
     [this.curves, this.state] = [new Curves(), "loading"];
     this.version++;
@@ -164,7 +166,7 @@ export class Lesson {
         [this.isSlow, this.state] = [report.isSlow, "learning"];
         break;
       case "look":
-        this.look = report.look;
+        [this.look, this.picture] = [report.look, report.picture];
         break;
       case "iteration": {
         const { steps, completion } = report.iteration;

@@ -1,7 +1,7 @@
 /** The thread beside the page in which cars drive and learn, with Python where it is asked for; it is ended by ending the
  * worker. */
 import type { RewardVerdict } from "../api/client";
-import type { Look } from "../lib/poses";
+import type { Look, Picture } from "../lib/poses";
 import { loadCore, type LoadedCore } from "./core";
 import { read, type Plan, type TrackFile } from "./plan";
 import { type Pay, Python, RewardFailure } from "./python";
@@ -35,7 +35,7 @@ export type Report =
   | { kind: "loaded"; isSlow: boolean }
   | { kind: "paying"; isPaying: boolean } // rewards are computed from here on, or no longer
   | { kind: "printed"; text: string }
-  | { kind: "look"; look: Look }
+  | { kind: "look"; look: Look; picture: Picture }
   | { kind: "iteration"; iteration: Iteration; seconds: number }
   | { kind: "evaluation"; evaluation: Evaluation; steps: number; seconds: number }
   | { kind: "ended"; isReached: boolean }
@@ -94,7 +94,7 @@ function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded
   const look = () => {
     if (performance.now() - looked < OFTEN) return;
     looked = performance.now();
-    tell({ kind: "look", look: lookOf(trainer, plan) });
+    tell({ kind: "look", ...lookOf(trainer, plan) });
   };
   const say = () => {
     const text = printed();
@@ -117,8 +117,11 @@ function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded
   tell({ kind: "ended", isReached: false });
 }
 
-/** This moment as the console's server streams it. */
-function lookOf({ cars, columns, steps }: Trainer, { cars: { width, height } }: Plan): Look {
+/** This moment and what the foremost car sees, as the console's server streams them. */
+function lookOf(
+  { cars, columns, steps }: Trainer,
+  { cars: { width, height } }: Plan,
+): { look: Look; picture: Picture } {
   const { vehicles, rows, rowWidth, count, frames, numPixels } = cars;
   const column = (name: string, car: number) => rows[car * rowWidth + columns.indexOf(name)]!;
   const field = (index: number, car: number) => Math.round(vehicles[index * count + car]! * 1000);
@@ -130,13 +133,14 @@ function lookOf({ cars, columns, steps }: Trainer, { cars: { width, height } }: 
   const focus = all.reduce((best, car) => (poses[car]![5]! > poses[best]![5]! ? car : best), 0);
   const frame = String.fromCharCode(...frames.subarray(focus * numPixels, (focus + 1) * numPixels));
   return {
-    step: steps,
-    poses,
-    steps: all.map((car) => column("steps", car)),
-    policy: [],
-    is_discrete: true,
-    frame: btoa(frame),
-    frame_shape: [height!, width!],
-    focus,
+    look: {
+      step: steps,
+      poses,
+      steps: all.map((car) => column("steps", car)),
+      policy: [],
+      is_discrete: true,
+      focus,
+    },
+    picture: { frame: btoa(frame), frame_shape: [height!, width!] },
   };
 }

@@ -23,6 +23,7 @@ from racecraft.sim.objects import OBJECT_KINDS
 
 FRESH: Final = 0.3  # s that a look at the jobs is good for
 MAX_MODELS: Final = 64  # that are remembered
+BLINK: Final = 0.24  # s between two pictures: every third tick of a stream
 MAX_SHARED: Final = 1 << 16  # bytes of points that are kept for the next tab; a new one reads all there are by itself
 
 
@@ -33,6 +34,11 @@ class _Seen:
     reader: LiveReader
     sequence: int = -1
     live: bytes = b""
+    look: Look | None = None
+    """The moment that `live` shows."""
+    eye: tuple[int, bytes] = (-1, b"")
+    """The newest picture as an event, and the number of its moment."""
+    eye_until: float = 0.0
     points: dict[int, tuple[int, bytes]] = field(default_factory=dict)
     """The newest points as an event, and their end, by where they begin."""
     points_until: float = 0.0
@@ -61,8 +67,19 @@ class Hub:
         look = seen.reader.look(after=seen.sequence)
         if look is not None:
             event = ServerSentEvent(json.dumps(_document(look), separators=(",", ":")), event="live")
-            seen.sequence, seen.live = look.sequence, event.encode()
+            seen.sequence, seen.live, seen.look = look.sequence, event.encode(), look
         return (seen.sequence, seen.live) if seen.sequence not in (-1, after) and seen.reader.is_live else None
+
+    def eye(self, name: str, *, after: int) -> tuple[int, bytes] | None:
+        """What the first car saw at the newest moment that `live` gave, and its number; pictures are made now and then.
+
+        None when there is nothing but the one with number `after`.
+        """
+        seen = self._of(name)
+        if seen.look is not None and seen.eye[0] != seen.sequence and time.monotonic() >= seen.eye_until:
+            event = ServerSentEvent(json.dumps(_picture(seen.look), separators=(",", ":")), event="eye")
+            seen.eye, seen.eye_until = (seen.sequence, event.encode()), time.monotonic() + BLINK
+        return seen.eye if seen.eye[0] not in (-1, after) and seen.reader.is_live else None
 
     async def points(self, name: str, *, after: int) -> tuple[int, bytes] | None:
         """The points of the curves behind an offset, as an event, and where they end; None when there are none."""
@@ -117,9 +134,12 @@ def _document(look: Look) -> dict[str, Any]:
         "objects": _objects(look),
         "policy": look.policy.round(4).tolist(),
         "is_discrete": look.is_discrete,
-        "frame": base64.b64encode(look.frame.tobytes()).decode(),
-        "frame_shape": list(look.frame.shape),
     }
+
+
+def _picture(look: Look) -> dict[str, Any]:
+    """Ten times the bytes of all poses: for those alone who show it."""
+    return {"frame": base64.b64encode(look.frame.tobytes()).decode(), "frame_shape": list(look.frame.shape)}
 
 
 def _objects(look: Look) -> list[list[int | str]]:
