@@ -24,10 +24,13 @@
 namespace racecraft {
 namespace {
 
-// As racecraft.sim.Simulation, Start and CameraSpec; `palette` is 0 for 2018, 1 for 2020, 2 for 2026.
+// As racecraft.sim.Simulation, Start and CameraSpec; `palette` is 0 for 2018, 1 for 2020, 2 for 2026. The
+// seed's upper half crosses by itself: a double holds 53 bits.
 #define RC_CAR_SETTINGS(X) \
     X(num_envs)            \
+    X(cars_per_race)       \
     X(seed)                \
+    X(seed_high)           \
     X(substeps)            \
     X(laps)                \
     X(max_steps)           \
@@ -48,7 +51,24 @@ namespace {
     X(forward)             \
     X(left)                \
     X(above)               \
-    X(pitch)
+    X(pitch)               \
+    X(baseline)
+
+// As racecraft.sim.Obstacles and Bots, each kind by its place in OBJECT_KINDS; then, of obstacles and of bots
+// that have fixed places, as many pairs of a fraction of a lap and a lane as there are.
+#define RC_OBJECT_SETTINGS(X) \
+    X(obstacle_kind)          \
+    X(obstacle_count)         \
+    X(obstacle_placement)     \
+    X(obstacle_distance)      \
+    X(bot_count)              \
+    X(bot_placement)          \
+    X(bot_distance)           \
+    X(bot_speed)              \
+    X(changes_lane)           \
+    X(shortest_stay)          \
+    X(longest_stay)           \
+    X(change_distance)
 
 // As racecraft.learn.PPOConfig.
 #define RC_PPO_SETTINGS(X)     \
@@ -91,6 +111,9 @@ namespace {
 struct CarSettings {
     RC_CAR_SETTINGS(RC_FIELD)
 };
+struct ObjectSettings {
+    RC_OBJECT_SETTINGS(RC_FIELD)
+};
 struct PpoSettings {
     RC_PPO_SETTINGS(RC_FIELD)
 };
@@ -99,7 +122,8 @@ struct NetworkSettings {
 };
 const char* const kNames[] = {RC_CAR_SETTINGS(RC_NAME),     RC_PPO_SETTINGS(RC_NAME),
                               RC_NETWORK_SETTINGS(RC_NAME), RC_VEHICLE_PARAMETERS(RC_NAME),
-                              RC_ROW_COLUMNS(RC_NAME),      RC_STATE_COLUMNS(RC_NAME)};
+                              RC_ROW_COLUMNS(RC_NAME),      RC_STATE_COLUMNS(RC_NAME),
+                              RC_OBJECT_SETTINGS(RC_NAME)};
 #undef RC_FIELD
 #undef RC_NAME
 
@@ -154,10 +178,42 @@ size_t count_of(double value) {
     return static_cast<size_t>(value);
 }
 
+ObjectGroup group_of(ObjectKind kind, double count, double placement, double distance,
+                     const double*& places) {
+    ObjectGroup group;
+    group.kind = kind;
+    require(count >= 0.0 && count <= kMaxObjects, "A track takes 0 to 32 objects.");
+    group.count = static_cast<int32_t>(count);
+    group.placement = static_cast<Placement>(static_cast<int>(placement));
+    group.min_distance = distance;
+    if (group.placement != Placement::fixed) return group;
+    for (int32_t i = 0; i < group.count; ++i) {
+        group.fractions[i] = *places++;
+        group.lanes[i] = static_cast<float>(*places++);
+    }
+    return group;
+}
+
+ObjectRule objects_of(const double* settings) {
+    ObjectSettings s;
+    std::memcpy(&s, settings, sizeof(s));
+    const double* places = settings + sizeof(s) / sizeof(double);
+    ObjectRule rule;
+    const auto kind = static_cast<ObjectKind>(static_cast<int>(s.obstacle_kind));
+    rule.obstacles = group_of(kind, s.obstacle_count, s.obstacle_placement, s.obstacle_distance, places);
+    const ObjectKind bot = s.bot_count > 0.0 ? ObjectKind::bot_car : ObjectKind::box;
+    rule.bots = group_of(bot, s.bot_count, s.bot_placement, s.bot_distance, places);
+    rule.bot = {static_cast<float>(s.bot_speed), s.changes_lane != 0.0, static_cast<float>(s.shortest_stay),
+                static_cast<float>(s.longest_stay), static_cast<float>(s.change_distance)};
+    return rule;
+}
+
 EngineConfig config_of(const CarSettings& s) {
     EngineConfig config{};
     config.num_envs = count_of(s.num_envs);
-    config.seed = static_cast<uint64_t>(s.seed);
+    config.cars_per_race = count_of(s.cars_per_race);
+    config.seed = static_cast<uint64_t>(s.seed_high) << 32 | static_cast<uint64_t>(s.seed);
+    config.baseline = static_cast<float>(s.baseline);
     config.substeps = static_cast<int>(s.substeps);
     config.num_threads = 1;
     config.limits = {static_cast<int>(s.laps), static_cast<int>(s.max_steps), s.time_limit};
@@ -258,14 +314,20 @@ RC_EXPORT(allocate) void* allocate(size_t bytes) {
 RC_EXPORT(release) void release(void* memory) {
     std::free(memory);
 }
-// 0 settings of cars, 1 of PPO, 2 of a network, 3 a vehicle's parameters, 4 columns of a row, 5 of a state;
-// words that end in a blank.
+// 0 settings of cars, 1 of PPO, 2 of a network, 3 a vehicle's parameters, 4 columns of a row, 5 of a state, 6
+// settings of objects; words that end in a blank.
 RC_EXPORT(names_of) const char* names_of(size_t list) {
     require(list < std::size(kNames), "There is no such list of names.");
     return kNames[list];
 }
 RC_EXPORT(is_fused) bool is_fused() {
     return RC_ISA::is_multiply_add_fused();
+}
+
+// numpy.random.default_rng(seeds).random(count).
+RC_EXPORT(uniforms) void uniforms(const uint64_t* seeds, size_t num_seeds, double* out, size_t count) {
+    NumpyRandom random({seeds, num_seeds});
+    for (; count > 0; --count) *out++ = random.random();
 }
 
 // ---- a track
@@ -285,8 +347,11 @@ RC_EXPORT(free_track) void free_track(TrackWorld* track) {
 
 // ---- cars
 
+// Objects as RC_OBJECT_SETTINGS says, or null; ranges of what differs from episode to episode, as
+// racecraft.sim.Randomization has them, or null.
 RC_EXPORT(make_cars)
-Engine* make_cars(const TrackWorld* track, const CarSettings* settings, const VehicleParameters* vehicle) {
+Engine* make_cars(const TrackWorld* track, const CarSettings* settings, const VehicleParameters* vehicle,
+                  const double* objects, const Randomization* ranges) {
     require(settings->num_envs >= 1.0 && settings->num_envs <= 4096.0, "There must be 1 to 4096 cars.");
     const RgbPalette* const palettes[] = {&kPalette2018, &kPalette2020, &kPalette2026};
     require(settings->palette >= 0.0 && settings->palette < std::size(palettes), "There is no such palette.");
@@ -296,8 +361,10 @@ Engine* make_cars(const TrackWorld* track, const CarSettings* settings, const Ve
     const bool has_camera = settings->has_camera != 0.0;
     std::vector<std::shared_ptr<const GroundMap>> grounds;
     if (has_camera) grounds.push_back(track->ground());
-    return new Engine(config_of(*settings), std::move(stores), std::move(grounds), *vehicle,
-                      has_camera ? &camera : nullptr, nullptr, *palettes[count_of(settings->palette)]);
+    EngineConfig config = config_of(*settings);
+    if (objects != nullptr) config.objects = objects_of(objects);
+    return new Engine(config, std::move(stores), std::move(grounds), *vehicle, has_camera ? &camera : nullptr,
+                      ranges, *palettes[count_of(settings->palette)]);
 }
 RC_EXPORT(free_cars) void free_cars(Engine* cars) {
     delete cars;
@@ -305,8 +372,9 @@ RC_EXPORT(free_cars) void free_cars(Engine* cars) {
 RC_EXPORT(step_cars) void step_cars(Engine* cars, const float* actions) {
     cars->step(actions);
 }
-RC_EXPORT(reset_cars) void reset_cars(Engine* cars, const bool* mask) {  // all of them without a mask
-    cars->reset(mask);
+// All of them without a mask; with seeds (N,), for whole races, they begin anew as Engine::reset() says.
+RC_EXPORT(reset_cars) void reset_cars(Engine* cars, const bool* mask, const uint64_t* seeds) {
+    cars->reset(mask, seeds);
 }
 RC_EXPORT(set_pose) void set_pose(Engine* cars, size_t car, float x, float y, float heading, float speed) {
     require(car < cars->num_envs(), "There is no such car.");

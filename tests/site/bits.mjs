@@ -162,15 +162,34 @@ function refuse(core, { track: of }) {
   }
 }
 
+/** A replay file driven again, or which sentence of the page says why not. */
+async function verify(core, { plan, replays, tracks }) {
+  const { ReplayProblem, verifyFile } = await load(
+    "src/tab/verify/verify.ts",
+  );
+  const found = [];
+  for (const file of replays) {
+    try {
+      const bytes = new Blob([Buffer.from(file, "base64")]);
+      found.push(
+        await verifyFile(core, plan, bytes, async (name) => tracks[name]),
+      );
+    } catch (error) {
+      if (!(error instanceof ReplayProblem)) throw error;
+      found.push({ key: error.key, values: error.values });
+    }
+  }
+  return found;
+}
+
 const { Core, loadCore } = await load("src/tab/core.ts");
 const core = await Core.load(readFileSync(code));
-const run = { ask, check, drive, train, refuse };
+const run = { ask, check, drive, train, refuse, verify };
 const all = JSON.parse(readFileSync(cases, "utf8"));
 const files = all.find(({ files }) => files)?.files;
 const python = files ? await startPython(files) : undefined;
-const results = all.map(
-  ({ what, ...rest }) => run[what](core, rest),
-);
+const results = [];
+for (const { what, ...rest } of all) results.push(await run[what](core, rest));
 // What a page takes where the first builds it asks for do not run.
 const bytes = readFileSync(code);
 const taken = async (broken) => {

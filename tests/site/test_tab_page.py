@@ -18,6 +18,10 @@ import pytest
 
 from racecraft import evaluate
 from racecraft.importing import import_run
+from racecraft.race import Autopilot, RaceRules
+from racecraft.race import evaluate as raced
+from racecraft.replay import Replay, read_replay, write_replay
+from racecraft.track import load_track
 from racecraft.training.evaluator import SEED
 
 if TYPE_CHECKING:
@@ -152,6 +156,22 @@ def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Pa
     page.get_by_text("from afar\n").first.wait_for()
     assert page.get_by_label("Track").input_value() == "hairpin"
     assert "#" not in page.url
+
+
+def test_a_replay_is_driven_again_in_the_tab_and_a_changed_number_is_named(page: Page, tmp_path: Path) -> None:
+    evaluation = raced(Autopilot(speed=2.0), load_track("oval"), rules=RaceRules(laps=1), num_trials=2, sees="state")
+    path = write_replay(Replay.of(evaluation), tmp_path / "club.replay")
+    chooser = page.get_by_label("Choose a replay", exact=True).and_(page.locator("input"))
+    chooser.set_input_files(path)
+    page.get_by_text("Driven: by drfc rules, with the car v5, on oval.").wait_for(timeout=PATIENCE)
+    page.get_by_text(re.compile(r"All \d+ steps of 2 cars come out the same, bit for bit")).wait_for()
+    replay = read_replay(path)
+    replay.rewards[1][40] = 0.25
+    chooser.set_input_files(write_replay(replay, path))
+    page.get_by_text("Car 2 differs first in step 40 (2.73 s): reward is 0.25 in the file").wait_for(timeout=PATIENCE)
+    path.write_bytes(b"none")
+    chooser.set_input_files(path)
+    page.get_by_text("This is no replay of Racecraft").wait_for(timeout=PATIENCE)
 
 
 FAILS_LATE = """calls = 0

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from racecraft.agent import ModelMetadata
 from racecraft.learn import NetworkSpec, PPOConfig, networks
+from racecraft.race.conditions import STANDARD_CAR
 from racecraft.race.placement import start_pose
 from racecraft.race.rules import RULE_SETS
 from racecraft.reward import situations
@@ -18,7 +19,9 @@ from racecraft.run.folder import RunInfo
 from racecraft.serve.tracks.courses import geometry
 from racecraft.sim.camera import CAMERAS, CameraSpec
 from racecraft.sim.columns import STATUS_NAMES
+from racecraft.sim.randomization import PRESETS as RANDOM
 from racecraft.sim.simulation import CONTROL_DT, DIRECTIONS, START_MODES, Start, track_arrays
+from racecraft.sim.vehicle import PRESETS as VEHICLES
 from racecraft.track import Track, joint_digest, load_track
 from racecraft.training.evaluator import SEED, SLOWEST
 from racecraft.training.settings import TrainSettings, make_settings
@@ -55,6 +58,17 @@ def told_track(arrays: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def told_road(track: Track) -> dict[str, Any]:
+    """What web/src/tab/verify/road.ts asks of a track in both directions, computed here: to the bit as a marshal's."""
+    sides = (track, track.reversed())
+    return {
+        "arcs": packed(np.stack([side.arc_length for side in sides])),
+        "headings": packed(np.stack([side.heading_at(side.arc_length[:-1]) for side in sides])),
+        "innerIsLeft": [side.inner_is_left for side in sides],
+        "repeats": list(track.repeats),
+    }
+
+
 def told_cars(
     camera: CameraSpec | None, start: Start, num_envs: int, *, seed: int, direction: str, max_steps: int = MAX_STEPS
 ) -> dict[str, float]:
@@ -62,7 +76,9 @@ def told_cars(
     eye = camera or CameraSpec()
     return {
         "num_envs": num_envs,
-        "seed": seed,
+        "cars_per_race": 1,
+        "seed": seed % 2**32,
+        "seed_high": seed >> 32,
         "substeps": SUBSTEPS,
         "laps": 1,
         "max_steps": max_steps,
@@ -84,6 +100,7 @@ def told_cars(
         "left": eye.left,
         "above": eye.above_ground,
         "pitch": eye.pitch,
+        "baseline": eye.baseline,
     }
 
 
@@ -155,6 +172,17 @@ def plan() -> dict[str, Any]:
         "run": _run(settings),
         "modelMetadata": metadata.to_dict(),
         "spec": asdict(spec),
+        "known": known(),
+    }
+
+
+def known() -> dict[str, Any]:
+    """By what a replay's conditions are named: the library's rules, cars (standard one first), randomisations."""
+    cars = {STANDARD_CAR: VEHICLES[STANDARD_CAR], **VEHICLES}
+    return {
+        "rules": {name: rules.to_dict() for name, rules in RULE_SETS.items()},
+        "vehicle": {name: asdict(car) for name, car in cars.items()},
+        "randomize": {name: {key: list(ends) for key, ends in asdict(one).items()} for name, one in RANDOM.items()},
     }
 
 
@@ -164,6 +192,7 @@ def track_file(name: str) -> dict[str, Any]:
     return {
         "told": told_track(track_arrays(track)),
         "waypoints": [one.waypoints.tolist() for one in (track, track.reversed())],
+        "road": told_road(track),
         "geometry": geometry(name, track).model_dump(),
         "digest": joint_digest([track]),
         "situations": [

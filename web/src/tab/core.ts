@@ -12,6 +12,12 @@ export interface TrackArrays {
   isClosed: boolean;
 }
 
+/** What is around the cars, and what differs from episode to episode; nothing by default. */
+export interface Around {
+  objects?: { settings: Settings; places: [number, number][] }; // fraction of a lap and lane, of fixed ones
+  ranges?: number[]; // as racecraft.sim.Randomization.values()
+}
+
 /** Numbers by name: every one that the core names, and no other. */
 export type Settings = Record<string, number>;
 
@@ -27,7 +33,7 @@ export interface Episode {
   length: number;
 }
 
-const LISTS = { cars: 0, ppo: 1, network: 2, vehicle: 3, row: 4, state: 5 } as const;
+const LISTS = { cars: 0, ppo: 1, network: 2, vehicle: 3, row: 4, state: 5, objects: 6 } as const;
 const PARTS = { weights: 0, moment1: 1, moment2: 2 } as const;
 const MOST_EPISODES = 4096;
 
@@ -104,6 +110,14 @@ export class Core {
     });
   }
 
+  /** numpy.random.default_rng(seeds).random(count). */
+  uniforms(seeds: bigint[], count: number): Float64Array {
+    return this.module.with([BigUint64Array.from(seeds), new Float64Array(count)], (from, to) => {
+      this.module.call("uniforms", from, seeds.length, to, count);
+      return this.module.view(Float64Array, to, count).slice();
+    });
+  }
+
   /** Settings as the core takes them; an Error where a name is missing or unknown. */
   ordered(list: keyof typeof LISTS, settings: Settings): Float64Array {
     const names = this.names(list);
@@ -128,11 +142,16 @@ class Held {
 }
 
 export class Track extends Held {
-  cars(settings: Settings, vehicle: Settings): Cars {
-    const { module } = this.core;
-    const arrays = [this.core.ordered("cars", settings), Float32Array.from(this.core.ordered("vehicle", vehicle))];
-    const at = module.with(arrays, (atSettings, atVehicle) => module.call("make_cars", this.at, atSettings, atVehicle));
-    return new Cars(this.core, at);
+  cars(settings: Settings, vehicle: Settings, { objects, ranges }: Around = {}): Cars {
+    const { core } = this;
+    const { module } = core;
+    const arrays = [core.ordered("cars", settings), Float32Array.from(core.ordered("vehicle", vehicle))];
+    if (objects) arrays.push(Float64Array.of(...core.ordered("objects", objects.settings), ...objects.places.flat()));
+    if (ranges) arrays.push(Float32Array.from(ranges));
+    const at = module.with(arrays, (atSettings, atVehicle, ...rest) =>
+      module.call("make_cars", this.at, atSettings, atVehicle, objects ? rest[0]! : 0, ranges ? rest.at(-1)! : 0),
+    );
+    return new Cars(core, at);
   }
 
   free(): void {
@@ -152,9 +171,12 @@ export class Cars extends Held {
     this.core.module.with([actions], (at) => this.call("step_cars", at));
   }
 
-  reset(mask?: Uint8Array): void {
-    if (!mask) this.call("reset_cars", 0);
-    else this.core.module.with([mask], (at) => this.call("reset_cars", at));
+  /** With `seeds`, one a car and the same for all cars of a race, what is drawn begins anew. */
+  reset(mask?: Uint8Array, seeds?: BigUint64Array): void {
+    const everyone = new Uint8Array(this.count).fill(1);
+    this.core.module.with([mask ?? everyone, seeds ?? new BigUint64Array()], (at, atSeeds) =>
+      this.call("reset_cars", at, seeds ? atSeeds : 0),
+    );
   }
 
   setPose(car: number, x: number, y: number, heading: number, speed = 0): void {

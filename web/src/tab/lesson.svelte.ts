@@ -4,7 +4,7 @@ import { Curves, type Point } from "../lib/curves";
 import type { Look, Picture } from "../lib/poses";
 import type { Plan, TrackFile } from "./plan";
 import type { Check, Load, Report, Start } from "./worker";
-import workerAddress from "./worker?worker&url";
+import { openWorker } from "./open";
 
 const LAPS = 5;
 const MOST = 400_000; // camera steps
@@ -13,15 +13,6 @@ const TICKS = 2; // a second
 const MOST_PRINTED = 20_000; // characters
 
 type Kind = "plain" | "python";
-
-/** A worker under the page's own policy, which says what it may reach: one that is loaded by its address has none. */
-function openWorker(): Worker {
-  const text = `import ${JSON.stringify(new URL(workerAddress, document.baseURI).href)};`;
-  const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
-  const worker = new Worker(address, { type: "module" });
-  URL.revokeObjectURL(address);
-  return worker;
-}
 
 const refusal = (message: string): RewardVerdict => ({
   ok: false,

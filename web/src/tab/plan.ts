@@ -1,6 +1,7 @@
 /** What the page is told of the training that it runs: the files that `python -m racecraft.site` writes beside it. */
 import type { TrackGeometry } from "../api/client";
 import type { NetworkSettings, Settings, TrackArrays } from "./core";
+import type { Known } from "./verify/provenance";
 
 export interface RewardPreset {
   name: string;
@@ -25,6 +26,7 @@ export interface Plan {
   run: Record<string, unknown>; // run.json, but for seed, track and time
   modelMetadata: Record<string, unknown>;
   spec: Record<string, unknown>;
+  known: Known; // rules, cars and randomisations of the library
   tracks: string[];
   rewards: RewardPreset[];
 }
@@ -44,17 +46,21 @@ export interface TrackFile {
     isClosed: boolean;
   };
   waypoints: [number, number][][]; // (2, K, 2) m: forward, reversed
+  road: { arcs: Packed; headings: Packed; innerIsLeft: boolean[]; repeats: number[] }; // of both directions
   geometry: TrackGeometry;
   digest: string;
   situations: { name: string; description: string; row: number[] }[]; // that a reward of one's own is tried in
   starts: Record<string, [number, number, number][]>; // by seed: x, y, heading of every trial but the first
 }
 
+/** Numbers that crossed as text. */
+export const doublesOf = (packed: Packed): Float64Array => new Float64Array(bytesOf(packed));
+
 const bytesOf = ({ data }: Packed) => Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0)).buffer;
 
 export const arraysOf = ({ told }: TrackFile): TrackArrays => ({
   ...told,
-  lines: new Float64Array(bytesOf(told.lines)),
+  lines: doublesOf(told.lines),
   tables: new Float32Array(bytesOf(told.tables)),
   waypoints: new Int32Array(bytesOf(told.waypoints)),
 });

@@ -6,6 +6,8 @@ import { loadCore, type LoadedCore } from "./core";
 import { read, type Plan, type TrackFile } from "./plan";
 import { type Pay, Python, RewardFailure } from "./python";
 import { type Evaluation, type Iteration, payWith, type Reward, Trainer } from "./trainer";
+import type { ProblemKey } from "./verify/problem";
+import type { Verdict } from "./verify/verify";
 
 export interface Load {
   kind: "load";
@@ -29,6 +31,14 @@ export interface Start {
   most: number; // camera steps
 }
 
+export interface Verify {
+  kind: "verify";
+  plan: Plan;
+  file: File; // of anybody
+}
+
+type Asked = Load | Check | Start | Verify;
+
 export type Report =
   | { kind: "ready" } // all that was asked for is loaded
   | { kind: "checked"; verdict: RewardVerdict }
@@ -39,6 +49,8 @@ export type Report =
   | { kind: "iteration"; iteration: Iteration; seconds: number }
   | { kind: "evaluation"; evaluation: Evaluation; steps: number; seconds: number }
   | { kind: "ended"; isReached: boolean }
+  | { kind: "verified"; verdict: Verdict }
+  | { kind: "unreadable"; key: ProblemKey; values: Record<string, string | number> }
   | { kind: "failed"; message: string; isReward: boolean };
 
 const OFTEN = 66; // ms between two looks
@@ -46,19 +58,20 @@ const OFTEN = 66; // ms between two looks
 const tell = (report: Report) => postMessage(report);
 
 interface Loaded {
+  site: string;
   core: LoadedCore;
   python: Python | undefined;
   presets: Record<string, Reward>;
 }
 
 let loading: Promise<Loaded> | undefined;
-onmessage = ({ data }: MessageEvent<Load | Check | Start>) => {
+onmessage = ({ data }: MessageEvent<Asked>) => {
   handle(data).catch((error: Error) =>
     tell({ kind: "failed", message: error.message, isReward: error instanceof RewardFailure }),
   );
 };
 
-async function handle(asked: Load | Check | Start): Promise<void> {
+async function handle(asked: Asked): Promise<void> {
   if (asked.kind === "load") {
     loading = load(asked);
     loading.then(() => tell({ kind: "ready" })).catch(() => {}); // is told when it is needed
@@ -66,7 +79,20 @@ async function handle(asked: Load | Check | Start): Promise<void> {
   }
   const loaded = await loading!;
   if (asked.kind === "check") tell({ kind: "checked", verdict: loaded.python!.check(asked.source, asked.track) });
+  else if (asked.kind === "verify") await prove(asked, loaded);
   else train(asked, loaded);
+}
+
+/** Drive a replay again; what that needs is loaded now. */
+async function prove({ plan, file }: Verify, { core: { core }, site }: Loaded): Promise<void> {
+  const { ReplayProblem, verifyFile } = await import("./verify/verify");
+  const track = async (name: string) => (await (await read(site, `data/tracks/${name}.json`)).json()) as TrackFile;
+  try {
+    tell({ kind: "verified", verdict: await verifyFile(core, plan, file, track) });
+  } catch (error) {
+    if (!(error instanceof ReplayProblem)) throw error;
+    tell({ kind: "unreadable", key: error.key, values: error.values });
+  }
 }
 
 async function load({ site, hasPython }: Load): Promise<Loaded> {
@@ -76,7 +102,7 @@ async function load({ site, hasPython }: Load): Promise<Loaded> {
     import(/* @vite-ignore */ address) as Promise<{ rewards: Record<string, Reward> }>,
     hasPython ? Python.load(site) : undefined,
   ]);
-  return { core, presets: rewards, python };
+  return { site, core, presets: rewards, python };
 }
 
 function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded): void {
