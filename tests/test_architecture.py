@@ -65,6 +65,7 @@ CONSOLE = (
     "driving",
     "rewards",
     "machine",
+    "lessons",
     "groups",
     "submissions",
     "context",

@@ -17,6 +17,7 @@ from racecraft.course.lesson import Facts
 from racecraft.course.pictures import bar_chart, line_chart
 from racecraft.course.quiz import LANGUAGES
 from racecraft.course.show import Picture
+from racecraft.course.shown import digest_of, picture_path, read_shown, shown_path
 from racecraft.errors import ConfigError
 
 TEXT = """\
@@ -206,3 +207,17 @@ def test_charts_show_what_they_are_given() -> None:
     chart = line_chart("Curve", {"a": np.array([0.0, np.nan, 1.0, 1.0]), "b": ([0, 3], [0.5, 0.5])})
     assert colored(chart, COLORS[0]) > 200
     assert colored(chart, COLORS[1]) > 1000
+
+
+@pytest.mark.parametrize("number", [lesson.number for lesson in lessons()])
+def test_what_a_lesson_showed_is_of_the_code_that_it_has(number: int) -> None:
+    lesson = find_lesson(number)
+    shown = read_shown(lesson)
+    assert shown.digest == digest_of(lesson.cells()), f"run python -m racecraft.course.shown {number}"
+    drawn = [one for outputs in shown.outputs.values() for one in outputs if one.kind == "picture"]
+    kept = {path.stem for path in shown_path(lesson).with_suffix("").iterdir()}
+    assert kept == {one.name for one in drawn}
+    for one in drawn:
+        assert one.description
+        with Image.open(picture_path(lesson, one.name)) as image:
+            assert image.size == (one.width, one.height)

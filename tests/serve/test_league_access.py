@@ -19,6 +19,11 @@ REWARD = "def reward_function(params):\n    return 1.0\n"
 
 ROWS: dict[str, tuple[str, Any]] = {
     # whose is what it is about, and a body that would do
+    "GET /api/lessons": ("each", None),
+    "GET /api/lessons/{lesson}": ("each", None),
+    "GET /api/lessons/{lesson}/pictures/{picture}": ("each", None),
+    "PUT /api/lessons/{lesson}/progress": ("each", {"is_read": True}),
+    "GET /api/groups/{group_id}/lessons": ("organiser", None),
     "GET /api/console": ("each", None),
     "GET /api/console/machine": ("admin", None),
     "GET /api/tracks": ("each", None),
@@ -199,6 +204,8 @@ class School:
         heat = {"models": [{"model": "adas-model"}] * 2, "track": "oval", "max_resets": 0}
         entry = ok(ada.post(f"/api/races/{race}/entries", json={"models": ["adas-model"]}), 202)["undecided"]
         self.objects = {
+            "lesson": 4,
+            "picture": "lake",
             "track": "adas-track",
             "name": "adas-model",
             "starter": "quick",

@@ -18,6 +18,7 @@ import pytest
 from leagues import RunningLeague, ok, refused, running_league
 from running_consoles import running_console
 
+from racecraft.course import find_lesson
 from racecraft.errors import ConfigError
 from racecraft.serve.people.devices import Devices
 from racecraft.serve.people.names import checked_name, handle_of
@@ -406,3 +407,28 @@ def test_what_would_show_secrets_is_refused_unless_said_twice(
             ServeSettings(runs=tmp_path, **settings)
     else:
         assert ServeSettings(runs=tmp_path, **settings).league
+
+
+def test_a_teacher_sees_how_far_the_class_is_and_nobody_else(league: RunningLeague) -> None:
+    teacher = league.organiser("Ms Lovelace")
+    group = league.group("8b", teacher)
+    ada = league.join(league.code(group, teacher), "Ada of 8b")
+    answers = [question.answer for question in find_lesson(1).facts.questions]
+    ok(ada.put("/api/lessons/1/progress", json={"is_read": True, "answers": answers}))
+    ok(ada.put("/api/lessons/2/progress", json={"is_read": True}))
+    (row,) = ok(teacher.get(f"/api/groups/{group}/lessons"))
+    assert row["name"] == "Ada of 8b"
+    assert {number: (one["is_read"], one["quiz"]) for number, one in row["lessons"].items()} == {
+        "1": (True, 1.0),
+        "2": (True, None),
+    }
+    assert ada.get(f"/api/groups/{group}/lessons").status_code == 404
+    cards = ok(ada.get("/api/lessons"))
+    assert [card["progress"]["is_read"] for card in cards] == [True, True] + [False] * 10
+    assert not any(card["progress"]["is_read"] for card in ok(teacher.get("/api/lessons")))
+    assert ada.put("/api/lessons/1/progress", json={"answers": [0]}).status_code == 409
+    assert ada.get("/api/lessons/13").status_code == 404
+    assert ada.get("/api/lessons/1/pictures/..%2F..%2Fanswers").status_code in (404, 422)
+    assert ok(ada.get("/api/account/data"))["lessons"][0]["lesson"] == 1
+    ok(ada.delete("/api/account"), 204)
+    assert ok(teacher.get(f"/api/groups/{group}/lessons")) == []

@@ -32,6 +32,7 @@ from racecraft.serve.jobs import routes as jobs
 from racecraft.serve.jobs.follower import Follower
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
+from racecraft.serve.lessons import routes as lessons
 from racecraft.serve.machine import routes as console
 from racecraft.serve.models import archives, choices
 from racecraft.serve.models import routes as models
@@ -128,7 +129,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.add_middleware(guard.middleware)
     problems.install(app)
     parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, races]
-    parts += [contests, jobs, events, door, audit]
+    parts += [contests, jobs, events, door, audit, lessons]
     for part in parts:
         app.include_router(part.router)
     for part in (account, groups, league):

@@ -9,6 +9,7 @@ export type GroupCard = Schemas["GroupCard"];
 export type GroupDetail = Schemas["GroupDetail"];
 export type MemberInfo = Schemas["MemberInfo"];
 export type MemberModels = Schemas["MemberModels"];
+export type MemberLessons = Schemas["MemberLessons"];
 export type JoiningInfo = Schemas["JoiningInfo"];
 export type LoginCard = Schemas["LoginCard"];
 export type LeagueRace = Schemas["LeagueRace"];
@@ -48,6 +49,7 @@ export const leagueApi = {
   removeMember: (id: number, member: number) => ask<void>("DELETE", `/groups/${id}/members/${member}`),
   revoke: (id: number, member: number) => ask<void>("POST", `/groups/${id}/members/${member}/revoke`),
   cards: (id: number, members: number[]) => ask<LoginCard[]>("POST", `/groups/${id}/cards`, { members }),
+  lessons: (id: number) => ask<Schemas["MemberLessons"][]>("GET", `/groups/${id}/lessons`),
   models: (id: number) => ask<MemberModels[]>("GET", `/groups/${id}/models`),
   copy: (id: number, member: number, model: string) =>
     ask<Schemas["ModelCard"]>("POST", `/groups/${id}/models/copy`, { member, model }),

@@ -316,3 +316,17 @@ class DrivenRecord(Table):
     trace: Mapped[list[list[int]]]
     """x, y, heading of every step, in whole mm and mrad."""
     driven: Mapped[datetime] = mapped_column(default=now)
+
+
+class StudiedLesson(Table):
+    """How far somebody is in a lesson of the course."""
+
+    __tablename__ = "studied_lessons"
+
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), primary_key=True)
+    lesson: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    """Its number."""
+    read: Mapped[datetime | None]
+    """When they came to its end for the first time."""
+    quiz: Mapped[float | None]
+    """Best share of right answers."""

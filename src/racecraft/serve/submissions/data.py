@@ -7,9 +7,29 @@ from typing import Any
 import sqlalchemy as sa
 
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Card, Deed, Group, Job, Member, Race, Session, Submission, Table, Token, User
+from racecraft.serve.store.tables import (
+    Card,
+    Deed,
+    Group,
+    Job,
+    Member,
+    Race,
+    Session,
+    StudiedLesson,
+    Submission,
+    Table,
+    Token,
+    User,
+)
 
-KEPT: dict[str, type[Table]] = {"sessions": Session, "cards": Card, "tokens": Token, "jobs": Job, "deeds": Deed}
+KEPT: dict[str, type[Table]] = {
+    "sessions": Session,
+    "cards": Card,
+    "tokens": Token,
+    "jobs": Job,
+    "deeds": Deed,
+    "lessons": StudiedLesson,
+}
 """Tables of rows that belong to somebody, by the name that they have in the document."""
 SECRET = ("digest", "password", "owner", "secret")
 """What is not handed out, at any depth: hashes, what is of the machine, and where a race starts that is not over."""

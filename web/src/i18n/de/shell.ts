@@ -10,6 +10,8 @@ export const shell: Record<keyof typeof english, string> = {
   me: "Ich",
   me_brief: "Ich",
   settings: "Einstellungen",
+  lessons: "Kurs",
+  lessons_brief: "Kurs",
   garage_brief: "Garage",
   create_brief: "Neu",
   tracks_brief: "Strecken",

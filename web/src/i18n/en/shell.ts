@@ -8,6 +8,8 @@ export const shell = {
   me: "Me",
   me_brief: "Me",
   settings: "Settings",
+  lessons: "Course",
+  lessons_brief: "Course",
   garage_brief: "Garage",
   create_brief: "New",
   tracks_brief: "Tracks",

@@ -1,0 +1,189 @@
+"""What a lesson's code printed and drew when it ran: kept beside the lesson, so that a page can show it.
+
+    python -m racecraft.course.shown        # every lesson whose code has changed since
+    python -m racecraft.course.shown 4      # one, whether it has or not
+
+`lessons/shown/04_q_table.json` holds a digest of the code and, by the number of the cell of code, what came out of it;
+the pictures lie in `lessons/shown/04_q_table/`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import hashlib
+import io
+import json
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from racecraft.course.lesson import Lesson, find_lesson, lessons
+from racecraft.course.percent import Cell
+from racecraft.course.show import Picture
+from racecraft.errors import ConfigError
+
+WIDEST: Final = 1000  # px
+_PICTURE: Final = re.compile(r"^\[picture: (?P<path>.+)\]$")
+
+
+class Printed(BaseModel):
+    """Lines of text."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: Literal["text"] = "text"
+    text: str
+
+
+class Drawn(BaseModel):
+    """A picture or an animation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: Literal["picture"] = "picture"
+    name: str
+    description: str
+    """For those who cannot see it."""
+    width: int
+    height: int
+
+
+Output = Annotated[Printed | Drawn, Field(discriminator="kind")]
+
+
+class Shown(BaseModel):
+    """A lesson as it ran."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    digest: str = ""
+    """Of the code that ran."""
+    outputs: dict[int, list[Output]] = Field(default_factory=dict)
+    """By the number of the cell of code, from 0."""
+
+
+def shown_path(lesson: Lesson) -> Path:
+    """Where it is kept."""
+    return lesson.path.parent / "shown" / f"{lesson.path.stem}.json"
+
+
+def picture_path(lesson: Lesson, name: str) -> Path:
+    """Where a picture of it is kept."""
+    return shown_path(lesson).with_suffix("") / f"{name}.webp"
+
+
+def read_shown(lesson: Lesson) -> Shown:
+    """What came out when the lesson ran; nothing if nobody has kept it.
+
+    Raises:
+        ConfigError: The file is damaged.
+    """
+    path = shown_path(lesson)
+    try:
+        return Shown.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return Shown()
+    except (OSError, ValidationError) as error:
+        raise ConfigError(f"{path} does not hold what a lesson showed: {' '.join(str(error).split())}") from error
+
+
+def digest_of(cells: Iterable[Cell]) -> str:
+    """Of the code alone: text may change without running it again."""
+    return hashlib.sha256(json.dumps([cell.source for cell in code_of(cells)]).encode()).hexdigest()
+
+
+def code_of(cells: Iterable[Cell]) -> list[Cell]:
+    """The cells of code."""
+    return [cell for cell in cells if cell.kind == "code"]
+
+
+def keep_shown(lesson: Lesson) -> Shown:
+    """Run a lesson, and keep what it prints and draws."""
+    cells, namespace = lesson.cells(), dict[str, Any]({"__name__": "__lesson__"})
+    outputs: dict[int, list[Output]] = {}
+    descriptions: dict[str, str] = {}
+    encoded = Picture.encoded
+
+    def noted(picture: Picture) -> bytes:
+        data = encoded(picture)
+        descriptions[hashlib.sha256(data).hexdigest()] = picture.description
+        return data
+
+    Picture.encoded = noted  # type: ignore[method-assign, assignment]
+    try:
+        for number, cell in enumerate(code_of(cells)):
+            said = io.StringIO()
+            with contextlib.redirect_stdout(said):
+                code = "\n" * (cell.line - 1) + cell.source  # as its lines stand in the file
+                exec(compile(code, str(lesson.path), "exec"), namespace)
+            if lines := said.getvalue().strip("\n").splitlines():
+                outputs[number] = list(_outputs(lesson, lines, descriptions))
+    finally:
+        Picture.encoded = encoded  # type: ignore[method-assign]
+    shown = Shown(digest=digest_of(cells), outputs=outputs)
+    shown_path(lesson).write_text(shown.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    return shown
+
+
+def _outputs(lesson: Lesson, lines: list[str], descriptions: dict[str, str]) -> Iterable[Output]:
+    text: list[str] = []
+    for line in lines:
+        found = _PICTURE.match(line)
+        if found is None:
+            text.append(line)
+            continue
+        if text:
+            yield Printed(text="\n".join(text))
+            text = []
+        yield _kept(lesson, Path(found["path"]), descriptions)
+    if text:
+        yield Printed(text="\n".join(text))
+
+
+def _kept(lesson: Lesson, source: Path, descriptions: dict[str, str]) -> Drawn:
+    """A picture as a small WebP file."""
+    from PIL import Image, ImageSequence
+
+    target = picture_path(lesson, source.stem)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with Image.open(source) as image:
+        share = min(1.0, WIDEST / image.width)
+        size = round(image.width * share), round(image.height * share)
+        frames: list[Any] = [
+            frame.convert("RGB").resize(size, Image.Resampling.LANCZOS) for frame in ImageSequence.Iterator(image)
+        ]
+        options: dict[str, Any] = {"quality": 82, "method": 6}
+        if len(frames) > 1:
+            options |= {"save_all": True, "append_images": frames[1:], "loop": 0, "quality": 60, "method": 4}
+            options |= {"duration": image.info.get("duration", 100)}
+        frames[0].save(target, "WEBP", **options)
+    description = descriptions[hashlib.sha256(source.read_bytes()).hexdigest()]
+    return Drawn(name=source.stem, description=description, width=size[0], height=size[1])
+
+
+def main(numbers: list[int]) -> None:
+    """Run lessons in a folder of their own, where nothing that they solve or write stays."""
+    wanted = [find_lesson(number) for number in numbers] or [
+        lesson for lesson in lessons() if read_shown(lesson).digest != digest_of(lesson.cells())
+    ]
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        os.environ["XDG_DATA_HOME"] = folder
+        for lesson in wanted:
+            sys.argv = [str(lesson.path)]
+            shown = keep_shown(lesson)
+            print(lesson.path.stem, sum(len(one) for one in shown.outputs.values()), flush=True)  # noqa: T201
+        os.chdir("/")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("lessons", nargs="*", type=int)
+    main(parser.parse_args().lessons)

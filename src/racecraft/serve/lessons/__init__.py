@@ -1,0 +1,1 @@
+"""The course: lessons as pages, and who has read and answered what."""

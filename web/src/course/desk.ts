@@ -1,0 +1,34 @@
+/** Where lessons come from and where progress is kept: a console, or a site that has no server. */
+import { ask } from "../api/client";
+import type { components } from "../api/schema";
+
+type Schemas = components["schemas"];
+export type LessonFacts = Schemas["LessonFacts"];
+export type LessonPage = Schemas["LessonPage"];
+export type LessonProgress = Schemas["LessonProgress"];
+export type LessonCard = Schemas["LessonCard"];
+export type PageCell = Schemas["PageCell"];
+export type Question = Schemas["Question"];
+
+export interface Step {
+  is_read?: boolean;
+  answers?: number[];
+}
+
+export interface Desk {
+  list(): Promise<LessonCard[]>;
+  lesson(number: number): Promise<LessonPage>;
+  record(lesson: LessonFacts, step: Step, share?: number): Promise<LessonProgress>;
+  /** Address of a picture. */
+  picture(lesson: LessonFacts, name: string): string;
+  /** Address of a lesson's page, or without a number of the course's. */
+  href(number?: number): string;
+}
+
+export const consoleDesk: Desk = {
+  list: () => ask<LessonCard[]>("GET", "/lessons"),
+  lesson: (number) => ask<LessonPage>("GET", `/lessons/${number}`),
+  record: (lesson, step) => ask<LessonProgress>("PUT", `/lessons/${lesson.number}/progress`, step),
+  picture: (lesson, name) => `/api/lessons/${lesson.number}/pictures/${name}`,
+  href: (number) => (number === undefined ? "/lessons" : `/lessons/${number}`),
+};

@@ -1,0 +1,13 @@
+/** Texts of the course in the chosen language: a catalogue of its own. */
+import { language, type Language } from "../i18n/index.svelte";
+import { de } from "./de";
+import { en, type CourseKey } from "./en";
+
+const catalogues: Record<Language, Record<CourseKey, string>> = { en, de };
+
+/** The text of a key, with {names} filled in. */
+export const c = (key: CourseKey, values: Record<string, string | number> = {}): string =>
+  catalogues[language.choice][key].replace(/\{(\w+)\}/g, (_, name: string) => String(values[name] ?? ""));
+
+/** A lesson's words in the chosen language. */
+export const said = (words: { en: string; de: string }): string => words[language.choice];
