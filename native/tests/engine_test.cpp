@@ -154,20 +154,22 @@ TEST(the_golden_hash_holds_for_any_batch_threads_and_instruction_set) {
     const std::string best = isa_name(current_isa());
     for (const Isa isa : available_isas()) {
         set_isa(isa_name(isa));
-        CHECK_EQUAL(hash_of_drive(kCars, 1), kGolden);
         CHECK_EQUAL(hash_of_drive(7, 2), kGolden);
+        if (!test::kEveryCase) continue;
+        CHECK_EQUAL(hash_of_drive(kCars, 1), kGolden);
         CHECK_EQUAL(hash_of_drive(1, 1), kGolden);
     }
     set_isa(best);
+    if (!test::kEveryCase) return;
     for (const size_t batch : {size_t{1}, size_t{7}, kCars}) {
         for (const int threads : {1, 2, 7}) CHECK_EQUAL(hash_of_drive(batch, threads), kGolden);
     }
 }
 
 TEST(frames_are_the_same_for_any_batch_and_threads) {
-    const uint64_t expected = hash_of_drive(1, 1, true);
-    CHECK_EQUAL(hash_of_drive(kCars, 7, true), expected);
+    const uint64_t expected = hash_of_drive(kCars, 7, true);
     CHECK_EQUAL(hash_of_drive(7, 2, true), expected);
+    if (test::kEveryCase) CHECK_EQUAL(hash_of_drive(1, 1, true), expected);
 }
 
 TEST(a_loaded_engine_goes_on_to_the_bit) {
