@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
+from collections.abc import Collection
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from racecraft.serve.door import guard
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.live.cars import LiveReader, Look
+from racecraft.serve.people.keys import Keys
 from racecraft.serve.streams import hub as hub_module
 from racecraft.serve.streams.hub import Hub
 
@@ -94,7 +99,7 @@ class Moments:
 
 def test_pictures_are_apart_from_poses_and_made_less_often(hub: Hub, monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
-    monkeypatch.setattr(hub_module.time, "monotonic", lambda: now)
+    monkeypatch.setattr(time, "monotonic", lambda: now)
     assert hub.eye("car", after=-1) is None
     hub._of("car").reader = cast(LiveReader, Moments())
     first = hub.live("car", after=-1)
@@ -105,9 +110,45 @@ def test_pictures_are_apart_from_poses_and_made_less_often(hub: Hub, monkeypatch
     assert picture is not None
     assert picture[0] == first[0]
     assert len(picture[1]) > 120 * 160
+    assert hub.live("car", after=first[0]) is None, "who looks a moment later is given the same"
+    now += 0.1
     hub.live("car", after=first[0])
     assert hub.eye("car", after=picture[0]) is None
     now += 0.25
     later = hub.eye("car", after=picture[0])
     assert later is not None
     assert later[0] == first[0] + 2
+
+
+class Doorkeeper:
+    """Stands for the keys of a league: counts how often it is asked."""
+
+    def __init__(self) -> None:
+        self.good, self.asked = {"one", "two"}, 0
+
+    def open_sessions(self, secrets: Collection[str]) -> set[str]:
+        self.asked += 1
+        return self.good & set(secrets)
+
+
+def test_a_hundred_tabs_cost_one_question_and_who_is_put_out_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    keys = Doorkeeper()
+
+    async def look() -> None:
+        nonlocal now
+        listeners = guard.Listeners(cast(Keys, keys))
+        tabs = ["one", "two"] * 50
+        with ExitStack() as stack:
+            for secret in tabs:
+                stack.enter_context(listeners.one_more(secret))
+            assert all(await asyncio.gather(*map(listeners.may_stay, tabs)))
+            assert keys.asked == 1
+            keys.good.remove("two")
+            now += guard.LOOK
+            assert await asyncio.gather(*map(listeners.may_stay, tabs)) == [True, False] * 50
+            assert keys.asked == 2
+        assert not listeners._here
+
+    asyncio.run(look())

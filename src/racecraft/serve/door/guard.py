@@ -7,9 +7,13 @@ a league people come with a session that `racecraft.serve.door.routes` gave them
 from __future__ import annotations
 
 import asyncio
+import functools
 import re
 import secrets
-from collections.abc import Callable
+import time
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 from urllib.parse import urlsplit
 
@@ -82,6 +86,7 @@ class Guard:
         self._needs_encryption = settings.needs_encryption
         self._tickets: set[str] = set()
         self._known: set[str] = set()
+        self._listeners = Listeners(keys)
 
     def ticket(self) -> str:
         """A secret that opens the console once."""
@@ -120,8 +125,9 @@ class Guard:
 
             answer = self._refuse(Request(scope)) or app
             if self._is_league and scope["path"].startswith(STREAMS) and answer is app:
-                stream = Listening(Request(scope), receive_so_much, may_stay=self._user)
-                await app(scope, stream.receive, send_with_headers)
+                stream = Listening(receive_so_much, may_stay=self._may_stay(Request(scope)))
+                with self._listeners.one_more(Request(scope).cookies.get(COOKIE)):
+                    await app(scope, stream.receive, send_with_headers)
                 if stream.has_left:
                     await send({"type": "http.response.body", "body": b"", "more_body": False})
             else:
@@ -184,6 +190,17 @@ class Guard:
             COOKIE, secret, httponly=True, samesite="strict", path="/", max_age=COOKIE_S, secure=self.is_secure
         )
 
+    def _may_stay(self, request: Request) -> Callable[[], Awaitable[bool]]:
+        """Asks whether who follows a stream still may: browsers all together, programs one by one."""
+        secret = request.cookies.get(COOKIE)
+
+        async def program_may() -> bool:
+            return await asyncio.to_thread(self._user, request) is not None
+
+        if secret is None or request.headers.get("authorization", "").startswith("Bearer "):
+            return program_may
+        return functools.partial(self._listeners.may_stay, secret)
+
     def _user(self, request: Request) -> int | None:
         """Who asks; of a league's people it is looked up every time, so that they are out as soon as they are."""
         request.state.scopes = None
@@ -208,17 +225,56 @@ class Guard:
         return user
 
 
+class Listeners:
+    """The browsers that follow streams: a hundred of them cost one question to the database now and then.
+
+    Args:
+        keys: What opens the door.
+    """
+
+    def __init__(self, keys: Keys) -> None:
+        self._keys = keys
+        self._here: Counter[str] = Counter()
+        self._good: set[str] = set()
+        self._until = 0.0
+        self._lock = asyncio.Lock()
+
+    @contextmanager
+    def one_more(self, secret: str | None) -> Iterator[None]:
+        """A stream of a browser that was just let in, as long as the block runs."""
+        if secret is None:
+            yield
+            return
+        self._here[secret] += 1
+        self._good.add(secret)
+        try:
+            yield
+        finally:
+            self._here[secret] -= 1
+            if not self._here[secret]:
+                del self._here[secret]
+
+    async def may_stay(self, secret: str) -> bool:
+        """Whether a browser's session is still good; the answer is at most half a `LOOK` old."""
+        async with self._lock:
+            if time.monotonic() >= self._until:
+                asked = set(self._here)
+                good = await asyncio.to_thread(self._keys.open_sessions, asked)
+                self._good = good | (set(self._here) - asked)  # who came meanwhile
+                self._until = time.monotonic() + LOOK / 2
+        return secret in self._good
+
+
 class Listening:
     """Somebody who follows a stream, until their session ends: to have it open is no way to stay.
 
     Args:
-        request: By which they do.
         receive: What the browser says.
-        may_stay: Who a request is from; None once it is nobody's.
+        may_stay: Whether they still may.
     """
 
-    def __init__(self, request: Request, receive: Receive, *, may_stay: Callable[[Request], int | None]) -> None:
-        self._request, self._receive, self._may_stay = request, receive, may_stay
+    def __init__(self, receive: Receive, *, may_stay: Callable[[], Awaitable[bool]]) -> None:
+        self._receive, self._may_stay = receive, may_stay
         self.has_left = False
 
     async def receive(self) -> Message:
@@ -227,7 +283,7 @@ class Listening:
         try:
             while not coming.done():
                 await asyncio.wait([coming], timeout=LOOK)
-                if not coming.done() and await asyncio.to_thread(self._may_stay, self._request) is None:
+                if not coming.done() and not await self._may_stay():
                     self.has_left = True
                     return {"type": "http.disconnect"}
             return coming.result()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import secrets
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Final, Literal
@@ -79,6 +80,14 @@ class Keys:
         """Whose cookie it is."""
         is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
         return self._user(sa.select(Session.user_id).where(Session.digest == digest_of(secret), is_valid))
+
+    def open_sessions(self, secrets: Collection[str]) -> set[str]:
+        """Those of some cookies that are somebody's, by one question."""
+        by_digest = {digest_of(secret): secret for secret in secrets}
+        is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
+        query = sa.select(Session.digest).where(Session.digest.in_(by_digest), is_valid)
+        with self._database.transaction() as session:
+            return {by_digest[digest] for digest in session.scalars(query)}
 
     def close_session(self, secret: str) -> None:
         """Sign a browser out."""

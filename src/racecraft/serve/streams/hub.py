@@ -23,6 +23,7 @@ from racecraft.sim.objects import OBJECT_KINDS
 
 FRESH: Final = 0.3  # s that a look at the jobs is good for
 MAX_MODELS: Final = 64  # that are remembered
+GLANCE: Final = 1 / 24  # s that a look at the cars is good for: half a tick of a stream
 BLINK: Final = 0.24  # s between two pictures: every third tick of a stream
 MAX_SHARED: Final = 1 << 16  # bytes of points that are kept for the next tab; a new one reads all there are by itself
 
@@ -33,6 +34,8 @@ class _Seen:
 
     reader: LiveReader
     sequence: int = -1
+    is_live: bool = False
+    live_until: float = 0.0
     live: bytes = b""
     look: Look | None = None
     """The moment that `live` shows."""
@@ -64,11 +67,15 @@ class Hub:
     def live(self, name: str, *, after: int) -> tuple[int, bytes] | None:
         """The cars as they are now, as an event, and its number; None when there is nothing after number `after`."""
         seen = self._of(name)
-        look = seen.reader.look(after=seen.sequence)
+        if time.monotonic() >= seen.live_until:
+            look, seen.is_live = seen.reader.look(after=seen.sequence), seen.reader.is_live
+            seen.live_until = time.monotonic() + GLANCE
+        else:
+            look = None
         if look is not None:
             event = ServerSentEvent(json.dumps(_document(look), separators=(",", ":")), event="live")
             seen.sequence, seen.live, seen.look = look.sequence, event.encode(), look
-        return (seen.sequence, seen.live) if seen.sequence not in (-1, after) and seen.reader.is_live else None
+        return (seen.sequence, seen.live) if seen.sequence not in (-1, after) and seen.is_live else None
 
     def eye(self, name: str, *, after: int) -> tuple[int, bytes] | None:
         """What the first car saw at the newest moment that `live` gave, and its number; pictures are made now and then.
@@ -79,7 +86,7 @@ class Hub:
         if seen.look is not None and seen.eye[0] != seen.sequence and time.monotonic() >= seen.eye_until:
             event = ServerSentEvent(json.dumps(_picture(seen.look), separators=(",", ":")), event="eye")
             seen.eye, seen.eye_until = (seen.sequence, event.encode()), time.monotonic() + BLINK
-        return seen.eye if seen.eye[0] not in (-1, after) and seen.reader.is_live else None
+        return seen.eye if seen.eye[0] not in (-1, after) and seen.is_live else None
 
     async def points(self, name: str, *, after: int) -> tuple[int, bytes] | None:
         """The points of the curves behind an offset, as an event, and where they end; None when there are none."""
