@@ -115,6 +115,10 @@ show(
 print(f"The best constant ε loses {min(losses):.0f}, at ε = {epsilons[int(np.argmin(losses))]:g}.")
 print(f"One that fades, 10 / (10 + pulls), loses {fading:.0f}.")
 
+# %% plaything bandit [markdown]
+# *To play with:* this lesson's page in the console (`racecraft serve`, *Course*) has five such machines. Pull them
+# yourself, then let ε-greedy pull, and compare the regret.
+
 # %% [markdown]
 # ## Explore early, exploit late
 #

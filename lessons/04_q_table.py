@@ -155,6 +155,11 @@ show(
     "who-reaches-the-goal",
 )
 
+# %% plaything grid [markdown]
+# *To play with:* this lesson's page in the console (`racecraft serve`, *Course*) has a grid whose table fills while one
+# watches. Go step by step until the first goal is found, and see how its worth creeps backwards; then let it run, and
+# try ε = 0, or a small γ.
+
 # %% [markdown]
 # ## SARSA beside a cliff
 #

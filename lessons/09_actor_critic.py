@@ -69,6 +69,10 @@ for lam, runs in learned.items():
 # caused it. With 0.95 and with 1 it stands for more than a hundred. Between those two there is no winner in three
 # seeds: 500, 113, 114 against 358, 115, 129 at the end.
 
+# %% plaything gae [markdown]
+# *To play with:* this lesson's page in the console (`racecraft serve`, *Course*) has eight surprises to drag. At λ = 0
+# the line lies on them; the nearer λ comes to 1, the further back the last one is heard.
+
 # %% [markdown]
 # ## A3C: nobody waits
 #

@@ -73,6 +73,10 @@ for name, runs in curves.items():
 # before it recovered: it had believed old news until nothing was left of what it could. At the end all of them stand
 # for 500 steps. The clip does not make the best better; it keeps the way there from breaking off.
 
+# %% plaything clip [markdown]
+# *To play with:* this lesson's page in the console (`racecraft serve`, *Course*) has the two curves to drag a ratio
+# along. For a bad action the flat part is on the other side.
+
 # %% [markdown]
 # ## SAC: earn much, and stay undecided
 #
