@@ -49,6 +49,7 @@ CONSOLE = (
     "compression",
     "tab",
     "problems",
+    "replies",
     "store",
     "people",
     "live",

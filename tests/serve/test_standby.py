@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -83,3 +85,8 @@ def test_without_a_server_nobody_waits(standby: Standby) -> None:
     assert worker.stdin is not None
     worker.stdin.close()  # as the system does when the server is killed
     assert worker.wait(PATIENCE) == 0
+
+
+def test_a_worker_does_not_load_the_server() -> None:
+    said = "import sys; from racecraft.serve.jobs.worker import load; load(); sys.exit('fastapi' in sys.modules)"
+    subprocess.run([sys.executable, "-c", said], check=True)

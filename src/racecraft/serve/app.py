@@ -14,7 +14,7 @@ from typing import Final
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
 
-from racecraft.serve import problems, tab
+from racecraft.serve import replies, tab
 from racecraft.serve.audit import routes as audit
 from racecraft.serve.compression import BROTLI, Compressed, accepts, gzipped
 from racecraft.serve.contests import routes as contests
@@ -127,7 +127,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.state.guard = guard = Guard(keys, settings, hosts)
     app.add_middleware(Compressed)  # behind the guard, which stands before everything
     app.add_middleware(guard.middleware)
-    problems.install(app)
+    replies.install(app)
     parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, races]
     parts += [contests, jobs, events, door, audit, lessons]
     for part in parts:
@@ -139,7 +139,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     def asset(name: str, request: Request) -> Response:
         path = PAGES / "assets" / name
         if "/" in name or path.suffix not in KINDS or not path.is_file():
-            return problems.problem(404, "NotFound", f"There is no file {name[:80]!r}.")
+            return replies.problem(404, "NotFound", f"There is no file {name[:80]!r}.")
         headers = {"Cache-Control": "public, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
         small, wanted = path.with_name(name + BROTLI), request.headers.get("accept-encoding", "")
         kind = KINDS[path.suffix]
@@ -155,7 +155,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     @app.get("/{path:path}", include_in_schema=False)
     def page(path: str, request: Request) -> Response:
         if path == "api" or path.startswith("api/"):
-            return problems.problem(404, "NotFound", f"There is nothing at /{path[:80]}.")
+            return replies.problem(404, "NotFound", f"There is nothing at /{path[:80]}.")
         nonce = secrets.token_urlsafe(16)
         try:
             text = (PAGES / "index.html").read_text(encoding="utf-8")

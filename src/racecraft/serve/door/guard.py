@@ -24,7 +24,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from racecraft.serve.people.keys import Keys
-from racecraft.serve.problems import problem
+from racecraft.serve.replies import problem
 from racecraft.serve.settings import COOKIE, LOOPBACK, OWNER, ServeSettings
 
 MAX_BODY: Final = 8 << 20  # bytes
