@@ -118,7 +118,7 @@ COMMANDS: dict[str, list[str]] = {
     ],
     "tune": [
         "tune -t oval -r racing --search lr --for laps -m 1 --trials 1 --trial-steps 64 --actions continuous"
-        " --hyperparameters H --from R/a -s 1 --num-threads 1 -n u --root U --json",
+        " --hyperparameters H --from R/a -s 1 --num-threads 1 --processes 1 --window 2 -n u --root U --json",
         "tune --model-metadata M",
         "tune --resume U/u",
     ],

@@ -91,7 +91,7 @@ def test_a_search_is_stopped_and_one_that_fails_says_why(console: RunningConsole
     client.post(f"/api/jobs/{job['id']}/cancel")
     assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
     card = client.get(path).json()[0]
-    assert (card["best"], [trial["state"] for trial in card["trials"]]) == (None, ["out of time"])
+    assert (card["best"], {trial["state"] for trial in card["trials"]}) == (None, {"out of time"})
 
     wrong = console.create(name="wrong", track="oval", train=False)
     (console.runs / wrong / "reward_function.py").write_text(

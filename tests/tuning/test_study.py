@@ -12,8 +12,18 @@ import pytest
 from racecraft.errors import ConfigError, RewardError, RunError
 from racecraft.learn import PPOConfig
 from racecraft.run import RunFolder
-from racecraft.tuning import TrialOutcome, Tuning, find_constants, start_tuning
-from racecraft.tuning import study as study_module
+from racecraft.tuning import (
+    Parameter,
+    TrialOutcome,
+    Tuning,
+    drawing,
+    find_constants,
+    record,
+    seats,
+    start_tuning,
+    study,
+)
+from racecraft.tuning.trial import Order, Report
 
 TINY = PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1)
 
@@ -55,14 +65,81 @@ def test_every_trial_is_a_run_with_the_numbers_it_was_given(tmp_path: Path) -> N
 def test_a_search_goes_on_where_it_was_killed(tmp_path: Path) -> None:
     folder = begin(tmp_path)
     Tuning(folder).run(minutes=5, max_trials=2)
-    tuning = Tuning(folder)
-    study = tuning._study()
-    trial = study.ask()  # and here the process dies
-    values = {parameter.name: study_module._suggest(trial, parameter) for parameter in tuning.space}
+    number, values, _ = Tuning(folder)._record().begin(2)  # and here the process dies
+    assert number == 2
     outcome = Tuning(folder).run(minutes=5, max_trials=1)
-    assert [trial.state for trial in outcome.trials] == ["complete", "complete", "fail", "complete"]
+    assert [trial.state for trial in outcome.trials] == ["complete", "complete", "out of time", "complete"]
     assert outcome.trials[3].params == values
     assert len(Tuning(folder).run(minutes=5, max_trials=1).trials) == 5  # once is enough
+
+
+@pytest.mark.slow
+def test_trials_at_once_are_the_same_trials_also_where_one_was_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Mortal(seats.ProcessSeat):
+        def run(self, order: Any) -> Any:
+            if order.run.endswith("trial-0001"):
+                self._started().kill()
+            return super().run(order)
+
+    monkeypatch.setattr(drawing, "BEGINNERS", 2)  # trials 4 and 5 are chosen by the estimator, 1 to 3 at random
+    monkeypatch.setattr(study, "ProcessSeat", Mortal)
+    found = []
+    for processes in (1, 2):
+        folder = begin(tmp_path, name=f"by-{processes}", window=3)
+        outcome = Tuning(folder).run(minutes=5, max_trials=6, processes=processes)
+        done = [trial for trial in outcome.trials if trial.state == "complete"]
+        found.append(sorted((str(trial.params), trial.value, trial.completion, trial.steps) for trial in done))
+        assert [trial.state for trial in outcome.trials].count("out of time") == processes - 1
+    assert found[0] == found[1]
+    assert len(found[0]) == 6
+
+
+@pytest.mark.slow
+def test_trials_at_once_end_with_the_time(tmp_path: Path) -> None:
+    outcome = Tuning(begin(tmp_path, trial_steps=10**8)).run(minutes=1 / 60, processes=2)
+    assert [trial.state for trial in outcome.trials] == ["out of time"] * 2
+
+
+def test_a_seat_that_was_stopped_before_its_process_was_there_trains_nothing() -> None:
+    seat = seats.ProcessSeat()
+    seat.stop()
+    with pytest.raises(seats.SeatLost):
+        seat.run(Order(run="none", goal="laps", trial_steps=1))
+
+
+def test_who_is_ready_first_does_not_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drawing, "BEGINNERS", 2)
+    space = [Parameter("gamma", "hyperparameter", 0.9, 0.99, False, False, 0.95)]
+    found = []
+    for name, last_first in (("a", False), ("b", True)):
+        (tmp_path / name).mkdir()
+        book = record.Record(tmp_path / name, space, seed=3, window=3)
+        under_way: dict[int, tuple[int, float]] = {}
+        for _ in range(7):
+            while len(under_way) < 3 and (place := book.next_place(list(under_way))) is not None:
+                number, values, _ = book.begin(place)
+                under_way[place] = number, values["gamma"]
+            number, gamma = under_way.pop(max(under_way) if last_first else min(under_way))
+            value = (gamma - 0.97) ** 2
+            marks = (value,)
+            book.tell(
+                number,
+                Report(reason="steps", value=value, marks=marks, completion=1.0, best_lap=None, steps=1, seconds=1.0),
+            )
+        found.append([trial.params["gamma"] for trial in book.trials()][:7])
+    assert found[0] == found[1]
+    assert len(set(found[0])) == 7
+
+
+def test_what_kills_its_process_again_and_again_has_failed(tmp_path: Path) -> None:
+    book = Tuning(begin(tmp_path))._record()
+    for _ in range(record.MAX_LOSSES):
+        number, _, _ = book.begin(0)
+        book.tell_cut(number, is_lost=True)
+    assert [trial.state for trial in book.trials()] == ["out of time", "out of time", "fail"]
+    assert book.next_place([]) == 1
 
 
 def test_at_the_end_of_the_time_the_trial_under_way_is_kept_for_later(tmp_path: Path) -> None:
@@ -106,12 +183,10 @@ def test_trials_begin_with_a_parents_weights_and_awss_numbers(tmp_path: Path, mo
 
 
 def test_a_trial_that_lags_behind_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    optuna = pytest.importorskip("optuna")
-    eager = optuna.pruners.ThresholdPruner(upper=0.5)  # nobody is that far after 64 steps
-    monkeypatch.setattr(optuna.pruners, "MedianPruner", lambda **_: eager)
+    monkeypatch.setattr(record, "bars", lambda *_: (0.0, 0.5))  # nobody is that far after 128 steps
     outcome = Tuning(begin(tmp_path, trial_steps=10**6)).run(minutes=5, max_trials=2)
     assert [trial.state for trial in outcome.trials] == ["pruned", "pruned"]
-    assert all(trial.steps == 64 for trial in outcome.trials)
+    assert all(trial.steps == 128 for trial in outcome.trials)  # never at its first evaluation
     assert not outcome.is_interrupted
 
 

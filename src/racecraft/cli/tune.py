@@ -9,6 +9,8 @@ import typer
 
 from racecraft.cli.app import INTERRUPTED, Json, app, is_given, print_json
 
+_OF_A_CALL = ("resume", "minutes", "trials", "processes", "as_json")
+
 
 @app.command()
 def tune(
@@ -41,6 +43,13 @@ def tune(
     ] = None,
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of every trial and of the search.")] = 0,
     num_threads: Annotated[int, typer.Option("--num-threads", help="0 takes one per core.")] = 0,
+    processes: Annotated[
+        int, typer.Option("--processes", help="Trials at once, up to --window; 0 for one per core. Same results.")
+    ] = 0,
+    window: Annotated[
+        int,
+        typer.Option("--window", help="Trials that may be under way at once; trial n knows those up to n - window."),
+    ] = 4,
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the search's folder.")] = None,
     root: Annotated[Path, typer.Option("--root", help="Folder that holds the searches.")] = Path("tuning"),
     resume: Annotated[Path | None, typer.Option("--resume", help="Go on with this search.")] = None,
@@ -49,7 +58,7 @@ def tune(
     """Tune a reward's constants and hyperparameters within minutes."""
     if resume is not None:
         for option in context.command.params:
-            if is_given(context, str(option.name)) and option.name not in ("resume", "minutes", "trials", "as_json"):
+            if is_given(context, str(option.name)) and option.name not in _OF_A_CALL:
                 context.fail(f"{option.opts[0]} does not go with --resume: a search keeps what it was started with.")
     from racecraft.cli import tune_text
     from racecraft.tuning import Tuning, start_tuning
@@ -64,6 +73,7 @@ def tune(
             search=search,
             goal=goal,
             trial_steps=trial_steps,
+            window=window,
             model_metadata=model_metadata,
             hyperparameters=hyperparameters,
             parent=parent,
@@ -73,7 +83,7 @@ def tune(
             root=root,
         )
     tuning = Tuning(folder, on_trial=None if as_json else lambda trial: tune_text.say_trial(trial, tuning.goal))
-    outcome = tuning.run(minutes=minutes, max_trials=trials)
+    outcome = tuning.run(minutes=minutes, max_trials=trials, processes=processes)
     if as_json:
         print_json(outcome.to_dict())
     else:

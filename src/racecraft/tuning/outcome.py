@@ -15,7 +15,7 @@ class TrialOutcome:
 
     number: int
     state: str
-    """``complete``, ``pruned`` (it lagged behind), ``out of time`` or ``fail``."""
+    """``running``, ``complete``, ``pruned`` (it lagged behind), ``out of time`` or ``fail``."""
     value: float | None
     """What the search makes small: camera steps or seconds; None where it did not come to that."""
     params: dict[str, float]

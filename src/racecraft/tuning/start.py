@@ -17,7 +17,7 @@ from racecraft.training.plan import Plan, make_plan
 from racecraft.training.start import read_settings
 from racecraft.tuning.constants import find_constants
 from racecraft.tuning.space import Parameter, make_space
-from racecraft.tuning.study import FORMAT, GOALS
+from racecraft.tuning.study import FORMAT, GOALS, MAX_WINDOW, WINDOW
 
 
 def start_tuning(
@@ -26,6 +26,7 @@ def start_tuning(
     search: Sequence[str] = (),
     goal: str = "laps",
     trial_steps: int = 40_000,
+    window: int = WINDOW,
     root: str | Path = "tuning",
     name: str | None = None,
     **settings: Any,
@@ -38,6 +39,7 @@ def start_tuning(
             all such constants, and the usual hyperparameters.
         goal: ``laps`` (fewest camera steps until every evaluation lap is completed) or ``lap_time`` (the fastest lap).
         trial_steps: Camera steps after which a trial ends.
+        window: How many trials may be under way at once: trial n is chosen by the results up to trial n - window.
         root: Where such folders lie.
         name: Of the folder; by default a new one.
         settings: Others of `racecraft.training.train`; with a ``parent`` every trial begins with its weights as they
@@ -47,7 +49,13 @@ def start_tuning(
         RacecraftError: An input is wrong.
     """
     return make_tuning(
-        make_plan(track, **settings), search=search, goal=goal, trial_steps=trial_steps, root=root, name=name
+        make_plan(track, **settings),
+        search=search,
+        goal=goal,
+        trial_steps=trial_steps,
+        window=window,
+        root=root,
+        name=name,
     )
 
 
@@ -92,6 +100,7 @@ def make_tuning(
     search: Sequence[str] = (),
     goal: str = "laps",
     trial_steps: int = 40_000,
+    window: int = WINDOW,
     root: str | Path = "tuning",
     name: str | None = None,
 ) -> Path:
@@ -103,6 +112,7 @@ def make_tuning(
     check_installed("optuna", "racecraft tune")  # importing it takes a second, which a server does not have
     check_choice("goal", goal, GOALS)
     check_whole("trial_steps", trial_steps, 1, is_plain=True)
+    check_whole("window", window, 1, MAX_WINDOW, is_plain=True)
     space = space_of(plan, search)
     folder = Path(root) / (_checked(name) if name is not None else f"tuning-{time.strftime('%Y%m%d-%H%M%S')}")
     try:
@@ -115,6 +125,7 @@ def make_tuning(
                 "format": FORMAT,
                 "goal": goal,
                 "trial_steps": trial_steps,
+                "window": window,
                 "space": [parameter.to_dict() for parameter in space],
                 "settings": plan.settings.to_dict(),
                 "parent": None if plan.parent is None else plan.parent.address,

@@ -7,43 +7,48 @@
                   result.json      the outcome so far
 
 Optuna chooses (a tree-structured Parzen estimator, https://papers.nips.cc/paper/4443), a trial trains for at most
-so many camera steps, and one whose evaluations lag behind the median of those before it at the same step is ended.
+so many camera steps, and one whose evaluations lag behind the median of those before it is ended. Several are made at
+once, each at a seat; which numbers they get does not depend on that, see `racecraft.tuning.drawing`.
 """
 
 from __future__ import annotations
 
+import os
+import queue
+import signal
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from types import FrameType
+from typing import Any, Final
 
 from racecraft.agent import ModelMetadata
 from racecraft.checks import check_whole, require
 from racecraft.errors import ConfigError, RacecraftError, RunError
-from racecraft.extras import needed_for
+from racecraft.extras import check_installed
 from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.run.lock import exclusive_lock
-from racecraft.training import EvaluationReport, SilentReporter, TrainResult, Until
-from racecraft.training.job import Training
+from racecraft.training import Until
 from racecraft.training.parent import open_parent
 from racecraft.training.plan import Plan
 from racecraft.training.settings import TrainSettings
 from racecraft.tuning.constants import rewrite_constants
 from racecraft.tuning.outcome import Outcome, TrialOutcome
+from racecraft.tuning.record import Record, name_of
+from racecraft.tuning.seats import HereSeat, ProcessSeat, Seat, SeatLost
 from racecraft.tuning.space import Parameter
-
-if TYPE_CHECKING:
-    import optuna
+from racecraft.tuning.trial import Order, Report
 
 GOALS: Final = ("laps", "lap_time")
 FORMAT: Final = 1
-BEGINNERS: Final = 6
-"""Trials drawn at random before the estimator has something to go by; the first one is what the user has now."""
-_NO_LAP: Final = 1000.0  # s, of a trial that completed no lap
+WINDOW: Final = 4
+"""Trials that may be under way at once, unless a search says otherwise."""
+MAX_WINDOW: Final = 256
 
 
 class Tuning:
@@ -67,6 +72,7 @@ class Tuning:
             if document["format"] != FORMAT:
                 raise RunError(f"{self.folder} was written by another version of Racecraft.", hint="Update Racecraft.")
             self.goal, self.trial_steps = str(document["goal"]), int(document["trial_steps"])
+            self.window = int(document.get("window", 1))
             self.space = tuple(Parameter.from_dict(dict(parameter)) for parameter in document["space"])
             settings = TrainSettings.from_dict(dict(document["settings"]))
             reward = (self.folder / "reward_function.py").read_text(encoding="utf-8")
@@ -74,6 +80,7 @@ class Tuning:
             parent, foreign = document.get("parent"), bool(document.get("foreign", False))
         except (ConfigError, KeyError, TypeError, ValueError, OSError) as error:
             raise RunError(f"{self.folder} cannot be opened: {error}") from error
+        check_installed("optuna", "racecraft tune")
         self.plan = Plan(
             settings=settings,
             reward=reward,
@@ -83,16 +90,17 @@ class Tuning:
             foreign=foreign,
         )
         self._on_trial = on_trial
-        self._optuna = _optuna()
         self._stop = threading.Event()
-        self._training: Training | None = None
+        self._news: queue.SimpleQueue[tuple[Seat, Report | BaseException] | None] = queue.SimpleQueue()
 
-    def run(self, *, minutes: float = 10.0, max_trials: int = 0) -> Outcome:
+    def run(self, *, minutes: float = 10.0, max_trials: int = 0, processes: int = 1) -> Outcome:
         """Search until the time is up.
 
         Args:
-            minutes: Wall clock of this call; a trial under way then is ended, and begun again by the next call.
+            minutes: Wall clock of this call; trials under way then are ended, and begun again by the next call.
             max_trials: Trials of this call; 0 sets no limit.
+            processes: Trials at once, at most as many as the search's window; 1 trains in this process, 0 takes
+                one per core, on a GPU just one. The trials are the same for any number.
 
         Raises:
             ConfigError: A limit is not allowed.
@@ -101,21 +109,24 @@ class Tuning:
         """
         require("minutes", minutes, 0 < minutes <= 30 * 24 * 60, "a number above 0, up to 43,200")
         check_whole("trials", max_trials, 0, 100_000)
+        check_whole("processes", processes, 0, MAX_WINDOW)
+        most = processes or (_num_cores() if self.plan.settings.device == "cpu" else 1)
+        count = min(most, self.window)
+        seats: list[Seat] = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
         with exclusive_lock(self.folder / ".lock"):
-            study = self._study()
-            self._take_up(study)
-            deadline = time.monotonic() + 60.0 * minutes  # however long a storage takes to open
-            done, is_interrupted = 0, False
-            while time.monotonic() < deadline and not is_interrupted and (not max_trials or done < max_trials):
-                if self._stop.is_set():
-                    is_interrupted = True
-                    break
-                is_interrupted = self._trial(study, deadline)
-                done += 1
-                self._write(self._outcome(study, is_interrupted=is_interrupted))
-            outcome = self._outcome(study, is_interrupted=is_interrupted)
-            self._write(outcome)
-        return outcome
+            record = self._record()
+            record.take_up()
+            call = _Call(record, seats, deadline=time.monotonic() + 60.0 * minutes, max_trials=max_trials)
+            try:
+                with self._interruptible():
+                    self._search(call)
+            finally:
+                for number, _ in call.busy.values():
+                    record.tell_cut(number)
+                for seat in seats:
+                    seat.close()
+            is_interrupted = self._stop.is_set() and not call.is_full
+            return self._write(record, is_interrupted=is_interrupted)
 
     def past(self) -> tuple[TrialOutcome, ...]:
         """The trials so far.
@@ -123,65 +134,95 @@ class Tuning:
         Raises:
             RunError: The storage is damaged.
         """
-        states = self._optuna.trial.TrialState
-        return tuple(self._seen(trial) for trial in self._study().trials if trial.state != states.WAITING)
+        return self._record().trials()
+
+    def seconds(self) -> float:
+        """Wall clock of all calls so far.
+
+        Raises:
+            RunError: The storage is damaged.
+        """
+        return self._record().seconds
 
     def stop(self) -> None:
-        """Ask the search to end; the trial under way is begun again by the next `run`. Safe from any thread."""
+        """Ask the search to end; trials under way are begun again by the next `run`. Safe from any thread."""
         self._stop.set()
-        training = self._training
-        if training is not None:
-            training.stop()
+        self._news.put(None)
 
-    # ---- one trial
+    # ---- the search
 
-    def _trial(self, study: optuna.Study, deadline: float) -> bool:
-        """Ask, train, tell; whether the user interrupted it."""
-        states = self._optuna.trial.TrialState
-        trial = study.ask()
-        values = {parameter.name: _suggest(trial, parameter) for parameter in self.space}
-        name = f"trial-{trial.number:04d}"
-        begun = time.monotonic()
-        trial.set_user_attr("run", name)
-        judge = _Judge(trial, goal=self.goal)
-        try:
-            run = self._start(values, name)
-            training = Training(run, reporter=judge, is_checked=True)
-            judge.training = self._training = training
-            if self._stop.is_set():  # between the look and the trial
-                training.stop()
-            timer = threading.Timer(max(deadline - begun, 0.0), training.stop)
-            timer.daemon = True
-            timer.start()
+    def _search(self, call: _Call) -> None:
+        """Give trials to seats and take what comes of them, until there is nothing more to do."""
+        is_told = False
+        while True:
+            is_over = self._stop.is_set() or call.failure is not None or time.monotonic() >= call.deadline
+            if is_over and not is_told:
+                is_told = True
+                for seat in call.busy:
+                    seat.stop()
+            while not is_over and (given := call.next_place()) is not None:
+                self._begin(call, *given)
+            if not call.busy:
+                break
             try:
-                result = training.run()
-            finally:
-                timer.cancel()
+                news = self._news.get(timeout=None if is_told else max(call.deadline - time.monotonic(), 0.0))
+            except queue.Empty:
+                continue  # the time is up
+            if news is not None:
+                self._end(call, *news)
+        if call.failure is not None:
+            raise call.failure
+
+    def _begin(self, call: _Call, seat: Seat, place: int) -> None:
+        number, values, bars = call.record.begin(place)
+        call.busy[seat] = number, place
+        try:
+            run = self._start(values, name_of(number))
         except RacecraftError as error:
-            trial.set_user_attr("error", f"{type(error).__name__}: {error}")
-            study.tell(trial, state=states.FAIL)
-            if trial.number == 0:
-                raise  # what the user has now does not train: nothing to search around
-            result = None
-        except BaseException:
-            trial.set_user_attr("cut", True)  # the next call begins it again
-            study.tell(trial, state=states.FAIL)
-            raise
-        if result is not None:
-            for attribute, value in judge.attributes(result).items():
-                trial.set_user_attr(attribute, value)
-            trial.set_user_attr("seconds", time.monotonic() - begun)
-            if judge.is_pruned:
-                study.tell(trial, state=states.PRUNED)
-            elif result.reason == "interrupted":
-                trial.set_user_attr("cut", True)
-                study.tell(trial, state=states.FAIL)
-            else:
-                study.tell(trial, judge.score(result, self.trial_steps))
+            self._news.put((seat, error))
+            return
+        order = Order(
+            run=str(run.path.resolve()),
+            goal=self.goal,
+            trial_steps=self.trial_steps,
+            bars=bars,
+            num_threads=0 if len(call.seats) == 1 else max(1, _num_cores() // len(call.seats)),
+        )
+
+        def work() -> None:
+            outcome: Report | BaseException
+            try:
+                outcome = seat.run(order)
+            except BaseException as error:  # told to who waits for it
+                outcome = error
+            self._news.put((seat, outcome))
+
+        self._write(call.record)
+        threading.Thread(target=work, name=run.name, daemon=True).start()
+
+    def _end(self, call: _Call, seat: Seat, outcome: Report | BaseException) -> None:
+        record, (number, place) = call.record, call.busy[seat]
+        if isinstance(outcome, RacecraftError):
+            record.tell_failed(number, f"{type(outcome).__name__}: {outcome}")
+            if place == 0:
+                call.failure = outcome  # what the user has now does not train: nothing to search around
+        elif isinstance(outcome, SeatLost):
+            record.tell_cut(number, is_lost=not self._stop.is_set() and time.monotonic() < call.deadline)
+        elif isinstance(outcome, BaseException):
+            record.tell_cut(number)
+            call.failure = outcome
+        elif outcome.reason == "interrupted":
+            record.tell_cut(number, outcome)
+        else:
+            record.tell(number, outcome)
+        del call.busy[seat]
+        trial = record.trial(number)
+        call.num_settled += trial.state != "out of time"
+        now = time.monotonic()
+        record.seconds, call.counted = record.seconds + now - call.counted, now
         if self._on_trial is not None:
-            self._on_trial(self._seen(study.trials[trial.number]))
-        is_cut = result is not None and result.reason == "interrupted" and not judge.is_pruned
-        return is_cut and time.monotonic() < deadline
+            self._on_trial(trial)
+        self._write(record)
 
     def _start(self, values: dict[str, float | int], name: str) -> RunFolder:
         """The run folder of a trial."""
@@ -200,137 +241,73 @@ class Tuning:
 
     # ---- the study
 
-    def _study(self) -> optuna.Study:
-        """The study in the folder's database, made where there is none."""
-        library = self._optuna
-        file = self.folder / "study.sqlite"
-        try:
-            storage = library.storages.RDBStorage(f"sqlite:///{file.resolve()}")
-            study: optuna.Study = library.create_study(
-                study_name="racecraft",
-                storage=storage,
-                load_if_exists=True,
-                direction="minimize",
-                pruner=library.pruners.MedianPruner(n_startup_trials=4, n_warmup_steps=1),
-            )
-        except Exception as error:
-            message = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise RunError(f"{file} cannot be used: {message}.", hint="Start a new tuning.") from error
-        if not study.trials:
-            study.enqueue_trial({parameter.name: parameter.default for parameter in self.space})
-        # Drawn anew by each call, or a call would repeat the random trials of the one before.
-        seed = self.plan.settings.seed + len(study.trials)
-        study.sampler = library.samplers.TPESampler(seed=seed, n_startup_trials=BEGINNERS)
-        return study
+    def _record(self) -> Record:
+        return Record(self.folder, self.space, seed=self.plan.settings.seed, window=self.window)
 
-    def _take_up(self, study: optuna.Study) -> None:
-        """Trials that a kill or the end of the time cut are to begin again."""
-        states = self._optuna.trial.TrialState
-        for trial in study.trials:
-            is_killed = trial.state == states.RUNNING
-            if is_killed:
-                study.tell(trial.number, state=states.FAIL)
-            is_cut = is_killed or (trial.state == states.FAIL and trial.user_attrs.get("cut") is True)
-            if is_cut and not any(_params(other) == trial.params for other in study.trials[trial.number + 1 :]):
-                study.enqueue_trial(trial.params)
-
-    # ---- tell
-
-    def _seen(self, trial: optuna.trial.FrozenTrial) -> TrialOutcome:
-        attributes = trial.user_attrs
-        state = "out of time" if attributes.get("cut") is True else trial.state.name.lower()
-        return TrialOutcome(
-            number=trial.number,
-            state=state,
-            value=trial.value,
-            params=dict(trial.params),
-            run=str(self.folder / str(attributes.get("run", f"trial-{trial.number:04d}"))),
-            completion=attributes.get("completion"),
-            best_lap_seconds=attributes.get("best_lap"),
-            steps=attributes.get("steps"),
-            seconds=attributes.get("seconds"),
-            error=str(attributes.get("error", "")),
-        )
-
-    def _outcome(self, study: optuna.Study, *, is_interrupted: bool) -> Outcome:
-        states = self._optuna.trial.TrialState
-        trials = [trial for trial in study.trials if trial.state != states.WAITING]
-        return Outcome(
+    def _write(self, record: Record, *, is_interrupted: bool = False) -> Outcome:
+        """The outcome so far, in its file."""
+        outcome = Outcome(
             folder=self.folder,
             goal=self.goal,
             space=self.space,
-            trials=tuple(self._seen(trial) for trial in trials),
-            importances=_importances(self._optuna, study),
+            trials=record.trials(),
+            importances=record.importances(),
             is_interrupted=is_interrupted,
         )
-
-    def _write(self, outcome: Outcome) -> None:
         try:
             write_json(self.folder / "result.json", outcome.to_dict())
         except OSError as error:
             raise RunError(f"{self.folder / 'result.json'} cannot be written: {error.strerror or error}.") from error
+        return outcome
+
+    @contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        """Turn the first Ctrl-C or SIGTERM into a clean end; a second Ctrl-C interrupts at once."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def handle(number: int, frame: FrameType | None) -> None:
+            if self._stop.is_set() and number == signal.SIGINT:
+                raise KeyboardInterrupt
+            self.stop()
+
+        before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
-class _Judge(SilentReporter):
-    """Follows a trial's evaluations, and ends it when it lags behind."""
+@dataclass
+class _Call:
+    """What one call of `Tuning.run` has under way."""
 
-    def __init__(self, trial: optuna.Trial, *, goal: str) -> None:
-        self.training: Training | None = None
-        self.is_pruned = False
-        self._trial, self._goal = trial, goal
-        self._best = 0.0
-        self._count = 0
+    record: Record
+    seats: list[Seat]
+    deadline: float
+    max_trials: int
+    busy: dict[Seat, tuple[int, int]] = field(default_factory=dict)
+    """Number and place of the trial at a seat."""
+    num_settled: int = 0
+    failure: BaseException | None = None
+    counted: float = field(default_factory=time.monotonic)
+    """Until when the record has the seconds."""
 
-    def evaluation(self, report: EvaluationReport) -> None:
-        """Compare with the trials before at the same evaluation: completion, then the lap time; less is better."""
-        self._best = max(self._best, report.completion)
-        lap = report.best_lap if self._goal == "lap_time" and report.best_lap is not None else _NO_LAP
-        self._trial.report(1.0 - report.completion + lap / _NO_LAP, step=self._count)
-        self._count += 1
-        if self.training is not None and self._trial.should_prune():
-            self.is_pruned = True
-            self.training.stop()
+    @property
+    def is_full(self) -> bool:
+        """Whether all trials that were wanted have ended."""
+        return 0 < self.max_trials <= self.num_settled
 
-    def score(self, result: TrainResult, trial_steps: int) -> float:
-        """The trial's value, less is better: camera steps, or seconds."""
-        if self._goal == "lap_time":
-            if result.best_lap_seconds is not None:
-                return result.best_lap_seconds
-            return _NO_LAP * (2.0 - self._best)
-        return float(result.steps) if result.reason == "laps" else trial_steps * (2.0 - self._best)
-
-    def attributes(self, result: TrainResult) -> dict[str, Any]:
-        """What the table shows of a trial."""
-        return {"completion": self._best, "best_lap": result.best_lap_seconds, "steps": result.steps}
+    def next_place(self) -> tuple[Seat, int] | None:
+        """A free seat and what is to be done there; None when there is no such."""
+        free = next((seat for seat in self.seats if seat not in self.busy), None)
+        if free is None or (self.max_trials and self.num_settled + len(self.busy) >= self.max_trials):
+            return None
+        place = self.record.next_place([place for _, place in self.busy.values()])
+        return None if place is None else (free, place)
 
 
-def _suggest(trial: optuna.Trial, parameter: Parameter) -> float | int:
-    if parameter.is_whole:
-        return trial.suggest_int(parameter.name, int(parameter.low), int(parameter.high), log=parameter.is_log)
-    return trial.suggest_float(parameter.name, parameter.low, parameter.high, log=parameter.is_log)
-
-
-def _params(trial: optuna.trial.FrozenTrial) -> dict[str, Any]:
-    """A trial's numbers, also of one that only waits."""
-    return dict(trial.params or trial.system_attrs.get("fixed_params", {}))
-
-
-def _importances(optuna: Any, study: optuna.Study) -> dict[str, float]:
-    """How much each number mattered, adding up to 1; empty while there are too few trials to say."""
-    done = [trial for trial in study.trials if trial.value is not None]
-    if len(done) < 4 or len({trial.value for trial in done}) < 2:
-        return {}
-    try:
-        found = optuna.importance.get_param_importances(
-            study, evaluator=optuna.importance.PedAnovaImportanceEvaluator()
-        )
-    except (ImportError, ValueError, RuntimeError):
-        return {}
-    return {name: float(share) for name, share in found.items()}
-
-
-def _optuna() -> Any:
-    with needed_for("racecraft tune"):
-        import optuna
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    return optuna
+def _num_cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,11 +1,13 @@
 import type { TuningCard, TuningTrial } from "../api/tunings";
 
-/** Completed trials, the best first, then the others in the order they began. */
+/** Trials under way, then completed ones, the best first, then the others in the order they began. */
 export function ranked(trials: TuningTrial[]): TuningTrial[] {
   const isDone = (trial: TuningTrial) => trial.state === "complete" && trial.value !== null;
+  const isUnderWay = (trial: TuningTrial) => trial.state === "running";
   return [
+    ...trials.filter(isUnderWay),
     ...trials.filter(isDone).sort((a, b) => a.value! - b.value! || a.number - b.number),
-    ...trials.filter((trial) => !isDone(trial)),
+    ...trials.filter((trial) => !isDone(trial) && !isUnderWay(trial)),
   ];
 }
 

@@ -53,7 +53,7 @@ class TuningTrial(Message):
 
     number: int
     state: str
-    """``complete``, ``pruned`` (it lagged behind), ``out of time`` or ``fail``."""
+    """``running``, ``complete``, ``pruned`` (it lagged behind), ``out of time`` or ``fail``."""
     value: float | None
     """What the search makes small: camera steps or seconds."""
     params: dict[str, float]

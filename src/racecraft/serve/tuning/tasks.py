@@ -22,9 +22,9 @@ def tune(task: Task) -> dict[str, Any]:
     tuning = Tuning(folder)
     task.on_stop(tuning.stop)
     past = [trial for trial in tuning.past() if trial.state in ("complete", "pruned", "fail")]
-    minutes = payload["minutes"] - sum(trial.seconds or 0.0 for trial in past) / 60.0
+    minutes = payload["minutes"] - tuning.seconds() / 60.0
     left = payload["trials"] - len(past)
     if minutes <= 0 or (payload["trials"] and left <= 0):
         return {"reason": "done", "trials": len(past)}
-    outcome = tuning.run(minutes=minutes, max_trials=left if payload["trials"] else 0)
+    outcome = tuning.run(minutes=minutes, max_trials=left if payload["trials"] else 0, processes=0)
     return {"reason": "interrupted" if outcome.is_interrupted else "done", "trials": len(outcome.trials)}

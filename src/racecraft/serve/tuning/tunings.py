@@ -15,6 +15,7 @@ from racecraft.errors import ConfigError, RunError
 from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
 from racecraft.run.folder import sanitize_name
+from racecraft.run.history import read_history
 from racecraft.serve.jobs.queue import ENDED, JobQueue
 from racecraft.serve.live.cars import NAME as LIVE
 from racecraft.serve.models.garage import Garage
@@ -170,12 +171,16 @@ def _tunable(parameter: Parameter, usual: set[str]) -> TunableNumber:
 
 def _trial(folder: Path, trial: dict[str, Any]) -> TuningTrial:
     run = RunFolder(folder / f"trial-{trial['number']:04d}")
+    evaluations = []
+    if trial["state"] == "running":
+        evaluations = [point for point in read_history(run.history)[0] if point.get("kind") == "evaluation"]
+    best = max((sum(point["completions"]) / len(point["completions"]) for point in evaluations), default=None)
     return TuningTrial(
         number=trial["number"],
         state=trial["state"],
         value=trial["value"],
         params=trial["params"],
-        completion=trial["completion"],
+        completion=trial["completion"] if best is None else best,
         best_lap=trial["best_lap_seconds"],
         steps=trial["steps"],
         error=trial["error"],

@@ -48,6 +48,7 @@ export const tune: Record<keyof typeof english, string> = {
   tune_result: "Ergebnis",
   tune_after: "{steps} Schritte",
   tune_of_a_lap: "{share} einer Runde",
+  tune_trial_running: "lernt: {share} einer Runde",
   tune_trial_pruned: "blieb zurück",
   tune_trial_cut: "Zeit um",
   tune_trial_fail: "fehlgeschlagen",

@@ -46,6 +46,7 @@ export const tune = {
   tune_result: "Result",
   tune_after: "{steps} steps",
   tune_of_a_lap: "{share} of a lap",
+  tune_trial_running: "learning: {share} of a lap",
   tune_trial_pruned: "lagged behind",
   tune_trial_cut: "out of time",
   tune_trial_fail: "failed",
