@@ -90,6 +90,7 @@ requirements: $(UV)  ## pin the newest allowed versions again
 	$(UV) pip compile -q --universal --python-version 3.11 --generate-hashes --no-header --extra serve --extra tune --extra multi -c requirements/dev.txt pyproject.toml -o requirements/serve.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/uv.in -o requirements/uv.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/site.in -o requirements/site.txt
+	$(UV) pip compile -q --no-deps --universal --python-version 3.11 --generate-hashes --no-header requirements/transfer.in -o requirements/transfer.txt
 
 $(UV): requirements/uv.txt
 	@test -n "$(PYTHON)" || { echo "Racecraft needs Python 3.11 or newer; none was found on PATH."; exit 1; }
@@ -117,6 +118,11 @@ $(VENV)/.serve: $(UV) $(VENV)/.train requirements/serve.txt
 $(ZIG): $(UV) requirements/site.txt
 	@echo "A compiler of WebAssembly from PyPI, some 90 MB ..."
 	@$(UV) pip install -q --python $(BIN)/python --target build/zig --require-hashes -r requirements/site.txt
+	@touch $@
+
+build/mujoco: $(UV) requirements/transfer.txt  # for benchmarks/transfer.py alone
+	@echo "MuJoCo from PyPI, some 30 MB ..."
+	@$(UV) pip install -q --python $(BIN)/python --target build/mujoco --no-deps --require-hashes -r requirements/transfer.txt
 	@touch $@
 
 $(NODE): web/package.json web/package-lock.json
