@@ -5,8 +5,9 @@ threads that wait for each other on cores they do not have cost many times what 
 as a test asks for.
 """
 
+import gc
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy and torch; child processes inherit it
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -23,6 +24,17 @@ settings.load_profile("unhurried")
 def _arithmetic_stays_as_it_was() -> Iterator[None]:
     yield
     assert np.float64(5e-324) * np.float64(1.0) != 0.0, "something left this thread without subnormal numbers"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What is imported to collect tests lives as long as they do: looking through it for garbage costs seconds."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_make_parametrize_id(val: object) -> str | None:
