@@ -164,9 +164,7 @@ function refuse(core, { track: of }) {
 
 /** A replay file driven again, or which sentence of the page says why not. */
 async function verify(core, { plan, replays, tracks }) {
-  const { ReplayProblem, verifyFile } = await load(
-    "src/tab/verify/verify.ts",
-  );
+  const { ReplayProblem, verifyFile } = await load("src/tab/verify/verify.ts");
   const found = [];
   for (const file of replays) {
     try {
@@ -182,9 +180,14 @@ async function verify(core, { plan, replays, tracks }) {
   return found;
 }
 
+async function policies(_, { plan, spaces }) {
+  const { policyFor } = await load("src/tab/policy.ts");
+  return spaces.map((space) => policyFor(plan, space));
+}
+
 const { Core, loadCore } = await load("src/tab/core.ts");
 const core = await Core.load(readFileSync(code));
-const run = { ask, check, drive, train, refuse, verify };
+const run = { ask, check, drive, train, refuse, verify, policies };
 const all = JSON.parse(readFileSync(cases, "utf8"));
 const files = all.find(({ files }) => files)?.files;
 const python = files ? await startPython(files) : undefined;

@@ -9,13 +9,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.agent import ModelMetadata
+from racecraft.agent import ActionSpace, DiscreteActionSpace, ModelMetadata, action_space
 from racecraft.learn import NetworkSpec, PPOConfig, networks
 from racecraft.race.conditions import STANDARD_CAR
 from racecraft.race.placement import start_pose
 from racecraft.race.rules import RULE_SETS
 from racecraft.reward import situations
 from racecraft.run.folder import RunInfo
+from racecraft.serve.rewards.routes import list_actions
+from racecraft.serve.rewards.schemas import ActionPreset
 from racecraft.serve.tracks.courses import geometry
 from racecraft.sim.camera import CAMERAS, CameraSpec
 from racecraft.sim.columns import STATUS_NAMES
@@ -149,8 +151,6 @@ def plan() -> dict[str, Any]:
     """The default training, whatever the track, the reward and the seed; those of a run are filled in by the page."""
     metadata = ModelMetadata(neural_network="RACECRAFT_SMALL")
     settings = make_settings(metadata=metadata)
-    spec = settings.network_spec(metadata)
-    space = metadata.action_space
     rules = RULE_SETS["first_lap"]
     camera = CAMERAS[settings.camera]
     trials = settings.evaluation_trials
@@ -159,20 +159,44 @@ def plan() -> dict[str, Any]:
         "cars": told_cars(camera, settings.start, settings.num_envs, seed=0, direction=settings.direction),
         "trials": told_cars(camera, line, trials, seed=0, direction="forward"),
         "vehicle": asdict(settings.vehicle),
-        "network": told_network(spec),
-        "layers": told_layers(spec),
-        "weights": [[name, list(shape)] for name, shape in networks.weight_shapes(spec).items()],
-        "ppo": told_ppo(settings.ppo),
         "averageShare": settings.ppo.average_share,
-        "table": space.to_commands(np.arange(space.size)).astype(np.float64).ravel().tolist(),
         "evaluateEvery": settings.evaluate_every,
         "slowest": SLOWEST,
         "seeds": list(SEEDS),
         "statuses": list(STATUS_NAMES),
+        "spaces": [told_space(preset) for preset in list_actions()],
+        "policies": {name: told_policy(action_space(name)) for name in ("default", "continuous")},
+        "known": known(),
+    }
+
+
+def told_space(preset: ActionPreset) -> dict[str, Any]:
+    """A preset as the console has it, with its numbers to the last digit: the page trains with them."""
+    told, space = preset.model_dump(), action_space(preset.name)
+    if isinstance(space, DiscreteActionSpace):
+        told["actions"] = [{"steering_angle": angle, "speed": speed} for angle, speed in space.to_degrees()]
+    return told
+
+
+def told_policy(space: ActionSpace) -> dict[str, Any]:
+    """What of the default training depends on the actions: a network, how it learns, and what is written of a run."""
+    metadata = ModelMetadata(action_space=space, neural_network="RACECRAFT_SMALL")
+    settings = make_settings(metadata=metadata)
+    spec = settings.network_spec(metadata)
+    if isinstance(space, DiscreteActionSpace):
+        table = space.to_commands(np.arange(space.size)).astype(np.float64)
+    else:
+        table = np.stack([space.low, space.high])
+    return {
+        "network": told_network(spec),
+        "layers": told_layers(spec),
+        "weights": [[name, list(shape)] for name, shape in networks.weight_shapes(spec).items()],
+        "logStd": networks.architecture_of(spec).log_std,
+        "ppo": told_ppo(settings.ppo),
+        "table": table.ravel().tolist(),
         "run": _run(settings),
         "modelMetadata": metadata.to_dict(),
         "spec": asdict(spec),
-        "known": known(),
     }
 
 

@@ -1,8 +1,9 @@
 /** A training as the page sees it: the workers, one of them with Python, and what they have told so far. */
-import type { RewardVerdict } from "../api/client";
+import type { ActionPreset, RewardVerdict } from "../api/client";
 import { Curves, type Point } from "../lib/curves";
 import type { Look, Picture } from "../lib/poses";
 import type { Plan, TrackFile } from "./plan";
+import { policyFor } from "./policy";
 import type { Check, Load, Report, Start } from "./worker";
 import { openWorker } from "./open";
 
@@ -98,7 +99,7 @@ export class Lesson {
   }
 
   /** `source`: of a reward of one's own, instead of a preset. */
-  train(track: TrackFile, reward: string, seed: number, source?: string): void {
+  train(track: TrackFile, reward: string, space: ActionPreset, seed: number, source?: string): void {
     [this.look, this.picture, this.judged] = [undefined, undefined, undefined];
     [this.seconds, this.failure] = [0, ""];
     [this.failedReward, this.printed] = ["", ""];
@@ -107,7 +108,8 @@ export class Lesson {
     this.running = source === undefined ? "plain" : "python";
     if (source !== undefined) this.preparePython();
     const { plan } = this;
-    const start: Start = { kind: "train", plan, track, reward: source ?? reward, seed, laps: LAPS, most: MOST };
+    const policy = policyFor(plan, space);
+    const start: Start = { kind: "train", plan, policy, track, reward: source ?? reward, seed, laps: LAPS, most: MOST };
     this.workers[this.running]!.postMessage(start);
   }
 

@@ -1,5 +1,7 @@
 /** A car that learned in this tab, and the archive of it that `racecraft import` takes. */
-import type { Plan, TrackFile } from "./plan";
+import type { ActionPreset } from "../api/client";
+import type { Plan, Policy, TrackFile } from "./plan";
+import { policyFor } from "./policy";
 import { gzip, tar } from "./tar";
 
 export interface Model {
@@ -13,6 +15,7 @@ export interface Model {
   seconds: number;
   laps: number; // of the last evaluation
   bestLap: number | null; // s
+  space?: ActionPreset; // none of models that were kept when there was only the default one
   weights: Float32Array;
 }
 
@@ -28,7 +31,8 @@ const text = (value: unknown) => new TextEncoder().encode(typeof value === "stri
 /** A run folder whose checkpoint holds weights alone: training goes on from them in the installed program. */
 export async function archive(model: Model, plan: Plan): Promise<Blob> {
   const { created, seed, track, trackDigest: track_digest } = model;
-  const checkpoint = checkpointOf(model, plan);
+  const policy = policyFor(plan, model.space ?? plan.spaces[0]!);
+  const checkpoint = checkpointOf(model, policy);
   const digest = await sha256(checkpoint);
   const file = `000000000-${digest.slice(0, 8)}.safetensors`;
   const [size, time_stamp] = [checkpoint.length, Date.parse(created) / 1000];
@@ -39,9 +43,9 @@ export async function archive(model: Model, plan: Plan): Promise<Blob> {
     checkpoints: [{ step: 0, file, size, sha256: digest, time_stamp, score: null, metrics: {} }],
   };
   const files = {
-    "run.json": text({ ...plan.run, seed, track, track_digest, created }),
+    "run.json": text({ ...policy.run, seed, track, track_digest, created }),
     "reward_function.py": text(model.reward),
-    "model_metadata.json": text(plan.modelMetadata),
+    "model_metadata.json": text(policy.modelMetadata),
     "checkpoints/manifest.json": text(manifest),
     [`checkpoints/${file}`]: checkpoint,
   };
@@ -50,12 +54,12 @@ export async function archive(model: Model, plan: Plan): Promise<Blob> {
 }
 
 /** https://huggingface.co/docs/safetensors */
-function checkpointOf({ weights, created, steps }: Model, plan: Plan): Uint8Array {
-  const metadata = { network: plan.spec, origin: { kind: "tab", steps } };
+function checkpointOf({ weights, created, steps }: Model, policy: Policy): Uint8Array {
+  const metadata = { network: policy.spec, origin: { kind: "tab", steps } };
   const about = { step: 0, time_stamp: Date.parse(created) / 1000, score: null, metrics: {}, metadata };
   const header: Record<string, unknown> = { __metadata__: { racecraft: JSON.stringify(about) } };
   let end = 0;
-  for (const [name, shape] of plan.weights) {
+  for (const [name, shape] of policy.weights) {
     const begin = end;
     end += 4 * shape.reduce((size, side) => size * side, 1);
     header[`weights/${name}`] = { dtype: "F32", shape, data_offsets: [begin, end] };

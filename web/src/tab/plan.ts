@@ -1,5 +1,5 @@
 /** What the page is told of the training that it runs: the files that `python -m racecraft.site` writes beside it. */
-import type { TrackGeometry } from "../api/client";
+import type { ActionPreset, TrackGeometry } from "../api/client";
 import type { NetworkSettings, Settings, TrackArrays } from "./core";
 import type { Known } from "./verify/provenance";
 
@@ -9,23 +9,30 @@ export interface RewardPreset {
   source: string;
 }
 
+/** What of a training depends on the actions. */
+export interface Policy {
+  network: NetworkSettings;
+  layers: number[][]; // rows, columns, gain of every matrix
+  weights: [string, number[]][]; // name and shape of every array, in the order of a flat vector
+  logStd: number; // that continuous actions begin with
+  ppo: Settings;
+  table: number[]; // (A, 2) steering angle in rad, speed in m/s; or the lowest and the highest (2, 2)
+  run: Record<string, unknown>; // run.json, but for seed, track and time
+  modelMetadata: Record<string, unknown>;
+  spec: Record<string, unknown>;
+}
+
 export interface Plan {
   cars: Settings;
   trials: Settings;
   vehicle: Settings;
-  network: NetworkSettings;
-  layers: number[][]; // rows, columns, gain of every matrix
-  weights: [string, number[]][]; // name and shape of every array, in the order of a flat vector
-  ppo: Settings;
   averageShare: number;
-  table: number[]; // (A, 2) steering angle in rad, speed in m/s
   evaluateEvery: number; // camera steps
   slowest: number; // m/s
   seeds: number[];
   statuses: string[]; // of a car, by the number in its row
-  run: Record<string, unknown>; // run.json, but for seed, track and time
-  modelMetadata: Record<string, unknown>;
-  spec: Record<string, unknown>;
+  spaces: ActionPreset[]; // the default first
+  policies: { default: Policy; continuous: Policy };
   known: Known; // rules, cars and randomisations of the library
   tracks: string[];
   rewards: RewardPreset[];

@@ -1,6 +1,6 @@
 /** A training in this thread: PPO's loop of the core, a reward in JavaScript, evaluations by the rules of `racecraft train`. */
 import type { Cars, Core, Episode, Learner, Training } from "./core";
-import { arraysOf, type Plan, type TrackFile } from "./plan";
+import { arraysOf, type Plan, type Policy, type TrackFile } from "./plan";
 import type { Pay } from "./python";
 
 /** Reward of a row of the simulation. */
@@ -48,6 +48,7 @@ export class Trainer {
   constructor(
     core: Core,
     private readonly plan: Plan,
+    policy: Policy,
     private readonly track: TrackFile,
     private readonly pay: Pay,
     readonly seed: number,
@@ -56,10 +57,10 @@ export class Trainer {
     this.cars = road.cars({ ...plan.cars, seed }, plan.vehicle);
     this.trials = road.cars({ ...plan.trials, seed: 0 }, plan.vehicle);
     this.columns = core.names("row");
-    this.table = Float64Array.from(plan.table);
-    this.learner = core.learner(plan.network);
-    this.learner.write("weights", initialWeights(core, plan, seed));
-    this.training = this.learner.train(this.cars, plan.ppo, this.table);
+    this.table = Float64Array.from(policy.table);
+    this.learner = core.learner(policy.network);
+    this.learner.write("weights", initialWeights(core, policy, seed));
+    this.training = this.learner.train(this.cars, policy.ppo, this.table);
   }
 
   get steps(): number {
@@ -151,14 +152,15 @@ export class Trainer {
   }
 }
 
-function initialWeights(core: Core, plan: Plan, seed: number): Float32Array {
-  const matrices = core.orthogonalWeights(seed, plan.layers);
-  const sizes = plan.weights.map(([, shape]) => shape.reduce((size, side) => size * side, 1));
+function initialWeights(core: Core, policy: Policy, seed: number): Float32Array {
+  const matrices = core.orthogonalWeights(seed, policy.layers);
+  const sizes = policy.weights.map(([, shape]) => shape.reduce((size, side) => size * side, 1));
   const all = new Float32Array(sizes.reduce((sum, size) => sum + size, 0)); // biases are zero
   let [from, to] = [0, 0];
-  for (const [index, [name]] of plan.weights.entries()) {
+  for (const [index, [name]] of policy.weights.entries()) {
     const size = sizes[index]!;
     if (name.endsWith(".weight")) all.set(matrices.subarray(from, (from += size)), to);
+    else if (name === "policy.log_std") all.fill(policy.logStd, to, to + size);
     to += size;
   }
   return all;

@@ -3,7 +3,7 @@
 import type { RewardVerdict } from "../api/client";
 import type { Look, Picture } from "../lib/poses";
 import { loadCore, type LoadedCore } from "./core";
-import { read, type Plan, type TrackFile } from "./plan";
+import { read, type Plan, type Policy, type TrackFile } from "./plan";
 import { type Pay, Python, RewardFailure } from "./python";
 import { type Evaluation, type Iteration, payWith, type Reward, Trainer } from "./trainer";
 import type { ProblemKey } from "./verify/problem";
@@ -24,6 +24,7 @@ export interface Check {
 export interface Start {
   kind: "train";
   plan: Plan;
+  policy: Policy;
   track: TrackFile;
   reward: string; // name of a preset, or the source where there is Python
   seed: number;
@@ -108,13 +109,13 @@ async function load({ site, hasPython }: Load): Promise<Loaded> {
 function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded): void {
   const began = performance.now();
   const seconds = () => (performance.now() - began) / 1000;
-  const { plan, track, reward, seed } = start;
+  const { plan, policy, track, reward, seed } = start;
   const numCars = plan.cars["num_envs"]!;
   let pay: Pay;
   let printed = () => "";
   if (python) ({ pay, printed } = python.open(reward, track, numCars, core.names("row").length, seed));
   else pay = payWith(presets[reward]!, track, numCars);
-  const trainer = new Trainer(core, plan, track, pay, seed);
+  const trainer = new Trainer(core, plan, policy, track, pay, seed);
   tell({ kind: "loaded", isSlow });
   let looked = -Infinity;
   const look = () => {
