@@ -1,0 +1,89 @@
+"""A learner's way through three lessons in a real browser: reading, playing, answering, and what is kept of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
+from running_consoles import running_console
+
+from racecraft.course import find_lesson
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+
+@pytest.fixture(scope="module")
+def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data")))  # nobody has solved anything yet
+        with running_console(tmp_path_factory.mktemp("course") / "runs") as console, visiting(console) as visit:
+            yield visit
+            assert visit.complaints == []
+
+
+def answer(page: Any, number: int, wrongly: int = 0) -> None:
+    """Answer all questions, the first so many wrongly; each says why."""
+    for index, question in enumerate(find_lesson(number).facts.questions):
+        is_wrong = index < wrongly
+        chosen = question.choices[(question.answer + is_wrong) % len(question.choices)]
+        card = page.locator("fieldset").nth(index)
+        card.get_by_label(chosen.text.en, exact=True).check()
+        card.get_by_text("Not quite." if is_wrong else "Right.", exact=True).wait_for()
+        card.get_by_text(chosen.why.en).wait_for()
+
+
+@needs_axe
+def test_a_learner_goes_through_three_lessons(visit: Visit) -> None:
+    from playwright.sync_api import expect
+
+    expect.set_options(timeout=30_000)
+    page = visit.open("/lessons")
+    expect(page.get_by_text("0 of 12 read")).to_be_visible()
+    page.get_by_role("link", name="Explore or exploit?").click()
+    page.get_by_role("button", name="Pull machine 2").focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_text("1 pulls; regret")).to_be_visible()
+    page.get_by_role("button", name="100 pulls").click()
+    expect(page.get_by_text("101 pulls; regret")).to_be_visible()
+    answer(page, 3)
+    count = len(find_lesson(3).facts.questions)
+    expect(page.get_by_text(f"{count} of {count} right.")).to_be_visible()
+    expect(page.get_by_text("quiz 100 %")).to_be_visible()
+
+    page.get_by_role("link", name="A table of values").click()
+    picture = page.get_by_role("img", name="The same cliff, two characters")
+    picture.scroll_into_view_if_needed()
+    expect(picture).to_have_js_property("complete", True)
+    expect(page.locator("math munder").first).to_be_attached()
+    for _ in range(2):
+        page.get_by_role("button", name="One step").click()
+    expect(page.get_by_text("2 steps, 0 walks")).to_be_visible()
+    page.get_by_role("button", name="Run", exact=True).click()
+    expect(page.get_by_text(re.compile(r"steps, [1-9]\d* walks"))).to_be_visible()
+    page.get_by_role("button", name="Pause").click()
+    answer(page, 4, wrongly=1)
+    expect(page.get_by_text("3 of 4 right.")).to_be_visible()
+    page.locator("fieldset").first.get_by_role("radio").nth(1).check()  # to see why changes nothing
+    expect(page.get_by_text("3 of 4 right.")).to_be_visible()
+
+    page.get_by_role("link", name="A table drives a car").last.click()
+    page.get_by_role("heading", name="A table drives a car").wait_for()
+    page.get_by_role("link", name="Where tables break").scroll_into_view_if_needed()
+    expect(page.get_by_text("read", exact=True)).to_be_attached()
+    page.get_by_role("navigation", name="Racecraft").get_by_role("link", name="Course").click()
+    expect(page.get_by_text("3 of 12 read")).to_be_visible()
+    kept = {
+        card["facts"]["number"]: (card["progress"]["is_read"], card["progress"]["quiz"])
+        for card in visit.console.client.get("/api/lessons").json()
+    }
+    assert [kept[number] for number in (2, 3, 4, 5)] == [(False, None), (True, 1.0), (True, 0.75), (True, None)]
+
+    visit.look("dark", "de")
+    page = visit.open("/lessons/4", width=390)
+    expect(page.get_by_text("Fragen 75 %")).to_be_visible()
+    page.get_by_role("button", name="Laufen lassen").wait_for()
+    assert visit.violations() == []
+    assert visit.overflow() <= 0
