@@ -54,9 +54,9 @@ def test_the_plain_command_reaches_the_bar(environment: str, algorithm: str, see
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_asynchronous_processes_learn_as_well() -> None:
-    # which of the processes comes first is chance: one seed alone may be further off, and ends well above the bar
+    # which of the processes comes first is chance: one seed alone may be further off, so its goal is well above the bar
     alone = [learned_by("Acrobot-v1", "a2c", seed).mean_return for seed in SEEDS]
-    together = [learn("Acrobot-v1", "a3c", seed=seed, until="-95 return") for seed in SEEDS]
+    together = [learn("Acrobot-v1", "a3c", seed=seed, until="-87 return") for seed in SEEDS]
     assert all(one.returns and one.mean_return >= -100.0 for one in together)
     assert np.median([one.mean_return for one in together]) == pytest.approx(np.median(alone), abs=10.0)
 

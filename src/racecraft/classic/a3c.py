@@ -34,8 +34,11 @@ from racecraft.errors import TrainingError
 
 __all__ = ["A3CSettings", "begin", "learn"]
 
-PAUSE: Final = 0.05
-"""s between two looks of the parent at what the others did."""
+PAUSE: Final = 0.02
+"""s between two looks of the parent at what the others did, and of a process at whether it may go on."""
+LEAD: Final = 5_000
+"""Steps that the processes may be ahead of the parent's last look: one that judges what they have learned on a busy
+machine would else find them far beyond, and see too few policies to choose a good one from."""
 FADE: Final = 0.99
 """Of RMSProp's running squares."""
 PROGRAM: Final = "from racecraft.classic.a3c import work; work()"
@@ -57,8 +60,8 @@ class Shared:
         self.weights: Floats = _mapped(folder / "weights", size, np.float32)
         self.squares: Floats = _mapped(folder / "squares", size, np.float32)
         self.steps: NDArray[Any] = _mapped(folder / "steps", processes, np.int64)
-        self.end: NDArray[Any] = _mapped(folder / "end", 1, np.int64)
-        """Steps of all processes after which they stop."""
+        self.end: NDArray[Any] = _mapped(folder / "end", 2, np.int64)
+        """Steps of all processes after which they stop, and after which they wait."""
 
 
 def _mapped(path: Path, size: int, kind: type[Any]) -> NDArray[Any]:
@@ -74,7 +77,7 @@ def learn(worlds: Worlds, policy: ActorCritic, settings: A3CSettings, rng: np.ra
         folder, before = Path(name), worlds.steps
         shared = Shared(folder, size=split + len(policy.critic.parameters), processes=settings.processes)
         shared.weights[:split], shared.weights[split:] = policy.actor.parameters, policy.critic.parameters
-        shared.end[0] = settings.steps - before
+        shared.end[:] = settings.steps - before, LEAD
         task = {"name": worlds.name, "make": worlds.make, "settings": asdict(settings), "folder": name}
         workers = []
         try:
@@ -96,6 +99,7 @@ def learn(worlds: Worlds, policy: ActorCritic, settings: A3CSettings, rng: np.ra
                 yield
                 if is_last:
                     return
+                shared.end[1] = worlds.steps - before + LEAD
                 time.sleep(PAUSE)
         finally:
             shared.end[0] = 0
@@ -114,7 +118,7 @@ def _returns(folder: Path, number: int, *, skip: int) -> list[float]:
 
 
 def work() -> None:
-    """What each process does: copy the weights, play, work out a gradient, add it."""
+    """What each process does: copy the weights, play, work out a gradient, add it; wait for the parent now and then."""
     task = json.loads(sys.argv[1])
     number, values = task["number"], task["settings"]
     settings = A3CSettings(**{**values, "hidden": tuple(values["hidden"])})
@@ -125,6 +129,9 @@ def work() -> None:
     shared = Shared(Path(task["folder"]), size=split + len(policy.critic.parameters), processes=settings.processes)
     with (Path(task["folder"]) / f"returns-{number}").open("ab", buffering=0) as ledger:
         while shared.steps.sum() < shared.end[0] and os.getppid() == task["parent"]:
+            if shared.steps.sum() >= shared.end[1]:
+                time.sleep(PAUSE)
+                continue
             policy.actor.parameters[:], policy.critic.parameters[:] = shared.weights[:split], shared.weights[split:]
             rollout = collect(
                 worlds,
