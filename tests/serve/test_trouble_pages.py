@@ -212,6 +212,8 @@ def _make_untrained(route: Any) -> None:
 
 
 def test_nothing_is_drawn_while_nothing_moves(visit: Visit) -> None:
+    from playwright.sync_api import expect
+
     page = visit.open("/models/heron/watch")
     canvas = page.locator(".scene canvas")
     canvas.wait_for()
@@ -219,7 +221,7 @@ def test_nothing_is_drawn_while_nothing_moves(visit: Visit) -> None:
         "() => { const ask = requestAnimationFrame; window.asked = 0;"
         " window.requestAnimationFrame = (draw) => { window.asked++; return ask(draw); }; }"
     )
-    page.wait_for_function("document.querySelector('.scene canvas').width !== 300")  # the scene is there
+    expect(canvas).not_to_have_attribute("width", "300")  # the scene is there
     asked = [1]
     while asked[-1] and len(asked) < 8:  # the last frame, a sharp one, comes after a moment
         page.evaluate("window.asked = 0")

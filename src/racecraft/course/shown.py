@@ -29,7 +29,7 @@ from racecraft.course.percent import Cell
 from racecraft.course.show import Picture
 from racecraft.errors import ConfigError
 
-WIDEST: Final = 1000  # px
+WIDEST, WIDEST_FILM = 800, 480  # px
 _PICTURE: Final = re.compile(r"^\[picture: (?P<path>.+)\]$")
 
 
@@ -80,18 +80,23 @@ def picture_path(lesson: Lesson, name: str) -> Path:
 
 
 def read_shown(lesson: Lesson) -> Shown:
-    """What came out when the lesson ran; nothing if nobody has kept it.
+    """What came out when the lesson ran; nothing if nobody has kept it, and words alone in a wheel without pictures.
 
     Raises:
         ConfigError: The file is damaged.
     """
     path = shown_path(lesson)
     try:
-        return Shown.model_validate_json(path.read_bytes())
+        shown = Shown.model_validate_json(path.read_bytes())
     except FileNotFoundError:
         return Shown()
     except (OSError, ValidationError) as error:
         raise ConfigError(f"{path} does not hold what a lesson showed: {' '.join(str(error).split())}") from error
+    there = {
+        number: [one for one in outputs if isinstance(one, Printed) or picture_path(lesson, one.name).is_file()]
+        for number, outputs in shown.outputs.items()
+    }
+    return shown.model_copy(update={"outputs": there})
 
 
 def digest_of(cells: Iterable[Cell]) -> str:
@@ -154,14 +159,15 @@ def _kept(lesson: Lesson, source: Path, descriptions: dict[str, str]) -> Drawn:
     target = picture_path(lesson, source.stem)
     target.parent.mkdir(parents=True, exist_ok=True)
     with Image.open(source) as image:
-        share = min(1.0, WIDEST / image.width)
+        is_film = getattr(image, "n_frames", 1) > 1
+        share = min(1.0, (WIDEST_FILM if is_film else WIDEST) / image.width)
         size = round(image.width * share), round(image.height * share)
         frames: list[Any] = [
             frame.convert("RGB").resize(size, Image.Resampling.LANCZOS) for frame in ImageSequence.Iterator(image)
         ]
-        options: dict[str, Any] = {"quality": 82, "method": 6}
-        if len(frames) > 1:
-            options |= {"save_all": True, "append_images": frames[1:], "loop": 0, "quality": 60, "method": 4}
+        options: dict[str, Any] = {"quality": 70, "method": 6}
+        if is_film:
+            options |= {"save_all": True, "append_images": frames[1:], "loop": 0, "quality": 35}
             options |= {"duration": image.info.get("duration", 100)}
         frames[0].save(target, "WEBP", **options)
     description = descriptions[hashlib.sha256(source.read_bytes()).hexdigest()]
