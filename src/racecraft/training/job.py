@@ -10,18 +10,16 @@ calls, or draws at random, begins anew.)
 
 from __future__ import annotations
 
-import signal
 import threading
 import time
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from types import FrameType
 
 from racecraft.errors import CheckpointError, RacecraftError, RewardError
 from racecraft.run import CheckpointWarning, RunFolder
+from racecraft.training.interruption import interruptible
 from racecraft.training.meter import Meter
 from racecraft.training.progress import Reporter, SilentReporter, TrainResult
 from racecraft.training.session import Session, open_session
@@ -67,7 +65,7 @@ class Training:
         Raises:
             RacecraftError: Training cannot go on; the last checkpoint is good.
         """
-        with self.folder.lock(), self._interruptible():
+        with self.folder.lock(), interruptible(self._stop, self._end_soon):
             try:
                 with open_session(
                     self.folder,
@@ -232,24 +230,9 @@ class Training:
             parts=self.meter.parts,
         )
 
-    @contextmanager
-    def _interruptible(self) -> Iterator[None]:
-        """Turn the first Ctrl-C or SIGTERM into a clean end; a second Ctrl-C interrupts at once."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-
-        def handle(number: int, frame: FrameType | None) -> None:
-            if self._stop.is_set() and number == signal.SIGINT:
-                raise KeyboardInterrupt
-            self._stop.set()
-            # The signal may have come in the middle of a line that this thread is printing.
-            text = "Stopping after this iteration; a checkpoint is saved. Ctrl-C again stops at once."
-            threading.Thread(target=self.reporter.note, args=(text,), daemon=True).start()
-
-        before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+    def _end_soon(self) -> None:
+        """What the first Ctrl-C asks for."""
+        self._stop.set()
+        # The signal may have come in the middle of a line that this thread is printing.
+        text = "Stopping after this iteration; a checkpoint is saved. Ctrl-C again stops at once."
+        threading.Thread(target=self.reporter.note, args=(text,), daemon=True).start()

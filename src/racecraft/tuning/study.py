@@ -15,14 +15,11 @@ from __future__ import annotations
 
 import os
 import queue
-import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import FrameType
 from typing import Any, Final
 
 from racecraft.agent import ModelMetadata
@@ -34,6 +31,7 @@ from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.run.lock import exclusive_lock
 from racecraft.training import Until
+from racecraft.training.interruption import interruptible
 from racecraft.training.parent import open_parent
 from racecraft.training.plan import Plan
 from racecraft.training.settings import TrainSettings
@@ -118,7 +116,7 @@ class Tuning:
             record.take_up()
             call = _Call(record, seats, deadline=time.monotonic() + 60.0 * minutes, max_trials=max_trials)
             try:
-                with self._interruptible():
+                with interruptible(self._stop, self.stop):
                     self._search(call)
             finally:
                 for number, _ in call.busy.values():
@@ -259,25 +257,6 @@ class Tuning:
         except OSError as error:
             raise RunError(f"{self.folder / 'result.json'} cannot be written: {error.strerror or error}.") from error
         return outcome
-
-    @contextmanager
-    def _interruptible(self) -> Iterator[None]:
-        """Turn the first Ctrl-C or SIGTERM into a clean end; a second Ctrl-C interrupts at once."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-
-        def handle(number: int, frame: FrameType | None) -> None:
-            if self._stop.is_set() and number == signal.SIGINT:
-                raise KeyboardInterrupt
-            self.stop()
-
-        before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
 
 
 @dataclass
