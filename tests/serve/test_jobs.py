@@ -13,7 +13,8 @@ import sqlalchemy as sa
 from running_consoles import running_console
 
 from racecraft.errors import RunError
-from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, MAX_LOSSES, JobQueue, kinds_of, waiting_line
+from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, MAX_LOSSES, JobQueue, kinds_of
+from racecraft.serve.jobs.turns import waiting_line
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job, Table, User, now
 
@@ -89,7 +90,7 @@ def test_nobodys_hundred_jobs_stand_before_anothers_first(database: Database, qu
     first, second = bob.add("train", "bobs-first", {}), bob.add("train", "bobs-second", {})
     assert bob.before(first) == ["…"], "only what has the place already"
     with database.transaction() as session:
-        line = [job.id for job in waiting_line(session, ("train",))]
+        line = [job.id for job in waiting_line(session, ("train",), now())]
     assert line[:2] == [running.id, first.id]
     assert line[2:4] == [many[0].id, second.id], "turn by turn"
     assert (found := queue.claim(("train",), owner="w")) is not None

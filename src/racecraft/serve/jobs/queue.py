@@ -1,7 +1,7 @@
 """The queue of jobs: claimed under a lease, kept alive by heartbeats, taken over when the worker is gone.
 
     queued ──claim──▶ running ──finish──▶ done | failed | cancelled
-       ▲                 │ lease ran out (killed, machine off), or handed back (the server is stopped)
+       ▲                 │ lease ran out (killed, machine off), or handed back (the server stops, others wait)
        └─────────────────┘ again, unless it was lost too often in a row without having got any further
 
 Every step is one UPDATE whose WHERE says what it relies on, so two servers or workers never own a job together.
@@ -12,12 +12,13 @@ from __future__ import annotations
 import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any, Final, Literal
 
 import sqlalchemy as sa
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy.orm import aliased
 
+from racecraft.serve.jobs.turns import choose_to_rest, is_full, running_on, turn_of, turn_order, waiting_line
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
@@ -38,12 +39,14 @@ class JobKind:
     """
     travels: bool = False
     """Whether a machine that has nothing but the run can do it."""
+    rests: bool = False
+    """Whether it saves itself when it is asked to, and goes on later with nothing lost."""
     progress: str = "{run}/checkpoints/manifest.json"
     """File below the runs folder that changes whenever something is kept for good."""
 
 
 KINDS: Final[Mapping[str, JobKind]] = {
-    "train": JobKind(slot="training", work="racecraft.serve.models.tasks:train", travels=True),
+    "train": JobKind(slot="training", work="racecraft.serve.models.tasks:train", travels=True, rests=True),
     "tune": JobKind(
         slot="training", work="racecraft.serve.tuning.tasks:tune", progress=".racecraft/tunings/{tuning}/result.json"
     ),
@@ -65,6 +68,7 @@ MAX_LOSSES: Final = 5
 MAX_DEATHS: Final = 20
 """The same where all else on its machine died with it: rarely the job's doing."""
 ENDED: Final = ("done", "failed", "cancelled")
+RESTING: Final = tuple(name for name, kind in KINDS.items() if kind.rests)
 WATCHED: Final = timedelta(seconds=5)
 """How long a look at a training on another machine makes that show its cars."""
 
@@ -73,8 +77,8 @@ WATCHED: Final = timedelta(seconds=5)
 class Answer:
     """What the owner of a job is told."""
 
-    word: Literal["go on", "stop", "lost"]
-    """``stop`` when somebody cancelled it; ``lost`` when it is another's now."""
+    word: Literal["go on", "rest", "stop", "lost"]
+    """``rest`` when others wait for its place; ``stop`` when somebody cancelled it; ``lost`` when another has it."""
     is_watched: bool = False
     """Whether somebody elsewhere wants to see it."""
 
@@ -158,7 +162,7 @@ class JobQueue:
         if job.state != "queued":
             return []
         with self._database.transaction() as session:
-            line = waiting_line(session, kinds_of(KINDS[job.kind].slot))
+            line = waiting_line(session, kinds_of(KINDS[job.kind].slot), self._database.moment(session))
         earlier = line[: next((place for place, one in enumerate(line) if one.id == job.id), 0)]
         return [one.run if one.user_id == self._user_id else "…" for one in earlier]
 
@@ -180,10 +184,30 @@ class JobQueue:
         with self._database.transaction() as session:
             return session.scalar(query) or 0
 
+    def has_room(self, kinds: tuple[str, ...], *, machine: str, places: int) -> bool:
+        """Whether a machine with so many places for these kinds may start one more."""
+        with self._database.transaction() as session:
+            moment = self._database.moment(session)
+            return not is_full(running_on(session, kinds, machine), places, moment, resting=RESTING)
+
+    def make_room(self, kinds: tuple[str, ...], *, machine: str, places: int, is_home: bool = True) -> None:
+        """Where people wait who have no place on a machine, ask for that of somebody whose turn is over."""
+        first = sa.select(Job).where(Job.state == "queued", Job.kind.in_(kinds), turn_of(kinds) == 0)
+        if not is_home:
+            first = first.where(Job.travels)
+        with self._database.transaction() as session:
+            waiting = session.scalars(first).all()
+            if not waiting:
+                return
+            moment, running = self._database.moment(session), running_on(session, kinds, machine)
+            chosen = choose_to_rest(running, waiting, places, moment, resting=RESTING)
+            if chosen is not None:
+                session.execute(sa.update(Job).where(Job.id == chosen.id, Job.state == "running").values(asked=moment))
+
     def claim(self, kinds: tuple[str, ...], *, owner: str, machine: str = "", is_home: bool = True) -> Job | None:
         """Take the next queued job of these kinds, or None; away from home one that travels.
 
-        Next is the oldest of whoever has the fewest before it, so nobody's hundred jobs stand before another's first.
+        Whose turn it is says `racecraft.serve.jobs.turns`.
 
         A run is worked on by one machine at a time, which has its newest files.
         """
@@ -198,10 +222,10 @@ class JobQueue:
         oldest = sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds), ~is_away)
         if not is_home:
             oldest = oldest.where(Job.travels)
-        # of two that ask at once the second gets the next one; SQLite has one writer at a time
-        oldest = oldest.order_by(_turn(kinds), Job.created, Job.id).limit(1).with_for_update(skip_locked=True)
         with self._database.transaction() as session:
             moment = self._database.moment(session)
+            # of two that ask at once the second gets the next one; SQLite has one writer at a time
+            oldest = oldest.order_by(*turn_order(kinds, moment)).limit(1).with_for_update(skip_locked=True)
             job_id = session.scalar(oldest)
             taken = sa.update(Job).where(Job.id == job_id, Job.state == "queued")
             taken = taken.values(
@@ -211,6 +235,8 @@ class JobQueue:
                 attempts=Job.attempts + 1,
                 lease_until=moment + FIRST_LEASE,
                 started=sa.func.coalesce(Job.started, moment),
+                held_since=moment,
+                asked=None,
             )
             if job_id is None or session.execute(taken).rowcount != 1:  # type: ignore[attr-defined]
                 return None
@@ -220,14 +246,16 @@ class JobQueue:
     def heartbeat(self, job_id: str, *, owner: str, has_progressed: bool = False) -> Answer:
         """Keep a job, and hear whether to go on."""
         kept = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
-        told = sa.select(Job.is_cancelled, Job.watched_until).where(Job.id == job_id)
+        told = sa.select(Job.is_cancelled, Job.watched_until, Job.asked, Job.kind).where(Job.id == job_id)
         with self._database.transaction() as session:
             moment = self._database.moment(session)
             kept = kept.values(lease_until=moment + LEASE, **({"losses": 0} if has_progressed else {}))
             if session.execute(kept).rowcount != 1:  # type: ignore[attr-defined]
                 return Answer("lost")
-            is_cancelled, watched_until = session.execute(told).one()
-            return Answer("stop" if is_cancelled else "go on", watched_until is not None and watched_until > moment)
+            is_cancelled, watched_until, asked, kind = session.execute(told).one()
+            is_to_rest = asked is not None and kind in RESTING
+            word: Literal["stop", "rest", "go on"] = "stop" if is_cancelled else "rest" if is_to_rest else "go on"
+            return Answer(word, watched_until is not None and watched_until > moment)
 
     def finish(
         self,
@@ -241,12 +269,16 @@ class JobQueue:
         """End a job that this owner holds; False when it is another's now."""
         ended = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
         with self._database.transaction() as session:
+            moment, job = self._database.moment(session), session.get(Job, job_id)
+            if job is None:
+                return False
             ended = ended.values(
                 state=state,
                 result=None if result is None else dict(result),
                 error=None if error is None else dict(error),
-                finished=self._database.moment(session),
+                finished=moment,
                 lease_until=None,
+                **_let_go(job, moment),
             )
             return session.execute(ended).rowcount == 1  # type: ignore[attr-defined, no-any-return]
 
@@ -272,33 +304,25 @@ class JobQueue:
         self._take_back(Job.lease_until < moment, limit=MAX_DEATHS)
 
     def _take_back(self, condition: sa.ColumnElement[bool], *, limit: int = 0) -> None:
-        held = sa.update(Job).where(Job.state == "running", condition)
         gone = {"code": "WorkerLost", "message": f"The job's process died {limit} times.", "hint": ""}
         with self._database.transaction() as session:
             moment = self._database.moment(session)
-            stopped = held.where(Job.is_cancelled)
-            session.execute(stopped.values(state="cancelled", finished=moment, lease_until=None))
-            if limit:
-                tired = held.where(Job.losses >= limit - 1)
-                session.execute(tired.values(state="failed", error=gone, finished=moment, lease_until=None))
-            session.execute(held.values(state="queued", owner="", lease_until=None, losses=Job.losses + int(limit > 0)))
+            for job in session.scalars(sa.select(Job).where(Job.state == "running", condition)).all():
+                values: dict[str, Any] = {"lease_until": None, **_let_go(job, moment)}
+                if job.is_cancelled:
+                    values |= {"state": "cancelled", "finished": moment}
+                elif limit and job.losses >= limit - 1:
+                    values |= {"state": "failed", "error": gone, "finished": moment}
+                else:
+                    values |= {"state": "queued", "owner": "", "losses": job.losses + int(limit > 0), "rested": moment}
+                is_it = sa.and_(Job.id == job.id, Job.owner == job.owner, Job.state == "running", condition)
+                session.execute(sa.update(Job).where(is_it).values(values))
 
 
-def _turn(kinds: tuple[str, ...]) -> sa.ScalarSelect[int]:
-    """How many jobs of its owner have a place already or come before a queued one."""
-    other = aliased(Job)
-    is_earlier = sa.or_(
-        other.created < Job.created, sa.and_(other.created == Job.created, other.id < Job.id), other.state == "running"
-    )
-    query = sa.select(sa.func.count()).where(other.user_id == Job.user_id, other.kind.in_(kinds), other.id != Job.id)
-    return query.where(other.state.in_(("queued", "running")), is_earlier).scalar_subquery()
-
-
-def waiting_line(session: Session, kinds: tuple[str, ...]) -> Sequence[Job]:
-    """The jobs that have the places of these kinds, then those that wait for them in the order they get them."""
-    turn = sa.case((Job.state == "running", -1), else_=_turn(kinds))
-    open_ = sa.select(Job).where(Job.kind.in_(kinds), Job.state.in_(("queued", "running")))
-    return session.scalars(open_.order_by(turn, Job.created, Job.id)).all()
+def _let_go(job: Job, moment: datetime) -> dict[str, Any]:
+    """What a job's row says from now on of the place that it had."""
+    held = (moment - job.held_since).total_seconds() if job.held_since is not None else 0.0
+    return {"held_since": None, "asked": None, "used": job.used + max(0.0, held)}
 
 
 def kinds_of(slot: Slot) -> tuple[str, ...]:

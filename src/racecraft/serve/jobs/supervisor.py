@@ -97,16 +97,17 @@ class Supervisor:
         places: dict[Slot, int] = {"training": self._settings.training_slots, "other": self._settings.other_slots}
         for slot, count in places.items():
             kinds = kinds_of(slot)
-            while not self._is_stopping and self._num_running(kinds) < count and self._start(kinds):
+            while not self._is_stopping and self._has_room(kinds, count) and self._start(kinds):
                 pass
+            self._queue.make_room(kinds, machine=self._settings.machine, places=count, is_home=self._is_home)
         if not self._is_stopping and time.monotonic() - self._started > CALM:
             self._standby.prepare()
 
-    def _num_running(self, kinds: tuple[str, ...]) -> int:
-        return self._queue.num_running(kinds, machine=self._settings.machine)
+    def _has_room(self, kinds: tuple[str, ...], places: int) -> bool:
+        return self._queue.has_room(kinds, machine=self._settings.machine, places=places)
 
     def _start(self, kinds: tuple[str, ...]) -> bool:
-        """Start the oldest job of these kinds; False when there is none."""
+        """Start the next job of these kinds; False when there is none."""
         owner = self._standby.name()
         job = self._queue.claim(kinds, owner=owner, machine=self._settings.machine, is_home=self._is_home)
         if job is None:

@@ -108,7 +108,7 @@ class Worker:
             self._report(lambda: self._finish("failed", error=described))
             return
         if result.get("reason") == "interrupted" and not self._is_cancelled:
-            self._report(lambda: self._queue.hand_back(self._owner))  # the next server continues
+            self._report(lambda: self._queue.hand_back(self._owner))  # it continues later
         else:
             self._report(lambda: self._finish("done", result=result))
 
@@ -129,7 +129,7 @@ class Worker:
                 os._exit(3)  # it is another's now: touch nothing
             if answer.word == "stop":
                 self._is_cancelled = True
-            if answer.word == "stop" or self._leaving.is_set():
+            if answer.word in ("stop", "rest") or self._leaving.is_set():
                 self._stop()
             self._leaving.wait(HEARTBEAT)
             if self._leaving.is_set():

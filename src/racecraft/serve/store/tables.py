@@ -200,6 +200,14 @@ class Job(Table):
     """Whether what it needs is in the object store, so that any machine may do it."""
     machine: Mapped[str] = mapped_column(String(64), default="")
     """Where it runs, or ran last."""
+    held_since: Mapped[datetime | None]
+    """When it got the place that it has."""
+    rested: Mapped[datetime | None]
+    """When it gave up the last one that it had without having ended."""
+    asked: Mapped[datetime | None]
+    """Since when others wait for its place."""
+    used: Mapped[float] = mapped_column(default=0.0)
+    """Seconds for which it had places, without the one that it has now."""
     watched_until: Mapped[datetime | None]
     """Until when the machine that does it is to show its cars in the object store."""
     result: Mapped[dict[str, Any] | None] = mapped_column(JSON)

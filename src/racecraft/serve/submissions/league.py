@@ -25,7 +25,8 @@ from racecraft.limits import Medals
 from racecraft.limits.limit import known_limit
 from racecraft.race.announcement import Announcement
 from racecraft.race.entry_file import read_entry_file
-from racecraft.serve.jobs.queue import KINDS, kinds_of, new_job, waiting_line
+from racecraft.serve.jobs.queue import KINDS, kinds_of, new_job
+from racecraft.serve.jobs.turns import waiting_line
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, is_withheld, state_of
 from racecraft.serve.races.standings import trial_scores
@@ -198,7 +199,7 @@ class League:
                 query = query.where(Submission.id == only)
             rows = session.execute(query.order_by(Submission.id.desc()).limit(MAX_LISTED)).all()
             pace = _pace(session)
-            line = waiting_line(session, kinds_of(KINDS[KIND].slot))
+            line = waiting_line(session, kinds_of(KINDS[KIND].slot), self._database.moment(session))
         # jobs that have the places which a waiting one needs, or come first
         ahead = {job.id: place for place, job in enumerate(line) if job.state == "queued"}
         return [
