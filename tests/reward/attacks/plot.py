@@ -26,7 +26,7 @@ def attack(function: Attack) -> Attack:
 
 def every_attack() -> dict[str, Attack]:
     """All attacks by name."""
-    for module in ("reading", "processes", "changing", "kernel"):
+    for module in ("reading", "processes", "changing", "kernel", "roundabout"):
         import_module(f"attack_{module}")
     return ATTACKS
 
