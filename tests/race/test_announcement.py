@@ -207,6 +207,8 @@ def test_a_document_of_an_earlier_version_has_the_defaults_of_what_came_later() 
         {"vehicle": {"mass": 1e9}},
         {"vehicle": []},
         {"objects": {"obstacles": {"count": 10**6}}},
+        {"objects": 3},
+        {"objects": {"wings": 2}},
         {"randomize": {"friction": "soft"}},
         {"cars_per_race": "2"},
         {"cars_per_race": 0},

@@ -328,6 +328,7 @@ def changed_header(document: dict[str, Any], place: str, value: Any) -> dict[str
         ("camera", {"width": 10**9}),
         ("objects", {"obstacles": {"count": 10**6}}),
         ("objects", {"obstacles": {"count": 2}}),  # allowed, but the rows have no columns for them
+        ("objects", {"wings": 2}),
         ("randomize", {"friction": [0.0, 99.0]}),
         ("unknown", 1),
     ],

@@ -146,8 +146,10 @@ class Objects:
         """From what `to_dict` gave.
 
         Raises:
-            ConfigError: A value is not allowed, or a key is unknown.
+            ConfigError: It is no mapping, a value is not allowed, or a key is unknown.
         """
+        if not isinstance(document, Mapping) or not {"obstacles", "bots"}.issuperset(document):
+            raise ConfigError(f"Objects are {str(document)[:200]}; allowed are obstacles and bots.")
         groups: dict[str, Any] = {}
         for name, kind in (("obstacles", Obstacles), ("bots", Bots)):
             values = document.get(name)
