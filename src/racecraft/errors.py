@@ -7,7 +7,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import Any
+from itertools import islice
+from typing import Any, Final
+
+MOST_CHARACTERS: Final = 80  # characters of a name, and MOST_NAMES of these, that a suggestion is looked for among
+MOST_NAMES: Final = 500
 
 
 class RacecraftError(Exception):
@@ -110,6 +114,12 @@ def printable(text: str) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A suggestion such as ``Did you mean 'oval'?`` for a misspelt name, or an empty string."""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    """A suggestion such as ``Did you mean 'oval'?`` for a misspelt name, or an empty string.
+
+    Comparing takes the product of their lengths: a stranger's names are compared only where they are short and few.
+    """
+    if len(name) > MOST_CHARACTERS:
+        return ""
+    short = (one for one in known if len(one) <= MOST_CHARACTERS)
+    close = difflib.get_close_matches(name, list(islice(short, MOST_NAMES)), n=1, cutoff=0.5)
     return f"Did you mean '{close[0]}'?" if close else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 
 import pytest
 from hypothesis import given, settings
@@ -267,3 +268,19 @@ def test_any_text_gives_problems_and_never_an_exception(text):
     for problem in check_reward(text):
         assert problem.line >= 1
         assert problem.column >= 1
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        body(RETURN) + "".join(f"speedname{i} = 0\nspeednome{i}\n" for i in range(800)),
+        body(RETURN) + "a" * 30_000 + "b = 0\n" + "a" * 30_000 + "c\n",
+        body(RETURN) + "import " + "os.\\\n" * 20_000 + "path\n",
+    ],
+    ids=["names that resemble others", "long names that resemble each other", "a name of 20,000 parts"],
+)
+def test_a_strangers_source_is_looked_at_soon(source: str) -> None:
+    """A server looks at it while others wait."""
+    begun = time.process_time()
+    assert check_reward(source)
+    assert time.process_time() - begun < 1.0

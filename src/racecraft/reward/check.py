@@ -8,10 +8,12 @@ to the user and no border against a hostile one; that border is the worker proce
 from __future__ import annotations
 
 import ast
+import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from itertools import islice
+from typing import Final, Literal
 
 from racecraft.errors import RewardError, did_you_mean, printable
 from racecraft.reward.imports import ImportRules
@@ -21,6 +23,12 @@ from racecraft.reward.source import MAX_CHARACTERS
 from racecraft.reward.worker_process import FILENAME
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+# A stranger's source is looked at by a server that others wait for.
+MAX_PROBLEMS: Final = 1000
+MAX_PARTS: Final = 100
+"""Of a dotted name: Python's own parser takes seconds for an import of 46,000."""
+_CHAIN: Final = re.compile(rf"(?<![\w.])(?:[^\W\d]\w*+[\s\\]*+\.[\s\\]*+){{{MAX_PARTS}}}")
 
 
 @dataclass(frozen=True)
@@ -44,11 +52,11 @@ class Problem:
 
 
 def check_reward(source: str) -> list[Problem]:
-    """All problems that can be seen in the source, in the order of its lines."""
+    """The problems that can be seen in the source, in the order of its lines; of very many the first that are found."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Python's own are caught where the source is parsed
-            problems = list(_problems(source))
+            problems = list(islice(_problems(source), MAX_PROBLEMS))
     except (RecursionError, MemoryError):
         problems = [Problem(1, 1, "The source is nested too deeply to be read.")]
     problems = [
@@ -75,6 +83,10 @@ def _problems(source: str) -> Iterator[Problem]:
         return
     if len(source) > MAX_CHARACTERS:
         yield Problem(1, 1, f"The source has {len(source):,} characters; AWS accepts up to {MAX_CHARACTERS:,}.")
+        return
+    if (chain := _CHAIN.search(source)) is not None:
+        line = source.count("\n", 0, chain.start()) + 1
+        yield Problem(line, 1, f"A name has more than {MAX_PARTS} parts.")
         return
     tree, findings = _parse(source)
     yield from findings

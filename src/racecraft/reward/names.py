@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 # The worker's interpreter starts without 'site', which would add exit, quit, help and others.
 BUILTIN_NAMES = frozenset(dir(builtins)) - {"exit", "quit", "help", "copyright", "credits", "license"}
+GUESSED = 10  # undefined names that a meaning is looked for; each is compared with every other name of the source
 MODULE_NAMES = frozenset(("__name__", "__doc__", "__annotations__", "__class__"))
 
 
@@ -37,7 +38,7 @@ def bound_names(tree: ast.AST, *, into_functions: bool = True) -> set[str]:
 
 
 def undefined_names(source: str, tree: ast.Module) -> Iterator[tuple[ast.Name, str, list[str]]]:
-    """Names that no scope binds: where each is used first, the name, and what it could mean."""
+    """Names that no scope binds: where each is used first, the name, and for the first few what it could mean."""
     nodes = list(ast.walk(tree))
     if any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in nodes):
         return
@@ -62,10 +63,11 @@ def undefined_names(source: str, tree: ast.Module) -> Iterator[tuple[ast.Name, s
     if not missing:
         return
     candidates = sorted(bound_names(tree) | {name for name in BUILTIN_NAMES if name.islower()})
+    num_missing = len(missing)
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id in missing:
             missing.remove(node.id)
-            yield node, node.id, candidates
+            yield node, node.id, candidates if num_missing - len(missing) <= GUESSED else []
 
 
 def _scopes(table: symtable.SymbolTable) -> Iterator[symtable.SymbolTable]:
