@@ -14,6 +14,7 @@
 #include "numpy_random.hpp"
 #include "ppo.hpp"
 #include "refuse.hpp"
+#include "senses.hpp"
 #include "settings.hpp"
 
 #define RC_EXPORT(name) extern "C" [[clang::export_name(#name)]]
@@ -81,9 +82,10 @@ struct ActionTable {
     }
 };
 
-// PPO's loop, the cars that it drives and what its actions mean to them.
+// PPO's loop, the cars that it drives, what they see and what its actions mean to them.
 struct Training {
     Engine& cars;
+    Senses senses;
     ActionTable table;
     std::vector<float> commands;  // (N, 2)
     Ppo ppo;
@@ -169,12 +171,18 @@ RC_EXPORT(freeze_car) void freeze_car(Engine* cars, size_t car, int steps) {
     require(car < cars->num_envs(), "There is no such car.");
     cars->freeze(car, steps);
 }
+// Everything that the next step depends on, as Engine::save() has it and the installed program reads it: into
+// out where it has room for all of it; how many bytes that are.
+RC_EXPORT(save_cars) size_t save_cars(const Engine* cars, uint8_t* out, size_t room) {
+    const std::vector<uint8_t> bytes = cars->save();
+    if (bytes.size() <= room) std::copy(bytes.begin(), bytes.end(), out);
+    return bytes.size();
+}
 RC_EXPORT(num_envs) size_t num_envs(const Engine* cars) {
     return cars->num_envs();
 }
 RC_EXPORT(num_pixels) size_t num_pixels(const Engine* cars) {
-    const CameraModel* camera = cars->camera();
-    return camera == nullptr ? 0 : static_cast<size_t>(camera->spec().width * camera->spec().height);
+    return Senses::pixels_of(*cars);
 }
 RC_EXPORT(row_width) size_t row_width(const Engine* cars) {
     return cars->row_width();
@@ -251,11 +259,11 @@ void orthogonal_weights(double seed, const double* layers, size_t count, float* 
 RC_EXPORT(choose_best)
 void choose_best(Learner* learner, Engine* cars, const double* table, float* commands) {
     const ActorCriticShape shape = learner->shape();
-    require(num_pixels(cars) == shape.sight_size, "The network was made for other pictures.");
+    Senses senses(*cars, shape);
     const size_t count = cars->num_envs(), size = shape.policy_size();
     std::vector<uint8_t> observations(count * shape.observation_size);
     std::vector<float> outputs(count * size);
-    learner->encode(cars->frames(), count, observations.data());
+    learner->encode(senses.read(), count, observations.data());
     learner->policy(observations.data(), nullptr, count, outputs.data());
     const ActionTable actions{{table, table + 2 * (shape.is_discrete ? shape.num_actions : 2)},
                               shape.is_discrete};
@@ -279,11 +287,11 @@ Training* make_training(Learner* learner, Engine* cars, const PpoSettings* setti
     const ActorCriticShape shape = learner->shape();
     require(settings->num_envs == static_cast<double>(cars->num_envs()),
             "PPO must be told the number of its cars.");
-    require(num_pixels(cars) == shape.sight_size, "The network was made for other pictures.");
     require(shape.state_size <= cars->state_width(), "The network was made for another state.");
     require(shape.is_discrete || shape.num_actions == 2, "A car takes two commands.");
     const size_t rows = shape.is_discrete ? shape.num_actions : 2;
     return new Training{*cars,
+                        Senses(*cars, shape),
                         {{table, table + 2 * rows}, shape.is_discrete},
                         std::vector<float>(2 * cars->num_envs()),
                         Ppo(config_of(*settings), *learner)};
@@ -302,7 +310,7 @@ RC_EXPORT(drive) bool drive(Training* training) {
     Engine& cars = training->cars;
     Ppo& ppo = training->ppo;
     require(!ppo.is_full(), "The rollout is full.");
-    if (!ppo.act(cars.frames(), cars.state(), cars.state_width())) return false;
+    if (!ppo.act(training->senses.read(), cars.state(), cars.state_width())) return false;
     const ActionTable& table = training->table;
     for (size_t car = 0; car < cars.num_envs(); ++car) {
         float* command = training->commands.data() + 2 * car;
@@ -320,7 +328,7 @@ RC_EXPORT(pay) bool pay(Training* training, const double* rewards) {
     Engine& cars = training->cars;
     Ppo& ppo = training->ppo;
     if (ppo.pay(rewards, cars.terminated(), cars.truncated())) {
-        ppo.look(cars.frames(), cars.state(), cars.state_width());
+        ppo.look(training->senses.read(), cars.state(), cars.state_width());
     }
     if (ppo.any_begins()) cars.reset(ppo.begins());
     return ppo.is_full();
@@ -342,6 +350,13 @@ RC_EXPORT(ended_episodes) size_t ended_episodes(const Training* training, double
         out[2 * i + 1] = static_cast<double>(ended[i].length);
     }
     return ended.size();
+}
+// The episodes under way: sums of their rewards, and their steps  (N,).
+RC_EXPORT(episode_totals) double* episode_totals(Training* training) {
+    return training->ppo.totals();
+}
+RC_EXPORT(episode_lengths) int64_t* episode_lengths(Training* training) {
+    return training->ppo.lengths();
 }
 // Mean and spread of the returns, to be read and written  (2,).
 RC_EXPORT(return_scale) double* return_scale(Training* training) {

@@ -35,6 +35,7 @@ namespace racecraft {
     X(picture_age)         \
     X(palette)             \
     X(has_camera)          \
+    X(has_lidar)           \
     X(width)               \
     X(height)              \
     X(hfov)                \
@@ -85,7 +86,8 @@ namespace racecraft {
     X(adam_eps)                \
     X(is_eps_hat)
 
-// As _native.Learner's; then, each behind its length, convs (filters, kernel, stride), dense, critic_units.
+// As _native.Learner's; then, each behind its length, convs (filters, kernel, stride), dense, critic_units,
+// lidar_units.
 #define RC_NETWORK_SETTINGS(X) \
     X(height)                  \
     X(width)                   \
@@ -94,7 +96,8 @@ namespace racecraft {
     X(block)                   \
     X(num_actions)             \
     X(is_discrete)             \
-    X(state_size)
+    X(state_size)              \
+    X(lidar_size)
 
 #define RC_FIELD(name) double name;
 #define RC_NAME(name) #name " "
@@ -163,6 +166,7 @@ inline EngineConfig config_of(const CarSettings& s) {
     config.baseline = static_cast<float>(s.baseline);
     config.substeps = static_cast<int>(s.substeps);
     config.num_threads = 1;
+    config.has_lidar = s.has_lidar != 0.0;
     config.limits = {static_cast<int>(s.laps), static_cast<int>(s.max_steps), s.time_limit};
     config.start = {static_cast<StartMode>(static_cast<int>(s.start_mode)),
                     s.start_offset,
@@ -217,12 +221,14 @@ inline NetworkSpec network_of(const double* settings) {
     spec.is_discrete = s.is_discrete != 0.0;
     spec.state_size = static_cast<int>(s.state_size);
     spec.lenses = 1;
+    spec.lidar_size = static_cast<int>(s.lidar_size);
     for (int count = number(); count > 0; --count) {
         const int filters = number(), kernel = number(), stride = number();
         spec.convs.push_back({filters, kernel, stride});
     }
     for (int count = number(); count > 0; --count) spec.dense.push_back(number());
     for (int count = number(); count > 0; --count) spec.critic_units.push_back(number());
+    for (int count = number(); count > 0; --count) spec.lidar_units.push_back(number());
     return spec;
 }
 

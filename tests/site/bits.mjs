@@ -180,14 +180,66 @@ async function verify(core, { plan, replays, tracks }) {
   return found;
 }
 
-async function policies(_, { plan, spaces }) {
+async function policies(_, { plan, wishes }) {
   const { policyFor } = await load("src/tab/policy.ts");
-  return spaces.map((space) => policyFor(plan, space));
+  return wishes.map(({ race, space, objects }) =>
+    policyFor(plan.races[race], space, objects),
+  );
+}
+
+/** A whole training, as the page's worker runs it. */
+async function session(core, asked) {
+  const { plan, race: type, objects, space, track, seed, steps } = asked;
+  const { Trainer, payWith } = await load("src/tab/trainer.ts");
+  const { policyFor } = await load("src/tab/policy.ts");
+  const { rewards } = await import(
+    `data:text/javascript,${encodeURIComponent(asked.rewards)}`
+  );
+  const race = plan.races[type];
+  const policy = policyFor(race, space, objects);
+  const pay = () => payWith(rewards.own, track, race.cars.num_envs);
+  const wish = { plan, race, policy, objects, track, seed };
+  const trainer = new Trainer(core, wish, pay);
+  let evaluation;
+  while (trainer.steps < steps) {
+    trainer.drive(() => {});
+    trainer.learn();
+    if (trainer.needsEvaluation || trainer.steps >= steps)
+      evaluation = trainer.evaluate();
+  }
+  const { completions, lapTimes } = evaluation;
+  const { learning, average, simulation, totals, lengths, returnScale } =
+    trainer.state();
+  return {
+    steps: trainer.steps,
+    learning: digest(learning),
+    average: digest(average),
+    simulation: digest(simulation),
+    totals: digest(totals),
+    lengths: digest(lengths),
+    returnScale: digest(returnScale),
+    completions,
+    lapTimes,
+  };
+}
+
+/** Somebody's drive, answer by answer. */
+async function driven(core, { plan, track, settings, controls }) {
+  const { DrivenCar } = await load("src/tab/drivencar.ts");
+  const car = new DrivenCar(core, plan, track, settings);
+  const { start } = car.begin("");
+  const answers = controls.map(({ steering, speed, steps }) =>
+    car.step(steering, speed, steps),
+  );
+  return { start, answers };
 }
 
 const { Core, loadCore } = await load("src/tab/core.ts");
 const core = await Core.load(readFileSync(code));
-const run = { ask, check, drive, train, refuse, verify, policies };
+const run = {
+  ...{ ask, check, drive, train, refuse },
+  ...{ verify, policies, session, driven },
+};
 const all = JSON.parse(readFileSync(cases, "utf8"));
 const files = all.find(({ files }) => files)?.files;
 const python = files ? await startPython(files) : undefined;

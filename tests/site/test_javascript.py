@@ -11,19 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from racecraft.reward import load_preset, make_params
-from racecraft.reward.numeric import NotNumeric
-from racecraft.sim import Simulation
-from racecraft.site.javascript import javascript
+from racecraft.reward import load_preset, make_params, preset_names
+from racecraft.sim import Bots, Objects, Obstacles, Simulation
+from racecraft.sim.objects import NO_OBJECTS
+from racecraft.site.javascript import NotTranslated, javascript
 from racecraft.track import load_track
 
 RUN = """const { rewards } = await import(process.argv[1]);
 const { rows, waypoints } = JSON.parse(require("fs").readFileSync(0, "utf8"));
 const pay = (reward, row) => { try { return reward(row, waypoints); } catch { return null; } };
-const paid = Object.entries(rewards).map(([name, reward]) => [name, rows.map((row) => pay(reward, row))]);
+const every = ({ make }) => {
+  const made = Array.from({ length: 16 }, make);
+  return rows.map((row, i) => pay(made[i % 16], row));
+};
+const paid = Object.entries(rewards).map(([name, reward]) => [name, every(reward)]);
 console.log(JSON.stringify(Object.fromEntries(paid)));
 """
-NUMERIC = ("anti_zigzag", "centerline", "heading", "progress_pace", "racing", "speed_gate", "stay_inside")
+AMONG = Objects(obstacles=Obstacles(count=4, placement="random"), bots=Bots(count=3, speed=0.6))
 ODD = """import math
 LIMIT = 3
 
@@ -43,9 +47,21 @@ def reward_function(params):
 """
 
 
-def driven() -> tuple[list[list[float]], list[list[tuple[float, float]]]]:
+EVERY_OBJECT = """def reward_function(params):
+    total = len(params["objects_speed"]) + 0.5
+    for distance in params["objects_distance"]:
+        total += distance
+    for x, y in params["objects_location"]:
+        total += x * y
+    if params["objects_heading"] and params["object_in_camera"]:
+        total += params["objects_heading"][-1] + params["objects_speed"][-1]
+    return total if not params["is_offtrack"] else -total
+"""
+
+
+def driven(objects: Objects) -> tuple[list[list[float]], list[list[tuple[float, float]]]]:
     track = load_track("hairpin")
-    simulation = Simulation(track, num_envs=16, seed=3, camera=None, num_threads=1)
+    simulation = Simulation(track, num_envs=16, seed=3, camera=None, objects=objects, num_threads=1)
     rng = np.random.default_rng(3)
     rows = []
     for _ in range(25):
@@ -54,52 +70,46 @@ def driven() -> tuple[list[list[float]], list[list[tuple[float, float]]]]:
     return rows, [[(x, y) for x, y in one.waypoints.tolist()] for one in (track, track.reversed())]
 
 
-def test_rewards_in_a_tab_pay_what_they_pay_in_python(tmp_path: Path) -> None:
+@pytest.mark.parametrize("objects", [NO_OBJECTS, AMONG], ids=["alone", "among objects"])
+def test_rewards_in_a_tab_pay_what_they_pay_in_python(tmp_path: Path, objects: Objects) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("Node is not installed")
-    sources = {**{name: load_preset(name) for name in NUMERIC}, "odd": ODD, "broken": ODD.replace("LIMIT)", "1 / 0)")}
+    sources = {name: load_preset(name) for name in preset_names()}
+    sources |= {"odd": ODD, "every": EVERY_OBJECT, "broken": ODD.replace("LIMIT)", "1 / 0)")}
     module = tmp_path / "rewards.mjs"
     module.write_text(javascript(sources), encoding="utf-8")
-    rows, waypoints = driven()
+    rows, waypoints = driven(objects)
     command = [node, "-e", f"(async () => {{ {RUN} }})()", str(module)]
     told = json.dumps({"rows": rows, "waypoints": waypoints})
     done = subprocess.run(command, input=told, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     found = json.loads(done.stdout)
-    for name in (*NUMERIC, "odd"):
-        space: dict[str, object] = {}
-        exec(sources[name], space)
-        reward = space["reward_function"]
-        expected = [0.0 if row[1] == 1.0 else float(reward(make_params(row, waypoints))) for row in rows]  # type: ignore[operator]
-        np.testing.assert_allclose(found[name], expected, rtol=1e-13, atol=1e-15, err_msg=name)
-        assert len(set(expected)) > 1 or name == "progress_pace", name
+    for name in (*preset_names(), "odd", "every"):
+        spaces: list[dict[str, object]] = [{} for _ in range(16)]  # every car remembers for itself
+        for space in spaces:
+            exec(sources[name], space)
+        paid = [
+            spaces[index % 16]["reward_function"](make_params(row, waypoints)) if row[1] != 1.0 else 0.0  # type: ignore[operator]
+            for index, row in enumerate(rows)
+        ]
+        np.testing.assert_allclose(found[name], paid, rtol=1e-13, atol=1e-15, err_msg=name)
+        assert len(set(paid)) > 1 or name == "progress_pace", name
     assert all((paid is None) == (row[1] != 1.0) for paid, row in zip(found["broken"], rows, strict=True))
 
 
 @pytest.mark.parametrize(
     ("line", "why"),
     [
-        ("return params", "as a whole"),
         ("return sum([1.0])", "List"),
+        ("params['x'] += 1", "not translated"),
+        ("it = {1: 2}\n    return it[1]", "no plain words"),
         ("while True:\n        pass", "not translated"),
         ("return params['speed'].hex()", "calls"),
         ("return (lambda: 1)()", "calls"),
         ("import os\n    return 1", "not translated"),
     ],
 )
-def test_what_is_not_numeric_is_refused(line: str, why: str) -> None:
-    with pytest.raises(NotNumeric, match=re.escape(why)):
+def test_what_is_not_translated_is_refused(line: str, why: str) -> None:
+    with pytest.raises(NotTranslated, match=re.escape(why)):
         javascript({"own": f"def reward_function(params):\n    {line}\n"})
-
-
-def test_every_preset_that_keeps_nothing_is_offered() -> None:
-    def is_offered(name: str) -> bool:
-        try:
-            javascript({name: load_preset(name)})
-        except NotNumeric:
-            return False
-        return True
-
-    assert all(map(is_offered, NUMERIC))
-    assert not is_offered("touring")  # it remembers the step before

@@ -71,11 +71,16 @@ def page() -> Iterator[Page]:
 
 
 def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_program(page: Page, tmp_path: Path) -> None:
+    from playwright.sync_api import expect
+
     page.get_by_label("Track").select_option("oval")
     page.get_by_role("button", name="Delete: 9").click()  # nine actions are left
     page.get_by_role("button", name="Train").click()
     page.get_by_text(re.compile("64 cars learning at once")).wait_for(timeout=PATIENCE)
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Race it: oval-racing-1").click()
+    expect(page.get_by_label("Ghost")).to_have_value("model:oval-racing-1", timeout=PATIENCE)
+    page.get_by_role("button", name="Back").click()
     shown = page.get_by_text(re.compile(r"oval, 5 of 5 laps, best \d+\.\d\d s")).inner_text()
     with page.expect_download() as download:
         page.get_by_role("button", name="Download: oval-racing-1").click()
@@ -106,6 +111,34 @@ def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
     page.get_by_role("button", name="Train").click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Stop").click()
+
+
+def test_cars_learn_among_bots_and_a_time_trial_follows(page: Page) -> None:
+    page.get_by_label("Track").select_option("oval")
+    page.get_by_role("button", name="Head to bot").click()
+    page.get_by_label("Bot cars").fill("2")
+    assert page.get_by_label("What it is paid for").input_value() == "dodge"
+    page.get_by_role("button", name="Train").click()
+    page.get_by_text("128 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_role("button", name="Time trial").click()
+    assert page.get_by_label("What it is paid for").input_value() == "racing"
+    assert "dodge" not in page.get_by_label("What it is paid for").inner_text()
+
+
+def test_somebody_drives_a_lap_and_then_against_it(page: Page) -> None:
+    page.get_by_label("Track").select_option("straight")
+    page.get_by_role("button", name="Drive yourself").click()
+    page.get_by_text("Press ↑ to drive off").wait_for(timeout=PATIENCE)
+    page.keyboard.down("ArrowUp")
+    page.get_by_text(re.compile("A new best: ")).first.wait_for(timeout=PATIENCE)
+    page.keyboard.up("ArrowUp")
+    page.get_by_role("button", name="Back").click()
+    page.get_by_role("button", name="Drive yourself").click()
+    page.get_by_label("Ghost").get_by_text(re.compile(r"Your best lap · \d+\.\d\d s")).wait_for(
+        state="attached", timeout=PATIENCE
+    )
+    page.get_by_role("button", name="Back").click()
 
 
 def test_what_runs_in_the_page_reaches_no_other_site(page: Page) -> None:
@@ -231,7 +264,7 @@ def test_the_page_is_accessible_in_both_themes_and_fits_a_phone(page: Page) -> N
     page.evaluate(AXE.read_text(encoding="utf-8"))
     for theme in ("light", "dark"):
         page.get_by_label("Theme").select_option(theme)
-        page.wait_for_timeout(300)
+        page.wait_for_function("document.getAnimations().length === 0")  # colours have changed
         found = page.evaluate("axe.run().then((found) => found.violations.map((one) => [one.id, one.nodes[0].html]))")
         assert found == []
     for width in (390, 768):

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.reward import load_preset, preset_names
-from racecraft.reward.numeric import NotNumeric
 from racecraft.site.calls import SHIPPED
 from racecraft.site.javascript import javascript
 from racecraft.site.plan import plan, track_file
@@ -45,15 +44,19 @@ def write_data(folder: Path) -> None:
     """Plan, tracks and rewards."""
     (folder / "tracks").mkdir(parents=True, exist_ok=True)
     sources = {name: load_preset(name) for name in preset_names()}
-    offered = {name: source for name, source in sources.items() if _is_translated(source)}
     rewards = [
-        {"name": name, "description": (ast.get_docstring(ast.parse(source)) or "").split("\n")[0], "source": source}
-        for name, source in offered.items()
+        {
+            "name": name,
+            "description": (ast.get_docstring(ast.parse(source)) or "").split("\n")[0],
+            "source": source,
+            "seesObjects": '"objects_' in source,
+        }
+        for name, source in sources.items()
     ]
     write(folder / "plan.json", {**plan(), "tracks": track_names(), "rewards": rewards})
     for name in track_names():
         write(folder / "tracks" / f"{name}.json", track_file(name))
-    (folder / "rewards.js").write_text(javascript(offered), encoding="utf-8")
+    (folder / "rewards.js").write_text(javascript(sources), encoding="utf-8")
 
 
 def write_python(folder: Path, pyodide: Path) -> None:
@@ -77,14 +80,6 @@ def python_files() -> dict[str, str]:
 def write(path: Path, document: dict[str, Any]) -> None:
     """A JSON file without blanks."""
     path.write_text(json.dumps(document, separators=(",", ":")), encoding="utf-8")
-
-
-def _is_translated(source: str) -> bool:
-    try:
-        javascript({"it": source})
-    except NotNumeric:
-        return False
-    return True
 
 
 if __name__ == "__main__":

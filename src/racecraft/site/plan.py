@@ -1,4 +1,4 @@
-"""The training that the page runs, as numbers: the same car, network, PPO and evaluation as `racecraft train`."""
+"""The trainings that the page runs, as numbers: the same car, network, PPO and evaluation as `racecraft train`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from racecraft.agent import ActionSpace, DiscreteActionSpace, ModelMetadata, action_space
 from racecraft.learn import NetworkSpec, PPOConfig, networks
 from racecraft.race.conditions import STANDARD_CAR
-from racecraft.race.placement import start_pose
 from racecraft.race.rules import RULE_SETS
 from racecraft.reward import situations
 from racecraft.run.folder import RunInfo
@@ -20,16 +19,19 @@ from racecraft.serve.rewards.routes import list_actions
 from racecraft.serve.rewards.schemas import ActionPreset
 from racecraft.serve.tracks.courses import geometry
 from racecraft.sim.camera import CAMERAS, CameraSpec
-from racecraft.sim.columns import STATUS_NAMES
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, STATUS_NAMES
+from racecraft.sim.objects import NO_OBJECTS, OBJECT_KINDS, RACE_TYPES, Objects, objects_for_race
 from racecraft.sim.randomization import PRESETS as RANDOM
 from racecraft.sim.simulation import CONTROL_DT, DIRECTIONS, START_MODES, Start, track_arrays
 from racecraft.sim.vehicle import PRESETS as VEHICLES
 from racecraft.track import Track, joint_digest, load_track
 from racecraft.training.evaluator import SEED, SLOWEST
+from racecraft.training.regimes import regime_of
 from racecraft.training.settings import TrainSettings, make_settings
+from racecraft.training.stop import Until
 
 SEEDS: Final = range(1, 9)
-"""Seeds that the page trains with, one after the other; the evaluation's starts of each are among a track's files."""
+"""Seeds that the page trains with, one after the other."""
 SUBSTEPS, MAX_STEPS = 8, 100_000  # the defaults of `Simulation`
 PALETTES: Final = ("2018", "2020", "2026")
 PPO_SETTINGS: Final = (
@@ -72,7 +74,14 @@ def told_road(track: Track) -> dict[str, Any]:
 
 
 def told_cars(
-    camera: CameraSpec | None, start: Start, num_envs: int, *, seed: int, direction: str, max_steps: int = MAX_STEPS
+    camera: CameraSpec | None,
+    start: Start,
+    num_envs: int,
+    *,
+    seed: int,
+    direction: str,
+    max_steps: int = MAX_STEPS,
+    has_lidar: bool = False,
 ) -> dict[str, float]:
     """What `racecraft.sim.Simulation` would be told, by the core's names; the rest are its defaults."""
     eye = camera or CameraSpec()
@@ -95,6 +104,7 @@ def told_cars(
         "picture_age": round(eye.age / CONTROL_DT * SUBSTEPS),
         "palette": PALETTES.index(eye.palette),
         "has_camera": int(camera is not None),
+        "has_lidar": int(has_lidar),
         "width": eye.width,
         "height": eye.height,
         "hfov": eye.horizontal_fov,
@@ -120,10 +130,12 @@ def told_network(spec: NetworkSpec) -> dict[str, Any]:
             "num_actions": spec.num_actions,
             "is_discrete": int(spec.is_discrete),
             "state_size": spec.state_size,
+            "lidar_size": spec.lidar_size,
         },
         "convs": [[conv.filters, conv.kernel, conv.stride] for conv in arch.convs],
         "dense": list(arch.dense),
         "criticUnits": list(networks.CRITIC_UNITS),
+        "lidarUnits": list(arch.lidar),
     }
 
 
@@ -148,26 +160,55 @@ def told_ppo(config: PPOConfig) -> dict[str, float]:
 
 
 def plan() -> dict[str, Any]:
-    """The default training, whatever the track, the reward and the seed; those of a run are filled in by the page."""
-    metadata = ModelMetadata(neural_network="RACECRAFT_SMALL")
-    settings = make_settings(metadata=metadata)
-    rules = RULE_SETS["first_lap"]
-    camera = CAMERAS[settings.camera]
-    trials = settings.evaluation_trials
-    line = Start(mode="fixed", offset=rules.start_offset)
+    """What the page can train, whatever the track, the reward and the seed; those of a run it fills in itself."""
+    settings = _settings(action_space("default"))
     return {
-        "cars": told_cars(camera, settings.start, settings.num_envs, seed=0, direction=settings.direction),
-        "trials": told_cars(camera, line, trials, seed=0, direction="forward"),
         "vehicle": asdict(settings.vehicle),
         "averageShare": settings.ppo.average_share,
-        "evaluateEvery": settings.evaluate_every,
         "slowest": SLOWEST,
+        "evaluationSeed": SEED,
         "seeds": list(SEEDS),
         "statuses": list(STATUS_NAMES),
+        "objectKinds": list(OBJECT_KINDS),
+        "objectColumns": {"header": list(OBJECT_HEADER), "each": list(OBJECT_COLUMNS)},
         "spaces": [told_space(preset) for preset in list_actions()],
-        "policies": {name: told_policy(action_space(name)) for name in ("default", "continuous")},
+        "races": {race: told_race(race) for race in RACE_TYPES},
         "known": known(),
     }
+
+
+def told_race(race: str) -> dict[str, Any]:
+    """What of the default training depends on the kind of race: its cars and evaluations, and what it begins with."""
+    objects = objects_for_race(race)
+    regime = regime_of(objects=objects)
+    settings, suite = (
+        _settings(action_space(regime.actions), objects),
+        _metadata(action_space("default"), objects).suite,
+    )
+    camera = suite.camera(CAMERAS[settings.camera])
+    line = Start(mode="fixed", offset=RULE_SETS["first_lap"].start_offset)
+    common: dict[str, Any] = {"seed": 0, "has_lidar": bool(suite.lidar_name)}
+    return {
+        "reward": regime.reward,
+        "space": regime.actions,
+        "objects": objects.to_dict(),
+        "laps": settings.until.laps,
+        "good": regime.good,
+        "evaluateEvery": settings.evaluate_every,
+        "cars": told_cars(camera, settings.start, settings.num_envs, direction=settings.direction, **common),
+        "trials": told_cars(camera, line, settings.evaluation_trials, direction="forward", **common),
+        "policies": {name: told_policy(action_space(name), objects) for name in ("default", "continuous")},
+    }
+
+
+def _metadata(space: ActionSpace, objects: Objects) -> ModelMetadata:
+    sensors = regime_of(objects=objects).sensors
+    return ModelMetadata(action_space=space, sensors=sensors, neural_network="RACECRAFT_SMALL")
+
+
+def _settings(space: ActionSpace, objects: Objects = NO_OBJECTS) -> TrainSettings:
+    until = Until.parse(regime_of(objects=objects).until)
+    return make_settings(metadata=_metadata(space, objects), objects=objects, until=until)
 
 
 def told_space(preset: ActionPreset) -> dict[str, Any]:
@@ -178,10 +219,9 @@ def told_space(preset: ActionPreset) -> dict[str, Any]:
     return told
 
 
-def told_policy(space: ActionSpace) -> dict[str, Any]:
-    """What of the default training depends on the actions: a network, how it learns, and what is written of a run."""
-    metadata = ModelMetadata(action_space=space, neural_network="RACECRAFT_SMALL")
-    settings = make_settings(metadata=metadata)
+def told_policy(space: ActionSpace, objects: Objects = NO_OBJECTS) -> dict[str, Any]:
+    """What of a race's training depends on the actions: a network, how it learns, and what is written of a run."""
+    metadata, settings = _metadata(space, objects), _settings(space, objects)
     spec = settings.network_spec(metadata)
     if isinstance(space, DiscreteActionSpace):
         table = space.to_commands(np.arange(space.size)).astype(np.float64)
@@ -211,7 +251,7 @@ def known() -> dict[str, Any]:
 
 
 def track_file(name: str) -> dict[str, Any]:
-    """One track of the library: for the core, for the page to draw, and where evaluations start."""
+    """One track of the library: for the core, for the page to draw, and to put cars on it."""
     track = load_track(name)
     return {
         "told": told_track(track_arrays(track)),
@@ -222,7 +262,6 @@ def track_file(name: str) -> dict[str, Any]:
         "situations": [
             {"name": one.name, "description": one.description, "row": one.row.tolist()} for one in situations(track)
         ],
-        "starts": {str(seed): _starts(track, seed) for seed in SEEDS},
     }
 
 
@@ -232,9 +271,3 @@ def _run(settings: TrainSettings) -> dict[str, Any]:
     del document["seed"], document["track"]
     info = asdict(RunInfo(seed=0, track="", track_digest="", settings=document))
     return {"format": 1, **{name: info[name] for name in ("settings", "versions", "parent", "foreign")}}
-
-
-def _starts(track: Track, seed: int) -> list[list[float]]:
-    """X, y in m and heading in rad of every trial but the first, which starts at the line itself."""
-    rules, trials = RULE_SETS["first_lap"], TrainSettings().evaluation_trials
-    return [list(start_pose(track, rules, seed=(seed + SEED) % 2**32, trial=trial)) for trial in range(1, trials)]

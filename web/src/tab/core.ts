@@ -26,6 +26,7 @@ export interface NetworkSettings {
   convs: number[][]; // filters, kernel, stride
   dense: number[];
   criticUnits: number[];
+  lidarUnits: number[];
 }
 
 export interface Episode {
@@ -96,6 +97,7 @@ export class Core {
       ...[network.convs.length, ...network.convs.flat()],
       ...[network.dense.length, ...network.dense],
       ...[network.criticUnits.length, ...network.criticUnits],
+      ...[network.lidarUnits.length, ...network.lidarUnits],
     ];
     const at = this.module.with([Float64Array.from(settings)], (from) => this.module.call("make_learner", from));
     return new Learner(this, at);
@@ -185,6 +187,15 @@ export class Cars extends Held {
 
   freeze(car: number, steps: number): void {
     this.call("freeze_car", car, steps);
+  }
+
+  /** Everything that the next step depends on, as the installed program's Simulation.save() has it. */
+  save(): Uint8Array {
+    const size = this.call("save_cars", 0, 0);
+    return this.core.module.with([new Uint8Array(size)], (to) => {
+      this.call("save_cars", to, size);
+      return this.core.module.view(Uint8Array, to, size).slice();
+    });
   }
 
   // Views of what is now: good until the next call.
@@ -277,6 +288,16 @@ export class Training extends Held {
 
   get totalSteps(): number {
     return this.call("total_steps");
+  }
+
+  /** The episodes under way: sums of their rewards, and their steps; mean and spread of the returns. */
+  underWay(numCars: number): { totals: Float64Array; lengths: BigInt64Array; returnScale: Float64Array } {
+    const { module } = this.core;
+    return {
+      totals: module.view(Float64Array, this.call("episode_totals"), numCars).slice(),
+      lengths: module.view(BigInt64Array, this.call("episode_lengths"), numCars).slice(),
+      returnScale: module.view(Float64Array, this.call("return_scale"), 2).slice(),
+    };
   }
 
   /** Episodes that ended since begin(). */

@@ -23,11 +23,19 @@ export const de: Record<TabKey, string> = {
   models_lead:
     "Sie bleiben in diesem Browser. Ein Download geht im installierten Programm weiter: racecraft import DATEI, dann racecraft train --resume.",
   models_none: "Noch keines. Ein Auto, das trainiert und bewertet wurde, steht dann hier.",
-  model_about: "{track}, {laps} von 5 Runden, beste {lap}, {steps} Schritte",
+  model_about: "{track}, {laps} von {trials} Runden, beste {lap}, {steps} Schritte",
   download: "Herunterladen",
   drop: "Löschen",
   full: "Im Speicher dieses Browsers ist kein Platz mehr: Lösche ein Modell, oder lade dieses jetzt herunter.",
-  installed: "Alles andere, etwa Kisten und Bot-Autos, gibt es im installierten Programm.",
+  installed: "Alles andere, etwa Rennen zwischen Modellen, gibt es im installierten Programm.",
+  race: "Rennen",
+  race_lead: "Allein auf der Straße, um Kisten herum oder an langsameren Autos vorbei.",
+  race_among:
+    "Das Auto trägt hier ein LIDAR. Das Ausweichen lernt es in einigen Minuten; gewertet werden zwanzig Runden.",
+  drive: "Selbst fahren",
+  drive_on: "Selbst fahren: {track}",
+  drive_close: "Zurück",
+  race_it: "Gegen es fahren",
   own: "Eine eigene Belohnung",
   own_lead:
     "Python wie bei AWS: reward_function(params) gibt für jeden Schritt eine Zahl. Sie läuft nur in diesem Tab.",

@@ -2,18 +2,31 @@
 import type { ActionPreset, RewardVerdict } from "../api/client";
 import { Curves, type Point } from "../lib/curves";
 import type { Look, Picture } from "../lib/poses";
-import type { Plan, TrackFile } from "./plan";
+import { countOf } from "./objects";
+import type { Trace } from "./drivencar";
+import type { Plan, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
+import type { Objects } from "./verify/header";
 import type { Check, Load, Report, Start } from "./worker";
 import { openWorker } from "./open";
 
-const LAPS = 5;
-const MOST = 400_000; // camera steps
+const MOST = { alone: 400_000, among: 3_000_000 }; // camera steps
 const PATIENCE = 5; // s that a reward function may take for a step of all cars
 const TICKS = 2; // a second
 const MOST_PRINTED = 20_000; // characters
 
 type Kind = "plain" | "python";
+
+/** A training that somebody asks for. */
+export interface Wish {
+  track: TrackFile;
+  reward: string; // a preset's name
+  space: ActionPreset;
+  type: RaceType;
+  objects: Objects;
+  seed: number;
+  source: string | undefined; // of a reward of one's own, instead of the preset
+}
 
 const refusal = (message: string): RewardVerdict => ({
   ok: false,
@@ -32,6 +45,7 @@ export interface Judged {
   steps: number;
   seconds: number;
   weights: Float32Array;
+  trace: Trace;
 }
 
 export class Lesson {
@@ -99,7 +113,7 @@ export class Lesson {
   }
 
   /** `source`: of a reward of one's own, instead of a preset. */
-  train(track: TrackFile, reward: string, space: ActionPreset, seed: number, source?: string): void {
+  train({ track, reward, space, type, objects, seed, source }: Wish): void {
     [this.look, this.picture, this.judged] = [undefined, undefined, undefined];
     [this.seconds, this.failure] = [0, ""];
     [this.failedReward, this.printed] = ["", ""];
@@ -108,8 +122,10 @@ export class Lesson {
     this.running = source === undefined ? "plain" : "python";
     if (source !== undefined) this.preparePython();
     const { plan } = this;
-    const policy = policyFor(plan, space);
-    const start: Start = { kind: "train", plan, policy, track, reward: source ?? reward, seed, laps: LAPS, most: MOST };
+    const race = plan.races[type];
+    const policy = policyFor(race, space, objects);
+    const most = countOf(objects) ? MOST.among : MOST.alone;
+    const start: Start = { kind: "train", plan, race, policy, objects, track, reward: source ?? reward, seed, most };
     this.workers[this.running]!.postMessage(start);
   }
 
@@ -167,10 +183,10 @@ export class Lesson {
         break;
       }
       case "evaluation": {
-        const { completions, lapTimes, weights } = report.evaluation;
+        const { completions, lapTimes, weights, trace } = report.evaluation;
         const { steps, seconds } = report;
         const bestLap = lapTimes.length ? Math.min(...lapTimes) : null;
-        this.judged = { laps: lapTimes.length, trials: completions.length, bestLap, steps, seconds, weights };
+        this.judged = { laps: lapTimes.length, trials: completions.length, bestLap, steps, seconds, weights, trace };
         this.add({ kind: "evaluation", step: steps, seconds, completions, lap_times: lapTimes });
         break;
       }

@@ -1,8 +1,10 @@
 /** A car that learned in this tab, and the archive of it that `racecraft import` takes. */
 import type { ActionPreset } from "../api/client";
-import type { Plan, Policy, TrackFile } from "./plan";
+import type { Trace } from "./drivencar";
+import type { Plan, Policy, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
 import { gzip, tar } from "./tar";
+import type { Objects } from "./verify/header";
 
 export interface Model {
   name: string;
@@ -14,9 +16,12 @@ export interface Model {
   steps: number;
   seconds: number;
   laps: number; // of the last evaluation
+  trials?: number; // of it; none of models that were kept when there were always five
   bestLap: number | null; // s
   space?: ActionPreset; // none of models that were kept when there was only the default one
+  race?: { type: RaceType; objects: Objects }; // none of those that were kept when there were only time trials
   weights: Float32Array;
+  trace?: Trace; // of its fastest lap, to drive against; none of older ones
 }
 
 export const modelOf = (track: TrackFile, rest: Omit<Model, "track" | "trackDigest" | "created">): Model => ({
@@ -31,7 +36,8 @@ const text = (value: unknown) => new TextEncoder().encode(typeof value === "stri
 /** A run folder whose checkpoint holds weights alone: training goes on from them in the installed program. */
 export async function archive(model: Model, plan: Plan): Promise<Blob> {
   const { created, seed, track, trackDigest: track_digest } = model;
-  const policy = policyFor(plan, model.space ?? plan.spaces[0]!);
+  const { type, objects } = model.race ?? { type: "time-trial", objects: { obstacles: null, bots: null } };
+  const policy = policyFor(plan.races[type], model.space ?? plan.spaces[0]!, objects);
   const checkpoint = checkpointOf(model, policy);
   const digest = await sha256(checkpoint);
   const file = `000000000-${digest.slice(0, 8)}.safetensors`;

@@ -6,7 +6,7 @@ export class Refusal extends Error {}
 /** Address of something in the module's memory. */
 export type Address = number;
 
-type Numbers = Float64Array | Float32Array | Int32Array | Uint8Array | BigUint64Array;
+type Numbers = Float64Array | Float32Array | Int32Array | Uint8Array | BigUint64Array | BigInt64Array;
 type Kind<T extends Numbers> = new (buffer: ArrayBufferLike, at: number, length: number) => T;
 
 export class CoreModule {

@@ -1,12 +1,29 @@
 /** What the page is told of the training that it runs: the files that `python -m racecraft.site` writes beside it. */
 import type { ActionPreset, TrackGeometry } from "../api/client";
 import type { NetworkSettings, Settings, TrackArrays } from "./core";
+import type { Objects } from "./verify/header";
 import type { Known } from "./verify/provenance";
 
 export interface RewardPreset {
   name: string;
   description: string;
   source: string;
+  seesObjects: boolean; // and means nothing without them
+}
+
+export type RaceType = "time-trial" | "object-avoidance" | "head-to-bot";
+
+/** What of a training depends on the kind of race. */
+export interface RacePlan {
+  reward: string; // that it begins with
+  space: string; // likewise
+  objects: Objects; // likewise
+  laps: number; // of an evaluation, until it ends
+  good: number; // mean completion from which on the averaged weights drive
+  evaluateEvery: number; // camera steps
+  cars: Settings;
+  trials: Settings;
+  policies: { default: Policy; continuous: Policy };
 }
 
 /** What of a training depends on the actions. */
@@ -23,16 +40,16 @@ export interface Policy {
 }
 
 export interface Plan {
-  cars: Settings;
-  trials: Settings;
   vehicle: Settings;
   averageShare: number;
-  evaluateEvery: number; // camera steps
   slowest: number; // m/s
+  evaluationSeed: number; // added to a training's
   seeds: number[];
   statuses: string[]; // of a car, by the number in its row
+  objectKinds: string[]; // by the number in a row
+  objectColumns: { header: string[]; each: string[] }; // behind a row's own
   spaces: ActionPreset[]; // the default first
-  policies: { default: Policy; continuous: Policy };
+  races: Record<RaceType, RacePlan>;
   known: Known; // rules, cars and randomisations of the library
   tracks: string[];
   rewards: RewardPreset[];
@@ -57,7 +74,6 @@ export interface TrackFile {
   geometry: TrackGeometry;
   digest: string;
   situations: { name: string; description: string; row: number[] }[]; // that a reward of one's own is tried in
-  starts: Record<string, [number, number, number][]>; // by seed: x, y, heading of every trial but the first
 }
 
 /** Numbers that crossed as text. */

@@ -1,14 +1,16 @@
 /** What a training is told for the actions that somebody chose: the plan's policy of that kind, with their number. */
 import type { ActionPreset } from "../api/client";
 import { metadataOf } from "../lib/actions";
-import type { Plan, Policy } from "./plan";
+import type { Policy, RacePlan } from "./plan";
+import type { Objects } from "./verify/header";
 
 const HEAD = "policy.head"; // the layer that has a row an action
 const radians = (degrees: number) => degrees * (Math.PI / 180);
 
-export function policyFor({ policies }: Plan, space: ActionPreset): Policy {
+export function policyFor({ policies }: RacePlan, space: ActionPreset, objects: Objects): Policy {
   const isDiscrete = space.kind === "discrete";
-  const policy = isDiscrete ? policies.default : policies.continuous;
+  const planned = isDiscrete ? policies.default : policies.continuous;
+  const policy = { ...planned, run: { ...planned.run, settings: { ...(planned.run["settings"] as object), objects } } };
   const modelMetadata = { ...policy.modelMetadata, ...metadataOf(space) };
   if (!isDiscrete) {
     const [steering, speed] = [space.steering_angle!, space.speed!];

@@ -1,25 +1,44 @@
-/** Models in this browser's storage: they stay when the page is closed, and leave it only as a download. */
+/** Models in this browser's storage, and the best laps of who drives: they stay when the page is closed; a model leaves it
+ * only as a download. */
+import type { Trace } from "./drivencar";
 import type { Model } from "./model";
 
-const [BASE, MODELS] = ["racecraft-tab", "models"];
+const [BASE, VERSION] = ["racecraft-tab", 2];
+const KEYS = { models: "name", laps: "key" } as const; // of what is kept
 
-/** Everything kept, newest first. */
+/** A lap that somebody drove. */
+export interface DrivenLap {
+  key: string; // track, car and direction
+  seconds: number;
+  trace: Trace;
+}
+
+/** Every model, newest first. */
 export async function kept(): Promise<Model[]> {
-  const models = await ask<Model[]>("readonly", (store) => store.getAll());
+  const models = await ask<Model[]>("models", "readonly", (store) => store.getAll());
   return models.sort((a, b) => b.created.localeCompare(a.created));
 }
 
 /** Keep a model, instead of one of the same name; an Error with a sentence where there is no room. */
-export const keep = (model: Model): Promise<unknown> => ask("readwrite", (store) => store.put(model));
+export const keep = (model: Model): Promise<unknown> => ask("models", "readwrite", (store) => store.put(model));
 
-export const drop = (name: string): Promise<unknown> => ask("readwrite", (store) => store.delete(name));
+export const drop = (name: string): Promise<unknown> => ask("models", "readwrite", (store) => store.delete(name));
 
-async function ask<T>(mode: IDBTransactionMode, what: (store: IDBObjectStore) => IDBRequest): Promise<T> {
+export const drivenLap = (key: string): Promise<DrivenLap | undefined> =>
+  ask("laps", "readonly", (store) => store.get(key) as IDBRequest<DrivenLap | undefined>);
+
+export const keepLap = (lap: DrivenLap): Promise<unknown> => ask("laps", "readwrite", (store) => store.put(lap));
+
+async function ask<T>(
+  name: keyof typeof KEYS,
+  mode: IDBTransactionMode,
+  what: (store: IDBObjectStore) => IDBRequest,
+): Promise<T> {
   const base = await open();
   try {
     return await new Promise<T>((done, failed) => {
-      const transaction = base.transaction(MODELS, mode);
-      const request = what(transaction.objectStore(MODELS));
+      const transaction = base.transaction(name, mode);
+      const request = what(transaction.objectStore(name));
       transaction.oncomplete = () => done(request.result as T);
       transaction.onabort = () => failed(transaction.error ?? new Error("The browser's storage did not answer."));
     });
@@ -30,8 +49,11 @@ async function ask<T>(mode: IDBTransactionMode, what: (store: IDBObjectStore) =>
 
 const open = (): Promise<IDBDatabase> =>
   new Promise((done, failed) => {
-    const request = indexedDB.open(BASE, 1);
-    request.onupgradeneeded = () => request.result.createObjectStore(MODELS, { keyPath: "name" });
+    const request = indexedDB.open(BASE, VERSION);
+    request.onupgradeneeded = () => {
+      for (const [name, keyPath] of Object.entries(KEYS))
+        if (!request.result.objectStoreNames.contains(name)) request.result.createObjectStore(name, { keyPath });
+    };
     request.onsuccess = () => done(request.result);
     request.onerror = () => failed(request.error ?? new Error("This browser keeps nothing."));
   });

@@ -1,25 +1,35 @@
 /** A training in this thread: PPO's loop of the core, a reward in JavaScript, evaluations by the rules of `racecraft train`. */
 import type { Cars, Core, Episode, Learner, Training } from "./core";
-import { arraysOf, type Plan, type Policy, type TrackFile } from "./plan";
+import type { Trace } from "./drivencar";
+import { toldObjects } from "./objects";
+import { startPose } from "./placement";
+import { arraysOf, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
 import type { Pay } from "./python";
+import { Road } from "./road";
+import type { Objects } from "./verify/header";
 
-/** Reward of a row of the simulation. */
-export type Reward = (row: Float64Array, waypoints: [number, number][][]) => number;
+/** A preset, as racecraft.site.javascript writes it. */
+export interface Reward {
+  remembers: boolean; // something between two calls, so that every car needs its own
+  make: () => (row: Float64Array, waypoints: [number, number][][]) => number;
+}
 
 /** A preset, for the rows of a step. */
-export const payWith =
-  (reward: Reward, { waypoints }: TrackFile, numCars: number): Pay =>
-  (rows) => {
+export function payWith(reward: Reward, { waypoints }: TrackFile, numCars: number): Pay {
+  const made = Array.from({ length: reward.remembers ? numCars : 1 }, reward.make);
+  return (rows) => {
     const width = rows.length / numCars;
     return Float64Array.from({ length: numCars }, (_, car) =>
-      reward(rows.subarray(car * width, (car + 1) * width), waypoints),
+      made[car % made.length]!(rows.subarray(car * width, (car + 1) * width), waypoints),
     );
   };
+}
 
 export interface Evaluation {
   completions: number[]; // 0 to 1
   lapTimes: number[]; // s, of completed laps
   weights: Float32Array; // that drove
+  trace: Trace; // of the fastest lap, from its start; empty without one
 }
 
 export interface Iteration {
@@ -28,9 +38,34 @@ export interface Iteration {
   completion: number | null; // mean share of the lap of the episodes that ended
 }
 
+/** Where a training is; arrays of weights are flat. */
+export interface TrainingState {
+  seed: number;
+  iteration: number;
+  steps: number;
+  learning: Float32Array;
+  average: Float32Array;
+  moment1: Float32Array; // of Adam
+  moment2: Float32Array;
+  updates: number;
+  simulation: Uint8Array;
+  totals: Float64Array; // of the episodes under way: rewards
+  lengths: BigInt64Array; // and steps
+  returnScale: Float64Array; // mean and spread
+}
+
+/** What is trained. */
+export interface Asked {
+  plan: Plan;
+  race: RacePlan;
+  policy: Policy;
+  objects: Objects;
+  track: TrackFile;
+  seed: number;
+}
+
 const CONTROL_DT = 1 / 15; // s
 const RUNNING = ["prepare", "in_progress"];
-const GOOD = 1; // mean completion from which on the averaged weights drive
 
 export class Trainer {
   readonly cars: Cars;
@@ -39,6 +74,12 @@ export class Trainer {
   private readonly learner: Learner;
   private readonly training: Training;
   private readonly table: Float64Array;
+  private readonly road: Road;
+  private readonly plan: Plan;
+  private readonly race: RacePlan;
+  private readonly track: TrackFile;
+  private readonly pay: Pay;
+  readonly seed: number;
   private mean: Float32Array | undefined;
   private shares: number[] = []; // of the lap, of the episodes that ended
   private iteration = 0;
@@ -46,16 +87,19 @@ export class Trainer {
   private wasGood = false;
 
   constructor(
-    core: Core,
-    private readonly plan: Plan,
-    policy: Policy,
-    private readonly track: TrackFile,
-    private readonly pay: Pay,
-    readonly seed: number,
+    private readonly core: Core,
+    asked: Asked,
+    payFor: (numColumns: number) => Pay,
   ) {
+    const { plan, race, policy, objects, track, seed } = asked;
+    [this.plan, this.race, this.track, this.seed] = [plan, race, track, seed];
     const road = core.track(arraysOf(track));
-    this.cars = road.cars({ ...plan.cars, seed }, plan.vehicle);
-    this.trials = road.cars({ ...plan.trials, seed: 0 }, plan.vehicle);
+    const told = toldObjects(objects);
+    const around = told ? { objects: told } : {};
+    this.cars = road.cars({ ...race.cars, seed }, plan.vehicle, around);
+    this.trials = road.cars({ ...race.trials, seed: 0 }, plan.vehicle, around);
+    this.road = new Road(track, false);
+    this.pay = payFor(this.cars.rowWidth);
     this.columns = core.names("row");
     this.table = Float64Array.from(policy.table);
     this.learner = core.learner(policy.network);
@@ -68,7 +112,7 @@ export class Trainer {
   }
 
   get needsEvaluation(): boolean {
-    return this.steps - this.evaluatedAt >= this.plan.evaluateEvery;
+    return this.steps - this.evaluatedAt >= this.race.evaluateEvery;
   }
 
   /** Collect one rollout; `look` is called after every step. */
@@ -113,6 +157,24 @@ export class Trainer {
     for (let i = 0; i < mean.length; i++) mean[i] = mean[i]! + Math.fround(Math.fround(weights[i]! - mean[i]!) * share);
   }
 
+  /** Everything that the next iteration depends on, as a checkpoint of the installed program has it. */
+  state(): TrainingState {
+    const { learner, training, cars } = this;
+    const learning = learner.read("weights");
+    return {
+      seed: this.seed,
+      iteration: this.iteration,
+      steps: this.steps,
+      learning,
+      average: this.mean?.slice() ?? learning,
+      moment1: learner.read("moment1"),
+      moment2: learner.read("moment2"),
+      updates: learner.numUpdates,
+      simulation: cars.save(),
+      ...training.underWay(cars.count),
+    };
+  }
+
   private get drivingWeights(): Float32Array {
     return this.wasGood && this.mean ? this.mean : this.learner.read("weights");
   }
@@ -123,31 +185,53 @@ export class Trainer {
     const learning = learner.read("weights");
     const weights = this.drivingWeights.slice();
     learner.write("weights", weights);
-    trials.reset();
-    for (const [index, [x, y, heading]] of this.track.starts[this.seed]!.entries())
-      trials.setPose(index + 1, x, y, heading);
+    this.lineUp();
     const most = Math.round(this.track.geometry.length / this.plan.slowest / CONTROL_DT);
+    const traces = Array.from({ length: trials.count }, (): Trace => []);
+    const isOver = (trial: number) => trials.terminated[trial] || trials.truncated[trial];
     for (let step = 0; step < most; step++) {
       trials.step(learner.best(trials, this.table));
-      const { terminated, truncated } = trials;
+      const { terminated, truncated, vehicles } = trials;
+      const field = (index: number, trial: number) => Math.round(1000 * vehicles[index * trials.count + trial]!);
+      for (const [trial, trace] of traces.entries())
+        if (!isOver(trial)) trace.push([field(0, trial), field(1, trial), field(2, trial)]);
       if (terminated.every((flag, car) => flag || truncated[car])) break;
     }
     learner.write("weights", learning);
-    const evaluation = { ...this.judged(), weights };
+    const judged = this.judged();
+    const evaluation = { ...judged, weights, trace: traces[judged.fastest] ?? [] };
     this.evaluatedAt = this.steps;
     const mean = evaluation.completions.reduce((sum, one) => sum + one, 0) / trials.count;
-    this.wasGood ||= mean >= GOOD;
+    this.wasGood ||= mean >= this.race.good;
     return evaluation;
   }
 
-  private judged(): Omit<Evaluation, "weights"> {
+  /** Every trial at its start, as racecraft.race.placement.line_up: the first where the simulation puts it. */
+  private lineUp(): void {
+    const { trials, core, road, plan } = this;
+    trials.reset();
+    const hasObjects = trials.rowWidth > this.columns.length;
+    const column = this.columns.indexOf("offset");
+    const offsets = Array.from({ length: trials.count }, (_, trial) => trials.rows[trial * trials.rowWidth + column]!);
+    const seed = BigInt((this.seed + plan.evaluationSeed) % 2 ** 32);
+    for (let trial = 1; trial < trials.count; trial++) {
+      const offset = hasObjects ? offsets[trial]! : 0; // an object near the start asks for the other lane
+      const { x, y, heading } = startPose(core, road, plan.known.rules["first_lap"]!, { seed, trial, lap: 0, offset });
+      trials.setPose(trial, x, y, heading);
+    }
+  }
+
+  private judged(): Omit<Evaluation, "weights" | "trace"> & { fastest: number } {
     const { rows, rowWidth, count } = this.trials;
     const of = (name: string, car: number) => rows[car * rowWidth + this.columns.indexOf(name)]!;
     const cars = Array.from({ length: count }, (_, car) => car);
     const isComplete = (car: number) => this.plan.statuses[of("status", car)] === "lap_complete";
+    const complete = cars.filter(isComplete);
+    const time = (car: number) => of("time", car);
     return {
+      fastest: complete.length ? complete.reduce((best, car) => (time(car) < time(best) ? car : best)) : -1,
       completions: cars.map((car) => (isComplete(car) ? 1 : Math.min(Math.max(of("progress", car), 0), 1))),
-      lapTimes: cars.filter(isComplete).map((car) => of("time", car)),
+      lapTimes: complete.map(time),
     };
   }
 }

@@ -1,11 +1,15 @@
 /** The thread beside the page in which cars drive and learn, with Python where it is asked for; it is ended by ending the
  * worker. */
 import type { RewardVerdict } from "../api/client";
+import type { Drive, DriveState, Settings } from "../api/drives";
 import type { Look, Picture } from "../lib/poses";
 import { loadCore, type LoadedCore } from "./core";
-import { read, type Plan, type Policy, type TrackFile } from "./plan";
+import { DrivenCar, type Trace } from "./drivencar";
+import { objectsOf } from "./objects";
+import { read, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
 import { type Pay, Python, RewardFailure } from "./python";
 import { type Evaluation, type Iteration, payWith, type Reward, Trainer } from "./trainer";
+import type { Objects } from "./verify/header";
 import type { ProblemKey } from "./verify/problem";
 import type { Verdict } from "./verify/verify";
 
@@ -24,11 +28,12 @@ export interface Check {
 export interface Start {
   kind: "train";
   plan: Plan;
+  race: RacePlan;
   policy: Policy;
+  objects: Objects;
   track: TrackFile;
   reward: string; // name of a preset, or the source where there is Python
   seed: number;
-  laps: number; // of an evaluation, until it ends
   most: number; // camera steps
 }
 
@@ -38,7 +43,21 @@ export interface Verify {
   file: File; // of anybody
 }
 
-type Asked = Load | Check | Start | Verify;
+/** Somebody takes the wheel, of the only car of this thread. */
+export interface SitDown {
+  kind: "sit";
+  id: string;
+  plan: Plan;
+  track: TrackFile;
+  settings: Settings;
+}
+
+export interface DriveOn {
+  kind: "steer";
+  controls: { steering: number; speed: number; steps: number }; // rad, m/s, of 1/15 s
+}
+
+type Asked = Load | Check | Start | Verify | SitDown | DriveOn;
 
 export type Report =
   | { kind: "ready" } // all that was asked for is loaded
@@ -50,6 +69,8 @@ export type Report =
   | { kind: "iteration"; iteration: Iteration; seconds: number }
   | { kind: "evaluation"; evaluation: Evaluation; steps: number; seconds: number }
   | { kind: "ended"; isReached: boolean }
+  | { kind: "seated"; drive: Drive }
+  | { kind: "steered"; state: DriveState; trace: Trace }
   | { kind: "verified"; verdict: Verdict }
   | { kind: "unreadable"; key: ProblemKey; values: Record<string, string | number> }
   | { kind: "failed"; message: string; isReward: boolean };
@@ -81,7 +102,18 @@ async function handle(asked: Asked): Promise<void> {
   const loaded = await loading!;
   if (asked.kind === "check") tell({ kind: "checked", verdict: loaded.python!.check(asked.source, asked.track) });
   else if (asked.kind === "verify") await prove(asked, loaded);
-  else train(asked, loaded);
+  else if (asked.kind === "sit") sit(asked, loaded);
+  else if (asked.kind === "steer") {
+    const { steering, speed, steps } = asked.controls;
+    tell({ kind: "steered", ...driven!.step(steering, speed, steps) });
+  } else train(asked, loaded);
+}
+
+let driven: DrivenCar | undefined;
+function sit({ id, plan, track, settings }: SitDown, { core: { core } }: Loaded): void {
+  driven?.free();
+  driven = new DrivenCar(core, plan, track, settings);
+  tell({ kind: "seated", drive: driven.begin(id) });
 }
 
 /** Drive a replay again; what that needs is loaded now. */
@@ -109,19 +141,22 @@ async function load({ site, hasPython }: Load): Promise<Loaded> {
 function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded): void {
   const began = performance.now();
   const seconds = () => (performance.now() - began) / 1000;
-  const { plan, policy, track, reward, seed } = start;
-  const numCars = plan.cars["num_envs"]!;
-  let pay: Pay;
+  const { plan, race, policy, objects, track, reward, seed } = start;
+  const numCars = race.cars["num_envs"]!;
   let printed = () => "";
-  if (python) ({ pay, printed } = python.open(reward, track, numCars, core.names("row").length, seed));
-  else pay = payWith(presets[reward]!, track, numCars);
-  const trainer = new Trainer(core, plan, policy, track, pay, seed);
+  const payFor = (numColumns: number): Pay => {
+    if (!python) return payWith(presets[reward]!, track, numCars);
+    const paid = python.open(reward, track, numCars, numColumns, seed);
+    printed = paid.printed;
+    return paid.pay;
+  };
+  const trainer = new Trainer(core, { plan, race, policy, objects, track, seed }, payFor);
   tell({ kind: "loaded", isSlow });
   let looked = -Infinity;
   const look = () => {
     if (performance.now() - looked < OFTEN) return;
     looked = performance.now();
-    tell({ kind: "look", ...lookOf(trainer, plan) });
+    tell({ kind: "look", ...lookOf(trainer, start) });
   };
   const say = () => {
     const text = printed();
@@ -139,16 +174,13 @@ function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded
     if (!trainer.needsEvaluation) continue;
     const evaluation = trainer.evaluate();
     tell({ kind: "evaluation", evaluation, steps: trainer.steps, seconds: seconds() });
-    if (evaluation.lapTimes.length >= start.laps) return tell({ kind: "ended", isReached: true });
+    if (evaluation.lapTimes.length >= race.laps) return tell({ kind: "ended", isReached: true });
   }
   tell({ kind: "ended", isReached: false });
 }
 
 /** This moment and what the foremost car sees, as the console's server streams them. */
-function lookOf(
-  { cars, columns, steps }: Trainer,
-  { cars: { width, height } }: Plan,
-): { look: Look; picture: Picture } {
+function lookOf({ cars, columns, steps }: Trainer, { plan, race }: Start): { look: Look; picture: Picture } {
   const { vehicles, rows, rowWidth, count, frames, numPixels } = cars;
   const column = (name: string, car: number) => rows[car * rowWidth + columns.indexOf(name)]!;
   const field = (index: number, car: number) => Math.round(vehicles[index * count + car]! * 1000);
@@ -162,12 +194,13 @@ function lookOf(
   return {
     look: {
       step: steps,
+      objects: objectsOf(rows.subarray(focus * rowWidth, (focus + 1) * rowWidth), columns.length, plan),
       poses,
       steps: all.map((car) => column("steps", car)),
       policy: [],
       is_discrete: true,
       focus,
     },
-    picture: { frame: btoa(frame), frame_shape: [height!, width!] },
+    picture: { frame: btoa(frame), frame_shape: [race.cars["height"]!, race.cars["width"]!] },
   };
 }

@@ -2,12 +2,11 @@
  * by operation; the same rows come out, to the bit. */
 import type { Cars, Core } from "../core";
 import type { Lap, Rules } from "./header";
-import { avoidingPose, clearPose, startDistance, startPose, type Thing } from "./placement";
-import { roundHalfEven, type Point, type Road } from "./road";
+import { avoidingPose, clearPose, RESET_STATUSES, startDistance, startPose, type Thing } from "../placement";
+import { roundHalfEven, type Point, type Road } from "../road";
 
 export const CONTROL_DT = 1 / 15; // s
 const REFERENCE_AHEAD = 0.14; // m from the car's origin to the point that x and y speak of
-const RESET_STATUSES = ["crashed", "off_track", "immobilized", "reversed"];
 const GONE = 5; // of racecraft.sim.objects.OBJECT_KINDS
 const [HEADER, THING] = [4, 7]; // columns of all objects, of each
 

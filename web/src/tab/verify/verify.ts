@@ -12,7 +12,7 @@ import { MOST_FILE, readReplay, type ReplayFile, type StoredCar } from "./file";
 import { Marshal, type Course, type Driven } from "./marshal";
 import { ReplayProblem } from "./problem";
 import { provenanceOf, type Provenance } from "./provenance";
-import { Road } from "./road";
+import { Road } from "../road";
 
 /** The first thing that comes out otherwise. */
 export interface Difference {
@@ -109,7 +109,7 @@ function settingsOf(plan: Plan, { rules, seed, camera, cars, cars_per_race }: Re
   const fromLine = rules.starts === "line";
   const laps = rules.is_continuous && isClosed ? rules.laps : 1; // of one simulated episode
   const told: Settings = {
-    ...plan.trials,
+    ...plan.races["time-trial"].trials,
     num_envs: cars.length,
     cars_per_race,
     seed: Number(seed & 0xffff_ffffn),
@@ -139,7 +139,7 @@ function settingsOf(plan: Plan, { rules, seed, camera, cars, cars_per_race }: Re
     pitch: camera.pitch,
     baseline: camera.baseline,
     palette: PALETTES.indexOf(camera.palette),
-    picture_age: Math.round((camera.age / (1 / 15)) * plan.trials["substeps"]!),
+    picture_age: Math.round((camera.age / (1 / 15)) * plan.races["time-trial"].trials["substeps"]!),
   };
 }
 

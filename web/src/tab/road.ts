@@ -1,6 +1,6 @@
 /** A track in driving direction, as far as placing cars on it needs it: racecraft.track.Track, operation by operation, so
  * that the same bits come out. Lengths and headings were computed by that. */
-import { doublesOf, type TrackFile } from "../plan";
+import { doublesOf, type TrackFile } from "./plan";
 
 type Line = Float64Array; // (W, 2) m
 export type Point = [number, number];

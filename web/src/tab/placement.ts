@@ -1,6 +1,6 @@
 /** Where cars are put, at the start and after a mistake: racecraft.race.placement, operation by operation. */
-import type { Core } from "../core";
-import type { Rules } from "./header";
+import type { Core } from "./core";
+import type { Rules } from "./verify/header";
 import { wrapAngle, type Point, type Road } from "./road";
 
 export interface Pose {
@@ -17,6 +17,9 @@ export interface Thing {
   offset: number;
   distance: number;
 }
+
+/** What puts a car back on the track, as racecraft.race.rules. */
+export const RESET_STATUSES = ["crashed", "off_track", "immobilized", "reversed"];
 
 const CLEARANCE = 1; // m between an object and a car that is put back
 const LEAST_ROOM = 0.6; // m to the next object in a lane
@@ -45,7 +48,7 @@ export function startPose(
 }
 
 /** In the lane that the car was nearest to, along the track. */
-function resetPose(road: Road, distance: number, offset: number): Pose {
+export function resetPose(road: Road, distance: number, offset: number): Pose {
   const [x, y] = road.laneAt(distance, offset >= 0);
   return { x, y, heading: road.headingAt(distance) };
 }

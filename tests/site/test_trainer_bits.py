@@ -1,0 +1,103 @@
+"""A whole training as the page runs it, evaluations and averages included, against `racecraft train`: to the bit.
+
+Node runs the page's own files; see test_core_bits.py for what it needs.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from test_core_bits import digest, in_node
+
+from racecraft import train
+from racecraft.learn import NetworkSpec
+from racecraft.learn.flat_weights import join_weights
+from racecraft.learn.learner import below
+from racecraft.run import RunFolder
+from racecraft.sim.objects import objects_for_race
+from racecraft.site.javascript import javascript
+from racecraft.site.plan import plan, track_file
+
+pytestmark = pytest.mark.slow
+TRACK, SEED = "oval", 3
+PAYS = """def reward_function(params):
+    if params["is_offtrack"] or params["is_crashed"]:
+        return -1.0
+    reward = params["speed"] * (1.0 - params["distance_from_center"] / params["track_width"])
+    if params["objects_location"]:
+        for index in params["closest_objects"]:
+            reward += 0.01 * abs(params["objects_distance"][index] - params["projection_distance"])
+            if params["objects_left_of_center"][index] == params["is_left_of_center"]:
+                reward -= 0.1
+    return reward
+"""  # what browsers and Python compute alike, to the bit
+RACES: dict[str, tuple[dict[str, Any], int]] = {  # what is chosen of a race's objects, and steps between evaluations
+    "time-trial": ({}, 1500),
+    "object-avoidance": ({"count": 4}, 2500),
+    "head-to-bot": ({"count": 2, "speed": 0.5, "changes_lane": True}, 2500),
+}
+
+
+def settings_of(race: str) -> dict[str, Any]:
+    chosen, every = RACES[race]
+    objects = objects_for_race(race, settings=chosen)
+    common = {"objects": objects, "evaluate_every": every, "until": f"{2 * every} steps"}
+    return {**common, "actions": plan()["races"][race]["space"]}
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RunFolder]:
+    """A native training of every race."""
+    root = tmp_path_factory.mktemp("native")
+    reward = root / "reward_function.py"
+    reward.write_text(PAYS)
+    options: dict[str, Any] = {"reward": reward, "seed": SEED, "num_threads": 1, "root": root}
+    return {race: RunFolder(train(TRACK, name=race, **settings_of(race), **options).run) for race in RACES}
+
+
+def asked(race: str, **more: Any) -> dict[str, Any]:
+    """The same of the page."""
+    planned, (_, every) = plan(), RACES[race]
+    planned["races"][race]["evaluateEvery"] = every
+    settings = settings_of(race)
+    return {
+        "what": "session",
+        "plan": planned,
+        "race": race,
+        "objects": settings["objects"].to_dict(),
+        "space": next(space for space in planned["spaces"] if space["name"] == settings["actions"]),
+        "track": track_file(TRACK),
+        "seed": SEED,
+        "steps": 2 * every,
+        "rewards": javascript({"own": PAYS}),
+        **more,
+    }
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    cases = [asked(race) for race in RACES]
+    results = in_node("core", cases, tmp_path_factory.mktemp("bits"))["results"]
+    return dict(zip(RACES, results, strict=True))
+
+
+@pytest.mark.parametrize("race", RACES)
+def test_a_training_in_the_page_is_the_installed_programs(
+    found: dict[str, Any], runs: dict[str, RunFolder], race: str
+) -> None:
+    saved = runs[race].checkpoints.load("last")
+    spec = NetworkSpec(**{**saved.metadata["network"], "frame_shape": (120, 160)})
+    judged = saved.metadata["evaluator"]["last"]
+    assert found[race] == {
+        "steps": saved.step,
+        "learning": digest(join_weights(below("learning/", saved.arrays), spec)),
+        "average": digest(join_weights(below("average/", saved.arrays), spec)),
+        "simulation": digest(saved.arrays["simulation"]),
+        "totals": digest(saved.arrays["ppo/episode_returns"]),
+        "lengths": digest(saved.arrays["ppo/episode_lengths"]),
+        "returnScale": digest(saved.arrays["ppo/return_scale"]),
+        "completions": judged["completions"],
+        "lapTimes": judged["lap_times"],
+    }
+    assert len(set(judged["completions"])) > 1  # trials of different starts

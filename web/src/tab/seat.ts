@@ -1,0 +1,98 @@
+/** Who keeps the car that somebody drives in this tab: a worker of its own, so that a training goes on beside it. */
+import type { Drive, DriveState, Ghost, GhostCard, Seat, Settings } from "../api/drives";
+import type { Trace } from "./drivencar";
+import type { Model } from "./model";
+import { openWorker } from "./open";
+import type { Plan, TrackFile } from "./plan";
+import { drivenLap, keepLap } from "./shelf";
+import type { DriveOn, Load, Report, SitDown } from "./worker";
+
+const YOU = "you";
+
+export class TabSeat implements Seat {
+  readonly hasGhosts = true;
+  private readonly worker = openWorker();
+  private readonly asked: { answer: (report: Report) => void; fail: (error: Error) => void }[] = [];
+  private settings: Settings = { vehicle: "v5", direction: "forward" };
+  private round = 0;
+
+  constructor(
+    site: string,
+    private readonly plan: Plan,
+    private readonly track: TrackFile,
+    private readonly models: Model[],
+  ) {
+    this.worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data);
+    this.worker.onerror = ({ message }) => this.hear({ kind: "failed", message: message || "worker", isReward: false });
+    this.worker.postMessage({ kind: "load", site, hasPython: false } satisfies Load);
+  }
+
+  /** Answers come in the order of the questions. */
+  private hear(report: Report): void {
+    if (report.kind === "ready") return;
+    const asked = this.asked.shift();
+    if (report.kind === "failed") asked?.fail(new Error(report.message));
+    else asked?.answer(report);
+  }
+
+  private ask(question: SitDown | DriveOn): Promise<Report> {
+    return new Promise((answer, fail) => {
+      this.asked.push({ answer, fail });
+      this.worker.postMessage(question);
+    });
+  }
+
+  async begin(settings: Settings): Promise<Drive> {
+    this.settings = { ...settings };
+    const { plan, track } = this;
+    const id = String(++this.round);
+    const report = await this.ask({ kind: "sit", id, plan, track, settings: this.settings });
+    const best = await drivenLap(this.key);
+    return { ...(report as Extract<Report, { kind: "seated" }>).drive, best: best?.seconds ?? null };
+  }
+
+  async step(_id: string, controls: { steering: number; speed: number; steps: number }): Promise<DriveState> {
+    const { state, trace } = (await this.ask({ kind: "steer", controls })) as Extract<Report, { kind: "steered" }>;
+    const { finished } = state;
+    if (!finished || !trace.length) return state;
+    const best = await drivenLap(this.key);
+    if (best && best.seconds <= finished.seconds) return state;
+    await keepLap({ key: this.key, seconds: finished.seconds, trace });
+    return { ...state, finished: { ...finished, is_best: true } };
+  }
+
+  end(): void {
+    // the next drive takes the worker's place
+  }
+
+  /** The car is left for good. */
+  leave(): void {
+    this.worker.terminate();
+  }
+
+  async ghosts(): Promise<GhostCard[]> {
+    const own = await drivenLap(this.key);
+    const cards = this.raced.map(({ name, bestLap }) => ({ key: `model:${name}`, name, seconds: bestLap! }));
+    cards.sort((a, b) => a.seconds - b.seconds);
+    return [...(own ? [{ key: YOU, name: "", seconds: own.seconds }] : []), ...cards];
+  }
+
+  async ghost(key: string): Promise<Ghost> {
+    if (key === YOU) {
+      const { seconds, trace } = (await drivenLap(this.key))!;
+      return { key, name: "", seconds, trace };
+    }
+    const { name, bestLap, trace } = this.raced.find((one) => `model:${one.name}` === key)!;
+    return { key, name, seconds: bestLap!, trace: trace as Trace };
+  }
+
+  /** Models that lapped this track, all of which drive forward. */
+  private get raced(): Model[] {
+    if (this.settings.direction !== "forward") return [];
+    return this.models.filter(({ track, trace }) => track === this.track.geometry.name && trace?.length);
+  }
+
+  private get key(): string {
+    return [this.track.geometry.name, this.settings.vehicle, this.settings.direction].join("/");
+  }
+}
