@@ -14,6 +14,7 @@ LAYERS = (
     "checks",
     "extras",
     "json_file",
+    "moved",
     "track",
     "gpu",
     "sim",

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import random
 import shutil
+import sqlite3
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import sqlalchemy as sa
 from postgres_servers import USER, PostgresServer
 from running_consoles import RunningConsole, running_console
 from running_workers import RunningWorker, running_worker
@@ -21,17 +23,25 @@ pytest.importorskip("obstore")
 pytest.importorskip("psycopg")
 from racecraft.agent import ModelMetadata, action_space
 from racecraft.errors import ConfigError, RunError
+from racecraft.moved import move
 from racecraft.reward import load_preset
 from racecraft.run import RunFolder
+from racecraft.serve.jobs.cargo import Cargo, files_of, rivals_of
+from racecraft.serve.jobs.courier import Courier
+from racecraft.serve.jobs.follower import Follower
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.models.mirror import Mirror
+from racecraft.serve.people.people import add_person
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.station import work_for
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
+from racecraft.track import load_track, save_route
+from racecraft.training import Until
 from racecraft.training.job import Training
+from racecraft.training.opponents import Opponents
 from racecraft.training.settings import make_settings
 from racecraft.training.start import start_run
 
@@ -65,6 +75,21 @@ def place(postgres: PostgresServer, tmp_path_factory: pytest.TempPathFactory) ->
         yield Place(console, database, artifacts, folder)
 
 
+@contextmanager
+def busy_at_home(place: Place) -> Iterator[None]:
+    """The only place of the console's own machine is taken."""
+    database, home = Database(place.database), ServeSettings(runs=place.console.runs).machine
+    busy = Job(id="busy", kind="store", run="", state="running", owner="nobody", machine=home)
+    with database.transaction() as session:
+        session.add(busy)
+    try:
+        yield
+    finally:
+        with database.transaction() as session:
+            session.execute(sa.delete(Job).where(Job.id == "busy"))
+        database.close()
+
+
 def weights(folder: RunFolder) -> dict[str, Any]:
     arrays = folder.checkpoints.load("last").arrays
     return {name: value for name, value in arrays.items() if name != "recent_episodes"}  # holds wall-clock times
@@ -79,10 +104,11 @@ def test_a_training_elsewhere_is_seen_as_if_it_were_here(place: Place) -> None:
     with place.worker("lab-1"):
         with console.client.stream("GET", f"/api/events/{name}") as stream:
             looks = [line for line, _ in zip(filter(_is_look, stream.iter_lines()), range(3), strict=False)]
-        assert len({look.split('"step":')[1].split(",")[0] for look in looks}) == 3  # they move
+        assert len({look.split('"poses":')[1].split('"steps"')[0] for look in looks}) == 3  # they move
         console.wait_for(lambda: console.client.get(f"/api/models/{name}").json()["checkpoints"])
         assert console.client.get(f"/api/models/{name}/history").json()["points"]
         assert console.client.get(f"/api/models/{name}").json()["status"] == "training"
+        assert console.client.get(f"/api/jobs/{job['id']}").json()["machine"] == "lab-1"
         console.client.post(f"/api/models/{name}/stop")
         ended = place.done(job["id"])
         there, here = (RunFolder(place.folder / where / name) for where in ("lab-1", "console"))
@@ -100,19 +126,132 @@ def _is_look(line: str) -> bool:
     return line.startswith("data: ") and '"poses"' in line
 
 
-def test_what_only_this_machine_has_is_done_here(place: Place) -> None:
-    console = place.console
-    sketch = console.client.get("/api/tracks/oval/sketch").json()
-    made = console.client.put("/api/tracks/own", json=sketch)
+@pytest.mark.slow
+def test_races_and_searches_and_own_tracks_travel_too(place: Place) -> None:
+    pytest.importorskip("optuna")
+    console, client = place.console, place.console.client
+    made = client.put("/api/tracks/own", json=client.get("/api/tracks/oval/sketch").json())
     assert made.status_code in (200, 201), made.text
-    name = console.create(name="homely", train=False, track="own", until="512 steps")
-    with place.worker("lab-2"):
-        job = console.client.post(f"/api/models/{name}/train", json={}).json()["id"]
-        other = console.create(name="passer-by", track="oval", until="512 steps")
-        (passing,) = console.client.get("/api/jobs", params={"run": other}).json()
-        place.done(passing["id"])
-        assert console.client.get(f"/api/jobs/{job}").json()["state"] == "queued"
-    console.client.post(f"/api/models/{name}/stop")
+    console.create(name="first", track="own", until="512 steps")
+    with place.worker("lab-2"), busy_at_home(place):
+        (job,) = client.get("/api/jobs", params={"run": "first"}).json()
+        assert place.done(job["id"])["machine"] == "lab-2"
+        console.create(name="second", track="own", until="512 steps", race="head-to-head", opponents=["first"])
+        number = client.post("/api/races", json={"title": "Club", "track": "own", "max_resets": 1, "seed": 1}).json()[
+            "id"
+        ]
+        assert client.post(f"/api/races/{number}/entries", json={"models": ["first"]}).status_code == 202
+        two = [{"model": "first"}, {"model": "first"}]
+        heat = client.post("/api/contests/heats", json={"models": two, "track": "own", "max_resets": 1}).json()["id"]
+        ladder = client.post("/api/contests/ladders", json={"models": two, "tracks": ["own"], "starts": 1}).json()["id"]
+        search = {"trials": 1, "trial_steps": 512, "minutes": 5}
+        client.post("/api/models/first/tunings", json=search)
+        jobs = [
+            job
+            for job in client.get("/api/jobs").json()
+            if job["kind"] != "store" and job["state"] in ("queued", "running")
+        ]
+        assert {(job["kind"], place.done(job["id"])["machine"]) for job in jobs} == {
+            (kind, "lab-2") for kind in ("train", "race", "heat", "ladder", "tune")
+        }
+        (row,) = client.get(f"/api/races/{number}").json()["standings"]
+        assert client.get(row["video"]).headers["content-type"] == "video/mp4"
+        assert client.get(f"/api/contests/{heat}/video").status_code == 200
+        assert client.get(f"/api/contests/{ladder}/replay?match=0").status_code == 200
+        (card,) = client.get("/api/models/first/tunings").json()
+        assert [trial["can_be_kept"] for trial in card["trials"]] == [True]
+    for shelf in ("races", "contests", "tunings"):  # it is at home for good
+        assert Artifacts(place.artifacts).shelf(shelf).names() == []
+
+
+def test_a_guests_training_on_an_own_track_against_another_run_travels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    database = Database(f"sqlite:///{tmp_path / 'console.db'}")
+    database.migrate()
+    with database.transaction() as session:
+        guest = add_person(session, "Ada")
+    queue, store = JobQueue(database).of(guest), Artifacts(f"file://{tmp_path}/store")
+    owner = ServeSettings(runs=tmp_path / "home")
+    settings = owner.of(guest)
+    keeper = Mirror(store, settings=owner, queue=queue, supervisor=Supervisor(owner, database, queue))
+    keeper = keeper.of(settings, queue)
+    own = settings.tracks / "own.npy"
+    own.parent.mkdir(parents=True)
+    save_route(load_track("oval"), own)
+    metadata = ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
+    reward = load_preset("racing")
+    plain: dict[str, Any] = {
+        "metadata": metadata,
+        "hyperparameters": None,
+        "track": str(own),
+        "until": Until(steps=256),
+    }
+    start: dict[str, Any] = {"reward": reward, "metadata": metadata, "root": settings.runs}
+    rival = start_run(make_settings(**plain), name="rival", **start)
+    Training(rival).run()
+    against = Opponents(drivers=(str(rival.path.resolve()),))
+    folder = start_run(make_settings(**plain, opponents=against), name="duel", **start)
+    cargo = keeper.share_training(folder)
+    assert cargo is not None
+    assert set(cargo.runs) == {"duel", "rival"}
+    job = queue.add("train", "duel", {}, cargo=cargo)
+    own.rename(tmp_path / "gone.npy")  # as on a machine that never had it
+    rival.path.rename(tmp_path / "gone")
+
+    there = tmp_path / "there"
+    courier = Courier(store.of(guest), job, there, kept=there / "duel" / "checkpoints" / "manifest.json")
+    monkeypatch.setenv("RACECRAFT_MOVED", "")  # which is put back
+    move(courier.fetch())
+    Training(RunFolder(there / "duel")).run()
+    courier.deliver()
+    monkeypatch.undo()
+    follower = Follower(store, settings=owner, queue=queue)
+    job.state, job.machine = "done", "there"
+    follower.see(job)
+    assert folder.checkpoints.load("last").step == RunFolder(there / "duel").checkpoints.load("last").step > 0
+    assert store.names() == []  # the owner has none
+    assert store.of(guest).names() == ["duel", "rival"]
+    keeper.forget_all()
+    assert store.of(guest).names() == []
+    with pytest.raises(RunError, match="not removed"):
+        store.forget_all()
+    database.close()
+
+
+def test_what_only_this_machine_has_stays_here(tmp_path: Path) -> None:
+    folder = tmp_path / "tracks"
+    folder.mkdir()
+    save_route(load_track("oval"), folder / "own.npy")
+    assert files_of("oval + generated:3", str(folder / "own.npy")) == {str(folder / "own.npy")}
+    assert files_of(str(folder)) is None
+    assert files_of(str(tmp_path / "nothing.npy")) is None
+    assert rivals_of({"opponents": {"drivers": ["self"]}}, tmp_path) == set()
+    assert rivals_of({"opponents": {"drivers": [str(folder)]}}, tmp_path) is None
+    assert rivals_of({"opponents": None}, tmp_path) == set()
+
+
+def test_a_search_is_copied_as_its_last_transaction_left_it(tmp_path: Path) -> None:
+    store, search = Artifacts(f"file://{tmp_path}/store").shelf("tunings"), tmp_path / "tunings" / "a"
+    search.mkdir(parents=True)
+    with closing(sqlite3.connect(search / "study.sqlite")) as study:
+        study.execute("PRAGMA journal_mode=WAL")
+        study.execute("CREATE TABLE trials (number INTEGER)")
+        study.execute("INSERT INTO trials VALUES (1)")
+        study.commit()
+        study.execute("INSERT INTO trials VALUES (2)")  # not kept yet
+        store.keep(RunFolder(search))
+    (tmp_path / "there").mkdir()
+    assert store.bring("a", tmp_path / "there", incoming=tmp_path / "incoming")
+    with closing(sqlite3.connect(tmp_path / "there" / "a" / "study.sqlite")) as study:
+        assert study.execute("SELECT number FROM trials").fetchall() == [(1,)]
+    assert not store.bring("b", tmp_path / "there", incoming=tmp_path / "incoming", missing_ok=True)
+    (tmp_path / "left").mkdir()
+    shutil.copytree(search, tmp_path / "left" / "a", ignore=shutil.ignore_patterns(".copy"))
+    (search / "result.json").write_text("{}")
+    store.keep(RunFolder(search))
+    assert store.bring("a", tmp_path / "left", incoming=tmp_path / "incoming")  # of a job that was killed here
+    assert (tmp_path / "left" / "a" / "result.json").is_file()
 
 
 def test_a_worker_needs_no_more_rights_than_it_is_said_to(place: Place, postgres: PostgresServer) -> None:
@@ -146,9 +285,9 @@ def test_two_machines_never_work_on_one_run(postgres: PostgresServer) -> None:
     database = Database(postgres.new_database())
     database.migrate()
     queue = JobQueue(database)
-    first = queue.add("evaluate", "a", {}, travels=True)
-    second = queue.add("evaluate", "a", {}, travels=True)
-    third = queue.add("evaluate", "b", {}, travels=True)
+    first = queue.add("evaluate", "a", {}, cargo=Cargo())
+    second = queue.add("evaluate", "a", {}, cargo=Cargo())
+    third = queue.add("evaluate", "b", {}, cargo=Cargo())
     home = queue.add("evaluate", "c", {})
     kinds = ("evaluate",)
 
@@ -165,6 +304,8 @@ def test_two_machines_never_work_on_one_run(postgres: PostgresServer) -> None:
     assert queue.num_running(kinds, machine="x") == 2
     assert queue.num_running(kinds, machine="console") == 1
     assert {job.id for job in queue.elsewhere("x")} == {third.id}
+    heat = queue.add("heat", "a", {}, cargo=Cargo())  # which only reads the run
+    assert ids(queue.claim(("heat",), owner="y", machine="y", is_home=False)) == [heat.id]
     database.close()
 
 
@@ -182,8 +323,6 @@ def test_a_worker_that_cannot_work_says_why(tmp_path: Path, settings: dict[str, 
 
 
 def test_a_worker_of_another_version_changes_nothing(tmp_path: Path) -> None:
-    import sqlalchemy as sa
-
     database = Database(f"sqlite:///{tmp_path / 'console.db'}")
     database.migrate()
     with database.engine.begin() as connection:
@@ -209,7 +348,7 @@ def test_a_run_whose_copy_waits_behind_others_is_shared_all_the_same(tmp_path: P
     assert store.names() == []
     assert mirror.share(folder)
     assert store.names() == ["fresh"]
-    assert not mirror.share(folder, track=str(tmp_path / "own.npy"))
+    assert not mirror.share(folder, tracks=(str(tmp_path / "own.npy"),))
     database.close()
 
 

@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.json_file import read_json_object, read_text
+from racecraft.moved import place_of
 from racecraft.run.atomic import write_file, write_json
 from racecraft.run.checkpoint import CheckpointStore
 from racecraft.run.lock import exclusive_lock
@@ -115,7 +116,7 @@ class RunFolder:
         """
         if str(path).startswith(STARTER):
             path = unpack_starter(str(path).removeprefix(STARTER), "runs")
-        path = Path(path)
+        path = place_of(path)
         if not path.is_dir():
             siblings = [run.path.name for run in list_runs(path.parent)]
             raise RunError(f"There is no run {str(path)!r}.", hint=did_you_mean(path.name, siblings))

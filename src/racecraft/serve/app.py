@@ -80,6 +80,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     supervisor = Supervisor(settings, database, queue)
     artifacts = Artifacts(settings.artifacts) if settings.artifacts else None
     follower = Follower(artifacts, settings=settings, queue=queue)
+    mirror = Mirror(artifacts, settings=settings, queue=queue, supervisor=supervisor)
     context = Context(
         settings=settings,
         database=database,
@@ -90,10 +91,10 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         follower=follower,
         drives=Drives(),
         ghosts=Ghosts(settings.runs, database),
-        races=Races(database, queue, garage, courses),
-        contests=Contests(settings.state, database, queue, garage, courses),
-        tunings=Tunings(settings.state, queue, garage),
-        mirror=Mirror(artifacts, settings=settings, queue=queue, supervisor=supervisor),
+        races=Races(database, queue, garage, courses, share=mirror.share, see=follower.see),
+        contests=Contests(settings.state, database, queue, garage, courses, mirror=mirror),
+        tunings=Tunings(settings.state, queue, garage, mirror=mirror, see=follower.see),
+        mirror=mirror,
         hub=Hub(settings.runs, queue, see=follower.see),
     )
 

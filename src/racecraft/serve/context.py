@@ -98,7 +98,7 @@ def _console(owner: Context, user_id: int) -> Context:
     settings, database, queue = owner.settings.of(user_id), owner.database, owner.queue.of(user_id)
     settings.tracks.mkdir(parents=True, exist_ok=True)
     garage = Garage(settings.runs, settings.state, database, user_id=user_id)
-    courses = Courses(settings.tracks)
+    courses, mirror = Courses(settings.tracks), owner.mirror.of(settings, queue)
     return replace(
         owner,
         settings=settings,
@@ -106,11 +106,11 @@ def _console(owner: Context, user_id: int) -> Context:
         garage=garage,
         courses=courses,
         ghosts=Ghosts(settings.runs, database),
-        races=Races(database, queue, garage, courses, user_id=user_id),
-        contests=Contests(settings.state, database, queue, garage, courses),
-        tunings=Tunings(settings.state, queue, garage),
-        mirror=Mirror(None, settings=settings, queue=queue, supervisor=owner.supervisor),
-        hub=Hub(settings.runs, queue),
+        races=Races(database, queue, garage, courses, share=mirror.share, see=owner.follower.see, user_id=user_id),
+        contests=Contests(settings.state, database, queue, garage, courses, mirror=mirror),
+        tunings=Tunings(settings.state, queue, garage, mirror=mirror, see=owner.follower.see),
+        mirror=mirror,
+        hub=Hub(settings.runs, queue, see=owner.follower.see),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from racecraft.errors import TrackNotFound, did_you_mean
+from racecraft.moved import place_of
 from racecraft.track.generator import parse_generated
 from racecraft.track.library import library_track, track_names
 from racecraft.track.readers import read_track
@@ -30,7 +31,7 @@ def load_track(name_or_path: str | Path) -> Track:
         16.79
     """
     if not isinstance(name_or_path, str):
-        return read_track(name_or_path)
+        return read_track(place_of(name_or_path))
     name = name_or_path
     if name in track_names():
         return library_track(name)
@@ -38,6 +39,6 @@ def load_track(name_or_path: str | Path) -> Track:
         return parse_generated(name)
     path = Path(name)
     if path.suffix.lower() in {".npy", ".csv"} or len(path.parts) > 1:
-        return read_track(path)
+        return read_track(place_of(path))
     hint = f"{did_you_mean(name, track_names())} List all with 'racecraft tracks'.".strip()
     raise TrackNotFound(f"Track {name[:80]!r} does not exist.", hint=hint)

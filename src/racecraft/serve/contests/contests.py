@@ -32,6 +32,7 @@ from racecraft.serve.contests.schemas import (
 )
 from racecraft.serve.jobs.queue import ENDED, JobQueue
 from racecraft.serve.models.garage import Garage
+from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
@@ -52,11 +53,21 @@ class Contests:
         queue: Of jobs.
         garage: Of models.
         courses: Of tracks.
+        mirror: Has the object store hold what a contest needs.
     """
 
-    def __init__(self, state: Path, database: Database, queue: JobQueue, garage: Garage, courses: Courses) -> None:
+    def __init__(
+        self,
+        state: Path,
+        database: Database,
+        queue: JobQueue,
+        garage: Garage,
+        courses: Courses,
+        *,
+        mirror: Mirror,
+    ) -> None:
         self._state, self._database, self._queue = state, database, queue
-        self._garage, self._courses = garage, courses
+        self._garage, self._courses, self._mirror = garage, courses, mirror
 
     def start_heat(self, request: NewHeat) -> str:
         """Queue a heat; its id.
@@ -156,7 +167,9 @@ class Contests:
             raise Conflict(f"There are {MAX_CONTESTS} heats and ladders already.", hint="Delete some first.")
         if payload["seed"] is None:
             payload["seed"] = secrets.randbelow(2**32)
-        return self._queue.add(kind, starters[0].model, payload).id
+        folders = [self._garage.folder(starter.model) for starter in starters]
+        cargo = self._mirror.share(*folders, tracks=payload["paths"])
+        return self._queue.add(kind, starters[0].model, payload, cargo=cargo).id
 
     def _card(self, job: Job) -> ContestCard:
         payload, result = job.payload, job.result or {}

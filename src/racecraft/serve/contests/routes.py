@@ -44,6 +44,7 @@ def start_ladder(request: NewLadder, context: InContext) -> ContestDetail:
 @router.get("/{contest}")
 def get_contest(contest: Id, context: InContext) -> ContestDetail:
     """A heat or a ladder with its result."""
+    context.follower.see(context.contests.job(contest))
     return context.contests.get(contest)
 
 

@@ -85,7 +85,7 @@ def ladder(task: Task) -> dict[str, Any]:
     payload, folder = task.job.payload, _folder(task)
     names = dict(zip(payload["paths"], payload["tracks"], strict=True))
     shown = {Path(path).stem: name for path, name in names.items()}
-    unfinished = folder / f"{MATCHES}.{os.getpid()}"
+    unfinished = folder / f".{MATCHES}.{os.getpid()}"  # hidden: nobody copies it while it grows
     with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
 
         def watch(match: Match, trials: Sequence[Trial]) -> None:

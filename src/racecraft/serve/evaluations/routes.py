@@ -56,8 +56,9 @@ def evaluate_model(name: str, request: EvaluateModel, context: InContext) -> Job
     payload: dict[str, Any] = request.model_dump(exclude_none=True)
     if request.track is not None:
         payload["track"] = context.courses.path_or_name(request.track)
-    travels = context.mirror.share(folder, track=payload.get("track", ""))
-    job = context.queue.add("evaluate", folder.name, payload, travels=travels)
+    road = payload.get("track") or folder.read_info().track
+    cargo = context.mirror.share(folder, tracks=(road,))
+    job = context.queue.add("evaluate", folder.name, payload, cargo=cargo)
     context.supervisor.wake()
     return job_info(job)
 

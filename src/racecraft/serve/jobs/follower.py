@@ -5,15 +5,14 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from pathlib import Path
 from typing import Final
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.errors import RunError
-from racecraft.serve.jobs.queue import ENDED, JobQueue
+from racecraft.serve.jobs.queue import ENDED, JobQueue, folder_of
 from racecraft.serve.live.cars import write_live
-from racecraft.serve.settings import ServeSettings
+from racecraft.serve.settings import INCOMING, OWNER, STATE_FOLDER, ServeSettings, runs_of
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.tables import Job
 
@@ -25,7 +24,7 @@ _LOG: Final = logging.getLogger("racecraft.serve")
 
 
 class Follower:
-    """One per console; without a store it does nothing.
+    """One per console, for everybody's jobs; without a store it does nothing.
 
     Args:
         artifacts: The store, or None.
@@ -35,10 +34,10 @@ class Follower:
 
     def __init__(self, artifacts: Artifacts | None, *, settings: ServeSettings, queue: JobQueue) -> None:
         self._artifacts, self._settings, self._queue = artifacts, settings, queue
-        self._looks: dict[str, float] = {}
-        self._followed: dict[str, str] = {}  # jobs by run
+        self._looks: dict[tuple[int, str], float] = {}  # by person and run
+        self._followed: dict[str, Job] = {}
         self._ended: set[str] = set()  # jobs whose results are here
-        self._shown: dict[str, bytes] = {}
+        self._shown: dict[tuple[int, str], bytes] = {}
         self._is_stopped = threading.Event()
 
     def run(self) -> None:
@@ -60,45 +59,55 @@ class Follower:
         """Follow no longer."""
         self._is_stopped.set()
 
-    def look_at(self, run: str) -> None:
-        """Somebody looks at the cars of a run."""
-        self._looks[run] = time.monotonic()
+    def look_at(self, run: str, *, user_id: int = OWNER) -> None:
+        """Somebody looks at the cars of a person's run."""
+        self._looks[user_id, run] = time.monotonic()
 
     def see(self, job: Job) -> Job:
         """Before somebody is told that a job has ended: have here what another machine made of it."""
-        is_away = job.travels and job.machine != self._settings.machine and job.state in ENDED
-        if self._artifacts is not None and is_away and job.id not in self._ended:
-            try:
-                self._bring(self._artifacts, job.run)
-            except (RunError, OSError) as error:  # it is told all the same, and brought later
-                _LOG.error("%s", error)
-                return job
-            if len(self._ended) >= MAX_ENDED:
-                self._ended.clear()
-            self._ended.add(job.id)
+        if self._artifacts is None or not job.travels or job.state not in ENDED or job.id in self._ended:
+            return job
+        try:
+            if job.machine != self._settings.machine:
+                self._bring(self._artifacts, job)
+            if (folder := folder_of(job)) is not None:  # it is here for good
+                self._artifacts.of(job.user_id).shelf(folder[0]).forget(folder[1])
+        except (RunError, OSError) as error:  # it is told all the same, and brought later
+            _LOG.error("%s", error)
+            return job
+        if len(self._ended) >= MAX_ENDED:
+            self._ended.clear()
+        self._ended.add(job.id)
         return job
 
     def _follow(self, artifacts: Artifacts) -> None:
-        """Bring what is new of every run that is being worked on elsewhere, and once more when that has ended."""
+        """Bring what is new of every job that is being done elsewhere, and once more when that has ended."""
         before = self._followed
-        self._followed = {job.run: job.id for job in self._queue.elsewhere(self._settings.machine)}
-        for run in {*before, *self._followed}:
-            self._bring(artifacts, run)
-        for run, job in self._followed.items():
-            if self._is_looked_at(run):
-                self._queue.watch(job)
+        self._followed = {job.id: job for job in self._queue.elsewhere(self._settings.machine)}
+        for job in (before | self._followed).values():
+            self._bring(artifacts, job)
+        for job in self._followed.values():
+            if self._is_looked_at(job):
+                self._queue.watch(job.id)
 
     def _look(self, artifacts: Artifacts) -> None:
         """Show the cars of other machines as if they drove here."""
-        for run in filter(self._is_looked_at, self._followed):
-            live = artifacts.shown(run)
-            if live != self._shown.get(run):
-                self._shown[run] = live
-                write_live(self._settings.runs / run, live)
+        for job in filter(self._is_looked_at, self._followed.values()):
+            live = artifacts.of(job.user_id).shown(job.run)
+            if live != self._shown.get((job.user_id, job.run)):
+                self._shown[job.user_id, job.run] = live
+                write_live(runs_of(self._settings.runs, job.user_id) / job.run, live)
 
-    def _is_looked_at(self, run: str) -> bool:
-        return time.monotonic() - self._looks.get(run, float("-inf")) < PATIENCE
+    def _is_looked_at(self, job: Job) -> bool:
+        looked = self._looks.get((job.user_id, job.run), float("-inf"))
+        return folder_of(job) is None and time.monotonic() - looked < PATIENCE
 
-    def _bring(self, artifacts: Artifacts, run: str) -> None:
-        if Path(self._settings.runs / run / "run.json").is_file():  # else it was removed meanwhile
-            artifacts.bring(run, self._settings.runs, incoming=self._settings.incoming)
+    def _bring(self, artifacts: Artifacts, job: Job) -> None:
+        own, runs = artifacts.of(job.user_id), runs_of(self._settings.runs, job.user_id)
+        incoming, folder = runs / STATE_FOLDER / INCOMING, folder_of(job)
+        if folder is not None:
+            shelf, name = folder
+            (runs / STATE_FOLDER / shelf).mkdir(parents=True, exist_ok=True)
+            own.shelf(shelf).bring(name, runs / STATE_FOLDER / shelf, incoming=incoming, missing_ok=True)
+        elif (runs / job.run / "run.json").is_file():  # else it was removed meanwhile
+            own.bring(job.run, runs, incoming=incoming)

@@ -18,6 +18,7 @@ from typing import Any, Final, Literal
 import sqlalchemy as sa
 from sqlalchemy.orm import aliased
 
+from racecraft.serve.jobs.cargo import Cargo
 from racecraft.serve.jobs.turns import choose_to_rest, is_full, running_on, turn_of, turn_order, waiting_line
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
@@ -38,9 +39,15 @@ class JobKind:
     A job may be started again at any moment, so the function goes on where it was, or finds that all is done.
     """
     travels: bool = False
-    """Whether a machine that has nothing but the run can do it."""
+    """Whether another machine can do it, given its cargo."""
     rests: bool = False
     """Whether it saves itself when it is asked to, and goes on later with nothing lost."""
+    folder: str = ""
+    """What it fills below the state folder, if that is not its run."""
+    news: str = ""
+    """File of that folder that changes whenever there is something to show."""
+    needs: str = ""
+    """Module of an extra without which a worker leaves it to others."""
     progress: str = "{run}/checkpoints/manifest.json"
     """File below the runs folder that changes whenever something is kept for good."""
 
@@ -48,17 +55,29 @@ class JobKind:
 KINDS: Final[Mapping[str, JobKind]] = {
     "train": JobKind(slot="training", work="racecraft.serve.models.tasks:train", travels=True, rests=True),
     "tune": JobKind(
-        slot="training", work="racecraft.serve.tuning.tasks:tune", progress=".racecraft/tunings/{tuning}/result.json"
+        slot="training",
+        work="racecraft.serve.tuning.tasks:tune",
+        travels=True,
+        folder="tunings/{tuning}",
+        news="result.json",
+        needs="optuna",
+        progress=".racecraft/tunings/{tuning}/result.json",
     ),
     "evaluate": JobKind(slot="other", work="racecraft.serve.evaluations.tasks:evaluate", travels=True),
-    "race": JobKind(slot="other", work="racecraft.serve.races.tasks:race"),
-    "heat": JobKind(slot="other", work="racecraft.serve.contests.tasks:heat"),
-    "ladder": JobKind(slot="other", work="racecraft.serve.contests.tasks:ladder"),
+    "race": JobKind(slot="other", work="racecraft.serve.races.tasks:race", travels=True, folder="races/{job}"),
+    "heat": JobKind(slot="other", work="racecraft.serve.contests.tasks:heat", travels=True, folder="contests/{job}"),
+    "ladder": JobKind(
+        slot="other",
+        work="racecraft.serve.contests.tasks:ladder",
+        travels=True,
+        folder="contests/{job}",
+        news="driven.txt",
+    ),
     "judge": JobKind(slot="other", work="racecraft.serve.submissions.tasks:judge"),
     "store": JobKind(slot="other", work="racecraft.serve.models.tasks:store"),
 }
-
-
+WRITERS: Final = tuple(name for name, kind in KINDS.items() if not kind.folder)
+"""Kinds whose jobs change their run."""
 LEASE: Final = timedelta(seconds=20)
 """How long a job without a heartbeat still counts as running."""
 FIRST_LEASE: Final = timedelta(seconds=180)
@@ -83,7 +102,15 @@ class Answer:
     """Whether somebody elsewhere wants to see it."""
 
 
-def new_job(kind: str, run: str, payload: Mapping[str, Any], *, travels: bool = False, user_id: int = OWNER) -> Job:
+def folder_of(job: Job) -> tuple[str, str] | None:
+    """What a job fills below the state folder: kind of folder and its name; None where it is its run."""
+    shelf, _, name = KINDS[job.kind].folder.partition("/") if job.kind in KINDS else ("", "", "")
+    return (shelf, name.format(job=job.id, tuning=job.payload.get("tuning", ""))) if name else None
+
+
+def new_job(
+    kind: str, run: str, payload: Mapping[str, Any], *, cargo: Cargo | None = None, user_id: int = OWNER
+) -> Job:
     """A job that is at the end of the queue once a session adds it."""
     return Job(
         id=secrets.token_hex(8),
@@ -91,7 +118,8 @@ def new_job(kind: str, run: str, payload: Mapping[str, Any], *, travels: bool = 
         run=run,
         payload=dict(payload),
         user_id=user_id,
-        travels=travels and KINDS[kind].travels,
+        travels=cargo is not None and KINDS[kind].travels,
+        cargo={} if cargo is None else cargo.to_dict(),
     )
 
 
@@ -110,9 +138,14 @@ class JobQueue:
         """The same for another person."""
         return JobQueue(self._database, user_id=user_id)
 
-    def add(self, kind: str, run: str, payload: Mapping[str, Any], *, travels: bool = False) -> Job:
-        """Put a job at the end of the queue; any machine may do one that travels, its run being in the store."""
-        job = new_job(kind, run, payload, travels=travels, user_id=self._user_id)
+    @property
+    def user_id(self) -> int:
+        """Whose jobs these are."""
+        return self._user_id
+
+    def add(self, kind: str, run: str, payload: Mapping[str, Any], *, cargo: Cargo | None = None) -> Job:
+        """Put a job at the end of the queue; any machine may do one whose cargo is in the store."""
+        job = new_job(kind, run, payload, cargo=cargo, user_id=self._user_id)
         with self._database.transaction() as session:
             session.add(job)
         return job
@@ -147,9 +180,9 @@ class JobQueue:
 
     def is_travelling(self, run: str) -> bool:
         """Whether some machine works on this run and takes it to the store."""
-        query = sa.select(Job.id).where(self._about(run), Job.state == "running", Job.travels).limit(1)
+        query = sa.select(Job.id).where(self._about(run), Job.state == "running", Job.travels, Job.kind.in_(WRITERS))
         with self._database.transaction() as session:
-            return session.scalar(query) is not None
+            return session.scalar(query.limit(1)) is not None
 
     def _about(self, run: str) -> sa.ColumnElement[bool]:
         return sa.and_(Job.user_id == self._user_id, Job.run == run)
@@ -209,7 +242,7 @@ class JobQueue:
 
         Whose turn it is says `racecraft.serve.jobs.turns`.
 
-        A run is worked on by one machine at a time, which has its newest files.
+        A run is changed by one machine at a time, which has its newest files.
         """
         other = aliased(Job)
         is_away = sa.exists().where(
@@ -218,8 +251,10 @@ class JobQueue:
             other.state == "running",
             other.machine != machine,
             other.travels,
+            other.kind.in_(WRITERS),
         )
-        oldest = sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds), ~is_away)
+        is_free = sa.or_(Job.kind.not_in(WRITERS), ~is_away)
+        oldest = sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds), is_free)
         if not is_home:
             oldest = oldest.where(Job.travels)
         with self._database.transaction() as session:

@@ -23,6 +23,8 @@ class JobInfo(Message):
     finished: datetime | None
     result: dict[str, Any] | None
     error: dict[str, Any] | None
+    machine: str
+    """Where it runs or ran, if other machines may do such a job."""
     behind: list[str]
     """Runs whose work comes before this, while it waits."""
 
@@ -30,4 +32,5 @@ class JobInfo(Message):
 def job_info(job: Job, *, behind: Sequence[str] = ()) -> JobInfo:
     """A job as the browser sees it."""
     of_the_job = {name: getattr(job, name) for name in JobInfo.model_fields if name != "behind"}
-    return JobInfo.model_validate({**of_the_job, "behind": list(behind)})
+    machine = job.machine if job.travels else ""
+    return JobInfo.model_validate({**of_the_job, "machine": machine, "behind": list(behind)})

@@ -16,6 +16,8 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Final
 
@@ -23,7 +25,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.errors import RunError
 from racecraft.run.lock import exclusive_lock
-from racecraft.serve.jobs.queue import MAX_DEATHS, JobQueue, Slot, kinds_of
+from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, JobQueue, Slot, kinds_of
 from racecraft.serve.settings import ARTIFACTS, DATABASE, WORKERS, ServeSettings
 from racecraft.serve.store.database import Database
 
@@ -96,15 +98,19 @@ class Supervisor:
         self._queue.take_back_expired()
         places: dict[Slot, int] = {"training": self._settings.training_slots, "other": self._settings.other_slots}
         for slot, count in places.items():
-            kinds = kinds_of(slot)
-            while not self._is_stopping and self._has_room(kinds, count) and self._start(kinds):
+            kinds, doable = kinds_of(slot), self._doable(kinds_of(slot))
+            while not self._is_stopping and self._has_room(kinds, count) and self._start(doable):
                 pass
-            self._queue.make_room(kinds, machine=self._settings.machine, places=count, is_home=self._is_home)
+            self._queue.make_room(doable, machine=self._settings.machine, places=count, is_home=self._is_home)
         if not self._is_stopping and time.monotonic() - self._started > CALM:
             self._standby.prepare()
 
     def _has_room(self, kinds: tuple[str, ...], places: int) -> bool:
         return self._queue.has_room(kinds, machine=self._settings.machine, places=places)
+
+    def _doable(self, kinds: tuple[str, ...]) -> tuple[str, ...]:
+        """Those for which everything is installed; at home all, so that somebody says what is missing."""
+        return kinds if self._is_home else tuple(kind for kind in kinds if _is_installed(KINDS[kind].needs))
 
     def _start(self, kinds: tuple[str, ...]) -> bool:
         """Start the next job of these kinds; False when there is none."""
@@ -202,6 +208,11 @@ class Standby:
                 pass_fds=[lock.fileno()],
                 start_new_session=True,  # Ctrl-C in the server's terminal is not for it
             )
+
+
+@cache
+def _is_installed(module: str) -> bool:
+    return not module or find_spec(module) is not None
 
 
 def _pipe(worker: subprocess.Popen[bytes]) -> IO[bytes]:

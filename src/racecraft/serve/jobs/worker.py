@@ -19,11 +19,11 @@ from typing import Any, Final
 from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.errors import RacecraftError, RunError
-from racecraft.run import RunFolder
+from racecraft.moved import move
 from racecraft.serve.jobs.courier import Courier
 from racecraft.serve.jobs.queue import KINDS, LEASE, Answer, JobKind, JobQueue
 from racecraft.serve.jobs.task import Task
-from racecraft.serve.settings import INCOMING, OWNER, STATE_FOLDER, runs_of
+from racecraft.serve.settings import OWNER, runs_of
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
@@ -40,7 +40,8 @@ def work(task: Task) -> dict[str, Any]:
     if task.job.kind not in KINDS:
         raise RunError(f"Jobs of kind {task.job.kind!r} are not known here.", hint="Update Racecraft.")
     result: dict[str, Any] = _function(KINDS[task.job.kind])(task)
-    if task.artifacts is not None and task.job.run and not task.job.travels:
+    is_copied = task.job.user_id == OWNER and not task.job.travels
+    if task.artifacts is not None and task.job.run and is_copied:
         try:
             task.artifacts.keep(task.folder)
         except RunError as error:  # what was done is done; the next server copies what is missing
@@ -89,8 +90,7 @@ class Worker:
         )
         self._courier: Courier | None = None
         if artifacts is not None and job.travels:
-            incoming = runs / STATE_FOLDER / INCOMING
-            self._courier = Courier(artifacts, RunFolder(runs / job.run), incoming=incoming, kept=self._kept)
+            self._courier = Courier(artifacts, job, runs, kept=self._kept)
 
     def run(self) -> None:
         """Do it, and say how it ended."""
@@ -99,7 +99,7 @@ class Worker:
         threading.Thread(target=self._keep, name="heartbeat", daemon=True).start()
         try:
             if self._courier is not None:
-                self._courier.fetch()
+                move(self._courier.fetch())
             result = work(self._task)
             if self._courier is not None:
                 self._courier.deliver()
@@ -182,5 +182,5 @@ def do_job(job_id: str, *, owner: str, runs: Path, database_url: str, artifacts_
     with database.transaction() as session:
         job = session.get(Job, job_id)
     if job is not None and job.owner == owner:  # else it was taken for dead before it was there
-        artifacts = Artifacts(artifacts_url) if artifacts_url and job.user_id == OWNER else None
+        artifacts = Artifacts(artifacts_url).of(job.user_id) if artifacts_url else None
         Worker(database, job, owner=owner, runs=runs, artifacts=artifacts).run()

@@ -246,8 +246,8 @@ def get_file(name: str, path: str, context: InContext) -> FileResponse:
 
 def _train(context: Context, folder: RunFolder, *, until: str | None) -> JobInfo:
     _require_idle(context, folder)
-    travels = context.mirror.share(folder)
-    job = context.queue.add("train", folder.name, {"until": until}, travels=travels)
+    cargo = context.mirror.share_training(folder)
+    job = context.queue.add("train", folder.name, {"until": until}, cargo=cargo)
     context.supervisor.wake()
     return job_info(job)
 

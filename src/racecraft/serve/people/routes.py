@@ -110,8 +110,9 @@ def remove_token(token_id: Annotated[int, Path(ge=0, lt=2**31)], consoles: InCon
 @router.delete("", status_code=204)
 def remove_account(consoles: InConsoles, person: InPerson) -> Response:
     """Forget somebody with all that is theirs; download it first."""
-    folder = consoles.of(person.id).settings.runs
+    console = consoles.of(person.id)
     consoles.people.remove(person.id)
     consoles.forget(person.id)
-    shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(console.settings.runs, ignore_errors=True)
+    console.mirror.forget_all()
     return Response(status_code=204)

@@ -11,7 +11,7 @@ table says whose a race and an entry are.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, Final
 
@@ -22,6 +22,7 @@ from racecraft.errors import ConfigError
 from racecraft.race.announcement import Announcement, draw_secret
 from racecraft.race.conditions import Conditions
 from racecraft.race.rules import race_rules
+from racecraft.serve.jobs.cargo import Cargo
 from racecraft.serve.jobs.queue import JobQueue, new_job
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.problems import Conflict, NotFound
@@ -60,15 +61,25 @@ class Races:
         queue: Of jobs.
         garage: Of models.
         courses: Of tracks.
+        share: Has the store hold what an entry needs, where there is one.
+        see: Is given each entry's job before somebody hears of it.
         user_id: Who holds them.
     """
 
     def __init__(
-        self, database: Database, queue: JobQueue, garage: Garage, courses: Courses, *, user_id: int = OWNER
+        self,
+        database: Database,
+        queue: JobQueue,
+        garage: Garage,
+        courses: Courses,
+        *,
+        share: Callable[..., Cargo | None] = lambda *_, **__: None,
+        see: Callable[[Job], Job] = lambda job: job,
+        user_id: int = OWNER,
     ) -> None:
         self._database, self._queue, self._garage, self._courses = database, queue, garage, courses
         self._own = sa.and_(Race.owner_id == user_id, Race.group_id.is_(None), Race.deleted.is_(None))
-        self._user_id = user_id
+        self._share, self._see, self._user_id = share, see, user_id
 
     def create(self, request: NewRace, *, user_id: int, group_id: int | None = None) -> int:
         """Make a race, of a league's group if one is given; its id.
@@ -126,6 +137,8 @@ class Races:
         with self._database.transaction() as session:
             race = self._race(session, race_id)
             entries = _entries(session, [race_id]).get(race_id, [])
+        for _, job, _ in entries:
+            self._see(job)
         undecided = [
             Undecided.model_validate(
                 {"entry": entry.id, "model": job.run, "state": job.state, "created": entry.created, "error": job.error}
@@ -181,6 +194,9 @@ class Races:
         """
         models = list(dict.fromkeys(request.models))
         with self._database.transaction() as session:
+            road = self._courses.path_or_name(self._race(session, race_id).track)
+        cargo = {name: self._share(self._garage.folder(name), tracks=(road,)) for name in models}
+        with self._database.transaction() as session:
             _hold(session, race_id)
             race = self._race(session, race_id)
             for name in models:
@@ -192,11 +208,11 @@ class Races:
             if count + len(models) > MAX_ENTRIES:
                 raise Conflict(f"A race takes {MAX_ENTRIES} entries.")
             payload = {
-                "track": self._courses.path_or_name(race.track),
+                "track": road,
                 "announcement": announcement_of(race).to_dict(),
                 "checkpoint": request.checkpoint,
             }
-            jobs = [new_job(KIND, name, payload, user_id=user_id) for name in models]
+            jobs = [new_job(KIND, name, payload, cargo=cargo[name], user_id=user_id) for name in models]
             session.add_all(jobs)
             session.flush()  # entries name their jobs
             entries = [Entry(race_id=race_id, user_id=user_id, run=job.run, job_id=job.id) for job in jobs]
@@ -245,7 +261,7 @@ class Races:
             job = entries.get(entry_id)
             if job is None or job.state != "done":
                 raise NotFound(f"Entry {entry_id} has no replay in this race.")
-            found.append((entry_id, job))
+            found.append((entry_id, self._see(job)))
         return found
 
     def _race(self, session: Any, race_id: int, *, is_deleted: bool = False) -> Race:

@@ -4,6 +4,9 @@
                         copy is whole, or the one before
     runs/NAME/SHA256    a file's content
     live/NAME           its cars as they drive, while somebody looks
+    tracks/SHA256       a track of somebody's own, for jobs that drive on it
+    contests/JOB …      as runs: what a job makes that is no run, until it is at home
+    people/NUMBER/…     the same for each other person of a league
 
 A run folder remembers which copy it was last alike to. So whoever has an older one brings the newer, and nobody who was
 away writes over it.
@@ -14,14 +17,16 @@ The store is S3 (``s3://bucket/prefix``; keys, region and endpoint from AWS's en
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import os
 import re
 import shutil
+import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -30,6 +35,7 @@ from racecraft.errors import ConfigError, RunError
 from racecraft.extras import needed_for
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file
+from racecraft.serve.settings import OWNER
 
 T = TypeVar("T")
 FORMAT: Final = 1
@@ -41,12 +47,16 @@ _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}(/[A-Za-z0-9_][
 SCHEMES: Final = ("s3://", "file:///")
 MARK: Final = ".copy"
 """In a run folder: the number of the copy that it was last alike to."""
+RUNS: Final = "runs"
 MANIFEST: Final = "checkpoints/manifest.json"
 SNAPSHOTS: Final = 10
 """How often the checkpoints are looked at again because a training saved one meanwhile."""
 FETCHES: Final = 3
 """The same for a copy that was made anew while it was brought."""
 MAX_LIVE_BYTES: Final = 1 << 20
+MAX_TRACK_BYTES: Final = 1 << 26
+DATABASES: Final = ".sqlite"
+"""Ending of files that are copied last and as one transaction left them, while others write them."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +87,7 @@ class Artifacts:
             import obstore
             from obstore import exceptions, store
         self.url = url
+        self._prefix, self._shelf = "", RUNS
         self._api, self._missing = obstore, (exceptions.NotFoundError, FileNotFoundError)
         self._broken = (exceptions.BaseError, OSError)
         endpoint = os.environ.get("AWS_ENDPOINT_URL", os.environ.get("AWS_ENDPOINT", ""))
@@ -93,6 +104,19 @@ class Artifacts:
         except (*self._broken, ValueError) as error:
             raise ConfigError(f"The object store {url} cannot be opened: {_first_line(error)}.") from error
 
+    def of(self, user_id: int) -> Artifacts:
+        """The same for another person."""
+        return self._at("" if user_id == OWNER else f"people/{user_id}/", RUNS)
+
+    def shelf(self, name: str) -> Artifacts:
+        """The same for folders of another kind than runs."""
+        return self._at(self._prefix, name)
+
+    def _at(self, prefix: str, shelf: str) -> Artifacts:
+        other = copy.copy(self)
+        other._prefix, other._shelf = prefix, shelf
+        return other
+
     def names(self) -> list[str]:
         """The runs that are there.
 
@@ -101,8 +125,8 @@ class Artifacts:
         """
 
         def listed() -> list[str]:
-            found = self._api.list_with_delimiter(self._store, "runs")["objects"]
-            names = [entry["path"].removeprefix("runs/").removesuffix(".json") for entry in found]
+            found = self._api.list_with_delimiter(self._store, self._key())["objects"]
+            names = [entry["path"].removeprefix(f"{self._key()}/").removesuffix(".json") for entry in found]
             return sorted(name for name in names if _PLAIN.fullmatch(name) and "/" not in name)
 
         return self._tried(listed)
@@ -133,10 +157,10 @@ class Artifacts:
                 digest = known.get((status.st_size, status.st_mtime_ns, path))
                 size = status.st_size
                 if digest is None:
-                    data = file.read_bytes()
+                    data = _content(file)
                     digest, size = hashlib.sha256(data).hexdigest(), len(data)
                     if digest not in there:
-                        self._api.put(self._store, f"runs/{folder.name}/{digest}", data)
+                        self._api.put(self._store, self._key(folder.name, digest), data)
                         there.add(digest)
                         count += 1
                 return {"size": size, "time": status.st_mtime_ns, "sha256": digest}
@@ -146,10 +170,10 @@ class Artifacts:
             if files != before.files:
                 number += 1
                 document = {"format": FORMAT, "number": number, "files": files}
-                self._api.put(self._store, f"runs/{folder.name}.json", json.dumps(document).encode())
+                self._api.put(self._store, self._key(f"{folder.name}.json"), json.dumps(document).encode())
             _remember(folder.path, number)
             gone = {line["sha256"] for line in before.files.values()} - {line["sha256"] for line in files.values()}
-            self._delete(f"runs/{folder.name}/{digest}" for digest in gone)
+            self._delete(self._key(folder.name, digest) for digest in gone)
             return count
 
         return self._tried(copied)
@@ -164,7 +188,7 @@ class Artifacts:
         found = {path: (file.stat().st_size, file.stat().st_mtime_ns) for path, file in _files(folder.path)}
         return found == {path: (line["size"], line["time"]) for path, line in copy.files.items()}
 
-    def bring(self, name: str, runs: Path, *, incoming: Path) -> bool:
+    def bring(self, name: str, runs: Path, *, incoming: Path, missing_ok: bool = False) -> bool:
         """Have a run here as it is in the store, unless what is here is as new; whether anything was brought.
 
         Nothing changes before all of it is here and checked. Then files are replaced one by one, the list of
@@ -174,6 +198,7 @@ class Artifacts:
             name: Of the run.
             runs: Where it lies, or is to lie.
             incoming: Folder on the same disk where it is put together.
+            missing_ok: Whether there may be nothing of this name.
 
         Raises:
             RunError: It is not there, damaged, or the store cannot be reached.
@@ -182,10 +207,13 @@ class Artifacts:
         incoming.mkdir(parents=True, exist_ok=True)
         for attempt in range(1, FETCHES + 1):
             copy = self._tried(lambda: self._copy(name))
+            if copy is None and missing_ok:
+                return False
             if copy is None:
                 raise RunError(f"The store has no run {name[:80]!r}.")
             is_here = folder.exists()
-            if is_here and copy.number <= _mark(folder, copy.number):
+            # a run without a mark is older than marks; another folder was left by a job that was killed
+            if is_here and copy.number <= _mark(folder, copy.number if self._shelf == RUNS else 0):
                 return False
             target = Path(tempfile.mkdtemp(dir=incoming, prefix=f"{name}-"))
             target.chmod(0o755)
@@ -214,7 +242,7 @@ class Artifacts:
             file.parent.mkdir(parents=True, exist_ok=True)
             digest, size = hashlib.sha256(), 0
             with file.open("xb") as out:
-                for chunk in self._api.get(self._store, f"runs/{name}/{line['sha256']}").stream():
+                for chunk in self._api.get(self._store, self._key(name, line["sha256"])).stream():
                     size += len(chunk)
                     if size > line["size"]:
                         break
@@ -230,7 +258,7 @@ class Artifacts:
         Raises:
             RunError: The store cannot be reached.
         """
-        self._tried(lambda: self._api.put(self._store, f"live/{name}", live))
+        self._tried(lambda: self._api.put(self._store, f"{self._prefix}live/{name}", live))
 
     def shown(self, name: str) -> bytes:
         """What was shown last of a run's cars; nothing where nothing was, or too much.
@@ -241,7 +269,7 @@ class Artifacts:
 
         def read() -> bytes:
             try:
-                reply = self._api.get(self._store, f"live/{name}")
+                reply = self._api.get(self._store, f"{self._prefix}live/{name}")
             except self._missing:
                 return b""
             return b"" if reply.meta["size"] > MAX_LIVE_BYTES else bytes(reply.bytes())
@@ -256,16 +284,67 @@ class Artifacts:
         """
 
         def forgotten() -> None:
-            self._delete([f"runs/{name}.json", f"live/{name}"])
-            for page in self._api.list(self._store, f"runs/{name}"):
+            self._delete([self._key(f"{name}.json"), f"{self._prefix}live/{name}"])
+            for page in self._api.list(self._store, self._key(name)):
                 self._delete(entry["path"] for entry in page)
 
         self._tried(forgotten)
 
+    def forget_all(self) -> None:
+        """Remove all that another person of a league has here.
+
+        Raises:
+            RunError: The store cannot be reached.
+        """
+        if not self._prefix:
+            raise RunError("The owner's copies are not removed.")
+
+        def forgotten() -> None:
+            for page in self._api.list(self._store, self._prefix.rstrip("/")):
+                self._delete(entry["path"] for entry in page)
+
+        self._tried(forgotten)
+
+    def keep_track(self, file: Path) -> str:
+        """Have a track's file here; its SHA-256.
+
+        Raises:
+            RunError: The store cannot be reached, or the file cannot be read.
+        """
+
+        def kept() -> str:
+            data = file.read_bytes()
+            digest = hashlib.sha256(data).hexdigest()
+            self._api.put(self._store, f"{self._prefix}tracks/{digest}", data)
+            return digest
+
+        return self._tried(kept)
+
+    def bring_track(self, digest: str, file: Path) -> None:
+        """Have a track's file on this machine.
+
+        Raises:
+            RunError: It is not there, damaged, or the store cannot be reached.
+        """
+
+        def read() -> bytes:
+            reply = self._api.get(self._store, f"{self._prefix}tracks/{digest}")
+            return b"" if reply.meta["size"] > MAX_TRACK_BYTES else bytes(reply.bytes())
+
+        if not file.is_file():
+            data = self._tried(read)
+            if hashlib.sha256(data).hexdigest() != digest:
+                raise RunError(f"Track {file.name} is damaged in the store.")
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_file(file, data)
+
+    def _key(self, *parts: str) -> str:
+        return "/".join((f"{self._prefix}{self._shelf}", *parts))
+
     def _copy(self, name: str) -> Copy | None:
         """What the store has of a run, checked; None when there is nothing."""
         try:
-            reply = self._api.get(self._store, f"runs/{name}.json")
+            reply = self._api.get(self._store, self._key(f"{name}.json"))
             if reply.meta["size"] > MAX_INDEX_BYTES:
                 raise RunError(f"The list of files of run {name!r} is too large.")
             document = json.loads(bytes(reply.bytes()))
@@ -339,8 +418,21 @@ def _snapshot(root: Path, put: Callable[[str, Path], dict[str, Any]]) -> dict[st
         add(lambda path: path.startswith("checkpoints/"))
         if _moment(root / MANIFEST) == listed:
             break
-    add(lambda path: not path.startswith("checkpoints/"))
+    add(lambda path: not path.startswith("checkpoints/") and not path.endswith(DATABASES))
+    add(lambda path: path.endswith(DATABASES))
     return dict(sorted(files.items()))
+
+
+def _content(file: Path) -> bytes:
+    """Of a file; of a database as its last transaction left it."""
+    if file.suffix != DATABASES:
+        return file.read_bytes()
+    try:
+        with closing(sqlite3.connect(file)) as source, closing(sqlite3.connect(":memory:")) as copied:
+            source.backup(copied)
+            return copied.serialize()
+    except sqlite3.Error as error:
+        raise OSError(f"{file.name} cannot be read: {error}") from error
 
 
 def _replace(folder: Path, fresh: Path, wanted: dict[str, dict[str, Any]], copy: Copy) -> None:

@@ -198,6 +198,8 @@ class Job(Table):
     is_cancelled: Mapped[bool] = mapped_column(default=False)
     travels: Mapped[bool] = mapped_column(default=False)
     """Whether what it needs is in the object store, so that any machine may do it."""
+    cargo: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    """What the store has for it, see `racecraft.serve.jobs.cargo`."""
     machine: Mapped[str] = mapped_column(String(64), default="")
     """Where it runs, or ran last."""
     held_since: Mapped[datetime | None]

@@ -45,7 +45,7 @@ async def _stream(context: Context, name: str, offset: int, *, eye: bool) -> Asy
             if (jobs := await context.hub.jobs(name)) != jobs_seen:
                 jobs_seen = jobs
                 yield ServerSentEvent(jobs, event="jobs")
-        context.follower.look_at(name)
+        context.follower.look_at(name, user_id=context.queue.user_id)
         look = context.hub.live(name, after=sequence)
         if look is not None:
             sequence, event = look

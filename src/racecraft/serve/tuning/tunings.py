@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import secrets
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,9 +17,11 @@ from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
 from racecraft.run.folder import sanitize_name
 from racecraft.run.history import read_history
+from racecraft.serve.jobs.cargo import rivals_of
 from racecraft.serve.jobs.queue import ENDED, JobQueue
 from racecraft.serve.live.cars import NAME as LIVE
 from racecraft.serve.models.garage import Garage
+from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.tables import Job
 from racecraft.serve.tuning.schemas import KeepTrial, NewTuning, TunableNumber, TuningCard, TuningTrial
@@ -37,10 +40,15 @@ class Tunings:
         state: The console's own folder.
         queue: Of jobs.
         garage: Of models.
+        mirror: Has the object store hold what a search needs.
+        see: Is given each search's job before somebody hears of it.
     """
 
-    def __init__(self, state: Path, queue: JobQueue, garage: Garage) -> None:
-        self._folder, self._queue, self._garage = state / FOLDER, queue, garage
+    def __init__(
+        self, state: Path, queue: JobQueue, garage: Garage, *, mirror: Mirror, see: Callable[[Job], Job]
+    ) -> None:
+        self._see = see
+        self._folder, self._queue, self._garage, self._mirror = state / FOLDER, queue, garage, mirror
 
     def space(self, name: str) -> list[TunableNumber]:
         """Everything that may be searched of a model.
@@ -69,8 +77,9 @@ class Tunings:
         if request.search == []:
             raise ConfigError("search is empty; name at least one number, or leave it out.")
         tuning = secrets.token_hex(8)
-        make_tuning(
-            plan_of(self._garage.folder(name)),
+        plan = plan_of(self._garage.folder(name))
+        folder = make_tuning(
+            plan,
             search=search,
             goal=request.goal,
             trial_steps=request.trial_steps,
@@ -78,12 +87,16 @@ class Tunings:
             name=tuning,
         )
         payload = {"tuning": tuning, "minutes": request.minutes, "trials": request.trials}
-        return self._queue.add("tune", name, payload)
+        rivals, cargo = rivals_of(plan.settings.to_dict(), self._garage.runs), None
+        if rivals is not None:
+            runs = (RunFolder(self._garage.runs / rival) for rival in rivals)
+            cargo = self._mirror.share(*runs, tracks=(plan.settings.track,), filled=folder)
+        return self._queue.add("tune", name, payload, cargo=cargo)
 
     def cards(self, name: str) -> list[TuningCard]:
         """A model's searches, newest first."""
         folder = self._garage.folder(name)
-        cards = (self._card(job) for job in self._queue.list(run=folder.name, kind="tune"))
+        cards = (self._card(self._see(job)) for job in self._queue.list(run=folder.name, kind="tune"))
         return [card for card in cards if card is not None]
 
     def keep(self, name: str, tuning: str, request: KeepTrial) -> str:

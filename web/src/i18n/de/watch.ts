@@ -64,6 +64,7 @@ export const watch: Record<keyof typeof english, string> = {
   starting_long: "Autos, Netz und Belohnung werden vorbereitet, seit {time}",
   cars_wait: "{count} Autos warten, während das Netz aus ihren Fahrten lernt: seit {time}",
   cars: "{count} Autos lernen zugleich",
+  on_machine: "{told} · auf {machine}",
   not_live: "Gerade wird nicht trainiert.",
   best_drives: "Das beste Auto auf seiner Runde: {lap}",
   best_drives_part: "Das beste Auto; ganz herum kam es noch nicht",

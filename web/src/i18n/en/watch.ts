@@ -60,6 +60,7 @@ export const watch = {
   starting_long: "Preparing cars, network and reward, for {time}",
   cars_wait: "{count} cars wait while the network learns from what they drove: {time} so far",
   cars: "{count} cars learning at once",
+  on_machine: "{told} · on {machine}",
   not_live: "No training is running.",
   best_drives: "The best car on its lap: {lap}",
   best_drives_part: "The best car; it has not come all the way round yet",
