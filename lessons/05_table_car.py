@@ -142,6 +142,11 @@ show(
 # turn. Without looking ahead all five angles earn the same, and the table cannot tell them apart. The worth of the
 # *next* cell is what makes the difference: Bellman again.
 
+# %% plaything track [markdown]
+# *To play with:* this lesson's page in the console (`racecraft serve`, *Course*) has a road of 240 places, painted with
+# what each is worth, while a car finds it out. Let it run, and see the worth of the line creep backwards, against the
+# way that the car drives. Then make γ small: how far does it get?
+
 # %% [markdown]
 # ## Your turn: the smallest driver
 #

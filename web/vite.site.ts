@@ -1,4 +1,4 @@
-/** The page that needs no server: one folder for any static host, under any path. */
+/** The pages that need no server, where cars learn and the lessons: one folder for any static host, under any path. */
 import { svelte } from "@sveltejs/vite-plugin-svelte";
 import { defineConfig } from "vite";
 
@@ -10,6 +10,7 @@ export default defineConfig({
   build: {
     outDir: "../../build/site",
     emptyOutDir: true,
+    rolldownOptions: { input: ["site/index.html", "site/lessons.html"] },
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 1000,

@@ -13,6 +13,7 @@ from typing import Any, Final
 from racecraft.reward import load_preset, preset_names
 from racecraft.site.calls import SHIPPED
 from racecraft.site.javascript import javascript
+from racecraft.site.lessons import write_lessons
 from racecraft.site.plan import plan, track_file
 from racecraft.track import track_names
 
@@ -23,8 +24,9 @@ PYTHON: Final = ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_s
 
 
 def main(site: Path, pyodide: Path) -> None:
-    """Write data/plan.json, data/rewards.js, a file a track, python/, and files.js."""
+    """Write data/plan.json, data/rewards.js, a file a track, the lessons, python/, and files.js."""
     write_data(site / "data")
+    write_lessons(site / "lessons")
     write_python(site / "python", pyodide)
     write_files(site)
 

@@ -71,6 +71,29 @@ export const en = {
   gae_surprise: "surprise δ",
   gae_advantage: "advantage; of the first step",
   gae_numbers: "By sliders",
+  track: "What a place is worth",
+  track_lead:
+    "Green: worth something; red: a danger. The car goes counter-clockwise and chooses its lane; bends carry it outwards. Press a place to put it there: the line is where its best actions lead.",
+  track_said: "{steps} steps; worth here {worth}; mean distance to the exact worth {error}",
+  track_exact: "Show the exact worth",
+  track_pay: "Paid for",
+  track_line: "the line",
+  track_middle: "the middle",
+  track_place: "Choose the place by sliders",
+  segment: "Place along the lap",
+  lane: "Lane, from the left",
+  slip: "How slippery bends are",
+  lap: "A policy over a lap",
+  lap_lead:
+    "Above: where cars are that follow the policy; the denser, the more. Below: how it steers along the lap. Let it learn, drag the line, and look where it makes up its mind.",
+  lap_where: "Where the policy's cars are",
+  lap_chart: "How the policy steers, along the lap",
+  lap_left: "to the left",
+  lap_straight: "straight on",
+  lap_right: "to the right",
+  lap_said: "{drives} drives; {round} of the cars come round; {undecided} undecided",
+  lap_drive: "One drive",
+  beta: "β, weight of the entropy",
 } as const;
 
 export type CourseKey = keyof typeof en;

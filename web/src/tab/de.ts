@@ -3,6 +3,7 @@ import type { TabKey } from "./en";
 
 export const de: Record<TabKey, string> = {
   title: "Sieh zu, wie ein Auto fahren lernt",
+  lessons: "Lektionen",
   lead: "Wähle, wofür es belohnt wird, und drücke Trainieren: 64 Autos fahren nach Kamerabildern, in diesem Tab. Nichts verlässt ihn.",
   track: "Strecke",
   reward: "Wofür es belohnt wird",

@@ -1,6 +1,7 @@
 /** English texts of the page in a tab, beside those that it shares with the console: the complete catalogue. */
 export const en = {
   title: "Watch a car learn to drive",
+  lessons: "Lessons",
   lead: "Choose what it is paid for and press Train: sixty-four cars drive from camera pixels, in this tab. Nothing leaves it.",
   track: "Track",
   reward: "What it is paid for",

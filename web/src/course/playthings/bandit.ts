@@ -1,5 +1,6 @@
 /** A row of slot machines, and a player who mostly takes the best so far. */
 import type { Lot } from "./lot";
+import { choose as greedy } from "./table";
 
 export interface Player {
   pulls: number[];
@@ -19,11 +20,7 @@ export const newPlayer = (arms: number): Player => ({
 export const chances = (arms: number, lot: Lot): number[] => Array.from({ length: arms }, () => 0.1 + 0.8 * lot());
 
 /** Which arm an ε-greedy player takes; among equals by lot. */
-export function choose({ values }: Player, epsilon: number, lot: Lot): number {
-  if (lot() < epsilon) return Math.floor(lot() * values.length);
-  const top = values.flatMap((value, arm) => (value === Math.max(...values) ? [arm] : []));
-  return top[Math.floor(lot() * top.length)]!;
-}
+export const choose = ({ values }: Player, epsilon: number, lot: Lot): number => greedy(values, epsilon, lot);
 
 /** Pull an arm: whether it won. The player remembers the mean, one step of 1/n at a time. */
 export function pull(player: Player, arm: number, winning: number[], lot: Lot): boolean {

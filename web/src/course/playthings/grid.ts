@@ -1,5 +1,6 @@
 /** A grid world, Q-learning in it, and its exact solution. */
 import type { Lot } from "./lot";
+import { choose, emptyTable, update, worth, type Outcome, type Settings, type Table } from "./table";
 
 /** S: start, #: wall, G: goal (+1), P: pit (−1). */
 export const MAP = ["...#.G", ".#...P", "...#..", "S.P..."] as const;
@@ -19,12 +20,6 @@ const COST = -0.02; // of a step: who dawdles loses
 export const signOf = (state: number): string => MAP.join("")[state]!;
 export const isEnd = (state: number): boolean => "GP".includes(signOf(state));
 
-export interface Outcome {
-  after: number;
-  reward: number;
-  isOver: boolean;
-}
-
 /** What a move does: against a wall or the border one stays. */
 export function outcome(state: number, action: number): Outcome {
   const row = Math.floor(state / COLUMNS) + MOVES[action]![0];
@@ -36,39 +31,22 @@ export function outcome(state: number, action: number): Outcome {
   return { after, reward, isOver: isEnd(after) };
 }
 
-/** Worth of every action in every state, (STATES, 4). */
-export type Table = number[][];
-export const emptyTable = (): Table => Array.from({ length: STATES }, () => [0, 0, 0, 0]);
-export const best = (row: number[]): number => row.indexOf(Math.max(...row));
+export const newTable = (): Table => emptyTable(STATES, MOVES.length);
 
 /** The exact table, by dynamic programming. */
 export function solve(gamma: number, sweeps = 400): Table {
-  let table = emptyTable();
+  let table = newTable();
   for (let sweep = 0; sweep < sweeps; sweep++)
     table = table.map((row, state) =>
-      isEnd(state) || signOf(state) === "#"
-        ? row
-        : row.map((_, action) => {
-            const { after, reward, isOver } = outcome(state, action);
-            return reward + (isOver ? 0 : gamma * Math.max(...table[after]!));
-          }),
+      isEnd(state) || signOf(state) === "#" ? row : row.map((_, action) => worth(table, outcome(state, action), gamma)),
     );
   return table;
 }
 
-export interface Settings {
-  epsilon: number;
-  alpha: number;
-  gamma: number;
-}
-
 /** A step of Q-learning, which changes the table; where one is then, again at the start after an end. */
-export function learn(table: Table, state: number, { epsilon, alpha, gamma }: Settings, lot: Lot): Outcome {
-  const row = table[state]!;
-  const ties = [0, 1, 2, 3].filter((action) => row[action] === Math.max(...row));
-  const action = lot() < epsilon ? Math.floor(lot() * 4) : ties[Math.floor(lot() * ties.length)]!;
+export function learn(table: Table, state: number, settings: Settings, lot: Lot): Outcome {
+  const action = choose(table[state]!, settings.epsilon, lot);
   const told = outcome(state, action);
-  const target = told.reward + (told.isOver ? 0 : gamma * Math.max(...table[told.after]!));
-  row[action]! += alpha * (target - row[action]!);
+  update(table, state, action, told, settings);
   return { ...told, after: told.isOver ? START : told.after };
 }

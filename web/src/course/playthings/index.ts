@@ -6,4 +6,6 @@ export const playthings: Record<string, () => Promise<{ default: Component }>> =
   clip: () => import("./Clip.svelte"),
   gae: () => import("./Gae.svelte"),
   grid: () => import("./Grid.svelte"),
+  lap: () => import("./Lap.svelte"),
+  track: () => import("./Track.svelte"),
 };
