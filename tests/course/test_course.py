@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from pydantic import ValidationError
+from said_in_lessons import FIGURES, STATEMENTS
 
 from racecraft.course import check, checks_of, find_lesson, lessons, read_cells, read_progress, show, to_notebook
 from racecraft.course import progress as progress_file
@@ -223,6 +225,24 @@ def test_what_a_lesson_showed_is_of_the_code_that_it_has(number: int) -> None:
         assert one.description
         with Image.open(picture_path(lesson, one.name)) as image:
             assert image.size == (one.width, one.height)
+
+
+@pytest.mark.parametrize("number", [lesson.number for lesson in lessons()])
+def test_what_the_text_says_of_the_run_is_so(number: int) -> None:
+    lesson = find_lesson(number)
+    text = " ".join(" ".join(cell.source for cell in lesson.cells() if cell.kind == "markdown").split())
+    shown = [one for outputs in read_shown(lesson).outputs.values() for one in outputs]
+    printed = "\n".join(one.text for one in shown if one.kind == "text")
+    for figure in (one for one in FIGURES if one.lesson == number):
+        said, came = re.search(figure.text, text), re.search(figure.printed, printed)
+        assert said, figure.text
+        assert came, figure.printed
+        assert said.groups() == came.groups()
+    statements = [one for one in STATEMENTS if one.lesson == number]
+    assert statements or any(one.lesson == number for one in FIGURES)
+    for statement in statements:
+        assert statement.text in text
+        assert statement.holds(printed), statement.text
 
 
 def test_without_its_pictures_a_lesson_shows_its_words(tmp_path: Path) -> None:

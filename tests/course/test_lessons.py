@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
+from said_in_lessons import STATEMENTS
 
 from racecraft.course import checks_of, find_lesson, lessons, to_notebook
 
@@ -23,24 +24,27 @@ LONGEST = 150.0
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("number", [lesson.number for lesson in lessons()])
 def test_a_lesson_runs_from_top_to_bottom(number: int, tmp_path: Path) -> None:
+    lesson = find_lesson(number)
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "racecraft", "lessons", "run", str(number), "--json"]
+    command = [sys.executable, str(lesson.path)]  # as 'racecraft lessons run' does
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = subprocess.run(
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=380, check=False
     )
     assert done.returncode == 0, done.stderr[-3000:]
-    told = json.loads(done.stdout)
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < LONGEST
-    shown = re.findall(r"^\s*show\(", find_lesson(number).path.read_text(encoding="utf-8"), re.MULTILINE)
-    assert len(told["pictures"]) == len(shown) >= 2
-    for path in told["pictures"]:
-        with Image.open(tmp_path / path) as image:
+    shown = re.findall(r"^\s*show\(", lesson.path.read_text(encoding="utf-8"), re.MULTILINE)
+    pictures = list((tmp_path / "runs" / lesson.path.stem).iterdir())
+    assert len(pictures) == len(shown) >= 2
+    for path in pictures:
+        with Image.open(path) as image:
             assert image.width >= 600
             assert len(image.convert("RGB").resize((100, 100)).getcolors(10_000) or []) > 20, "an empty sheet"
-    refused = [line for line in told["output"].splitlines() if line.startswith("✗ Not yet.")]
+    refused = [line for line in done.stdout.splitlines() if line.startswith("✗ Not yet.")]
     assert len(refused) == len(checks_of(number)), "what a learner begins with is no answer"
     assert not (tmp_path / "data").exists(), "and nothing is solved"
+    for statement in (one for one in STATEMENTS if one.lesson == number):
+        assert statement.holds(done.stdout), f"the text says: {statement.text}"
 
 
 @pytest.mark.slow
