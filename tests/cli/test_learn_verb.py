@@ -107,10 +107,11 @@ def test_the_live_curve_rises_with_the_return() -> None:
     console = Console(file=StringIO(), force_terminal=True, width=80, color_system=None)
     with CurveReporter(title="T", console=console) as reporter:
         for turn in range(6):
-            reporter(Progress(turn * 10, 60, 1.0, float(turn), 10.0 * turn, is_best=True))
+            reporter(Progress(turn * 10, 60, 1.0, 60.0 * (100 - turn), float(turn), 10.0 * turn, is_best=True))
     shown = console.file.getvalue()  # type: ignore[attr-defined]
     assert "50.00" in shown
     assert "50 of 60 steps" in shown
+    assert "at most 1 h 35 min more" in " ".join(shown.replace("│", " ").split())
     rows = [line for line in shown.splitlines() if any("⠀" < mark <= "⣿" for mark in line)][-8:]
     filled = [sum("⠀" < mark <= "⣿" for mark in row) for row in rows]
     assert filled == sorted(filled)  # a rising curve is wider below

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -48,6 +49,8 @@ class Progress:
     """After which it ends."""
     seconds: float
     """Wall clock so far."""
+    seconds_left: float
+    """That the other steps will take, if they are as quick as those so far; NaN where nobody can say yet."""
     training_return: float
     """Mean of the last episodes that were played to learn; NaN before the first."""
     mean_return: float
@@ -71,17 +74,20 @@ class Learned:
     steps: int
     """Of all worlds, up to the end."""
     wall_seconds: float
-    """Of everything: learning, evaluating, judging."""
+    """Of learning, with the evaluations on the way."""
     learning_seconds: float
     """Of these, those of learning alone."""
-    mean_return: float
-    """Of 100 greedy episodes."""
     training_return: float
     """Mean of the last 100 episodes that were played to learn: with exploration."""
     returns: list[float] = field(repr=False)
     """Of every episode that was played to learn."""
     curve: list[tuple[int, float]] = field(repr=False)
     """Steps, and mean return of greedy episodes then."""
+
+    @cached_property
+    def mean_return(self) -> float:
+        """Of 100 greedy episodes in worlds of their own, played when somebody asks for it."""
+        return _judged(self.lesson, self.policy, JUDGE, number=self.steps, episodes=JUDGED)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
@@ -189,7 +195,7 @@ class _Classroom:
     """One lesson while it goes on: its worlds, its policy, and the best of it so far."""
 
     def __init__(self, lesson: Lesson, *, begun: int = 0) -> None:
-        self.lesson, self.algorithm = lesson, find_algorithm(lesson.algorithm)
+        self.lesson, self.algorithm, self.begun = lesson, find_algorithm(lesson.algorithm), begun
         self.started = time.perf_counter()
         self.rng = np.random.default_rng((lesson.seed, begun))
         self.worlds = worlds_of(lesson, num_envs=lesson.settings.num_envs, purpose=LEARN, number=begun)
@@ -257,7 +263,6 @@ class _Classroom:
             reason=reason,
             steps=steps,
             learning_seconds=learning,
-            mean_return=self._evaluate(JUDGE, episodes=JUDGED),
             wall_seconds=time.perf_counter() - self.started,
             training_return=self._recent(),
             returns=worlds.returns,
@@ -270,12 +275,9 @@ class _Classroom:
     def _evaluate(self, purpose: int, *, episodes: int) -> float:
         """Mean return of greedy episodes in fresh worlds."""
         before = time.perf_counter()
-        worlds = worlds_of(self.lesson, num_envs=episodes, purpose=purpose, number=self.worlds.steps)
-        try:
-            return float(play(worlds, self.policy).mean())
-        finally:
-            worlds.close()
-            self.judging += time.perf_counter() - before
+        mean = _judged(self.lesson, self.policy, purpose, number=self.worlds.steps, episodes=episodes)
+        self.judging += time.perf_counter() - before
+        return mean
 
     def _check_finite(self) -> None:
         if not all(np.isfinite(array).all() for array in self.policy.arrays.values()):
@@ -290,10 +292,13 @@ class _Classroom:
         return float(np.mean(returns)) if returns else math.nan
 
     def _progress(self, mean: float, *, is_best: bool) -> Progress:
+        steps, total = self.worlds.steps, self.lesson.settings.steps
+        seconds, taken = time.perf_counter() - self.started, steps - self.begun
         return Progress(
-            steps=self.worlds.steps,
-            total_steps=self.lesson.settings.steps,
-            seconds=time.perf_counter() - self.started,
+            steps=steps,
+            total_steps=total,
+            seconds=seconds,
+            seconds_left=seconds / taken * max(total - steps, 0) if taken > 0 else math.nan,
             training_return=self._recent(),
             mean_return=mean,
             is_best=is_best,
@@ -303,6 +308,15 @@ class _Classroom:
         plain = {name: value for name, value in result.items() if name not in ("run", "steps", "seed")}
         plain = {name: value for name, value in plain.items() if name not in ("environment", "algorithm")}
         save(folder, self.lesson, arrays, steps=steps, curve=self.curve, result=plain)
+
+
+def _judged(lesson: Lesson, policy: Policy, purpose: int, *, number: int, episodes: int) -> float:
+    """Mean return of greedy episodes, one in each of so many worlds."""
+    worlds = worlds_of(lesson, num_envs=episodes, purpose=purpose, number=number)
+    try:
+        return float(play(worlds, policy).mean())
+    finally:
+        worlds.close()
 
 
 def _copy(policy: Policy) -> dict[str, NDArray[Any]]:

@@ -66,7 +66,7 @@ class CurveReporter:
             best = "  (best so far)" if progress.is_best else ""
             line = (
                 f"{progress.seconds:7.1f} s {progress.steps:>11,} steps  return {progress.mean_return:10.2f}"
-                f"  while learning {_figure(progress.training_return):>10}{best}"
+                f"  while learning {_figure(progress.training_return):>10}{_left(progress)}{best}"
             )
             self._console.print(line, highlight=False, markup=False, soft_wrap=True)
 
@@ -86,9 +86,18 @@ class CurveReporter:
         last, best = self._seen[-1], max(returns)
         numbers = Text(
             f"{last.seconds:.1f} s   {last.steps:,} of {last.total_steps:,} steps   now {_figure(last.mean_return)}   "
-            f"best {_figure(best)}   while learning {_figure(last.training_return)}"
+            f"best {_figure(best)}   while learning {_figure(last.training_return)}{_left(last)}"
         )
         return Panel(Group(graph, numbers), title=self._title, border_style="cyan", width=width)
+
+
+def _left(progress: Progress) -> str:
+    """How long the other steps will take at most, where that is worth knowing."""
+    minutes = progress.seconds_left / 60.0
+    if not minutes >= 1.0:
+        return ""
+    hours, rest = divmod(round(minutes), 60)
+    return f"   at most {f'{hours} h {rest} min' if hours else f'{rest} min'} more"
 
 
 def say_learned(learned: Learned, film: Path | None) -> None:
