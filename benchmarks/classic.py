@@ -3,10 +3,12 @@
     python benchmarks/classic.py --seeds 3 --json
     python benchmarks/classic.py --only CartPole-v1 --no-rival
 
-Each run is a process of its own on one thread (A3C: as many as it starts). Wall clock counts from the first step to the
-end of learning, evaluations included, for both; imports do not count. The rival learns with its PPO, A2C, DQN or SAC
-and the settings that its zoo of tuned agents publishes, or its defaults, is evaluated as often on as many episodes, and
-stops at the same return.
+Each run is a process of its own on one thread (A3C: as many as it starts). Time counts from the first step to the end
+of learning, evaluations included, for both; imports do not count. `seconds` is wall clock, `cpu_seconds` processor time
+of the process and its children: on one thread the same thing on a machine with nothing else to do, and what can still
+be compared on a busy one. The rival learns with its PPO, A2C, DQN or SAC and the settings that its zoo of tuned agents
+publishes, or its defaults, is evaluated as often on as many episodes, and stops at the same return; `share` is our
+median processor time by its.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import argparse
 import json
 import os
 import platform
+import resource
 import statistics
 import subprocess
 import sys
@@ -58,12 +61,20 @@ RIVALS: dict[tuple[str, str], dict[str, Any]] = {
 RIVAL_STEPS = {"MountainCar-v0": 120_000, "Pendulum-v1": 20_000}
 
 
+def cpu() -> float:
+    """s that this process and the children that it has waited for have computed."""
+    mine, theirs = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+    return mine.ru_utime + mine.ru_stime + theirs.ru_utime + theirs.ru_stime
+
+
 def ours(environment: str, algorithm: str, seed: int) -> dict[str, Any]:
     """One run of the plain command."""
     from racecraft.classic import learn
 
+    begun = cpu()
     learned = learn(environment, algorithm, seed=seed)
     return {
+        "cpu_seconds": cpu() - begun,  # before the last evaluation, which nobody has asked for yet
         "seconds": learned.wall_seconds,
         "learning_seconds": learned.learning_seconds,
         "steps": learned.steps,
@@ -111,11 +122,12 @@ def rival(environment: str, algorithm: str, seed: int) -> dict[str, Any]:
 
     model, stop = kind("MlpPolicy", worlds, seed=seed, device="cpu", **settings), Stop()
     steps = RIVAL_STEPS.get(environment, recipe.settings.steps)
-    started = time.perf_counter()
+    started, begun = time.perf_counter(), cpu()
     model.learn(steps, callback=stop)
-    seconds = time.perf_counter() - started
+    seconds, cpu_seconds = time.perf_counter() - started, cpu() - begun
     assert gymnasium.spec(environment) is not None
     return {
+        "cpu_seconds": cpu_seconds,
         "seconds": seconds,
         "steps": model.num_timesteps,
         "mean_return": judge(model, 100, 9_000_000),
@@ -156,11 +168,14 @@ def main() -> None:
                 continue
             row[who] = [measure(who, environment, algorithm, seed) for seed in range(1, options.seeds + 1)]
             told = [run for run in row[who] if "error" not in run]
-            line = ", ".join(f"{run['mean_return']:.2f} in {run['seconds']:.1f} s" for run in told)
-            median = statistics.median(run["seconds"] for run in told) if told else float("nan")
-            print(
-                f"{environment:16} {algorithm:10} {who:6} median {median:6.1f} s   {line}", file=sys.stderr, flush=True
+            line = ", ".join(
+                f"{run['mean_return']:.2f} in {run['cpu_seconds']:.1f} ({run['seconds']:.1f}) s" for run in told
             )
+            row[f"{who}_cpu_seconds"] = statistics.median(run["cpu_seconds"] for run in told) if told else None
+            median = "failed" if not told else f"{row[f'{who}_cpu_seconds']:6.1f} s"
+            print(f"{environment:16} {algorithm:10} {who:6} median {median}   {line}", file=sys.stderr, flush=True)
+        if row.get("ours_cpu_seconds") and row.get("rival_cpu_seconds"):
+            row["share"] = row["ours_cpu_seconds"] / row["rival_cpu_seconds"]
         rows.append(row)
     if options.json:
         print(
