@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from racecraft.classic import ALGORITHMS, RECIPES, Progress, learn, resume
+from racecraft.classic import ALGORITHMS, RECIPES, Progress, job, learn, resume
 from racecraft.classic.saved import load
 from racecraft.classic.settings import Settings
 from racecraft.classic.until import Goal
@@ -92,6 +92,14 @@ def test_it_ends_when_it_should() -> None:
     assert (easy.reason, easy.steps) == ("return", 50_000) or easy.steps < 50_000
     assert short("q-table", until="0.2 s or 10000000 steps").reason == "seconds"
     assert short("q-table").reason == "steps"
+
+
+def test_the_last_episodes_are_played_when_somebody_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    learned, played = short("q-table"), list[int]()
+    monkeypatch.setattr(job, "play", lambda worlds, policy: played.append(worlds.num_envs) or np.full(3, 7.0))
+    assert not played
+    assert (learned.mean_return, learned.to_dict()["mean_return"]) == (7.0, 7.0)
+    assert played == [100]
 
 
 def test_an_interrupted_run_is_saved(tmp_path: Path) -> None:
