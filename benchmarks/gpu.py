@@ -52,9 +52,10 @@ CASES: dict[str, dict[str, Any]] = {
 
 def machine() -> dict[str, Any]:
     """What is measured on."""
+    device = open_device("cuda")  # where there is none, torch need not be loaded to say so
+
     import torch
 
-    device = open_device("cuda")
     return {
         "gpu": device.name,
         "architecture": device.architecture,

@@ -18,7 +18,6 @@ from typing import Any
 NUM_ENVS = 4
 ROLLOUT_STEPS = 64
 AWS_SETTINGS = {
-    "n_steps": ROLLOUT_STEPS,
     "batch_size": 64,
     "n_epochs": 10,
     "learning_rate": 3e-4,
@@ -29,11 +28,14 @@ AWS_SETTINGS = {
 }
 
 
-def measure(seconds: float = 30.0, *, num_threads: int | None = None) -> dict[str, Any]:
+def measure(
+    seconds: float = 30.0, *, rollout_steps: int = ROLLOUT_STEPS, num_threads: int | None = None
+) -> dict[str, Any]:
     """Training steps per second, rollout and updates included, over whole iterations of at least `seconds` in all.
 
     Args:
         seconds: When to stop; the iteration under way is finished.
+        rollout_steps: Steps of each car in an iteration.
         num_threads: Threads of torch, its own choice by default.
     """
     import stable_baselines3
@@ -68,7 +70,7 @@ def measure(seconds: float = 30.0, *, num_threads: int | None = None) -> dict[st
 
     env = DummyVecEnv([lambda: RacecraftEnv("reinvent_2018")] * NUM_ENVS)
     try:
-        learner = PPO("CnnPolicy", env, seed=0, device="cpu", **AWS_SETTINGS)
+        learner = PPO("CnnPolicy", env, seed=0, device="cpu", n_steps=rollout_steps, **AWS_SETTINGS)
         stopwatch = Stopwatch()
         learner.learn(10**9, callback=stopwatch)
     finally:
@@ -81,11 +83,13 @@ def measure(seconds: float = 30.0, *, num_threads: int | None = None) -> dict[st
         "observation": "160x120 grey",
         "num_envs": NUM_ENVS,
         "num_threads": torch.get_num_threads(),
-        "settings": AWS_SETTINGS,
+        "settings": {"n_steps": rollout_steps, **AWS_SETTINGS},
     }
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--seconds", type=float, default=30.0, help="how long to measure")
-    print(json.dumps(measure(parser.parse_args().seconds)))
+    parser.add_argument("--rollout-steps", type=int, default=ROLLOUT_STEPS, help="steps of each car in an iteration")
+    given = parser.parse_args()
+    print(json.dumps(measure(given.seconds, rollout_steps=given.rollout_steps)))

@@ -54,8 +54,8 @@ def test_a_policy_drives_tracks_it_never_saw(tmp_path: Path) -> None:
         "actions": "safe",
         "root": tmp_path,
     }
-    learned = train(TRACKS, **recipe, until="60000 steps", evaluate_every=20_000, seed=1)
-    ignorant = train(TRACKS, **recipe, until="2048 steps", ppo=replace(MANY_TRACKS.ppo, learning_rate=0.0))
+    learned = train(TRACKS, **recipe, until="24000 steps", evaluate_every=24_000, seed=3)
+    ignorant = train(TRACKS, **recipe, until="512 steps", ppo=replace(MANY_TRACKS.ppo, learning_rate=0.0))
     found = {
         (name, conditions): generalize(run, tracks=UNSEEN, randomize=conditions, checkpoint="last").generalization
         for name, run in (("learned", learned.run), ("ignorant", ignorant.run))
