@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,14 +14,21 @@ from racecraft import evaluate, load_track, train
 from racecraft.fidelity import replay
 from racecraft.run import read_metrics
 
-matplotlib = pytest.importorskip("matplotlib")
-matplotlib.use("Agg")
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # what its own imports deprecate is not ours
-    logs = pytest.importorskip("deepracer.logs")
-    tracks = pytest.importorskip("deepracer.tracks")
+logs: Any
+tracks: Any
 
 pytestmark = pytest.mark.filterwarnings("ignore::FutureWarning", "ignore::DeprecationWarning", "ignore::UserWarning")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _tools() -> None:
+    """They load pandas and matplotlib: here, and not in every process that collects tests."""
+    global logs, tracks
+    pytest.importorskip("matplotlib").use("Agg")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what its own imports deprecate is not ours
+        logs = pytest.importorskip("deepracer.logs")
+        tracks = pytest.importorskip("deepracer.tracks")
 
 
 @pytest.fixture(scope="module")
