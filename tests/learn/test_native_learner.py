@@ -17,6 +17,10 @@ from racecraft.learn import NetworkSpec, make_learner, networks
 from racecraft.learn.native_learner import NativeLearner
 
 NAMES = networks.network_names()
+# Of one network, the largest, every test takes seconds.
+MARKED = [
+    pytest.param(name, marks=pytest.mark.slow) if name == "DEEP_CONVOLUTIONAL_NETWORK" else name for name in NAMES
+]
 SMALL = NetworkSpec(num_actions=5, state_size=21)
 HEADS = [(True, 0), (False, 21)]  # is_discrete, state_size
 
@@ -79,7 +83,7 @@ def test_frames_are_encoded_as_in_numpy(name):
     )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", MARKED)
 def test_forward_agrees_with_numpy(name):
     spec = NetworkSpec(name=name, num_actions=6)
     learner = NativeLearner(spec, seed=None)
@@ -136,7 +140,7 @@ def test_a_policy_looks_at_both_lenses_and_at_the_lidar():
         assert abs(learner.policy(learner.encode(changed)) - seen).max() > 1e-3
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", MARKED)
 @pytest.mark.parametrize(("is_discrete", "state_size"), HEADS)
 def test_outputs_agree_with_torch(name, is_discrete, state_size):
     spec = NetworkSpec(name=name, num_actions=3, is_discrete=is_discrete, state_size=state_size)
@@ -158,7 +162,7 @@ def test_gradient_of_the_small_network_is_exact(is_discrete, state_size, value_l
     assert_exact_gradient(spec, size=size, value_loss=value_loss)
 
 
-@pytest.mark.parametrize("name", NAMES[1:])
+@pytest.mark.parametrize("name", MARKED[1:])
 @pytest.mark.parametrize(("is_discrete", "state_size"), HEADS)
 def test_gradient_of_aws_networks_is_exact(name, is_discrete, state_size):
     spec = NetworkSpec(name=name, num_actions=4, is_discrete=is_discrete, state_size=state_size)
@@ -220,6 +224,7 @@ def test_eps_hat_is_added_before_the_correction_as_in_tensorflow():
 
 
 # the last one's dense layer fits no cache, so it takes portions of a minibatch, which depend on the threads
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "spec",
     [
@@ -242,7 +247,7 @@ def test_same_bits_for_any_number_of_threads(spec):
         assert_same_bits(state, results[0][2])
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", MARKED)
 def test_same_bits_on_every_instruction_set(name, restored_isa):
     isas = _native.available_isas()
     if name != NAMES[0]:

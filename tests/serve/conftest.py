@@ -29,7 +29,11 @@ def postgres() -> Iterator[PostgresServer]:
         yield server
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
+ON_POSTGRESQL = pytest.param("postgresql", marks=pytest.mark.slow)
+"""The second time that the same tests run."""
+
+
+@pytest.fixture(params=["sqlite", ON_POSTGRESQL])
 def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """The URL of an empty database."""
     if request.param == "sqlite":
@@ -51,7 +55,7 @@ def runs(tmp_path: Path) -> Iterator[Path]:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run what depends on the database on both, and pages, drives and the like on SQLite alone."""
     if "console" in metafunc.fixturenames:
-        databases = ["sqlite", "postgresql"] if metafunc.module.__name__ in ON_BOTH else ["sqlite"]
+        databases = ["sqlite", ON_POSTGRESQL] if metafunc.module.__name__ in ON_BOTH else ["sqlite"]
         metafunc.parametrize("console", databases, indirect=True, scope="module")
 
 

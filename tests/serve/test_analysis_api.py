@@ -13,6 +13,8 @@ import pytest
 from leagues import untrained_run
 from running_consoles import RunningConsole
 
+pytestmark = pytest.mark.slow
+
 GATE = "def reward_function(params):\n    return params['speed']\n"
 
 

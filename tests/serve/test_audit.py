@@ -20,6 +20,8 @@ from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Reset, now
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def league(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningLeague]:

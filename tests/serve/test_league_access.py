@@ -11,6 +11,8 @@ from leagues import RunningLeague, ok, running_league, untrained_run
 
 from racecraft.race.entry_file import pack_entry
 
+pytestmark = pytest.mark.slow
+
 MODEL: dict[str, Any] = {"name": "adas-model"}
 RACE: dict[str, Any] = {"title": "adas-race", "track": "oval", "laps": 1, "trials": 1}
 SKETCH = [[0, 0], [8, 0], [8, 6], [0, 6]]
