@@ -11,6 +11,7 @@ from gymnasium import spaces
 
 from racecraft.classic.evaluation import play
 from racecraft.classic.policy import Table
+from racecraft.classic.recipes import find_recipe
 from racecraft.classic.views import CellView, Cut, VectorView
 from racecraft.classic.worlds import Worlds, to_bounds
 from racecraft.errors import ConfigError
@@ -169,3 +170,9 @@ def test_atari_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ConfigError, match="ALE/Pong-v5 is a game of Atari and needs ale_py") as refused:
         worlds("ALE/Pong-v5")
     assert "racecraft[atari]" in refused.value.hint
+
+
+def test_atari_is_learned_from_memory_and_judged_seldom() -> None:
+    pong, other = find_recipe("ALE/Pong-v5", "dqn"), find_recipe("Taxi-v4", "dqn")
+    assert pong.make == {"obs_type": "ram"}
+    assert pong.evaluate_every == 10 * other.evaluate_every

@@ -64,6 +64,9 @@ MAKE: Final[Mapping[str, Mapping[str, Any]]] = {
 }
 """Arguments for an environment, whatever the algorithm."""
 
+ATARI_EVERY: Final = 50_000
+"""Steps between two evaluations in a game of Atari: twenty games take as long as ten thousand steps of learning."""
+
 RECIPES: Final[Mapping[tuple[str, str], Recipe]] = {
     ("FrozenLake-v1", "q-table"): Recipe(
         settings=TableSettings(
@@ -150,7 +153,8 @@ def find_recipe(environment: str, algorithm: str) -> Recipe:
     """
     made = find_algorithm(algorithm)
     name = environment.rpartition(":")[2]
-    make = {"obs_type": "ram"} if name.startswith("ALE/") else MAKE.get(name, {})
+    is_atari = name.startswith("ALE/")
+    make = {"obs_type": "ram"} if is_atari else MAKE.get(name, {})
     recipe = RECIPES.get((name, algorithm))
     if recipe is not None:
         return Recipe(
@@ -161,7 +165,12 @@ def find_recipe(environment: str, algorithm: str) -> Recipe:
         )
     spec = gymnasium.registry.get(name)
     threshold = spec.reward_threshold if spec is not None else None
-    return Recipe(settings=made.settings(), goal=math.inf if threshold is None else float(threshold), make=make)
+    return Recipe(
+        settings=made.settings(),
+        goal=math.inf if threshold is None else float(threshold),
+        make=make,
+        evaluate_every=ATARI_EVERY if is_atari else Recipe.evaluate_every,
+    )
 
 
 def default_algorithm(environment: str) -> str:
