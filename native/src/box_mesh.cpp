@@ -23,7 +23,7 @@ void add_arrow(std::vector<Triangle>& mesh, float x, float side) {
              {x - 0.024f, y, 0.050f}, Paint::ink);
 }
 
-std::vector<Triangle> build_mesh() {
+std::vector<Triangle> build_box() {
     std::vector<Triangle> mesh;
     for (const float side : {-1.0f, 1.0f}) {
         const float x = side * kX;
@@ -52,7 +52,7 @@ std::vector<Triangle> build_mesh() {
 }  // namespace
 
 const std::vector<Triangle>& box_mesh() {
-    static const std::vector<Triangle> mesh = build_mesh();
+    static const std::vector<Triangle> mesh = build_box();
     return mesh;
 }
 

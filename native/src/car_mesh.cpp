@@ -76,7 +76,7 @@ class MeshBuilder {
     }
 };
 
-std::vector<Triangle> build_mesh() {
+std::vector<Triangle> build_car() {
     MeshBuilder mesh;
     // Hull from tail to nose, the cabin on it, side pods, wings.
     mesh.add_loft({{-0.146f, 0.044f, 0.036f, 0.036f, 0.072f},
@@ -123,7 +123,7 @@ std::vector<Triangle> build_mesh() {
 }  // namespace
 
 const std::vector<Triangle>& car_mesh() {
-    static const std::vector<Triangle> mesh = build_mesh();
+    static const std::vector<Triangle> mesh = build_car();
     return mesh;
 }
 

@@ -7,14 +7,14 @@
 namespace racecraft {
 namespace {
 
-constexpr size_t kMaxGroups = 16;    // of samples, each with a gradient of its own; decides the bits
-constexpr size_t kMinGroupSize = 8;  // likewise
-constexpr size_t kBlock = 4096;      // parameters of a task that works on them one by one
-constexpr size_t kDenseRows = 128;   // inputs of a task that sums up a dense layer's gradient
+constexpr size_t kMaxGroups = 16;         // of samples, each with a gradient of its own; decides the bits
+constexpr size_t kMinGroupSize = 8;       // likewise
+constexpr size_t kTaskParameters = 4096;  // parameters of a task that works on them one by one
+constexpr size_t kDenseRows = 128;        // inputs of a task that sums up a dense layer's gradient
 constexpr double kBeta1 = 0.9, kBeta2 = 0.999;
 
 size_t num_blocks(size_t count) {
-    return (count + kBlock - 1) / kBlock;
+    return (count + kTaskParameters - 1) / kTaskParameters;
 }
 
 // What a layer reads; `before` is the output of the layer before it.
@@ -443,7 +443,8 @@ double Learner::sum_over_tasks(size_t num_groups, size_t size) {
     for_each_task(dense_tasks_.size() + blocks, [&](Worker&, size_t task) {
         if (task < dense_tasks_.size()) return sum_dense(dense_tasks_[task], size);
         const size_t block = task - dense_tasks_.size();
-        const size_t first = block * kBlock, count = std::min(kBlock, network_.num_grouped - first);
+        const size_t first = block * kTaskParameters,
+                     count = std::min(kTaskParameters, network_.num_grouped - first);
         RC_DISPATCH(sum_gradients, group_gradients_.data() + first, num_groups, network_.num_grouped, count,
                     gradient_.data() + first);
         squares_[block] = RC_DISPATCH(sum_of_squares, gradient_.data() + first, count);
@@ -468,7 +469,8 @@ void Learner::step(const Objective& objective, double norm) {
                                                            : objective.adam_eps),
     };
     pool_.for_each(num_blocks(network_.num_packed), [&](size_t block) {
-        const size_t first = block * kBlock, count = std::min(kBlock, network_.num_packed - first);
+        const size_t first = block * kTaskParameters,
+                     count = std::min(kTaskParameters, network_.num_packed - first);
         RC_DISPATCH(adam, adam_step, gradient_.data() + first, count, moment1_.data() + first,
                     moment2_.data() + first, weights_.data() + first);
     });

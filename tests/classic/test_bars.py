@@ -58,7 +58,7 @@ def test_asynchronous_processes_learn_as_well() -> None:
     alone = [learned_by("Acrobot-v1", "a2c", seed).mean_return for seed in SEEDS]
     together = [learn("Acrobot-v1", "a3c", seed=seed, until="-87 return") for seed in SEEDS]
     assert all(one.returns and one.mean_return >= -100.0 for one in together)
-    assert np.median([one.mean_return for one in together]) == pytest.approx(np.median(alone), abs=10.0)
+    assert np.median([one.mean_return for one in together]) >= np.median(alone) - 10.0
 
 
 @pytest.mark.slow
