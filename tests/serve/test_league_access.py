@@ -54,6 +54,8 @@ ROWS: dict[str, tuple[str, Any]] = {
     "GET /api/models": ("each", None),
     "POST /api/models": ("each", None),
     "POST /api/models/starters/{starter}": ("each", None),
+    "GET /api/sweeps": ("each", None),
+    "POST /api/sweeps": ("each", None),
     **{
         label: ("own", body)
         for label, body in {
@@ -75,6 +77,10 @@ ROWS: dict[str, tuple[str, Any]] = {
             "GET /api/models/{name}/evaluations/{stamp}/saliency": "?lap=1&row=1",
             "GET /api/models/{name}/maps": "?first=0&last=1",
             "GET /api/models/{name}/report": None,
+            "GET /api/sweeps/{name}": None,
+            "POST /api/sweeps/{name}/stop": None,
+            "POST /api/sweeps/{name}/go-on": None,
+            "DELETE /api/sweeps/{name}": None,
             "GET /api/models/{name}/tunings": None,
             "POST /api/models/{name}/tunings": {"minutes": 1},
             "GET /api/models/{name}/tunings/space": None,

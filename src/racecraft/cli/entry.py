@@ -30,6 +30,7 @@ VERBS = (
     "tracks",
     "reward",
     "tune",
+    "sweep",
     "learn",
     "lessons",
     "logs",
@@ -38,7 +39,7 @@ VERBS = (
     "machine",
 )
 """Files of verbs in the order of ``--help``; to import one is to register its verbs."""
-ALONE = frozenset({"train", "evaluate", "report", "export", "learn", "perceive", "tune"})
+ALONE = frozenset({"train", "evaluate", "report", "export", "learn", "perceive", "sweep", "tune"})
 """Verbs that are all that the file of their name holds: who types one waits for no other."""
 
 

@@ -50,6 +50,8 @@ from racecraft.serve.store.database import Database
 from racecraft.serve.streams import routes as events
 from racecraft.serve.streams.hub import Hub
 from racecraft.serve.submissions import routes as league
+from racecraft.serve.sweeps import routes as sweeps
+from racecraft.serve.sweeps.sweeps import Sweeps
 from racecraft.serve.tracks import routes as tracks
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning import routes as tunings
@@ -94,6 +96,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         races=Races(database, queue, garage, courses, share=mirror.share, see=follower.see),
         contests=Contests(settings.state, database, queue, garage, courses, mirror=mirror),
         tunings=Tunings(settings.state, queue, garage, mirror=mirror, see=follower.see),
+        sweeps=Sweeps(queue, garage, courses, mirror=mirror, see=follower.see),
         mirror=mirror,
         hub=Hub(settings.runs, queue, see=follower.see),
     )
@@ -129,7 +132,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.add_middleware(Compressed)  # behind the guard, which stands before everything
     app.add_middleware(guard.middleware)
     replies.install(app)
-    parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, races]
+    parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, sweeps, races]
     parts += [contests, jobs, events, door, audit, lessons]
     for part in parts:
         app.include_router(part.router)

@@ -29,6 +29,7 @@ from racecraft.serve.settings import OWNER, ServeSettings
 from racecraft.serve.store.database import Database
 from racecraft.serve.streams.hub import Hub
 from racecraft.serve.submissions.league import League
+from racecraft.serve.sweeps.sweeps import Sweeps
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning.tunings import Tunings
 
@@ -51,6 +52,7 @@ class Context:
     races: Races
     contests: Contests
     tunings: Tunings
+    sweeps: Sweeps
     mirror: Mirror
     hub: Hub
 
@@ -109,6 +111,7 @@ def _console(owner: Context, user_id: int) -> Context:
         races=Races(database, queue, garage, courses, share=mirror.share, see=owner.follower.see, user_id=user_id),
         contests=Contests(settings.state, database, queue, garage, courses, mirror=mirror),
         tunings=Tunings(settings.state, queue, garage, mirror=mirror, see=owner.follower.see),
+        sweeps=Sweeps(queue, garage, courses, mirror=mirror, see=owner.follower.see),
         mirror=mirror,
         hub=Hub(settings.runs, queue, see=owner.follower.see),
     )

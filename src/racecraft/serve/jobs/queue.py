@@ -166,6 +166,12 @@ class JobQueue:
         with self._database.transaction() as session:
             return list(session.scalars(query))
 
+    def newest(self, kind: str, runs: Sequence[str]) -> dict[str, Job]:
+        """The newest job of a kind about each of some runs that has one."""
+        query = sa.select(Job).where(Job.user_id == self._user_id, Job.kind == kind, Job.run.in_(runs))
+        with self._database.transaction() as session:
+            return {job.run: job for job in session.scalars(query.order_by(Job.created))}
+
     def active(self, run: str) -> Job | None:
         """The training of a run that is queued or running."""
         query = sa.select(Job).where(self._about(run), Job.kind == "train", Job.state.in_(("queued", "running")))

@@ -13,6 +13,7 @@ import { races } from "./races";
 import { replay } from "./replay";
 import { settings } from "./settings";
 import { shell } from "./shell";
+import { sweeps } from "./sweeps";
 import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
@@ -29,6 +30,7 @@ export const de: Record<Key, string> = {
   ...presets,
   ...watch,
   ...tune,
+  ...sweeps,
   ...garage,
   ...evaluation,
   ...tracks,

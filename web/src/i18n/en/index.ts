@@ -12,6 +12,7 @@ import { races } from "./races";
 import { replay } from "./replay";
 import { settings } from "./settings";
 import { shell } from "./shell";
+import { sweeps } from "./sweeps";
 import { tracks } from "./tracks";
 import { tune } from "./tune";
 import { watch } from "./watch";
@@ -28,6 +29,7 @@ export const en = {
   ...presets,
   ...watch,
   ...tune,
+  ...sweeps,
   ...garage,
   ...evaluation,
   ...tracks,

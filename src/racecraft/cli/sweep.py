@@ -1,0 +1,54 @@
+"""`racecraft sweep`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from racecraft.cli.app import INTERRUPTED, Json, app, print_json
+
+if TYPE_CHECKING:
+    from racecraft.tuning.trial import Report
+
+
+@app.command()
+def sweep(
+    context: typer.Context,
+    file: Annotated[
+        Path | None, typer.Argument(help="TOML with seeds, what all trainings have, and the settings.")
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option("--name", "-n", help="Of the sweep; its runs are NAME-SETTING-SEED.")
+    ] = None,
+    runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
+    processes: Annotated[
+        int, typer.Option("--processes", help="Trainings at once; 0 for one per core. Same results.")
+    ] = 0,
+    resume: Annotated[str, typer.Option("--resume", help="Go on with the sweep of this name.")] = "",
+    board: Annotated[bool, typer.Option("--board", help="Only show how it stands; with --resume NAME.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Train a table of settings with several seeds each, and say which can be told apart."""
+    if (file is None) == (not resume):
+        context.fail("Give the file of a new sweep, or --resume NAME.")
+    if resume and name is not None:
+        context.fail("--name does not go with --resume: a sweep keeps the name that it was made with.")
+    from racecraft.cli import sweep_text
+    from racecraft.json_file import read_text
+    from racecraft.sweeping import Sweep, make_sweep, read_sweep
+
+    def tell(run: str, how: Report | Exception) -> None:
+        if not as_json:
+            sweep_text.say_run(run, how)
+
+    swept = Sweep(runs, resume) if file is None else make_sweep(read_sweep(read_text(file)), runs=runs, name=name)
+    is_interrupted = False if board else swept.train(processes=processes, on_end=tell)
+    found = swept.board()
+    if as_json:
+        print_json({"sweep": swept.name, **found.to_dict(), "is_interrupted": is_interrupted})
+    else:
+        sweep_text.say_board(swept.name, found, runs=runs)
+    if is_interrupted:
+        raise typer.Exit(INTERRUPTED)

@@ -1,0 +1,1 @@
+"""Sweeps: settings by seeds, trained on whichever machines there are."""

@@ -1,0 +1,209 @@
+"""A sweep: runs like all others, and a file that says which belong together.
+
+runs/.sweeps/NAME.json          settings, seeds, goal
+runs/NAME-SETTING-SEED/         a run for each setting and seed
+
+`racecraft sweep` trains the runs here, several at once; the console puts
+them into its queue. Killed at any moment it goes on, and every run ends in the bits that it would have alone.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from racecraft.checks import check_whole
+from racecraft.errors import ConfigError, RacecraftError, RunError
+from racecraft.json_file import read_json_object
+from racecraft.run import RunFolder
+from racecraft.run.atomic import write_json
+from racecraft.run.folder import MAX_NAME, checked_name
+from racecraft.run.lock import exclusive_lock
+from racecraft.sweeping.board import Board, Outcome, board_of, outcome_of
+from racecraft.sweeping.plan import SweepPlan
+from racecraft.training.interruption import interruptible
+from racecraft.tuning.seats import HereSeat, ProcessSeat, Seat, SeatLost
+from racecraft.tuning.trial import Order, Report
+
+FOLDER: Final = ".sweeps"
+FORMAT: Final = 1
+MAX_LOSSES: Final = 3
+"""How often what makes a training may die before it is given up."""
+MAX_BYTES: Final = 1 << 22
+
+
+def sweep_names(runs: Path) -> list[str]:
+    """The sweeps of a folder of runs, newest first."""
+    files = sorted((runs / FOLDER).glob("*.json"), key=lambda path: path.stat().st_mtime_ns, reverse=True)
+    return [path.stem for path in files]
+
+
+def make_sweep(plan: SweepPlan, *, runs: str | Path = "runs", name: str | None = None) -> Sweep:
+    """Make the runs of a sweep, untrained.
+
+    Args:
+        plan: What is to be trained.
+        runs: Folder of the runs.
+        name: Of the sweep; by default a new one.
+
+    Raises:
+        RacecraftError: The name is taken or too long, or a run cannot be made.
+    """
+    runs = Path(runs)
+    name = checked_name(name) if name is not None else f"sweep-{time.strftime('%Y%m%d-%H%M%S')}"
+    file = runs / FOLDER / f"{name}.json"
+    longest = max(len(_run(name, setting.name, seed)) for setting in plan.settings for seed in plan.seeds)
+    if longest > MAX_NAME:
+        raise RunError(f"Runs of the sweep {name!r} would have names of {longest} characters; {MAX_NAME} are allowed.")
+    if file.exists():
+        raise RunError(f"There is a sweep {name!r} already.", hint="Choose another --name, or go on with --resume.")
+    document = {
+        "format": FORMAT,
+        "goal": plan.goal,
+        "seeds": list(plan.seeds),
+        "settings": {setting.name: setting.words for setting in plan.settings},
+    }
+    for setting in plan.settings:
+        for seed in plan.seeds:
+            seeded = replace(setting.plan, settings=replace(setting.plan.settings, seed=seed))
+            seeded.start(root=runs, name=_run(name, setting.name, seed))
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_json(file, document)
+    except OSError as error:
+        raise RunError(f"{file} cannot be written: {error.strerror or error}.") from error
+    return Sweep(runs, name)
+
+
+class Sweep:
+    """A sweep that was made.
+
+    Args:
+        runs: Folder of the runs.
+        name: Of the sweep.
+
+    Raises:
+        RunError: There is none of this name, or its file is not what it was.
+    """
+
+    def __init__(self, runs: str | Path, name: str) -> None:
+        self.runs, self.name = Path(runs), name
+        self.file = self.runs / FOLDER / f"{name}.json"
+        if not self.file.is_file():
+            raise RunError(f"There is no sweep {name[:80]!r} in {self.runs}.")
+        try:
+            document = read_json_object(self.file, max_bytes=MAX_BYTES)
+            if document["format"] != FORMAT:
+                raise RunError(f"{self.file} was written by another version of Racecraft.", hint="Update Racecraft.")
+            self.goal, self.seeds = str(document["goal"]), tuple(int(seed) for seed in document["seeds"])
+            self.settings: dict[str, dict[str, Any]] = {
+                str(setting): dict(words) for setting, words in document["settings"].items()
+            }
+        except (ConfigError, KeyError, TypeError, ValueError, AttributeError) as error:
+            raise RunError(f"{self.file} cannot be read: {error}") from error
+        self._stop = threading.Event()
+        self._seats: list[Seat] = []
+
+    def run_of(self, setting: str, seed: int) -> RunFolder:
+        """The run of a setting with a seed, which may have been removed."""
+        return RunFolder(self.runs / _run(self.name, setting, seed))
+
+    def names(self) -> Iterator[str]:
+        """Its runs, one seed of all settings after the other."""
+        for seed in self.seeds:
+            for setting in self.settings:
+                yield _run(self.name, setting, seed)
+
+    def board(self) -> Board:
+        """The leaderboard so far; runs that are gone or have not begun are left out."""
+        outcomes: dict[str, dict[int, Outcome]] = {}
+        for setting in self.settings:
+            for seed in self.seeds:
+                folder = self.run_of(setting, seed)
+                if (folder.path / "run.json").is_file():
+                    outcome = outcome_of(folder)
+                    if outcome.steps:
+                        outcomes.setdefault(setting, {})[seed] = outcome
+        return board_of(self.goal, self.settings, outcomes)
+
+    def train(self, *, processes: int = 0, on_end: Callable[[str, Report | Exception], None] = lambda *_: None) -> bool:
+        """Train all of its runs here, one seed of all settings after the other; whether that was interrupted.
+
+        A run that cannot be trained is told, and the others go on. What was trained before is not trained again.
+
+        Args:
+            processes: Trainings at once; 0 takes one per core. The runs are the same for any number.
+            on_end: Is told each run that ended, and how.
+
+        Raises:
+            ConfigError: The number of processes is not allowed.
+            RunError: It is being trained already.
+        """
+        check_whole("processes", processes, 0, 256)
+        waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
+        names = [name for name in self.names() if (self.runs / name / "run.json").is_file()]
+        for name in names:
+            waiting.put(name)
+        count = max(1, min(processes or _num_cores(), len(names)))
+        self._seats = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
+        threads = max(1, _num_cores() // count)
+        with exclusive_lock(self.file.with_suffix(".lock")), interruptible(self._stop, self.stop):
+            workers = [
+                threading.Thread(target=self._work, args=(seat, waiting, threads, on_end), daemon=True)
+                for seat in self._seats
+            ]
+            for worker in workers:
+                worker.start()
+            try:
+                for worker in workers:
+                    while worker.is_alive():  # a wait without end would let no signal in on some systems
+                        worker.join(0.5)
+            finally:
+                for seat in self._seats:
+                    seat.close()
+        return self._stop.is_set()
+
+    def stop(self) -> None:
+        """Ask `train` to end; what is under way is saved. Safe from any thread."""
+        self._stop.set()
+        for seat in self._seats:
+            seat.stop()
+
+    def _work(
+        self,
+        seat: Seat,
+        waiting: queue.SimpleQueue[str],
+        num_threads: int,
+        on_end: Callable[[str, Report | Exception], None],
+    ) -> None:
+        losses: dict[str, int] = {}
+        while not self._stop.is_set():
+            try:
+                name = waiting.get_nowait()
+            except queue.Empty:
+                return
+            order = Order(run=str((self.runs / name).resolve()), goal="laps", trial_steps=1, num_threads=num_threads)
+            try:
+                on_end(name, seat.run(order))
+            except SeatLost as error:
+                losses[name] = losses.get(name, 0) + 1
+                if not self._stop.is_set() and losses[name] < MAX_LOSSES:
+                    waiting.put(name)
+                elif not self._stop.is_set():
+                    on_end(name, error)
+            except RacecraftError as error:
+                on_end(name, error)
+
+
+def _run(sweep: str, setting: str, seed: int) -> str:
+    return f"{sweep}-{setting}-{seed}"
+
+
+def _num_cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

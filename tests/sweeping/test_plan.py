@@ -1,0 +1,95 @@
+"""The file of a sweep: what it says, and what it must not."""
+
+from __future__ import annotations
+
+import pytest
+
+from racecraft.errors import ConfigError, RacecraftError
+from racecraft.sweeping import read_sweep
+from racecraft.tuning import find_constants
+
+FILE = """
+seeds = "3..4"
+goal = "lap_time"
+
+[all]
+track = "oval"
+until = "512 steps"
+numbers = { gamma = 0.95 }
+
+[settings.plain]
+
+[settings.bold]
+reward = "racing"
+numbers = { learning_rate = 0.002, BORDER_LOSS = 0.25 }
+"""
+
+
+def test_settings_have_what_all_have_and_what_they_say_themselves() -> None:
+    plan = read_sweep(FILE)
+    assert (plan.seeds, plan.goal) == ((3, 4), "lap_time")
+    plain, bold = plan.settings
+    assert (plain.name, bold.name) == ("plain", "bold")
+    for setting in plan.settings:
+        assert setting.plan.settings.track == "oval"
+        assert setting.plan.settings.until.steps == 512
+        assert setting.plan.settings.ppo.gamma == 0.95
+    assert bold.plan.settings.ppo.learning_rate == 0.002 != plain.plan.settings.ppo.learning_rate
+    assert find_constants(bold.plan.reward)["BORDER_LOSS"] == 0.25
+    assert bold.words == {
+        "track": "oval",
+        "until": "512 steps",
+        "reward": "racing",
+        "numbers": {"gamma": 0.95, "learning_rate": 0.002, "BORDER_LOSS": 0.25},
+    }
+
+
+def test_what_varies_makes_every_combination() -> None:
+    plan = read_sweep('[settings.a]\n[settings.b]\n[vary]\ncritic = ["camera", "lap"]\ngamma = [0.9, 0.95]')
+    assert [setting.name for setting in plan.settings][:4] == [
+        "a-camera-0.9",
+        "a-camera-0.95",
+        "a-lap-0.9",
+        "a-lap-0.95",
+    ]
+    assert len(plan.settings) == 8
+    assert plan.settings[-1].plan.settings.critic == "lap"
+    assert plan.settings[-1].plan.settings.ppo.gamma == 0.95
+    assert [setting.name for setting in read_sweep("").settings] == ["plain"]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("seeds = ", "not TOML"),
+        ('seeds = "5..1"', "seeds is '5..1'"),
+        ("seeds = [1, 1]", "seeds is"),
+        ("seeds = [1.5]", "seeds"),
+        ("speed = 3", "has no 'speed'"),
+        ("[all]\nnumbers = 3", "numbers"),
+        ("[settings.a]\ntrak = 'oval'", "has no 'trak'"),
+        ("[settings.a]\ntrack = 'nowhere'", "nowhere"),
+        ("[settings.a]\nnumbers = { speling = 1 }", "speling"),
+        ("[settings.a]\nalgorithm = 'sac'\nactions = 'continuous'\nnumbers = { gamma = 0.9 }", "number of ppo"),
+        ("settings = 3", "settings is 3"),
+        ("[vary]\ncritic = 'lap'", "vary.critic"),
+        ("[vary]\ncritic = ['lap', 'lap']", "Two settings"),
+        ("goal = 'points'", "goal"),
+        (
+            "seeds = '1..100'\n[vary]\ngamma = [0.9, 0.91, 0.92, 0.93, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 0.995]",
+            "1000",
+        ),
+    ],
+)
+def test_what_is_no_sweep_is_refused_in_a_sentence(text: str, says: str) -> None:
+    with pytest.raises(RacecraftError) as told:
+        read_sweep(text)
+    assert says in str(told.value) + told.value.hint
+
+
+def test_who_reads_it_may_refuse_a_word() -> None:
+    def refuse(word: str, value: object) -> object:
+        raise ConfigError(f"{word} is nobody's business.")
+
+    with pytest.raises(ConfigError, match="Setting 'a': track is nobody's"):
+        read_sweep("[settings.a]\ntrack = 'oval'", resolve=refuse)

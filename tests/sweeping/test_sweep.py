@@ -1,0 +1,107 @@
+"""Sweeps of tiny trainings: their runs, that they go on, and what the leaderboard makes of chance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from racecraft.errors import RunError
+from racecraft.run import RunFolder
+from racecraft.sweeping import Sweep, board_of, make_sweep, read_sweep, sweep_names
+from racecraft.sweeping.board import Outcome, outcome_of
+from racecraft.training.job import Training
+from racecraft.tuning.trial import Report
+
+FILE = """
+seeds = [1, 2]
+[all]
+track = "oval"
+until = "256 steps"
+evaluate_every = 256
+num_envs = 8
+[settings.plain]
+[settings.bold]
+numbers = { learning_rate = 0.002 }
+"""
+
+
+def test_its_runs_are_those_that_each_would_be_alone(tmp_path: Path) -> None:
+    sweep = make_sweep(read_sweep(FILE), runs=tmp_path, name="s")
+    assert sweep_names(tmp_path) == ["s"]
+    assert list(sweep.names()) == ["s-plain-1", "s-bold-1", "s-plain-2", "s-bold-2"]
+    assert [place.seeds for place in sweep.board().places] == [0, 0]
+    told: dict[str, Report | Exception] = {}
+    assert not Sweep(tmp_path, "s").train(processes=1, on_end=told.__setitem__)
+    assert set(told) == set(sweep.names())
+    assert {how.reason for how in told.values() if isinstance(how, Report)} == {"steps"}
+    assert [place.seeds for place in sweep.board().places] == [2, 2]
+
+    (plan,) = (one.plan for one in read_sweep(FILE).settings if one.name == "bold")
+    alone = plan.start(root=tmp_path / "alone", name="bold")  # with seed 0, so it is another
+    Training(alone).run()
+    apart = make_sweep(read_sweep(FILE.replace("[1, 2]", "[0]")), runs=tmp_path, name="again")
+    apart.train(processes=1)
+    for name, value in alone.checkpoints.load("last").arrays.items():
+        if name != "recent_episodes":  # holds wall-clock times
+            again = apart.run_of("bold", 0).checkpoints.load("last").arrays[name]
+            np.testing.assert_array_equal(value, again, err_msg=name)
+
+
+def test_it_goes_on_where_it_was_and_says_what_cannot_be_trained(tmp_path: Path) -> None:
+    sweep = make_sweep(read_sweep(FILE), runs=tmp_path, name="s")
+
+    def stop_after_one(_: str, __: Report | Exception) -> None:
+        sweep.stop()
+
+    assert sweep.train(processes=1, on_end=stop_after_one)
+    done = [name for name in sweep.names() if outcome_of(RunFolder(tmp_path / name)).steps]
+    assert done == ["s-plain-1"]
+    kept = (tmp_path / "s-plain-1" / "checkpoints" / "manifest.json").read_bytes()
+    (tmp_path / "s-bold-1" / "reward_function.py").write_text("def reward_function(params):\n    return 'x'\n")
+    told: dict[str, Report | Exception] = {}
+    assert not Sweep(tmp_path, "s").train(processes=1, on_end=told.__setitem__)
+    assert "x" in str(told["s-bold-1"])
+    assert isinstance(told["s-bold-1"], Exception)
+    assert (tmp_path / "s-plain-1" / "checkpoints" / "manifest.json").read_bytes() == kept
+    assert [place.seeds for place in sweep.board().places] == [2, 1]
+
+
+def test_names_that_are_taken_or_gone_are_refused(tmp_path: Path) -> None:
+    make_sweep(read_sweep("seeds = [1]\n[all]\ntrack = 'oval'"), runs=tmp_path, name="s")
+    with pytest.raises(RunError, match="a sweep 's' already"):
+        make_sweep(read_sweep("seeds = [1]"), runs=tmp_path, name="s")
+    with pytest.raises(RunError, match="no sweep 't'"):
+        Sweep(tmp_path, "t")
+    (tmp_path / ".sweeps" / "s.json").write_text("{}")
+    with pytest.raises(RunError, match="cannot be read"):
+        Sweep(tmp_path, "s")
+
+
+def outcomes(*values: float | None) -> dict[int, Outcome]:
+    return {
+        seed: Outcome(steps=1000, laps_after=None if value is None else int(value), best_lap=value)
+        for seed, value in enumerate(values)
+    }
+
+
+def test_the_board_knows_chance() -> None:
+    words = {name: {"reward": name} for name in ("slow", "fast", "lucky", "lost", "never")}
+    found = {
+        "slow": outcomes(300, 310, 320, 330),
+        "fast": outcomes(200, 210, 220, 230),
+        "lucky": outcomes(100, 300, 215, 290),
+        "lost": outcomes(100, 110, None, 120),
+    }
+    board = board_of("laps", words, found)
+    assert [(row.setting, row.is_tied) for row in board.places] == [
+        ("fast", False), ("lucky", True), ("slow", False), ("lost", False), ("never", True)
+    ]  # fmt: skip
+    fast = board.places[0]
+    assert (fast.laps_after.mean, fast.laps_after.count, fast.seeds) == (215.0, 4, 4)
+    assert fast.laps_after.low == pytest.approx(215 - 3.182446 * np.std([200, 210, 220, 230], ddof=1) / 2, abs=1e-3)
+    assert board.places[3].laps_after.count == 3
+    assert board.places[4].best_lap.mean is None
+    one = board_of("lap_time", {"a": {}}, {"a": outcomes(9.5)}).places[0]
+    assert (one.best_lap.mean, one.best_lap.low) == (9.5, None)
