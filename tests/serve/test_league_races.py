@@ -20,14 +20,20 @@ import sqlalchemy as sa
 from leagues import RunningLeague, ok, refused, running_league, untrained_run
 
 from racecraft.contest.standings import places, ranking_key
+from racecraft.errors import RunError
+from racecraft.race.announcement import Announcement, draw_secret
+from racecraft.race.conditions import Conditions
 from racecraft.race.entry_file import pack_entry, read_entry_file
 from racecraft.race.policy import WEIGHTS
+from racecraft.race.rules import RaceRules
 from racecraft.run import RunFolder
 from racecraft.run.checkpoint import HEADER_KEY
 from racecraft.run.tensor_file import tensor_file
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Race, Submission, User, now
+from racecraft.serve.submissions.bench import Bench
 from racecraft.serve.submissions.board import AROUND, read_board
+from racecraft.track import load_track
 
 CUP: dict[str, Any] = {"title": "Cup", "track": "oval", "laps": 1, "trials": 2, "max_resets": 1}
 
@@ -68,6 +74,29 @@ class Cup:
 @pytest.fixture(scope="module")
 def cup(league: RunningLeague) -> Cup:
     return Cup(league)
+
+
+def test_a_judge_that_fails_is_there_for_the_next_entry(run: RunFolder, tmp_path: Path) -> None:
+    bench, conditions = Bench(), Conditions(track=load_track("oval"), rules=RaceRules(laps=1, max_resets=1))
+    terms = Announcement.of(
+        conditions, kind="time-trial", ranking="total", minimum_laps=1, num_trials=1, secret=draw_secret()
+    )
+    told = {"document": dict(terms.document), "commitment": terms.commitment, "seed": 1, "track": "oval", "name": "x"}
+    try:
+        with pytest.raises(RunError, match="judge's process failed"):
+            bench.ask(told, folder=tmp_path / "nowhere")
+        judge = bench._process
+        assert judge is not None
+        (tmp_path / "entry.safetensors").write_bytes(b"no weights")
+        with pytest.raises(RunError, match="no safetensors file"):
+            bench.ask(told, folder=tmp_path)
+        (tmp_path / "entry.safetensors").write_bytes(pack_entry(run))
+        assert bench.ask(told, folder=tmp_path)["step"] == 64
+        assert bench._process is judge
+        environment = Path(f"/proc/{judge.pid}/environ").read_bytes().decode().split("\0")
+        assert sorted(filter(None, environment)) == ["OMP_NUM_THREADS=1", "OPENBLAS_NUM_THREADS=1"]
+    finally:
+        bench.close()
 
 
 def test_what_is_sent_in_is_judged_and_stands_on_the_board(cup: Cup, run: RunFolder) -> None:

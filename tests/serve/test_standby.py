@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import select
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -47,10 +49,33 @@ def test_the_waiting_worker_does_the_next_job(settings: ServeSettings, standby: 
     worker = standby.start(job.id)
     assert worker is waiting
     assert worker.wait(PATIENCE) == 0
+    assert worker.stdin is not None
+    worker.stdin.close()
     ended = queue.get(job.id)
     assert ended is not None
     assert ended.state == "failed"
     assert "nothing" in (ended.error or {})["message"]
+    database.close()
+
+
+def test_after_a_short_job_it_waits_for_another(settings: ServeSettings, standby: Standby) -> None:
+    database = Database(settings.database_url)
+    database.migrate()
+    queue = JobQueue(database)
+    workers = []
+    for _ in range(2):
+        job, name = queue.add("judge", "", {}), standby.name()  # of no submission, which is its sentence
+        assert queue.claim(("judge",), owner=name) is not None
+        workers.append(standby.start(job.id))
+        assert select.select([standby.bell], [], [], PATIENCE)[0], "it rings when a job has ended"
+        os.read(standby.bell, 10)
+        assert not queue.is_held(name)
+        assert (ended := queue.get(job.id)) is not None
+        assert ended.state == "failed"
+        assert workers[-1].poll() is None
+        assert standby.take(name, workers[-1])
+    assert workers[0] is workers[1]
+    assert not standby.take("another", workers[0]), "one is enough"
     database.close()
 
 

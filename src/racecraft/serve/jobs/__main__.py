@@ -1,13 +1,15 @@
-"""The process of a job: ``python -m racecraft.serve.jobs RUNS LOCK``, with two URLs in the environment.
+"""The process of a job: ``python -m racecraft.serve.jobs RUNS LOCK BELL``, with two URLs in the environment.
 
-It loads what jobs need, and waits for one line on its standard input: the job and the name that it was claimed under.
-Without a line the server has ended, and so does this. LOCK is an open file, whose lock says that this process lives.
+It loads what jobs need, and waits for a line on its standard input: a job and the name that it was claimed under. After
+some kinds of jobs it waits for another line. Without one the server has ended, and so does this. LOCK is an open file,
+whose lock says that this process lives; a byte in the pipe BELL says that a job has ended.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -18,9 +20,10 @@ NICENESS: Final = 15
 """Jobs leave most of the processor to pages and 3D views, which stay smooth beside a training."""
 
 
-def main(runs: str, lock: str) -> int:
-    """Do one job; the exit status is 0 unless the process itself failed."""
-    os.set_inheritable(int(lock), False)  # it is to end with this process, not with what that starts
+def main(runs: str, lock: str, bell: str) -> int:
+    """Do jobs; the exit status is 0 unless the process itself failed."""
+    for file in (int(lock), int(bell)):
+        os.set_inheritable(file, False)  # they are to end with this process, not with what that starts
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     with loading():
@@ -28,12 +31,16 @@ def main(runs: str, lock: str) -> int:
 
         load()
 
-    told = sys.stdin.readline().split()
-    if len(told) != 2:
-        return 0
-    job_id, owner = told
     database_url, artifacts_url = os.environ.pop(DATABASE), os.environ.pop(ARTIFACTS, "")
-    do_job(job_id, owner=owner, runs=Path(runs), database_url=database_url, artifacts_url=artifacts_url)
+    while len(told := sys.stdin.readline().split()) == 2:
+        job_id, owner = told
+        try:
+            stays = do_job(job_id, owner=owner, runs=Path(runs), database_url=database_url, artifacts_url=artifacts_url)
+        finally:
+            with suppress(OSError):  # there is no server any more, or it has been told often enough
+                os.write(int(bell), b".")
+        if not stays:
+            break
     return 0
 
 

@@ -48,6 +48,8 @@ class JobKind:
     """File of that folder that changes whenever there is something to show."""
     needs: str = ""
     """Module of an extra without which a worker leaves it to others."""
+    stays: bool = False
+    """Whether its process waits for another job afterwards: it is short, and loading takes longer."""
     progress: str = "{run}/checkpoints/manifest.json"
     """File below the runs folder that changes whenever something is kept for good."""
 
@@ -73,7 +75,7 @@ KINDS: Final[Mapping[str, JobKind]] = {
         folder="contests/{job}",
         news="driven.txt",
     ),
-    "judge": JobKind(slot="other", work="racecraft.serve.submissions.tasks:judge"),
+    "judge": JobKind(slot="other", work="racecraft.serve.submissions.tasks:judge", stays=True),
     "store": JobKind(slot="other", work="racecraft.serve.models.tasks:store"),
 }
 WRITERS: Final = tuple(name for name, kind in KINDS.items() if not kind.folder)
@@ -204,6 +206,12 @@ class JobQueue:
             line = waiting_line(session, kinds_of(KINDS[job.kind].slot), self._database.moment(session))
         earlier = line[: next((place for place, one in enumerate(line) if one.id == job.id), 0)]
         return [one.run if one.user_id == self._user_id else "…" for one in earlier]
+
+    def is_held(self, owner: str) -> bool:
+        """Whether a worker has a job."""
+        query = sa.select(Job.id).where(Job.owner == owner, Job.state == "running").limit(1)
+        with self._database.transaction() as session:
+            return session.scalar(query) is not None
 
     def elsewhere(self, machine: str) -> Sequence[Job]:
         """What other machines are doing."""

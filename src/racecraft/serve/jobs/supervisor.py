@@ -2,7 +2,8 @@
 
 A child holds a lock on a file of its own, which the system drops with it. So a server sees at once that a child of the
 server before it is dead, too; what ran on another machine is taken over when its lease has run out. One child more has
-loaded what jobs need and waits for one, so that a click is followed by driving and not by imports.
+loaded what jobs need and waits for one, so that a click is followed by driving and not by imports. After a short job a
+child waits for another one itself. All ring a bell when a job has ended: a pipe that the server listens at.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ class Supervisor:
     def __init__(self, settings: ServeSettings, database: Database, queue: JobQueue, *, is_home: bool = True) -> None:
         self._settings, self._database, self._queue, self._is_home = settings, database, queue, is_home
         self._children: dict[str, subprocess.Popen[bytes]] = {}  # by owner
+        self._staying: set[str] = set()  # those of them that wait for another job after theirs
         self._awake = asyncio.Event()
         self._is_stopping = False
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -67,14 +69,23 @@ class Supervisor:
     async def run(self) -> None:
         """Until cancelled."""
         self._loop = asyncio.get_running_loop()
-        while True:
-            try:
-                await asyncio.to_thread(self._tend)
-            except (SQLAlchemyError, OSError) as error:  # the database is being restarted, the disk is full
-                logging.getLogger("racecraft.serve").error("Jobs cannot be tended: %s", str(error).splitlines()[0])
-            with suppress(TimeoutError):
-                await asyncio.wait_for(self._awake.wait(), POLL)
-            self._awake.clear()
+        self._loop.add_reader(self._standby.bell, self._heard)
+        try:
+            while True:
+                try:
+                    await asyncio.to_thread(self._tend)
+                except (SQLAlchemyError, OSError) as error:  # the database is being restarted, the disk is full
+                    logging.getLogger("racecraft.serve").error("Jobs cannot be tended: %s", str(error).splitlines()[0])
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._awake.wait(), POLL)
+                self._awake.clear()
+        finally:
+            self._loop.remove_reader(self._standby.bell)
+
+    def _heard(self) -> None:
+        with suppress(BlockingIOError):
+            os.read(self._standby.bell, 1 << 10)
+        self._awake.set()
 
     async def stop(self) -> None:
         """Let the children save themselves; what they were doing is queued again for the next server."""
@@ -88,8 +99,9 @@ class Supervisor:
                 for child in self._children.values():
                     child.kill()
             await asyncio.sleep(0.05)
-        for owner in self._children:
+        for owner, child in self._children.items():
             self._queue.hand_back(owner)
+            _pipe(child).close()
         self._children.clear()
 
     def _tend(self) -> None:
@@ -119,16 +131,26 @@ class Supervisor:
         if job is None:
             return False
         self._children[owner] = self._standby.start(job.id)
+        if KINDS[job.kind].stays:
+            self._staying.add(owner)
         self._started = time.monotonic()
         return True
 
     def _reap(self) -> None:
-        """Take note of children that ended."""
+        """Take note of children that ended, and of those whose job has ended and that wait for another."""
         for owner, child in list(self._children.items()):
             if child.poll() is not None:
                 self._queue.release(owner)
                 (self._workers / owner).unlink(missing_ok=True)
+                _pipe(child).close()
                 del self._children[owner]
+                self._staying.discard(owner)
+            elif owner in self._staying and not self._queue.is_held(owner):
+                self._staying.discard(owner)
+                if not self._is_stopping and self._standby.take(owner, child):
+                    del self._children[owner]
+                else:
+                    _pipe(child).close()  # one waits already: this one goes home
 
     def _bury(self) -> None:
         """Take note of children of earlier servers that are dead."""
@@ -161,6 +183,11 @@ class Standby:
         self._workers, self._log = workers, log
         self._name = ""  # of the one that waits
         self._waiting: subprocess.Popen[bytes] | None = None
+        self.bell, self._rope = os.pipe()
+        """A pipe of which a byte comes out whenever a job has ended."""
+        self._ends = [self.bell, self._rope]
+        for end in self._ends:
+            os.set_blocking(end, False)
 
     def prepare(self) -> None:
         """Have a worker wait."""
@@ -179,9 +206,19 @@ class Standby:
     def start(self, job_id: str) -> subprocess.Popen[bytes]:
         """Have the worker that is next do a job, claimed under its name: the one that waits, or a new one."""
         worker, self._waiting = self._waiting or self._launch(), None
-        with suppress(BrokenPipeError), _pipe(worker) as pipe:  # one that has just died is noticed like any other
-            pipe.write(f"{job_id} {self._name}\n".encode())
+        with suppress(BrokenPipeError):  # one that has just died is noticed like any other
+            _pipe(worker).write(f"{job_id} {self._name}\n".encode())
+            _pipe(worker).flush()
         return worker
+
+    def take(self, name: str, worker: subprocess.Popen[bytes]) -> bool:
+        """Have a worker wait that has done its job; False where one does already."""
+        if self._waiting is not None and self._waiting.poll() is None:
+            return False
+        if self._waiting is not None:
+            self._forget()
+        self._waiting, self._name = worker, name
+        return True
 
     def close(self) -> None:
         """Send the waiting one home."""
@@ -189,6 +226,8 @@ class Standby:
             self._waiting.terminate()
             self._waiting.wait()
             self._forget()
+        while self._ends:
+            os.close(self._ends.pop())
 
     def _forget(self) -> None:
         assert self._waiting is not None
@@ -200,12 +239,12 @@ class Standby:
         with self._log.open("ab") as log, (self._workers / self._name).open("wb") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)  # of the open file, which the worker inherits
             return subprocess.Popen(
-                [*self._command, str(lock.fileno())],
+                [*self._command, str(lock.fileno()), str(self._rope)],
                 env=self._environment,
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                pass_fds=[lock.fileno()],
+                pass_fds=[lock.fileno(), self._rope],
                 start_new_session=True,  # Ctrl-C in the server's terminal is not for it
             )
 

@@ -82,6 +82,7 @@ class Worker:
         self._stops: list[Callable[[], None]] = []
         self._is_cancelled = False  # by the user
         self._leaving = threading.Event()  # the server is going down
+        self._telling, self._is_told = threading.Lock(), False  # how it ended
         kind = KINDS.get(job.kind, KINDS["train"])
         home, runs = runs, runs_of(runs, job.user_id)
         self._kept = runs / kind.progress.format(run=job.run, tuning=job.payload.get("tuning", ""))
@@ -92,9 +93,17 @@ class Worker:
         if artifacts is not None and job.travels:
             self._courier = Courier(artifacts, job, runs, kept=self._kept)
 
-    def run(self) -> None:
-        """Do it, and say how it ended."""
+    def run(self) -> bool:
+        """Do it, and say how it ended; whether this process may do another one."""
         signal.signal(signal.SIGTERM, lambda *_: self._leaving.set())
+        try:
+            self._do()
+        finally:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        kind = KINDS.get(self._job.kind)
+        return kind is not None and kind.stays and not self._leaving.is_set()
+
+    def _do(self) -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which then tells us
         threading.Thread(target=self._keep, name="heartbeat", daemon=True).start()
         try:
@@ -116,13 +125,16 @@ class Worker:
         """Keep the lease, and hear of being cancelled."""
         kept, begun = time.monotonic(), self._progress()
         while True:
-            try:
-                answer = self._queue.heartbeat(
-                    self._job.id, owner=self._owner, has_progressed=self._progress() != begun
-                )
-                kept = time.monotonic()
-            except SQLAlchemyError:  # the database is being restarted, say
-                answer = Answer("go on")
+            with self._telling:
+                if self._is_told:
+                    return
+                try:
+                    answer = self._queue.heartbeat(
+                        self._job.id, owner=self._owner, has_progressed=self._progress() != begun
+                    )
+                    kept = time.monotonic()
+                except SQLAlchemyError:  # the database is being restarted, say
+                    answer = Answer("go on")
             if self._courier is not None:
                 self._courier.is_watched = answer.is_watched
             if answer.word == "lost" or time.monotonic() - kept > LEASE.total_seconds():
@@ -138,7 +150,11 @@ class Worker:
     def _stop(self) -> None:
         for call in self._stops:
             call()
-        if not self._stops:  # nothing to be saved
+        if self._stops:
+            return
+        with self._telling:  # nothing to be saved
+            if self._is_told:
+                return
             if self._is_cancelled:
                 self._finish("cancelled")
             else:
@@ -152,7 +168,10 @@ class Worker:
         """Say how it ended; while the database is away, try again until the lease has run out."""
         while True:
             try:
-                return tell()
+                with self._telling:
+                    tell()
+                    self._is_told = True
+                return
             except SQLAlchemyError:
                 time.sleep(HEARTBEAT)
 
@@ -176,11 +195,14 @@ def _described(error: Exception) -> dict[str, Any]:
     }
 
 
-def do_job(job_id: str, *, owner: str, runs: Path, database_url: str, artifacts_url: str) -> None:
-    """Do a job that was claimed by `owner`, if it still is."""
+def do_job(job_id: str, *, owner: str, runs: Path, database_url: str, artifacts_url: str) -> bool:
+    """Do a job that was claimed by `owner`, if it still is; whether this process may do another one."""
     database = Database(database_url)
     with database.transaction() as session:
         job = session.get(Job, job_id)
-    if job is not None and job.owner == owner:  # else it was taken for dead before it was there
-        artifacts = Artifacts(artifacts_url).of(job.user_id) if artifacts_url else None
-        Worker(database, job, owner=owner, runs=runs, artifacts=artifacts).run()
+    if job is None or job.owner != owner:  # it was taken for dead before it was there
+        return False
+    artifacts = Artifacts(artifacts_url).of(job.user_id) if artifacts_url else None
+    stays = Worker(database, job, owner=owner, runs=runs, artifacts=artifacts).run()
+    database.close()
+    return stays

@@ -9,9 +9,6 @@ what comes out the same, from the starts that the secret gives: laps and mistake
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,11 +20,13 @@ from racecraft.serve.jobs.task import Task
 from racecraft.serve.races.races import announcement_of
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.tables import Race, Submission, now
+from racecraft.serve.submissions.bench import Bench
 from racecraft.serve.submissions.judge import JUDGED
 
 FOLDER: Final = "submissions"
 REPLAY: Final = "entry.replay"
-PATIENCE: Final = 600.0  # s
+BENCH: Final = Bench()
+"""Of this process, which does one job at a time."""
 
 
 def submission_folder(state: Path, job_id: str) -> Path:
@@ -44,7 +43,14 @@ def judge(task: Task) -> dict[str, Any]:
     payload = task.job.payload
     announcement = _announcement(task)
     folder = submission_folder(task.home / STATE_FOLDER, task.job.id)
-    result = _ask_judge(folder, announcement, track=payload["track"], name=payload["name"])
+    told = {
+        "document": dict(announcement.document),
+        "commitment": announcement.commitment,
+        "seed": announcement.seed,
+        "track": payload["track"],
+        "name": payload["name"],
+    }
+    result = BENCH.ask(told, folder=folder)
     replay = read_replay(folder / JUDGED)
     found = verify(replay, race=announcement)
     if not found.is_genuine:
@@ -64,31 +70,3 @@ def _announcement(task: Task) -> Announcement:
     race = sa.select(Race).join(Submission, Submission.race_id == Race.id).where(Submission.job_id == task.job.id)
     with task.database.transaction() as session:
         return announcement_of(session.scalars(race).one())
-
-
-def _ask_judge(folder: Path, announcement: Announcement, *, track: str, name: str) -> dict[str, Any]:
-    """What the judge says; it has nothing but the folder and what it is told."""
-    told = {
-        "document": dict(announcement.document),
-        "commitment": announcement.commitment,
-        "seed": announcement.seed,
-        "track": track,
-        "name": name,
-    }
-    try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-m", "racecraft.serve.submissions.judge"],
-            cwd=folder,
-            env={"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-            input=json.dumps(told).encode(),
-            stdout=subprocess.PIPE,
-            timeout=PATIENCE,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise RunError(f"It drove for more than {PATIENCE:.0f} s and was stopped.") from error
-    if done.returncode not in (0, 3):
-        raise RunError("The judge's process failed.", hint="The server's jobs.log says why.")
-    result: dict[str, Any] = json.loads(done.stdout)
-    if done.returncode == 3:
-        raise RunError(result["message"], hint=result["hint"])
-    return result

@@ -1,0 +1,101 @@
+"""The judges' bench: the process of `racecraft.serve.submissions.judge` as those see it who ask it for verdicts."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any, Final
+
+from racecraft.errors import RunError
+
+PATIENCE: Final = 600.0  # s
+MOST: Final = 1 << 23  # bytes of an answer
+CALM: Final[dict[str, str]] = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+"""The whole environment of a judge."""
+
+
+class Bench:
+    """Asks a judge's process, which it starts when it is needed; for one thread at a time."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+
+    def ask(self, told: dict[str, Any], *, folder: Path) -> dict[str, Any]:
+        """What the judge says of a submission; it has nothing but the folder and what it is told.
+
+        Raises:
+            RunError: It cannot drive, or did not end; the message says why.
+        """
+        with self._lock:
+            answer = self._answer({**told, "folder": str(folder.resolve())})
+        if answer["status"] not in (0, 3):
+            raise RunError("The judge's process failed.", hint="The server's jobs.log says why.")
+        said: dict[str, Any] = json.loads(answer["said"])
+        if answer["status"] == 3:
+            raise RunError(said["message"], hint=said["hint"])
+        return said
+
+    def _answer(self, told: dict[str, Any]) -> dict[str, Any]:
+        process = self._process if self._process is not None and self._process.poll() is None else self._start()
+        asked, answers = _pipes(process)
+        try:
+            asked.write(json.dumps(told).encode() + b"\n")
+            asked.flush()
+            answer: dict[str, Any] = json.loads(_line(answers))
+        except TimeoutError as error:
+            self.close()
+            raise RunError(f"It drove for more than {PATIENCE:.0f} s and was stopped.") from error
+        except (OSError, ValueError) as error:
+            self.close()
+            raise RunError("The judge's process failed.", hint="The server's jobs.log says why.") from error
+        return answer
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "racecraft.serve.submissions.judge"],
+            cwd="/",
+            env=CALM,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # so that a child which hangs ends with it
+        )
+        return self._process
+
+    def close(self) -> None:
+        """End the judge's process with all that it has begun."""
+        if self._process is not None:
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+            for pipe in _pipes(self._process):
+                with suppress(OSError):
+                    pipe.close()
+            self._process = None
+
+
+def _line(pipe: IO[bytes]) -> bytes:
+    """The next line, within the time there is."""
+    read, deadline = b"", time.monotonic() + PATIENCE
+    while not read.endswith(b"\n"):
+        ready, _, _ = select.select([pipe], [], [], max(0.0, deadline - time.monotonic()))
+        if not ready:
+            raise TimeoutError
+        if not (part := os.read(pipe.fileno(), 1 << 16)) or len(read) > MOST:
+            raise ValueError("no answer")
+        read += part
+    return read
+
+
+def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
+    assert process.stdin is not None
+    assert process.stdout is not None
+    return process.stdin, process.stdout
