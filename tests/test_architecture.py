@@ -71,6 +71,7 @@ CONSOLE = (
     "machine",
     "lessons",
     "groups",
+    "quotas",
     "submissions",
     "context",
     "app",

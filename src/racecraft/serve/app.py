@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import secrets
 import shutil
 import threading
@@ -13,6 +14,7 @@ from typing import Final
 
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
+from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.serve import replies, tab
 from racecraft.serve.audit import routes as audit
@@ -40,6 +42,7 @@ from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.people import routes as account
 from racecraft.serve.people.keys import Keys
+from racecraft.serve.quotas import routes as quotas
 from racecraft.serve.races import routes as races
 from racecraft.serve.races.races import Races
 from racecraft.serve.rewards import routes as rewards
@@ -60,6 +63,18 @@ from racecraft.serve.tuning.tunings import Tunings
 PAGES: Final = Path(__file__).parent / "pages"
 """The built web client, part of the package."""
 KINDS: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".woff2": "font/woff2"}
+
+
+COUNT: Final = 5.0  # s between two looks at who has trained enough for a day
+
+
+async def _count(consoles: Consoles) -> None:
+    while True:
+        await asyncio.sleep(COUNT)
+        try:
+            await asyncio.to_thread(consoles.quotas.end_what_is_over)
+        except SQLAlchemyError as error:  # the database is being restarted
+            logging.getLogger("racecraft.serve").error("Quotas cannot be read: %s", str(error).splitlines()[0])
 
 
 def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
@@ -104,11 +119,14 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         tending = asyncio.create_task(context.supervisor.run())
+        counting = asyncio.create_task(_count(app.state.consoles)) if settings.league else None
         for name, work in (("mirror", context.mirror.start), ("follower", follower.run)):
             threading.Thread(target=work, name=name, daemon=True).start()
         yield
         context.mirror.end()
         follower.end()
+        if counting is not None:
+            counting.cancel()
         tending.cancel()
         with suppress(asyncio.CancelledError):
             await tending
@@ -136,7 +154,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     parts += [contests, jobs, events, door, audit, lessons]
     for part in parts:
         app.include_router(part.router)
-    for part in (account, groups, league):
+    for part in (account, groups, league, quotas):
         app.include_router(part.router, dependencies=[audit.Audited])
 
     @app.get("/assets/{name}", include_in_schema=False)

@@ -24,6 +24,7 @@ from racecraft.serve.people.keys import Keys
 from racecraft.serve.people.people import People, Person
 from racecraft.serve.people.tries import Tries
 from racecraft.serve.problems import NotFound
+from racecraft.serve.quotas.quotas import Quotas
 from racecraft.serve.races.races import Races
 from racecraft.serve.settings import OWNER, ServeSettings
 from racecraft.serve.store.database import Database
@@ -68,6 +69,7 @@ class Consoles:
     def __init__(self, owner: Context, keys: Keys) -> None:
         self.owner, self.keys = owner, keys
         self.people, self.groups = People(owner.database), Groups(owner.database)
+        self.quotas = Quotas(owner.database, owner.settings.runs)
         self.audit, self.devices = Audit(owner.database), Devices()
         self.league = League(owner.database, owner.settings.state, self._courses)
         self._others: dict[int, Context] = {}
@@ -167,6 +169,25 @@ def _admin(consoles: InConsoles, user: InUser) -> None:
 OnlyAdmin = Depends(_admin)
 """A route with this dependency exists for admins only; alone at the console everybody is one."""
 
+
+def _makes_model(consoles: InConsoles, user: InUser) -> None:
+    consoles.quotas.require(user, "models")
+
+
+def _takes_place(consoles: InConsoles, user: InUser) -> None:
+    consoles.quotas.require(user, "places")
+
+
+def _trains(consoles: InConsoles, user: InUser) -> None:
+    consoles.quotas.require(user, "places", "minutes")
+
+
+MakesModel = Depends(_makes_model)
+"""A route with this dependency makes a model, where its quota lets somebody."""
+TakesPlace = Depends(_takes_place)
+"""The same for a job."""
+Trains = Depends(_trains)
+"""The same for a training."""
 
 InContext = Annotated[Context, Depends(_context)]
 """A route's parameter of this type is given the parts of a console: one's own."""

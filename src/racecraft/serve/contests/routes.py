@@ -9,7 +9,7 @@ from fastapi.responses import FileResponse
 
 from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
 from racecraft.serve.contests.schemas import ContestCard, ContestDetail, NewHeat, NewLadder
-from racecraft.serve.context import InContext
+from racecraft.serve.context import InContext, TakesPlace
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.replays import poses_of, replay_of
 from racecraft.serve.races.schemas import RaceReplay, ReplayCar
@@ -25,7 +25,7 @@ def list_contests(context: InContext) -> list[ContestCard]:
     return context.contests.cards()
 
 
-@router.post("/heats", status_code=202)
+@router.post("/heats", status_code=202, dependencies=[TakesPlace])
 def start_heat(request: NewHeat, context: InContext) -> ContestDetail:
     """Let two to eight models race on one road."""
     contest = context.contests.start_heat(request)
@@ -33,7 +33,7 @@ def start_heat(request: NewHeat, context: InContext) -> ContestDetail:
     return context.contests.get(contest)
 
 
-@router.post("/ladders", status_code=202)
+@router.post("/ladders", status_code=202, dependencies=[TakesPlace])
 def start_ladder(request: NewLadder, context: InContext) -> ContestDetail:
     """Rate models by many races."""
     contest = context.contests.start_ladder(request)

@@ -11,7 +11,7 @@ from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
 from racecraft.race.rules import RULE_SETS
 from racecraft.run import RunFolder
-from racecraft.serve.context import InContext
+from racecraft.serve.context import InContext, TakesPlace
 from racecraft.serve.evaluations.schemas import EvaluateModel, EvaluationCard, Telemetry
 from racecraft.serve.jobs.schemas import JobInfo, job_info
 from racecraft.serve.problems import NotFound
@@ -47,7 +47,7 @@ def list_evaluations(name: str, context: InContext) -> list[EvaluationCard]:
     return found
 
 
-@router.post("", status_code=202)
+@router.post("", status_code=202, dependencies=[TakesPlace])
 def evaluate_model(name: str, request: EvaluateModel, context: InContext) -> JobInfo:
     """Race a model against the clock."""
     folder = context.garage.folder(name)

@@ -90,6 +90,17 @@ class Groups:
         with self._database.transaction() as session:
             return session.get_one(Group, group_id).title
 
+    def known(self, group_id: int) -> int:
+        """A group's number.
+
+        Raises:
+            NotFound: There is no such group.
+        """
+        with self._database.transaction() as session:
+            if session.get(Group, group_id) is None:
+                raise NotFound(f"There is no group {group_id}.")
+        return group_id
+
     def part(self, group_id: int, user_id: int) -> Part | None:
         """What somebody is in a group; None for who is not in it."""
         with self._database.transaction() as session:

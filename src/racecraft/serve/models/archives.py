@@ -15,7 +15,7 @@ from fastapi.responses import StreamingResponse
 from racecraft.errors import RunError, SourceError, TrackNotFound
 from racecraft.run import archive_chunks
 from racecraft.run.folder import sanitize_name
-from racecraft.serve.context import Context, InContext
+from racecraft.serve.context import Context, InContext, MakesModel
 from racecraft.serve.models.schemas import ImportedModel
 from racecraft.serve.schemas import RunName
 
@@ -28,6 +28,7 @@ UPLOADS: Final = "uploads"  # inside the state folder
 @router.post(
     "/import",
     status_code=201,
+    dependencies=[MakesModel],
     openapi_extra={
         "requestBody": {
             "required": True,

@@ -16,7 +16,7 @@ from racecraft.reward import load_preset, preset_names
 from racecraft.run import RunFolder, read_stretches, stretch_at
 from racecraft.run.history import read_history
 from racecraft.run.starters import starter_names, unpack_starter
-from racecraft.serve.context import Context, InContext
+from racecraft.serve.context import Context, InConsoles, InContext, InUser, MakesModel, Trains
 from racecraft.serve.jobs.schemas import JobInfo, job_info
 from racecraft.serve.models.demonstration import demonstration
 from racecraft.serve.models.garage import RACED, finite
@@ -54,9 +54,11 @@ def list_models(context: InContext) -> list[ModelCard]:
     return context.garage.cards()
 
 
-@router.post("", status_code=201)
-def create_model(request: NewModel, context: InContext) -> ModelCard:
+@router.post("", status_code=201, dependencies=[MakesModel])
+def create_model(request: NewModel, context: InContext, consoles: InConsoles, user: InUser) -> ModelCard:
     """A new model from settings that may all be left out; training starts at once unless told otherwise."""
+    if request.train:
+        consoles.quotas.require(user, "places", "minutes")
     source = load_preset(request.reward) if request.reward in preset_names() else request.reward
     metadata = _metadata(request)
     parameters = None if request.hyperparameters is None else Hyperparameters.from_dict(request.hyperparameters)
@@ -102,7 +104,7 @@ def create_model(request: NewModel, context: InContext) -> ModelCard:
     return card
 
 
-@router.post("/starters/{starter}", status_code=201)
+@router.post("/starters/{starter}", status_code=201, dependencies=[MakesModel])
 def bring_starter(starter: str, context: InContext) -> ModelCard:
     """A policy that comes with Racecraft, as a model of one's own; the one there is, if it was brought before."""
     if starter not in starter_names():
@@ -154,7 +156,7 @@ def delete_model(name: str, context: InContext) -> Response:
     return Response(status_code=204)
 
 
-@router.post("/{name}/restore")
+@router.post("/{name}/restore", dependencies=[MakesModel])
 def restore_model(name: str, context: InContext) -> ModelCard:
     """Bring a deleted model back."""
     context.garage.restore(name)
@@ -162,7 +164,7 @@ def restore_model(name: str, context: InContext) -> ModelCard:
     return context.garage.card(name)
 
 
-@router.post("/{name}/clone", status_code=201)
+@router.post("/{name}/clone", status_code=201, dependencies=[MakesModel])
 def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard:
     """A new model with the same settings, untrained, or a branch from one of its checkpoints."""
     folder = context.garage.folder(name)
@@ -191,7 +193,7 @@ def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard
     return context.garage.card(copy.name)
 
 
-@router.post("/{name}/train", status_code=202)
+@router.post("/{name}/train", status_code=202, dependencies=[Trains])
 def train_model(name: str, request: TrainOn, context: InContext) -> JobInfo:
     """Train a model, or go on training it, if wanted with a changed reward function."""
     folder = context.garage.folder(name)

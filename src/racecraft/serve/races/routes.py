@@ -12,7 +12,7 @@ from fastapi.responses import FileResponse
 from racecraft.contest.terms import MAX_TRIALS
 from racecraft.errors import ConfigError
 from racecraft.judging.race import FORMAT
-from racecraft.serve.context import InContext, InUser
+from racecraft.serve.context import InContext, InUser, TakesPlace
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.replays import replay_of, trial_poses
@@ -74,7 +74,7 @@ def restore_race(race_id: Id, context: InContext) -> RaceDetail:
     return context.races.get(race_id)
 
 
-@router.post("/{race_id}/entries", status_code=202)
+@router.post("/{race_id}/entries", status_code=202, dependencies=[TakesPlace])
 def enter_race(race_id: Id, request: Enter, context: InContext, user: InUser) -> RaceDetail:
     """Enter models; each drives as a job."""
     context.races.enter(race_id, request, user_id=user)

@@ -328,6 +328,20 @@ class DrivenRecord(Table):
     driven: Mapped[datetime] = mapped_column(default=now)
 
 
+class Quota(Table):
+    """What somebody, or several people, may use of the machine; see racecraft.serve.quotas."""
+
+    __tablename__ = "quotas"
+
+    scope: Mapped[str] = mapped_column(String(16), primary_key=True)
+    """``everybody``, ``group`` (all its racers together), ``each`` (each of its racers) or ``person``."""
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    """Of the group or the person; 0 for everybody."""
+    minutes: Mapped[int | None]
+    models: Mapped[int | None]
+    places: Mapped[int | None]
+
+
 class StudiedLesson(Table):
     """How far somebody is in a lesson of the course."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Response
 
-from racecraft.serve.context import InContext
+from racecraft.serve.context import InContext, MakesModel, Trains
 from racecraft.serve.jobs.schemas import JobInfo, job_info
 from racecraft.serve.models.schemas import ModelCard
 from racecraft.serve.tuning.schemas import KeepTrial, NewTuning, TunableNumber, TuningCard
@@ -24,7 +24,7 @@ def get_tuning_space(name: str, context: InContext) -> list[TunableNumber]:
     return context.tunings.space(name)
 
 
-@router.post("", status_code=202)
+@router.post("", status_code=202, dependencies=[Trains])
 def start_tuning(name: str, request: NewTuning, context: InContext) -> JobInfo:
     """Search better numbers for a model by short trainings; the model itself stays as it is."""
     job = context.tunings.start(name, request)
@@ -32,7 +32,7 @@ def start_tuning(name: str, request: NewTuning, context: InContext) -> JobInfo:
     return job_info(job)
 
 
-@router.post("/{tuning}/keep", status_code=201)
+@router.post("/{tuning}/keep", status_code=201, dependencies=[MakesModel])
 def keep_trial(name: str, tuning: str, request: KeepTrial, context: InContext) -> ModelCard:
     """Make a model of a trial, the best one by default."""
     fresh = context.tunings.keep(name, tuning, request)

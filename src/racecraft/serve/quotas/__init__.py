@@ -1,0 +1,1 @@
+"""What a racer, and all of a group together, may use of the machine."""

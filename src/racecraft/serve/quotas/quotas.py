@@ -1,0 +1,182 @@
+"""How much of the machine a racer may use, and all racers of a group together.
+
+    person ──▶ each racer of their groups ──▶ everybody ──▶ DEFAULT     the first of these that has a number counts
+    group, together                                                     besides; used up where all their groups are
+
+Minutes are of training, in the last 24 hours; models are those in the garage; places are jobs that wait or run, without
+submissions, which races limit. Organisers and admins are not limited. Being over a limit takes nothing away but time:
+what is trained is saved, and goes on when there are minutes again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, fields, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Final, Literal
+
+import sqlalchemy as sa
+from sqlalchemy.orm import Session
+
+from racecraft.run import list_runs
+from racecraft.serve.jobs.queue import KINDS, kinds_of
+from racecraft.serve.problems import Conflict
+from racecraft.serve.settings import OWNER, runs_of
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Job, Member, Quota, User
+
+Scope = Literal["everybody", "group", "each", "person"]
+WHOLE: Final = 0
+"""The number that goes with the scope ``everybody``."""
+DAY: Final = timedelta(days=1)
+UNCOUNTED: Final = ("judge", "store")
+"""Jobs that are limited otherwise, or nobody asked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """So much may be used; None where a scope says nothing."""
+
+    minutes: int | None = None
+    models: int | None = None
+    places: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Usage:
+    """So much is used."""
+
+    minutes: float
+    models: int
+    places: int
+
+
+DEFAULT: Final = Limits(models=200, places=50)
+"""Of a racer, where nobody has said anything: so that a slip does not fill the disk."""
+WORDS: Final = {"minutes": "minutes of training a day", "models": "models", "places": "jobs at once"}
+HINTS: Final = {
+    "minutes": "What you trained yesterday comes back hour by hour; whoever organises your group can give you more.",
+    "models": "Delete some that you no longer need.",
+    "places": "Wait for one of them, or stop it.",
+}
+
+
+class Quotas:
+    """Everybody's.
+
+    Args:
+        database: Where they and the jobs are.
+        runs: Folder of the owner's runs; those of others lie within.
+    """
+
+    def __init__(self, database: Database, runs: Path) -> None:
+        self._database, self._runs = database, runs
+
+    def said(self, scope: Scope, number: int = WHOLE) -> Limits:
+        """What was said of a scope itself."""
+        with self._database.transaction() as session:
+            return _said(session, scope, number)
+
+    def say(self, scope: Scope, limits: Limits, number: int = WHOLE) -> None:
+        """Say something else."""
+        with self._database.transaction() as session:
+            session.merge(Quota(scope=scope, number=number, **vars(limits)))
+
+    def limits(self, user_id: int) -> Limits:
+        """What somebody may use; nothing is limited for who is no racer."""
+        with self._database.transaction() as session:
+            return _limits(session, user_id)
+
+    def usage(self, people: Collection[int]) -> Usage:
+        """What some people use together."""
+        with self._database.transaction() as session:
+            return self._usage(session, people)
+
+    def require(self, user_id: int, *what: Literal["minutes", "models", "places"]) -> None:
+        """Refuse what would be more than somebody, or their groups, may use.
+
+        Raises:
+            Conflict: It would.
+        """
+        with self._database.transaction() as session:
+            over = self._over(session, user_id, what)
+        if over is not None:
+            raise Conflict(*over[:1], hint=over[1])
+
+    def end_what_is_over(self) -> None:
+        """Stop the trainings of whoever has no minutes left; they are saved."""
+        kinds = kinds_of("training")
+        open_ = sa.select(Job.user_id).where(Job.kind.in_(kinds), Job.state.in_(("queued", "running"))).distinct()
+        with self._database.transaction() as session:
+            over = [user for user in session.scalars(open_) if self._over(session, user, ("minutes",)) is not None]
+            theirs = sa.and_(Job.user_id.in_(over), Job.kind.in_(kinds))
+            session.execute(sa.update(Job).where(theirs, Job.state == "running").values(is_cancelled=True))
+            waiting = sa.update(Job).where(theirs, Job.state == "queued")
+            moment = self._database.moment(session)
+            session.execute(waiting.values(is_cancelled=True, state="cancelled", finished=moment))
+
+    def _over(self, session: Session, user_id: int, what: Iterable[str]) -> tuple[str, str] | None:
+        """A sentence and a hint about what is used up; None where nothing is."""
+        own = _limits(session, user_id)
+        if own == Limits():
+            return None
+        groups = session.scalars(sa.select(Member.group_id).where(Member.user_id == user_id)).all()
+        together = [(group, _said(session, "group", group)) for group in groups]
+        for name in what:
+            limit = getattr(own, name)
+            if limit is not None and getattr(self._usage(session, [user_id]), name) >= limit:
+                return f"You have {limit} {WORDS[name]}, and they are used up.", HINTS[name]
+            if together and all(self._is_used_up(session, group, name, limits) for group, limits in together):
+                return f"All the {WORDS[name]} of your group are used up.", HINTS[name]
+        return None
+
+    def _is_used_up(self, session: Session, group: int, name: str, limits: Limits) -> bool:
+        limit = getattr(limits, name)
+        if limit is None:
+            return False
+        racers = sa.select(Member.user_id).where(Member.group_id == group, Member.role == "racer")
+        return bool(getattr(self._usage(session, session.scalars(racers).all()), name) >= limit)
+
+    def _usage(self, session: Session, people: Collection[int]) -> Usage:
+        moment = self._database.moment(session)
+        theirs = sa.select(Job.used, Job.held_since).where(Job.user_id.in_(people), Job.kind.in_(kinds_of("training")))
+        since = theirs.where(sa.func.coalesce(Job.finished, moment) > moment - DAY)
+        open_ = sa.select(sa.func.count()).where(Job.user_id.in_(people), Job.state.in_(("queued", "running")))
+        counted = open_.where(Job.kind.in_([kind for kind in KINDS if kind not in UNCOUNTED]))
+        return Usage(
+            minutes=sum(_seconds(used, held, moment) for used, held in session.execute(since)) / 60.0,
+            models=sum(len(list_runs(runs_of(self._runs, user))) for user in people),
+            places=session.scalar(counted) or 0,
+        )
+
+
+def _limits(session: Session, user_id: int) -> Limits:
+    user = session.get(User, user_id)
+    if user_id == OWNER or user is None or user.role != "racer":
+        return Limits()
+    groups = sa.select(Member.group_id).where(Member.user_id == user_id)
+    each = [_said(session, "each", group) for group in session.scalars(groups).all()]
+    found = _said(session, "person", user_id)
+    for more in (_most(each), _said(session, "everybody", WHOLE), DEFAULT):
+        blanks = [field.name for field in fields(Limits) if getattr(found, field.name) is None]
+        found = replace(found, **{name: getattr(more, name) for name in blanks})
+    return found
+
+
+def _said(session: Session, scope: Scope, number: int) -> Limits:
+    row = session.get(Quota, (scope, number))
+    return Limits() if row is None else Limits(minutes=row.minutes, models=row.models, places=row.places)
+
+
+def _most(several: list[Limits]) -> Limits:
+    """Of somebody in several groups: what the most generous one gives."""
+    values = {
+        field.name: max((n for one in several if (n := getattr(one, field.name)) is not None), default=None)
+        for field in fields(Limits)
+    }
+    return Limits(**values)
+
+
+def _seconds(used: float, held_since: datetime | None, moment: datetime) -> float:
+    return used + (0.0 if held_since is None else max(0.0, (moment - held_since).total_seconds()))
