@@ -18,6 +18,8 @@ WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/
 
 # The compiler of WebAssembly, in a folder of its own: nothing else needs it.
 ZIG := build/zig/ziglang/zig
+# What makes pages of docs/*.md, likewise.
+SPHINX := build/sphinx/furo/__init__.py
 
 # Without bytecode kept, every process of a test compiles what it imports anew: most of the time of a server's start.
 unexport PYTHONDONTWRITEBYTECODE
@@ -34,10 +36,11 @@ console: $(VENV)/.built $(VENV)/.serve $(PAGES)  ## set up if needed, build the 
 	$(BIN)/racecraft serve
 
 WASM = $(MAKE) --no-print-directory -j$$($(BIN)/python -c 'import os; print(os.cpu_count() or 1)') -f native/wasm/Makefile ZIG=$(CURDIR)/$(ZIG)
-site: $(ZIG) $(VENV)/.built $(VENV)/.serve $(NODE)  ## build build/site: a page where cars learn in a browser's tab, for any static host
+site: $(ZIG) $(SPHINX) $(VENV)/.built $(VENV)/.serve $(NODE)  ## build build/site: a page where cars learn in a browser's tab, for any static host
 	@$(WASM)
 	@cd web && npm run --silent site
 	@mkdir -p build/site/core && cp build/wasm/*.wasm build/site/core
+	@PYTHONPATH=build/sphinx $(BIN)/python -m sphinx -q -W --keep-going -c tools/docs -d build/doctrees docs build/site/docs
 	@$(BIN)/python -m racecraft.site build/site web/node_modules/pyodide
 
 build/wasm/%.wasm: $(ZIG) FORCE
@@ -90,6 +93,7 @@ requirements: $(UV)  ## pin the newest allowed versions again
 	$(UV) pip compile -q --universal --python-version 3.11 --generate-hashes --no-header --extra serve --extra tune --extra multi -c requirements/dev.txt pyproject.toml -o requirements/serve.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/uv.in -o requirements/uv.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/site.in -o requirements/site.txt
+	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/docs.in -o requirements/docs.txt
 	$(UV) pip compile -q --no-deps --universal --python-version 3.11 --generate-hashes --no-header requirements/transfer.in -o requirements/transfer.txt
 
 $(UV): requirements/uv.txt
@@ -118,6 +122,11 @@ $(VENV)/.serve: $(UV) $(VENV)/.train requirements/serve.txt
 $(ZIG): $(UV) requirements/site.txt
 	@echo "A compiler of WebAssembly from PyPI, some 90 MB ..."
 	@$(UV) pip install -q --python $(BIN)/python --target build/zig --require-hashes -r requirements/site.txt
+	@touch $@
+
+$(SPHINX): $(UV) requirements/docs.txt
+	@echo "A generator of the documentation's pages from PyPI, some 20 MB ..."
+	@$(UV) pip install -q --python $(BIN)/python --target build/sphinx --require-hashes -r requirements/docs.txt
 	@touch $@
 
 build/mujoco: $(UV) requirements/transfer.txt  # for benchmarks/transfer.py alone

@@ -256,6 +256,13 @@ def test_the_page_opens_and_trains_without_a_network_after_the_first_visit(page:
     page.get_by_role("button", name="Train").click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Stop").click()
+    page.get_by_role("link", name="Documentation").click()
+    page.get_by_label("Search").fill("penalty")
+    page.keyboard.press("Enter")
+    page.locator("#search-results").get_by_role("link", name="Evaluation", exact=True).click()
+    page.get_by_role("heading", name="Evaluation", exact=True).wait_for()
+    page.get_by_role("link", name="Train a car").click()
+    page.get_by_role("button", name="Train").wait_for(timeout=PATIENCE)
     page.context.set_offline(False)
 
 

@@ -17,5 +17,6 @@ self.addEventListener("activate", (event) => {
 self.addEventListener("fetch", (event) => {
   const { request } = event;
   if (request.method !== "GET" || !request.url.startsWith(self.registration.scope)) return;
-  event.respondWith(caches.match(request, { cacheName: VERSION }).then((found) => found ?? fetch(request)));
+  const where = { cacheName: VERSION, ignoreSearch: true }; // what the documentation is asked for stands behind a "?"
+  event.respondWith(caches.match(request, where).then((found) => found ?? fetch(request)));
 });

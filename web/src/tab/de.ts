@@ -29,6 +29,7 @@ export const de: Record<TabKey, string> = {
   drop: "Löschen",
   full: "Im Speicher dieses Browsers ist kein Platz mehr: Lösche ein Modell, oder lade dieses jetzt herunter.",
   installed: "Alles andere, etwa Rennen zwischen Modellen, gibt es im installierten Programm.",
+  docs: "Dokumentation (englisch)",
   race: "Rennen",
   race_lead: "Allein auf der Straße, um Kisten herum oder an langsameren Autos vorbei.",
   race_among:

@@ -27,6 +27,7 @@ export const en = {
   drop: "Delete",
   full: "There is no room left in this browser's storage: delete a model, or download this one now.",
   installed: "Everything else, such as races between models, is in the installed program.",
+  docs: "Documentation",
   race: "Race",
   race_lead: "Alone on the road, around boxes, or past slower cars.",
   race_among: "The car carries a LIDAR here. To learn the way round takes some minutes; twenty laps are judged.",
