@@ -201,11 +201,13 @@ async function session(core, asked) {
   const wish = { plan, race, policy, objects, track, seed };
   const trainer = new Trainer(core, wish, pay);
   let evaluation;
+  let download; // of what was judged first
   while (trainer.steps < steps) {
     trainer.drive(() => {});
     trainer.learn();
-    if (trainer.needsEvaluation || trainer.steps >= steps)
-      evaluation = trainer.evaluate();
+    if (!trainer.needsEvaluation && trainer.steps < steps) continue;
+    evaluation = trainer.evaluate();
+    download ??= await downloaded(trainer, evaluation, asked);
   }
   const { completions, lapTimes } = evaluation;
   const { learning, average, simulation, totals, lengths, returnScale } =
@@ -220,7 +222,22 @@ async function session(core, asked) {
     returnScale: digest(returnScale),
     completions,
     lapTimes,
+    download,
   };
+}
+
+/** What the page would give of a training as it stands. */
+async function downloaded(trainer, evaluation, asked) {
+  const { modelOf, archive } = await load("src/tab/model.ts");
+  const { plan, race: type, objects, space, track, seed, source } = asked;
+  const { weights } = evaluation;
+  const model = modelOf(track, {
+    ...{ name: type, seed, reward: source, space, race: { type, objects } },
+    ...{ steps: trainer.steps, seconds: 1, laps: 0, bestLap: null, weights },
+    ...{ state: trainer.state(), judgement: trainer.judgement(evaluation) },
+  });
+  const file = await archive(model, plan);
+  return Buffer.from(await file.arrayBuffer()).toString("base64");
 }
 
 /** Somebody's drive, answer by answer. */

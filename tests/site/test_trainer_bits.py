@@ -5,19 +5,24 @@ Node runs the page's own files; see test_core_bits.py for what it needs.
 
 from __future__ import annotations
 
+import base64
+from pathlib import Path
 from typing import Any
 
 import pytest
 from test_core_bits import digest, in_node
 
 from racecraft import train
+from racecraft.importing import import_run
 from racecraft.learn import NetworkSpec
 from racecraft.learn.flat_weights import join_weights
 from racecraft.learn.learner import below
 from racecraft.run import RunFolder
+from racecraft.run.checkpoint import Checkpoint
 from racecraft.sim.objects import objects_for_race
 from racecraft.site.javascript import javascript
 from racecraft.site.plan import plan, track_file
+from racecraft.training import resume
 
 pytestmark = pytest.mark.slow
 TRACK, SEED = "oval", 3
@@ -70,6 +75,7 @@ def asked(race: str, **more: Any) -> dict[str, Any]:
         "track": track_file(TRACK),
         "seed": SEED,
         "steps": 2 * every,
+        "source": PAYS,
         "rewards": javascript({"own": PAYS}),
         **more,
     }
@@ -87,9 +93,16 @@ def test_a_training_in_the_page_is_the_installed_programs(
     found: dict[str, Any], runs: dict[str, RunFolder], race: str
 ) -> None:
     saved = runs[race].checkpoints.load("last")
-    spec = NetworkSpec(**{**saved.metadata["network"], "frame_shape": (120, 160)})
     judged = saved.metadata["evaluator"]["last"]
-    assert found[race] == {
+    theirs = {name: value for name, value in found[race].items() if name != "download"}
+    assert theirs == {**bits(saved), "completions": judged["completions"], "lapTimes": judged["lap_times"]}
+    assert len(set(judged["completions"])) > 1  # trials of different starts
+
+
+def bits(saved: Checkpoint) -> dict[str, Any]:
+    """What the next iteration depends on."""
+    spec = NetworkSpec(**{**saved.metadata["network"], "frame_shape": (120, 160)})
+    return {
         "steps": saved.step,
         "learning": digest(join_weights(below("learning/", saved.arrays), spec)),
         "average": digest(join_weights(below("average/", saved.arrays), spec)),
@@ -97,7 +110,17 @@ def test_a_training_in_the_page_is_the_installed_programs(
         "totals": digest(saved.arrays["ppo/episode_returns"]),
         "lengths": digest(saved.arrays["ppo/episode_lengths"]),
         "returnScale": digest(saved.arrays["ppo/return_scale"]),
-        "completions": judged["completions"],
-        "lapTimes": judged["lap_times"],
     }
-    assert len(set(judged["completions"])) > 1  # trials of different starts
+
+
+@pytest.mark.parametrize("race", RACES)
+def test_a_downloaded_training_goes_on_in_the_installed_program_to_the_same_bits(
+    found: dict[str, Any], runs: dict[str, RunFolder], race: str, tmp_path: Path
+) -> None:
+    archive = tmp_path / f"{race}.tar.gz"
+    archive.write_bytes(base64.b64decode(found[race]["download"]))
+    imported = RunFolder(import_run(archive, root=tmp_path / "runs").run)
+    begun, straight = imported.checkpoints.load("last"), runs[race].checkpoints.load("last")
+    assert 0 < begun.step < straight.step
+    resume(imported.path, until=f"{straight.step} steps")
+    assert bits(imported.checkpoints.load("last")) == bits(straight)

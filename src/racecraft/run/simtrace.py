@@ -71,7 +71,7 @@ _KEPT = (
     "track_length",
 )
 _KEPT_INDICES = np.array([ROW_COLUMNS.index(name) for name in _KEPT])
-_WIDTH = len(_KEPT) + 2  # and the index of the action, and the reward
+STEP_WIDTH = len(_KEPT) + 2  # and the index of the action, and the reward
 _COMPACT_EVERY = 512  # steps after which running episodes are packed
 
 
@@ -111,7 +111,7 @@ class SimTraceWriter:
         self._log = log
         self._stride = 1
         self._file: TextIO | None = None
-        self._steps: list[NDArray[np.float64]] = []  # (N, _WIDTH) each
+        self._steps: list[NDArray[np.float64]] = []  # (N, STEP_WIDTH) each
         self._first = [0] * num_envs  # index into _steps where a car's episode begins
         self._packed: list[list[NDArray[np.float64]]] = [[] for _ in range(num_envs)]  # its steps before _steps
         self._sizes = self._cut(episodes)  # bytes of the files there are, by iteration
@@ -132,7 +132,7 @@ class SimTraceWriter:
             rewards: Rewards of the step   (N,).
             ended: The episodes that end with it, as `EpisodeCounter.update` returns them.
         """
-        step = np.zeros((len(rows), _WIDTH))
+        step = np.zeros((len(rows), STEP_WIDTH))
         step[:, : len(_KEPT)] = rows[:, _KEPT_INDICES]
         step[:, -1] = rewards
         if isinstance(self._action_space, DiscreteActionSpace):
@@ -164,7 +164,7 @@ class SimTraceWriter:
         tables = [table for packed in self._packed for table in packed]
         lengths = [sum(map(len, packed)) for packed in self._packed]
         return {
-            "trace/steps": np.concatenate([np.zeros((0, _WIDTH)), *tables]),
+            "trace/steps": np.concatenate([np.zeros((0, STEP_WIDTH)), *tables]),
             "trace/lengths": np.array(lengths, np.float64),
         }
 
@@ -175,11 +175,11 @@ class SimTraceWriter:
             CheckpointError: It is of another number of cars, or damaged.
         """
         steps, lengths = state["trace/steps"], state["trace/lengths"].astype(np.int64)
-        fits = len(lengths) == len(self._first) and steps.shape == (lengths.sum(), _WIDTH) and (lengths >= 0).all()
+        fits = len(lengths) == len(self._first) and steps.shape == (lengths.sum(), STEP_WIDTH) and (lengths >= 0).all()
         if not fits:
             raise CheckpointError(
                 f"The state of the sim-trace is of {len(lengths)} cars and {steps.shape} steps, "
-                f"expected {len(self._first)} cars and {_WIDTH} numbers a step."
+                f"expected {len(self._first)} cars and {STEP_WIDTH} numbers a step."
             )
         self._steps.clear()
         self._first = [0] * len(lengths)
@@ -207,7 +207,7 @@ class SimTraceWriter:
             self._file = None
 
     def _take(self, env: int) -> NDArray[np.float64]:
-        """The steps of a car's episode   (T, _WIDTH); the next one begins after them."""
+        """The steps of a car's episode   (T, STEP_WIDTH); the next one begins after them."""
         recent = [step[env] for step in self._steps[self._first[env] :]]
         table = np.concatenate([*self._packed[env], recent]) if recent else np.concatenate(self._packed[env])
         self._first[env] = len(self._steps)

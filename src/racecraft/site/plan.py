@@ -15,6 +15,7 @@ from racecraft.race.conditions import STANDARD_CAR
 from racecraft.race.rules import RULE_SETS
 from racecraft.reward import situations
 from racecraft.run.folder import RunInfo
+from racecraft.run.simtrace import STEP_WIDTH
 from racecraft.serve.rewards.routes import list_actions
 from racecraft.serve.rewards.schemas import ActionPreset
 from racecraft.serve.tracks.courses import geometry
@@ -170,6 +171,7 @@ def plan() -> dict[str, Any]:
         "seeds": list(SEEDS),
         "statuses": list(STATUS_NAMES),
         "objectKinds": list(OBJECT_KINDS),
+        "traceWidth": STEP_WIDTH,
         "objectColumns": {"header": list(OBJECT_HEADER), "each": list(OBJECT_COLUMNS)},
         "spaces": [told_space(preset) for preset in list_actions()],
         "races": {race: told_race(race) for race in RACE_TYPES},

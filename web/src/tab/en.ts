@@ -20,7 +20,7 @@ export const en = {
   unable: "This browser cannot run the simulator: {why}",
   models: "Your models",
   models_lead:
-    "They stay in this browser. A download goes on in the installed program: racecraft import FILE, then racecraft train --resume.",
+    "They stay in this browser. A download goes on in the installed program where it stopped here: racecraft import FILE, then racecraft train --resume.",
   models_none: "Nothing yet. A car that has been trained and judged is kept here.",
   model_about: "{track}, {laps} of {trials} laps, best {lap}, {steps} steps",
   download: "Download",

@@ -4,6 +4,7 @@ import { Curves, type Point } from "../lib/curves";
 import type { Look, Picture } from "../lib/poses";
 import { countOf } from "./objects";
 import type { Trace } from "./drivencar";
+import type { Judgement, TrainingState } from "./trainer";
 import type { Plan, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
 import type { Objects } from "./verify/header";
@@ -46,6 +47,8 @@ export interface Judged {
   seconds: number;
   weights: Float32Array;
   trace: Trace;
+  state: TrainingState;
+  judgement: Judgement;
 }
 
 export class Lesson {
@@ -184,9 +187,19 @@ export class Lesson {
       }
       case "evaluation": {
         const { completions, lapTimes, weights, trace } = report.evaluation;
-        const { steps, seconds } = report;
+        const { steps, seconds, state, judgement } = report;
         const bestLap = lapTimes.length ? Math.min(...lapTimes) : null;
-        this.judged = { laps: lapTimes.length, trials: completions.length, bestLap, steps, seconds, weights, trace };
+        this.judged = {
+          laps: lapTimes.length,
+          trials: completions.length,
+          bestLap,
+          steps,
+          seconds,
+          weights,
+          trace,
+          state,
+          judgement,
+        };
         this.add({ kind: "evaluation", step: steps, seconds, completions, lap_times: lapTimes });
         break;
       }

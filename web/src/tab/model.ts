@@ -1,9 +1,11 @@
 /** A car that learned in this tab, and the archive of it that `racecraft import` takes. */
 import type { ActionPreset } from "../api/client";
 import type { Trace } from "./drivencar";
-import type { Plan, Policy, RaceType, TrackFile } from "./plan";
+import { weightsAlone, wholeTraining } from "./checkpoint";
+import type { Plan, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
 import { gzip, tar } from "./tar";
+import type { Judgement, TrainingState } from "./trainer";
 import type { Objects } from "./verify/header";
 
 export interface Model {
@@ -21,6 +23,8 @@ export interface Model {
   space?: ActionPreset; // none of models that were kept when there was only the default one
   race?: { type: RaceType; objects: Objects }; // none of those that were kept when there were only time trials
   weights: Float32Array;
+  state?: TrainingState; // of the training behind it, to go on to the same bits; none of older ones
+  judgement?: Judgement;
   trace?: Trace; // of its fastest lap, to drive against; none of older ones
 }
 
@@ -33,50 +37,31 @@ export const modelOf = (track: TrackFile, rest: Omit<Model, "track" | "trackDige
 
 const text = (value: unknown) => new TextEncoder().encode(typeof value === "string" ? value : JSON.stringify(value));
 
-/** A run folder whose checkpoint holds weights alone: training goes on from them in the installed program. */
+/** A run folder that the installed program goes on with: where the training was kept whole, with the step that would
+ * have come next, otherwise from its weights. */
 export async function archive(model: Model, plan: Plan): Promise<Blob> {
-  const { created, seed, track, trackDigest: track_digest } = model;
+  const { created, seed, track, trackDigest: track_digest, weights, steps, seconds, state, judgement } = model;
   const { type, objects } = model.race ?? { type: "time-trial", objects: { obstacles: null, bots: null } };
   const policy = policyFor(plan.races[type], model.space ?? plan.spaces[0]!, objects);
-  const checkpoint = checkpointOf(model, policy);
-  const digest = await sha256(checkpoint);
-  const file = `000000000-${digest.slice(0, 8)}.safetensors`;
-  const [size, time_stamp] = [checkpoint.length, Date.parse(created) / 1000];
-  const manifest = {
-    format: 1,
-    best: file,
-    last: file,
-    checkpoints: [{ step: 0, file, size, sha256: digest, time_stamp, score: null, metrics: {} }],
-  };
+  const time_stamp = Date.parse(created) / 1000;
+  const checkpoint =
+    state && judgement
+      ? wholeTraining(plan, policy, weights, { state, judgement, seconds, created: time_stamp })
+      : weightsAlone(policy, weights, { steps, seconds: time_stamp });
+  const { step, score, metrics } = checkpoint;
+  const digest = await sha256(checkpoint.file);
+  const file = `${String(step).padStart(9, "0")}-${digest.slice(0, 8)}.safetensors`;
+  const entry = { step, file, size: checkpoint.file.length, sha256: digest, time_stamp, score, metrics };
+  const manifest = { format: 1, best: file, last: file, checkpoints: [entry] };
   const files = {
     "run.json": text({ ...policy.run, seed, track, track_digest, created }),
     "reward_function.py": text(model.reward),
     "model_metadata.json": text(policy.modelMetadata),
     "checkpoints/manifest.json": text(manifest),
-    [`checkpoints/${file}`]: checkpoint,
+    [`checkpoints/${file}`]: checkpoint.file,
   };
   const named = Object.entries(files).map(([name, data]) => [`${model.name}/${name}`, data] as const);
-  return gzip(tar(Object.fromEntries(named), Date.parse(created) / 1000));
-}
-
-/** https://huggingface.co/docs/safetensors */
-function checkpointOf({ weights, created, steps }: Model, policy: Policy): Uint8Array {
-  const metadata = { network: policy.spec, origin: { kind: "tab", steps } };
-  const about = { step: 0, time_stamp: Date.parse(created) / 1000, score: null, metrics: {}, metadata };
-  const header: Record<string, unknown> = { __metadata__: { racecraft: JSON.stringify(about) } };
-  let end = 0;
-  for (const [name, shape] of policy.weights) {
-    const begin = end;
-    end += 4 * shape.reduce((size, side) => size * side, 1);
-    header[`weights/${name}`] = { dtype: "F32", shape, data_offsets: [begin, end] };
-  }
-  const head = text(JSON.stringify(header));
-  const padded = Math.ceil(head.length / 8) * 8;
-  const all = new Uint8Array(8 + padded + end).fill(0x20, 8, 8 + padded);
-  new DataView(all.buffer).setBigUint64(0, BigInt(padded), true);
-  all.set(head, 8);
-  all.set(new Uint8Array(weights.buffer, weights.byteOffset, weights.byteLength), 8 + padded);
-  return all;
+  return gzip(tar(Object.fromEntries(named), time_stamp));
 }
 
 async function sha256(data: Uint8Array): Promise<string> {

@@ -46,6 +46,7 @@ export interface Plan {
   evaluationSeed: number; // added to a training's
   seeds: number[];
   statuses: string[]; // of a car, by the number in its row
+  traceWidth: number; // numbers that the installed program logs of a step
   objectKinds: string[]; // by the number in a row
   objectColumns: { header: string[]; each: string[] }; // behind a row's own
   spaces: ActionPreset[]; // the default first

@@ -3,6 +3,7 @@ import type { Cars, Core, Episode, Learner, Training } from "./core";
 import type { Trace } from "./drivencar";
 import { toldObjects } from "./objects";
 import { startPose } from "./placement";
+import { NO_LAP } from "./checkpoint";
 import { arraysOf, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
 import type { Pay } from "./python";
 import { Road } from "./road";
@@ -54,6 +55,15 @@ export interface TrainingState {
   returnScale: Float64Array; // mean and spread
 }
 
+/** What evaluations said so far, as racecraft.training.evaluator remembers it. */
+export interface Judgement {
+  completions: number[]; // of the last one
+  lapTimes: number[];
+  bestScore: number[]; // mean completion, and less the fastest lap
+  bestLap: number | null; // s
+  episodes: number; // that ended
+}
+
 /** What is trained. */
 export interface Asked {
   plan: Plan;
@@ -84,7 +94,9 @@ export class Trainer {
   private shares: number[] = []; // of the lap, of the episodes that ended
   private iteration = 0;
   private evaluatedAt = 0;
-  private wasGood = false;
+  private episodes = 0;
+  private bestScore = [-1, -NO_LAP];
+  private bestLap: number | null = null;
 
   constructor(
     private readonly core: Core,
@@ -138,9 +150,11 @@ export class Trainer {
     if (!training.learn()) throw new Error("The loss is no number any more. Look for huge rewards.");
     this.iteration++;
     this.average();
+    const ended = training.ended();
+    this.episodes += ended.length;
     return {
       steps: this.steps,
-      ended: training.ended(),
+      ended,
       completion: shares.length
         ? shares.reduce((sum, share) => sum + Math.min(Math.max(share, 0), 1), 0) / shares.length
         : null,
@@ -175,6 +189,16 @@ export class Trainer {
     };
   }
 
+  /** What goes with it: the last evaluation's outcome, and the best so far. */
+  judgement({ completions, lapTimes }: Evaluation): Judgement {
+    const { bestScore, bestLap, episodes } = this;
+    return { completions, lapTimes, bestScore, bestLap, episodes };
+  }
+
+  private get wasGood(): boolean {
+    return this.bestScore[0]! >= this.race.good;
+  }
+
   private get drivingWeights(): Float32Array {
     return this.wasGood && this.mean ? this.mean : this.learner.read("weights");
   }
@@ -202,7 +226,11 @@ export class Trainer {
     const evaluation = { ...judged, weights, trace: traces[judged.fastest] ?? [] };
     this.evaluatedAt = this.steps;
     const mean = evaluation.completions.reduce((sum, one) => sum + one, 0) / trials.count;
-    this.wasGood ||= mean >= this.race.good;
+    const lap = judged.lapTimes.length ? Math.min(...judged.lapTimes) : null;
+    const score = [mean, -(lap ?? NO_LAP)];
+    const isBest = score[0] === this.bestScore[0] ? score[1]! >= this.bestScore[1]! : score[0]! > this.bestScore[0]!;
+    if (isBest) this.bestScore = score;
+    if (lap !== null) this.bestLap = Math.min(lap, this.bestLap ?? lap);
     return evaluation;
   }
 

@@ -8,7 +8,15 @@ import { DrivenCar, type Trace } from "./drivencar";
 import { objectsOf } from "./objects";
 import { read, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
 import { type Pay, Python, RewardFailure } from "./python";
-import { type Evaluation, type Iteration, payWith, type Reward, Trainer } from "./trainer";
+import {
+  payWith,
+  Trainer,
+  type Evaluation,
+  type Iteration,
+  type Judgement,
+  type Reward,
+  type TrainingState,
+} from "./trainer";
 import type { Objects } from "./verify/header";
 import type { ProblemKey } from "./verify/problem";
 import type { Verdict } from "./verify/verify";
@@ -67,7 +75,14 @@ export type Report =
   | { kind: "printed"; text: string }
   | { kind: "look"; look: Look; picture: Picture }
   | { kind: "iteration"; iteration: Iteration; seconds: number }
-  | { kind: "evaluation"; evaluation: Evaluation; steps: number; seconds: number }
+  | {
+      kind: "evaluation";
+      evaluation: Evaluation;
+      steps: number;
+      seconds: number;
+      state: TrainingState;
+      judgement: Judgement;
+    }
   | { kind: "ended"; isReached: boolean }
   | { kind: "seated"; drive: Drive }
   | { kind: "steered"; state: DriveState; trace: Trace }
@@ -173,7 +188,8 @@ function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded
     tell({ kind: "iteration", iteration: trainer.learn(), seconds: seconds() });
     if (!trainer.needsEvaluation) continue;
     const evaluation = trainer.evaluate();
-    tell({ kind: "evaluation", evaluation, steps: trainer.steps, seconds: seconds() });
+    const [state, judgement] = [trainer.state(), trainer.judgement(evaluation)];
+    tell({ kind: "evaluation", evaluation, steps: trainer.steps, seconds: seconds(), state, judgement });
     if (evaluation.lapTimes.length >= race.laps) return tell({ kind: "ended", isReached: true });
   }
   tell({ kind: "ended", isReached: false });
