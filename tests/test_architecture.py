@@ -80,7 +80,10 @@ CONSOLE = (
     "openapi",
 )
 """Rooms of serve/, lowest first; a room's routes see the context, which is made of what all rooms know."""
-ROUTES = ("serve/models/archives.py", "serve/models/choices.py", "serve/evaluations/analysis.py")
+ROUTES = (
+    *("serve/models/archives.py", "serve/models/choices.py", "serve/models/exports.py"),
+    *("serve/evaluations/analysis.py", "serve/evaluations/beliefs.py"),
+)
 """Besides those that are called routes.py."""
 FACADE = ("__init__", "__main__")
 TORCH = ("learn/torch_",)

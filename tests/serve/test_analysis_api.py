@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import shutil
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -12,6 +13,11 @@ import numpy as np
 import pytest
 from leagues import untrained_run
 from running_consoles import RunningConsole
+
+from racecraft import load_track
+from racecraft.car.export import read_exported
+from racecraft.race.policy import load_policy
+from racecraft.run import RunFolder
 
 pytestmark = pytest.mark.slow
 
@@ -101,6 +107,64 @@ def test_saliency_of_one_moment(raced: tuple[RunningConsole, str, str]) -> None:
     refused(console.client.get(path, params={"lap": 1, "row": 10**6}), 404)
     refused(console.client.get(path, params={"lap": 1, "row": 3, "target": 50}), 404, "no output 50")
     refused(console.client.get(path, params={"lap": 1}), 422, "row")
+
+
+def test_what_perception_believes_of_one_moment(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, stamp = raced
+    path = f"/api/models/{name}/evaluations/{stamp}/belief"
+    track = load_track("oval")
+    lap = console.client.get(f"/api/models/{name}/evaluations/{stamp}/laps").json()["laps"][0]
+    for row in (1, 3):
+        seen = console.client.get(path, params={"lap": 1, "row": row}).json()
+        frame = base64.b64decode(seen["frame"])
+        assert len(frame) == seen["height"] * seen["width"]
+        drawn = console.client.get(path.replace("belief", "saliency"), params={"lap": 1, "row": row}).json()
+        colours = np.frombuffer(frame, np.uint8).astype(int) - np.frombuffer(base64.b64decode(drawn["frame"]), np.uint8)
+        assert np.abs(colours).mean() < 1.0  # the policy's own picture, but for how colours are mixed at edges
+        assert seen["on_road"]
+        _, left = track.project([lap["x"][row], lap["y"][row]])
+        assert seen["offset_m"] == pytest.approx(float(left), abs=0.05)
+        assert len(seen["line_rows"]) == len(seen["line_columns"]) == len(seen["line_error"]) > 3
+        assert np.shape(seen["regions"]) == (len(seen["region_rows"]), len(seen["region_columns"]))
+        assert seen["distance_m"] is None
+    refused(console.client.get(path, params={"lap": 9, "row": 3}), 404, "no step 3 in lap 9")
+    refused(console.client.get(path, params={"lap": 1, "row": 10**6}), 404)
+
+
+def test_a_model_for_a_car_and_driven_as_one(raced: tuple[RunningConsole, str, str], tmp_path: Path) -> None:
+    console, name, _ = raced
+    client, path = console.client, f"/api/models/{name}/export"
+    notes = client.get(path).json()
+    assert notes["network"] == "RACECRAFT_SMALL"
+    assert any("throttle" in note for note in notes["notes"])
+    reply = client.get(f"{path}/car")
+    assert reply.headers["Content-Disposition"] == f'attachment; filename="{name}.tar.gz"'
+    archive = tmp_path / "archive.tar.gz"
+    archive.write_bytes(reply.content)
+    own = load_policy(RunFolder.open(console.runs / name))[1]
+    weights = own.learner.weights()
+    for key, array in read_exported(archive).learner.weights().items():
+        if key.startswith("policy."):
+            assert np.array_equal(array, weights[key]), key
+    assert client.get(f"{path}/onnx").headers["Content-Disposition"] == f'attachment; filename="{name}.onnx"'
+    refused(client.get(f"{path}/toaster"), 422, "target")
+    refused(client.get(f"{path}/car", params={"checkpoint": "../x"}), 422, "checkpoint")
+    refused(client.get(f"{path}/car", params={"checkpoint": "77"}), 404, f"{name!r} has no checkpoint 77")
+
+    request = {"laps": 1, "num_trials": 1, "rules": "first_lap", "as_car": True}
+    job = client.post(f"/api/models/{name}/evaluations", json=request).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    cards = client.get(f"/api/models/{name}/evaluations").json()
+    assert [card["as_car"] for card in cards[:2]] == [True, False]
+    assert cards[1]["commands"] is None
+    picture = client.get(f"/api/models/{name}/files/{cards[0]['commands']}")
+    assert picture.headers["Content-Type"] == "image/png"
+
+
+def test_a_model_that_no_car_can_drive_says_why(console: RunningConsole) -> None:
+    name = untrained_run(console.runs, "seer", sensors=("FRONT_FACING_CAMERA", "DISCRETIZED_SECTOR_LIDAR")).name
+    refused(console.client.get(f"/api/models/{name}/export"), 422, "DISCRETIZED_SECTOR_LIDAR")
+    assert console.client.get(f"/api/models/{name}/export/onnx").status_code == 200
 
 
 def test_maps_of_a_training(raced: tuple[RunningConsole, str, str]) -> None:

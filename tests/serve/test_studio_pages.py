@@ -113,6 +113,22 @@ def test_a_lap_is_scrubbed_with_a_ghost_beside_it(studio: tuple[RunningConsole, 
     page.get_by_role("heading", name="Why is").or_(page.get_by_text("To say why")).wait_for()
 
 
+def test_a_model_is_driven_as_a_car_and_taken_to_one(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/models/right/race")
+    page.get_by_role("spinbutton", name="Trials").fill("1")
+    page.get_by_role("spinbutton", name="Laps").fill("1")
+    page.get_by_role("checkbox", name="As a car drives it").check()
+    page.get_by_role("button", name="Start an evaluation").click()
+    page.get_by_role("img", name="Commanded against resulting").wait_for()
+    assert page.locator("option", has_text="as a car").count() == 1
+    page.locator("summary", has_text="What a car does otherwise").click()
+    page.get_by_text("throttle").first.wait_for()
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download for a car").click()
+    assert download.value.suggested_filename == "right.tar.gz"
+    assert Path(download.value.path()).read_bytes().startswith(b"\x1f\x8b")
+
+
 @pytest.mark.parametrize(("kind", "begins"), [("CSV", b'"Place'), ("SVG", b"<svg"), ("PNG", b"\x89PNG")])
 def test_a_chart_is_kept_as_a_file(studio: tuple[RunningConsole, Any], kind: str, begins: bytes) -> None:
     page = visit(studio, "/models/left/race")
@@ -134,10 +150,13 @@ def test_maps_and_saliency(studio: tuple[RunningConsole, Any]) -> None:
     page.get_by_role("checkbox", name="The whole training").uncheck()
     page.get_by_text("Iteration 0").wait_for()
     page.get_by_text("Grad-CAM on conv2").wait_for()
-    before = page.locator("canvas").screenshot()
+    looks, believes = (page.locator(f"canvas[aria-label^='What {name}']") for name in ("the policy", "perception"))
+    page.get_by_text("In the way").wait_for()
+    before = looks.screenshot(), believes.screenshot()
     page.get_by_role("slider", name="Moment of the lap").fill("30")
     page.wait_for_timeout(1500)
-    assert page.locator("canvas").screenshot() != before
+    assert looks.screenshot() != before[0]
+    assert believes.screenshot() != before[1]
     with page.expect_download() as download:
         page.get_by_role("link", name="Download the report").click()
     assert b"Laps of the last evaluation" in Path(download.value.path()).read_bytes()

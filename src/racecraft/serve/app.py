@@ -27,7 +27,7 @@ from racecraft.serve.door.guard import Guard, content_policy
 from racecraft.serve.driving import routes as drives
 from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
-from racecraft.serve.evaluations import analysis
+from racecraft.serve.evaluations import analysis, beliefs
 from racecraft.serve.evaluations import routes as evaluations
 from racecraft.serve.groups import routes as groups
 from racecraft.serve.jobs import routes as jobs
@@ -36,7 +36,7 @@ from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.lessons import routes as lessons
 from racecraft.serve.machine import routes as console
-from racecraft.serve.models import archives, choices
+from racecraft.serve.models import archives, choices, exports
 from racecraft.serve.models import routes as models
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
@@ -150,7 +150,8 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     app.add_middleware(Compressed)  # behind the guard, which stands before everything
     app.add_middleware(guard.middleware)
     replies.install(app)
-    parts = [console, tracks, drives, rewards, choices, archives, models, evaluations, analysis, tunings, sweeps, races]
+    parts = [console, tracks, drives, rewards, choices, archives, exports, models]
+    parts += [evaluations, analysis, beliefs, tunings, sweeps, races]
     parts += [contests, jobs, events, door, audit, lessons]
     for part in parts:
         app.include_router(part.router)

@@ -24,6 +24,8 @@ export type HistoryPage = Schemas["HistoryPage"];
 export type EvaluationLaps = Schemas["EvaluationLaps"];
 export type TrainingMaps = Schemas["TrainingMaps"];
 export type SaliencyPicture = Schemas["SaliencyPicture"];
+export type RoadBelief = Schemas["RoadBelief"];
+export type ExportNotes = Schemas["ExportNotes"];
 export type Choices = Schemas["Choices"];
 export type NumberChoice = Schemas["NumberChoice"];
 export type RewardLap = Schemas["RewardLap"];
@@ -139,6 +141,9 @@ export const api = {
       "GET",
       `/models/${name(run)}/evaluations/${stamp}/saliency?lap=${lap}&row=${row}${target === undefined ? "" : `&target=${target}`}`,
     ),
+  belief: (run: string, stamp: string, lap: number, row: number) =>
+    ask<RoadBelief>("GET", `/models/${name(run)}/evaluations/${stamp}/belief?lap=${lap}&row=${row}`),
+  exportNotes: (run: string) => ask<ExportNotes>("GET", `/models/${name(run)}/export`),
   maps: (run: string, first: number, last: number) =>
     ask<TrainingMaps>("GET", `/models/${name(run)}/maps?first=${first}&last=${last}`),
   job: (id: string) => ask<JobInfo>("GET", `/jobs/${id}`),
@@ -146,6 +151,10 @@ export const api = {
 
 /** Address of a model as one tar.gz, weights included. */
 export const archiveOf = (run: string) => `/api/models/${name(run)}/archive`;
+
+/** Address of a model as the archive of a physical car, or as ONNX. */
+export const exportedOf = (run: string, target: "car" | "onnx", checkpoint: string) =>
+  `/api/models/${name(run)}/export/${target}?checkpoint=${checkpoint}`;
 
 /** Address of a model's report. */
 export const reportOf = (run: string) => `/api/models/${name(run)}/report`;

@@ -88,7 +88,7 @@ def _card(folder: RunFolder, path: Path) -> EvaluationCard:
     summary = read_json_object(path)
     metrics = folder.evaluation_metrics(stamp)
     laps = read_json_object(metrics)["metrics"] if metrics.is_file() else []
-    picture = path.parent / "racing-line.png"
+    picture, commands = path.parent / "racing-line.png", path.parent / "as-car.png"
     trace = path.parent / "evaluation-simtrace" / "0-iteration.csv"
     return EvaluationCard(
         stamp=stamp,
@@ -98,4 +98,6 @@ def _card(folder: RunFolder, path: Path) -> EvaluationCard:
         picture=f"{path.parent.name}/{picture.name}" if picture.is_file() else None,
         video=summary.get("video"),
         telemetry=stamp if trace.is_file() else None,
+        as_car="as_car" in summary,
+        commands=f"{path.parent.name}/{commands.name}" if commands.is_file() else None,
     )

@@ -21,6 +21,8 @@ class EvaluateModel(Message):
     rules: str = "drfc"
     checkpoint: str | int = "best"
     seed: int = Field(0, ge=0, le=2**32 - 1)
+    as_car: bool = False
+    """Drive the exported file through a physical car's own steps."""
 
 
 class EvaluationCard(Message):
@@ -34,6 +36,10 @@ class EvaluationCard(Message):
     picture: str | None
     video: str | None
     telemetry: str | None
+    as_car: bool
+    """Whether it was driven as a physical car drives."""
+    commands: str | None
+    """Then a picture: what was commanded, against what became of it."""
 
 
 class Telemetry(Message):
@@ -161,6 +167,37 @@ class SaliencyPicture(Message):
     """Probabilities of actions, or mean steering and speed from -1 to 1."""
     target: int
     is_discrete: bool
+
+
+class RoadBelief(Message):
+    """What perception believes of one picture; lengths and angles are the lens's, as in `racecraft perceive --json`."""
+
+    on_road: bool
+    offset_m: float
+    """Left of the road's middle positive."""
+    offset_error_m: float
+    """As all errors the mean distance to the truth that is expected."""
+    heading_rad: float
+    heading_error_rad: float
+    middle: list[float | None]
+    middle_error: list[float | None]
+    half_width_m: float
+    curvature_per_m: dict[str, float]
+    distance_m: float | None
+    """To what is in the way; null where nothing is."""
+    distance_between_m: list[float] | None
+    line_rows: list[int]
+    """Rows of the picture in which the road's middle is seen."""
+    line_columns: list[float]
+    line_error: list[float]
+    regions: list[list[float]]
+    """Probability of road at `region_rows` and `region_columns`."""
+    region_rows: list[int]
+    region_columns: list[int]
+    height: int
+    width: int
+    frame: str
+    """The camera's image, grey, a byte a pixel, base64."""
 
 
 LapTrace.model_rebuild()

@@ -12,12 +12,15 @@ from racecraft.serve.jobs.task import Task
 
 def evaluate(task: Task) -> dict[str, Any]:
     """Race a model against the clock, unless this very job did so before its process was killed."""
+    from racecraft.car.evaluation import evaluate_as_car
     from racecraft.judging.evaluation import evaluate_run
 
     folder = task.folder
     if task.job.attempts > 1 and (done := _evaluated(folder, task.job.id)) is not None:
         return done
-    return evaluate_run(folder.path, job=task.job.id, **task.job.payload).to_dict()
+    payload = dict(task.job.payload)
+    judge = evaluate_as_car if payload.pop("as_car", False) else evaluate_run
+    return judge(folder.path, job=task.job.id, **payload).to_dict()
 
 
 def _evaluated(folder: RunFolder, job: str) -> dict[str, Any] | None:

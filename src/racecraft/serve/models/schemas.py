@@ -119,6 +119,16 @@ class ImportedModel(Message):
     notes: list[str]
 
 
+class ExportNotes(Message):
+    """What a model would be as the archive of a physical car."""
+
+    step: int
+    """Camera steps of training behind it."""
+    network: str
+    notes: list[str]
+    """Sentences on what a car does otherwise than the simulator."""
+
+
 class Demonstration(Message):
     """A lap of a model's best checkpoint, driven to be looked at."""
 

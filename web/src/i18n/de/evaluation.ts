@@ -27,5 +27,17 @@ export const evaluation: Record<keyof typeof english, string> = {
   end_immobilized: "Stehen geblieben",
   end_time_up: "Zeit abgelaufen",
   end_in_progress: "Unterwegs",
+  as_car: "So, wie ein Auto es fährt",
+  as_car_hint:
+    "Fährt die Datei, die ein Auto nimmt, durch dessen eigene Schritte: sein Bild, seine Anteile, seine Gaskurve.",
+  as_car_mark: "als Auto",
+  as_car_commands: "Was ein Auto aus den Befehlen macht",
+  as_car_commands_alt: "Befohlene gegen entstandene Geschwindigkeiten und Lenkwinkel, wie die Auswertung sie fuhr",
+  for_car: "Für ein echtes Auto",
+  for_car_lead:
+    "Das Archiv, das ein DeepRacer-Auto nimmt, über seine Seite oder einen USB-Stick. Auf einem Auto hat es hier niemand erprobt.",
+  for_car_file: "Für ein Auto herunterladen",
+  for_car_onnx: "Als ONNX herunterladen",
+  for_car_notes: "Was ein Auto anders macht",
   train_first: "Trainiere das Modell zuerst: Noch gibt es nichts, womit es fahren könnte.",
 };

@@ -1,0 +1,87 @@
+"""What perception believes of one moment of a lap, beside the camera's picture of it."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import math
+import threading
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from fastapi import APIRouter, Query
+
+from racecraft.analysis import driven_direction, read_laps
+from racecraft.judging.trained import trained_camera
+from racecraft.serve.context import InContext
+from racecraft.serve.evaluations.analysis import AHEAD, evaluation_track, trace_of
+from racecraft.serve.evaluations.objects import objects_of
+from racecraft.serve.evaluations.schemas import LapObject, RoadBelief
+from racecraft.serve.problems import NotFound
+from racecraft.sim.camera import LUMA
+from racecraft.sim.views import BoxView, CarView, ObjectView, Scene
+
+if TYPE_CHECKING:
+    from racecraft.perception import Perceiver
+
+router = APIRouter(prefix="/api/models/{name}", tags=["analysis"])
+
+_LOOKING: Final = threading.Lock()
+"""One network for everybody, which looks at one picture at a time."""
+
+
+@router.get("/evaluations/{stamp}/belief")
+def get_belief(
+    name: str,
+    stamp: str,
+    context: InContext,
+    lap: int = Query(ge=1, le=10**6),
+    row: int = Query(ge=0, le=10**6),
+) -> RoadBelief:
+    """The camera's picture of one step of a lap, with what stood on the road, and what perception believes of it."""
+    from racecraft.perception.answers import REGION_COLUMNS, REGION_ROWS, ROWS
+    from racecraft.perception.telling import sees_middle, tell
+
+    folder = context.garage.folder(name)
+    track = evaluation_track(context, folder, stamp)
+    laps = read_laps(trace_of(folder, stamp))
+    found = next((traced for traced in laps if traced.number == lap), None)
+    if found is None or row >= len(found.time):
+        raise NotFound(f"Evaluation {stamp} of {name!r} has no step {row} in lap {lap}.")
+    heading = float(found.heading[row])
+    x, y = found.points[row] - AHEAD * np.array([math.cos(heading), math.sin(heading)])
+    camera = trained_camera(folder.read_info())
+    view = Scene(driven_direction(track, [found.points]), palette=camera.palette).driver_view(camera, lit_walls=False)
+    there = [_view(one, row) for one in objects_of(folder, stamp, laps).get(lap, [])]
+    picture = view.draw(float(x), float(y), heading, cars=there)
+    frame = (picture @ np.array(LUMA) + 0.5).astype(np.uint8)
+    with _LOOKING:
+        belief = _perceiver()(frame[None])
+    told = tell("", belief, 0)
+    del told["file"]
+    seen = [place for place in range(len(ROWS)) if sees_middle(belief, 0, place)]
+    return RoadBelief(
+        **told,
+        line_rows=[ROWS[place] for place in seen],
+        line_columns=belief.middle[0, seen].astype(float).round(2).tolist(),
+        line_error=belief.middle_error[0, seen].astype(float).round(2).tolist(),
+        regions=belief.regions[0].astype(float).round(3).tolist(),
+        region_rows=list(REGION_ROWS),
+        region_columns=list(REGION_COLUMNS),
+        height=frame.shape[0],
+        width=frame.shape[1],
+        frame=base64.b64encode(frame.tobytes()).decode(),
+    )
+
+
+@functools.cache
+def _perceiver() -> Perceiver:
+    from racecraft.perception import Perceiver
+
+    return Perceiver(num_threads=1)
+
+
+def _view(thing: LapObject, row: int) -> ObjectView:
+    place = min(row, len(thing.x) - 1)  # what stands has one pose for the whole lap
+    pose = (thing.x[place], thing.y[place], thing.heading[place])
+    return BoxView(*pose) if thing.kind == "box" else CarView(*pose)
