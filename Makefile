@@ -55,7 +55,7 @@ test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every 
 	$(PYTEST) --durations=40
 
 test-fast: $(VENV)/.built $(VENV)/.dev  ## the tests that take seconds
-	$(PYTEST) -m "not slow"
+	$(PYTEST) -m "not slow and not costly"
 
 mutants: $(VENV)/.built $(VENV)/.dev  ## plant small faults, one at a time, and count which ones the tests notice (hours; goes on where it stopped)
 	$(BIN)/python tests/mutants/plant_python.py --jobs 2

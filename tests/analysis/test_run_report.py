@@ -36,7 +36,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder.path
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_report_needs_nothing_else(run: Path) -> None:
     path = write_report(run)
     assert path == run / "report.html"

@@ -28,7 +28,7 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("racecraft.bench.machine.COPY_BYTES", 1 << 20)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_benchmark_alone_gives_its_figures_below_the_machines_limit(name: str) -> None:
     said: list[str] = []
@@ -131,7 +131,7 @@ def test_what_takes_minutes_runs_only_when_it_is_named(monkeypatch: pytest.Monke
     assert ran[-1] == "learn"
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_learning_command_gives_its_time_and_its_memory(tmp_path: Path) -> None:
     result, wall, peak = learning._command(
         ["--track", "oval", "--until", "512 steps", "--num-threads", "1"], str(tmp_path)

@@ -23,7 +23,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_script_writes_its_table(tmp_path: Path) -> None:
     table = tmp_path / "table.json"
     small = ("--recipe", "steady", "--tracks", "oval", "--tracks", "kidney", "--until", "1024 steps")

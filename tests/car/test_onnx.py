@@ -108,7 +108,7 @@ def check(network: str, sensors: tuple[str, ...], kind: str, sight: NDArray[np.u
         assert (theirs.argmax(1) == ours.argmax(1)).all()
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize(("network", "sensors", "kind"), MODELS)
 def test_the_model_answers_as_the_network(network: str, sensors: tuple[str, ...], kind: str) -> None:
     shape = (5, 2, 40, 40) if STEREO in sensors else (5, 40, 40)

@@ -118,7 +118,7 @@ def check(network: str, sensors: tuple[str, ...], kind: str, *, count: int = 6) 
     np.testing.assert_allclose(theirs, ours, atol=1e-5 if network in (SMALL, SHALLOW) else 2e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize(("network", "sensors", "kind"), QUICK)
 def test_the_graph_answers_as_the_network(network: str, sensors: tuple[str, ...], kind: str) -> None:
     check(network, sensors, kind)
@@ -130,7 +130,7 @@ def test_a_large_graph_answers_as_the_network(network: str, sensors: tuple[str, 
     check(network, sensors, kind, count=2)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @REAL
 @pytest.mark.parametrize(("network", "kind"), [(SMALL, "discrete"), (SMALL, "continuous"), (SHALLOW, "discrete")])
 def test_real_pictures_get_the_same_answer(network: str, kind: str) -> None:

@@ -42,7 +42,7 @@ def test_every_algorithm_is_a_page_that_can_be_read() -> None:
         assert "import torch" not in text
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("algorithm", list(SHORT))
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others(algorithm: str) -> None:
     first, same, other = short(algorithm), short(algorithm), short(algorithm, seed=2)
@@ -53,7 +53,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others(algorithm: st
     assert first.steps >= 600
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("algorithm", list(SHORT))
 def test_a_learning_rate_of_zero_changes_nothing(algorithm: str) -> None:
     still = {"learning_rate": 0.0}
@@ -68,7 +68,7 @@ def test_a_learning_rate_of_zero_changes_nothing(algorithm: str) -> None:
     assert any((moved[name] != begun[name]).any() for name in kept)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("algorithm", list(SHORT))
 def test_what_was_learned_is_saved_and_goes_on(algorithm: str, tmp_path: Path) -> None:
     seen: list[Progress] = []
@@ -137,7 +137,7 @@ def test_numbers_that_leave_all_bounds_are_told() -> None:
     assert "learning_rate" in told.value.hint
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("environment", ["Blackjack-v1", "Taxi-v4", "MountainCarContinuous-v0"])
 def test_other_environments_are_learned_too(environment: str) -> None:
     for algorithm in ("q-table", "ppo") if environment != "MountainCarContinuous-v0" else ("ppo", "sac"):

@@ -42,7 +42,7 @@ def test_a_wrong_option_writes_nothing(racecraft: Run, trained: Path, arguments:
     assert not list(Path().iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_car_is_measured_and_driven(racecraft: Run, trained: Path) -> None:
     measured = ["--circle-left", "0.8", "--servo", "1.7,1.45,1.25", "--speed", "60=1.9", "--speed", "30=0.7"]
     outcome = racecraft("car", "calibrate", *measured, "-o", "mine.json")

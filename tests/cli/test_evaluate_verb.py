@@ -23,7 +23,7 @@ def test_evaluate(racecraft: Run, trained: Path) -> None:
     assert all(len(line) <= 80 for line in table)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_evaluate_as_json_names_files_that_can_be_read(racecraft: Run, trained: Path) -> None:
     arguments = ["--track", "oval", "--laps", "1", "--trials", "2", "--max-resets", "1", "--json"]
     document = racecraft("evaluate", str(trained), *arguments).document

@@ -16,7 +16,7 @@ from racecraft.cli.learn_text import CurveReporter
 SHORT = ("learn", "CliffWalking-v1", "--algorithm", "sarsa", "--seed", "1", "--until", "12000 steps", "--name", "a")
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_it_ends_with_one_object(racecraft: Run, tmp_path: Path) -> None:
     outcome = racecraft(*SHORT, "--json")
     assert (outcome.status, outcome.err) == (0, "")
@@ -34,7 +34,7 @@ def test_it_ends_with_one_object(racecraft: Run, tmp_path: Path) -> None:
     assert other["training_return"] != document["training_return"]
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_for_people_it_prints_lines_and_where_the_run_is(racecraft: Run) -> None:
     outcome = racecraft(*SHORT)
     assert outcome.status == 0
@@ -55,7 +55,7 @@ def test_it_films_what_was_learned(racecraft: Run, tmp_path: Path) -> None:
         assert stream.frames > 5
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_saved_run_is_watched_and_goes_on(racecraft: Run, tmp_path: Path) -> None:
     racecraft(*SHORT)
     outcome = racecraft("learn", "--resume", "runs/a", "--watch", "--json", "--until", "14000 steps")

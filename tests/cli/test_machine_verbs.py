@@ -43,7 +43,7 @@ def test_the_doctor_finds_what_is_broken(racecraft: Run, monkeypatch: pytest.Mon
     assert not racecraft("doctor", "--json").document["ok"]
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_bench(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(suite, "CAMERA_CARS", 16)
     monkeypatch.setattr(suite, "STATE_CARS", 64)

@@ -8,7 +8,7 @@ import pytest
 from command_line import Run
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_race_verify_and_ladder(racecraft: Run, trained: Path, tmp_path: Path) -> None:
     short = ("--track", "oval", "--time-limit", "4", "--no-video", "--laps", "1")
     document = racecraft("race", str(trained), f"{trained}@64", *short, "--json").document
@@ -46,7 +46,7 @@ def test_race_verify_and_ladder(racecraft: Run, trained: Path, tmp_path: Path) -
     assert racecraft("verify", str(tmp_path / "none.replay")).err.startswith("ReplayError")
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_race_of_a_secret_is_announced_held_and_checked(racecraft: Run, trained: Path, tmp_path: Path) -> None:
     short = ("--track", "oval", "--time-limit", "3", "--no-video", "--laps", "1", "--trials", "3")
     held = racecraft("race", str(trained), f"{trained}@64", *short, "--secret")

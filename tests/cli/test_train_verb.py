@@ -26,7 +26,7 @@ def test_train_ends_with_one_json_object(racecraft: Run) -> None:
     assert json.loads(Path("runs/mine/run.json").read_text())["seed"] == 3
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_train_against_itself_and_against_the_run_that_came_of_it(racecraft: Run) -> None:
     race = ("--race", "head-to-head", "--cars", "3", "--until", "512 steps", "--json")
     first = racecraft("train", *SMALL, *race, "--name", "first")
@@ -53,7 +53,7 @@ def test_train_tells_people_how_it_goes_and_how_to_go_on(racecraft: Run) -> None
     assert "--resume" in taken.document["error"]["hint"]
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_log_of_aws_on_stdout_is_all_there_is_on_stdout(racecraft: Run, trained: Path) -> None:
     outcome = racecraft("train", *SMALL, "--until", "512 steps", "--name", "mine", "--aws-log", "-")
     assert outcome.status == 0

@@ -75,7 +75,7 @@ def test_a_model_ties_with_itself(models: list[Path], tmp_path: Path) -> None:
     assert len({path.name for path in found.files.values()}) >= 4
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_race_is_filmed_with_ghosts(models: list[Path], tmp_path: Path) -> None:
     import av
 

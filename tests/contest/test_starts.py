@@ -168,7 +168,7 @@ def test_a_network_that_gives_no_numbers_is_named() -> None:
         held(entry("good", Blind()), entry("broken", Blind((float("nan"), 1.0))))
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_replay_of_a_car_with_another_lens_verifies(tmp_path: Path) -> None:
     """`object_in_camera` is seen through each entry's own lens; with another one honest replays would look forged."""
     objects = Objects(obstacles=Obstacles(count=6, placement="random"))

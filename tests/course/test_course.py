@@ -90,7 +90,7 @@ def test_a_lesson_is_complete(number: int) -> None:
             compile(cell.source, lesson.path.name, "exec")
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("number", [lesson.number for lesson in lessons()])
 def test_answers_are_judged(number: int) -> None:
     """The lesson's own cell that asks is run after each answer."""

@@ -37,7 +37,7 @@ def actions_for(envs, *, steps, seed=0):
     return [envs.action_space.sample() for _ in range(steps)]
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 @pytest.mark.parametrize(
     "settings",

@@ -41,7 +41,7 @@ def test_every_script_is_tested_here():
     }
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_gymnasium_loop_drives_one_car_and_many():
     printed = run("gymnasium_loop.py", "--steps", "100", "--track", "oval")
     assert "camera steps/s with 64 cars" in printed
@@ -54,7 +54,7 @@ def test_the_custom_reward_is_tried_and_driven():
     assert "line" not in printed  # neither a problem nor an error
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_custom_reward_is_clean_on_every_track():
     source = load_reward(CUSTOM / "reward_function.py")
     assert check_reward(source) == []

@@ -122,7 +122,7 @@ def test_frames_of_a_lap_that_no_colour_was_fitted_to_are_reproduced():
     assert np.median([structural_similarity(*pair) for pair in pairs]) > 0.88  # the bar is 0.75
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.skipif(not AWS_MODEL.is_dir(), reason="../shared/aws_model is not beside this repository")
 def test_policies_that_aws_trained_take_our_frames_for_real_ones():
     """Aligned, pose and lens: a quarter of a row up or down already changes a tenth of what they choose."""

@@ -44,7 +44,7 @@ def medians(found: dict) -> list[float]:
     return [100 * metres for metres in found["position_error_m"].values()]
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_rules_of_every_row_of_every_run():
     result = replay([*RUNS, OLDER], track=str(ROUTE))
     found = result.to_dict()
@@ -56,7 +56,7 @@ def test_the_rules_of_every_row_of_every_run():
     assert not result.reversed
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_car_on_runs_that_the_fit_never_saw():
     found = replay(UNSEEN, track=str(ROUTE), vehicle="v5").to_dict()
     assert found["windows"] > 50_000

@@ -32,7 +32,7 @@ def fits() -> list[FrameFit]:
     return [fit_frame(frame, track=ROUTE) for frame in FRAMES]
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @needs_frames
 def test_frames_of_the_original_are_reproduced(fits):
     for fit in fits:
@@ -72,7 +72,7 @@ def our_frame(path: Path, track, pose, size=(640, 480)) -> Path:
     return path
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_frame_of_our_own_is_found(tmp_path):
     track = load_track("reinvent_2018")
     x, y = track.point_at(6.0).tolist()
@@ -84,7 +84,7 @@ def test_a_frame_of_our_own_is_found(tmp_path):
     assert fit.difference < 3.0
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_command_prints_and_draws(tmp_path):
     track = load_track("oval")
     pose = (*track.point_at(3.0).tolist(), float(track.heading_at(3.0)))

@@ -141,7 +141,7 @@ def test_rewards(lines, tmp_path):
     assert str(result.differences.kept[0]).startswith("a.csv, line 3: reward 1.76152933, here 2.76152933")
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_another_cars_drive_is_told_apart_and_calibrated(tmp_path):
     path = write(tmp_path / "a.csv", drive(episodes=40, vehicle="v6"))
     assert replay(path, track="oval", vehicle="v5").to_dict()["position_error_m"]["15"] > 0.05
@@ -240,7 +240,7 @@ def test_an_evaluation_of_ours_with_resets_and_flying_laps(tmp_path):
     assert found["broken_rows"] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_logs_as_they_come_out_of_other_tools(lines, tmp_path):
     rows = [",".join(fields) for fields in lines]
     names = ["episode", "steps", "x", "y", "yaw", "steering_angle", "speed", *COLUMNS[7:10], "on_track", *COLUMNS[11:]]
@@ -354,7 +354,7 @@ def test_episodes_are_handed_on_whole(lines, tmp_path, monkeypatch):
     assert sum(map(len, episodes)) == len(set.union(*episodes)) == 25
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_long_log_does_not_fill_the_memory(lines, tmp_path):
     # From /proc, not getrusage: that one starts a process at the peak of the parent it was forked from.
     if not Path("/proc/self/status").exists():

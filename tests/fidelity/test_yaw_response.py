@@ -53,7 +53,7 @@ def response(files: Sequence[Path], speeds: tuple[float, float]) -> float:
     return float((first + (0.63 - before_it) / (step[first] - before_it)) / 15)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("speeds", [SLOW, FAST])
 def test_version_4_turns_twice_as_late_as_version_5(speeds: tuple[float, float]) -> None:
     older, newer = response([OLDER], speeds), response(NEWER, speeds)

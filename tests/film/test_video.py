@@ -22,7 +22,7 @@ def record(driver=None, **rules):
 CLUMSY = record(max_resets=1)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_video_can_be_read_again(tmp_path):
     path = film(CLUMSY, tmp_path / "race.mp4", name="racer", laps=1)
     with av.open(str(path)) as container:

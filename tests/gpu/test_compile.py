@@ -27,7 +27,7 @@ def test_every_kernel_of_the_source_is_listed():
     assert sorted(path.stem for path in SOURCES.glob("*.cu")) == sorted(PROGRAMS)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_programs_become_ptx_without_fused_multiply_add(name):
     code = compiled(name, "compute_80").decode()

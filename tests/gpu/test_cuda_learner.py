@@ -133,7 +133,7 @@ def open_ppo(*, reward: str = "racing", config: PPOConfig | None = None, actions
     return CudaPPO(config, learner, environment, seed=3), environment
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("actions", ["default", "continuous"])
 def test_an_iteration_does_what_it_says(actions):
     notes: list[str] = []
@@ -151,7 +151,7 @@ def test_an_iteration_does_what_it_says(actions):
     assert any((before[name] != array).any() for name, array in ppo.learner.weights().items())
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_interpreted_and_translated_rewards_train_alike():
     def run(reward: str, notes: list[str]):
         ppo, _ = open_ppo(reward=reward, notes=notes)

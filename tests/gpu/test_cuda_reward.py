@@ -93,7 +93,7 @@ def test_translation_and_interpreter_agree(source, device, rows):
         assert len(set(worker(rows).tolist())) > 1
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_what_python_raises_is_not_a_number():
     device = HostDevice()
     bad = "import math\ndef reward_function(params):\n    return {}"

@@ -69,7 +69,7 @@ def pair(name: str, device=None, cars: int = CARS):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("name", CASES)
 def test_kernels_and_engine_give_the_same_bits(name, device):
     kernels, engine = pair(name, device)

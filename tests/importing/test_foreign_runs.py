@@ -65,7 +65,7 @@ def test_an_archive_of_racecrafts_own_is_foreign_too(tmp_path: Path) -> None:
     assert is_foreign(import_run(archive, root=tmp_path / "theirs", name="mine").run)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.usefixtures("_no_walls")
 def test_without_walls_it_is_refused_before_a_line_of_it_runs(tmp_path: Path, imported: Path) -> None:
     with pytest.raises(RewardError, match="somebody else") as caught:
@@ -77,7 +77,7 @@ def test_without_walls_it_is_refused_before_a_line_of_it_runs(tmp_path: Path, im
     assert any("cannot lock in somebody else's reward function (no Landlock)" in note for note in report.notes)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @complete
 def test_within_walls_it_trains_and_leaves_no_trace(tmp_path: Path, imported: Path) -> None:
     assert resume(imported, until="1 steps").steps > 0
@@ -96,7 +96,7 @@ def test_the_mark_goes_with_the_reward_and_not_with_the_weights(imported: Path, 
         Tuning(search).run(minutes=1, max_trials=1)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @complete
 def test_a_run_that_begins_from_it_has_the_mark_where_it_has_the_reward(imported: Path, tmp_path: Path) -> None:
     resume(imported, until="1 steps")

@@ -22,7 +22,7 @@ ONLINE = "main_level/agent/main/online"
 SHALLOW = "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.skipif(not AWS_MODEL.is_dir(), reason="the models are not in the repository")
 @pytest.mark.parametrize("name", ["model_30.pb", "model_48.pb"])
 def test_probabilities_are_those_of_the_graph(name: str) -> None:

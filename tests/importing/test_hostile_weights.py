@@ -46,7 +46,7 @@ def few_layers() -> bytes:
     return writer.bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_whatever_bits_flip_a_graph_gives_a_sentence_or_its_weights(tmp_path: Path) -> None:
     path = tmp_path / "model.pb"
     rng = np.random.default_rng(3)
@@ -62,7 +62,7 @@ def test_whatever_bits_flip_a_graph_gives_a_sentence_or_its_weights(tmp_path: Pa
     assert not any("\n" in text or len(text) > 400 for text in said)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_wherever_a_graph_is_cut_off_it_is_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "model.pb"
     for whole in (few_layers(), AwsModel().small_graph()):
@@ -89,7 +89,7 @@ for path in sys.argv[1:]:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_hostile_archive_costs_seconds_and_megabytes(tmp_path: Path) -> None:
     metadata = json.dumps(AwsModel().metadata())
     huge = bytes_field(8, number(1, 1) + bytes_field(2, shape_message((1 << 13, 1 << 13))) + bytes_field(5, bytes(4)))

@@ -106,7 +106,7 @@ def test_an_index_that_says_nothing_is_no_hindrance(damage: str, tmp_path: Path)
     assert imported(models.as_folder(files, tmp_path / "m"))[0] == "model_7.pb"
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_car_s_archive_and_every_place_of_a_graph(tmp_path: Path) -> None:
     for place in ("agent/model.pb", "model.pb", "model/model_3.pb", "output/frozen.pb"):
         files = {**small(), place: models.GRAPH, "worker_0.multi_agent_graph_0.json": "{}"}
@@ -137,7 +137,7 @@ def test_the_weights_of_the_pretrained_model_until_there_are_own_ones(tmp_path: 
     assert any("it begins with fresh ones" in note for note in notes)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_checkpoint_goes_on_learning_where_it_stopped(tmp_path: Path) -> None:
     model = AwsModel(DEEP, kind="continuous")
     model.write(tmp_path / "m", graph="model/model_8.pb", checkpoint="model/8_Step-100.ckpt")
@@ -160,7 +160,7 @@ def test_a_checkpoint_goes_on_learning_where_it_stopped(tmp_path: Path) -> None:
     assert resume(found.run, until="1 steps").steps >= after.step  # and resumes as any run does
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_another_run_begins_from_it(tmp_path: Path) -> None:
     model = AwsModel(DEEP)
     model.write(tmp_path / "m", graph="agent/model.pb")

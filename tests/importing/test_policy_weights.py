@@ -97,7 +97,7 @@ def check(model: AwsModel, folder: Path) -> None:
     assert np.abs(outputs_of(weights, model, sight) - theirs).max() < 1e-5
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_our_network_answers_as_the_graph(model: AwsModel, tmp_path: Path) -> None:
     check(model, tmp_path)

@@ -33,7 +33,7 @@ def test_every_tensor_is_read(tmp_path: Path) -> None:
         assert np.array_equal(bundle.read(name), tensor)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_whatever_bit_flips_it_is_a_sentence_or_nothing(tmp_path: Path) -> None:
     index = write_checkpoint(tmp_path, "4_Step-9.ckpt", few_tensors(6))
     data = index.with_suffix(".data-00000-of-00001")

@@ -28,7 +28,7 @@ def trained(root: Path, **settings: Any) -> Path:
 QUICK = {"laps": 1, "num_trials": 2, "max_resets": 1, "video": False, "num_threads": 1}
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_it_evaluates_as_it_was_trained(tmp_path: Path) -> None:
     run = trained(tmp_path, direction="reverse", vehicle=Vehicle(mass=5.0))
     found = evaluate(run, **QUICK)
@@ -78,7 +78,7 @@ def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path:
     assert json.loads(first.files["summary"].read_text()) == expected
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_an_evaluation_in_a_car_of_ones_own_says_so(tmp_path: Path) -> None:
     run = trained(tmp_path, vehicle=Vehicle(front_friction=1.9))
     found = evaluate(run, **{**QUICK, "max_resets": 100})
@@ -89,7 +89,7 @@ def test_an_evaluation_in_a_car_of_ones_own_says_so(tmp_path: Path) -> None:
     assert sentence.endswith("(max_resets 1 instead of 100, otherwise drfc) with the standard car v5 on oval")
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_track_that_changed_since_must_be_named(tmp_path: Path) -> None:
     def save(seed: int) -> None:
         track = generate_track(seed)

@@ -73,7 +73,7 @@ def test_the_students_steps_become_smaller() -> None:
     assert 0 < moved[1] < 0.5 * moved[0]
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_what_a_teacher_answers_is_its_mean_without_its_exploring() -> None:
     trained = make(is_discrete=False)
     for _ in range(40):

@@ -19,7 +19,7 @@ from racecraft.learn.native_learner import NativeLearner
 NAMES = networks.network_names()
 # Of one network, the largest, every test takes seconds.
 MARKED = [
-    pytest.param(name, marks=pytest.mark.slow) if name == "DEEP_CONVOLUTIONAL_NETWORK" else name for name in NAMES
+    pytest.param(name, marks=pytest.mark.costly) if name == "DEEP_CONVOLUTIONAL_NETWORK" else name for name in NAMES
 ]
 SMALL = NetworkSpec(num_actions=5, state_size=21)
 HEADS = [(True, 0), (False, 21)]  # is_discrete, state_size

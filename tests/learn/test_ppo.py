@@ -28,7 +28,7 @@ def assert_same_weights(a: PPO, b: PPO) -> None:
     assert_equal(dict(a.driving_weights), dict(b.driving_weights))
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("backend", ["native", "torch"])
 @pytest.mark.parametrize("is_discrete", [True, False])
 def test_learns_to_centre_the_stripe(is_discrete, backend):
@@ -44,7 +44,7 @@ def test_learns_to_centre_the_stripe(is_discrete, backend):
     assert np.mean(rewards[-3:]) > 0.78
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_learns_from_rewards_of_any_scale():
     class LoudWorld(StripeWorld):
         def step(self, actions):

@@ -73,7 +73,7 @@ def test_sac_learns_nothing_without_steps_of_adam() -> None:
         assert mean_reward(sac.learner) < 0.7
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_same_seed_gives_the_same_weights_and_a_resumed_run_has_them() -> None:
     config = replace(CONFIG, learning_starts=64)
     first, second = make(config), make(config)

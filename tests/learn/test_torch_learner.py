@@ -13,7 +13,7 @@ from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import NetworkSpec, networks
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("name", networks.network_names())
 def test_forward_agrees_with_numpy(name):
     spec = NetworkSpec(name=name, num_actions=6)
@@ -153,7 +153,7 @@ def test_unknown_precision_is_refused():
         TorchLearner(NetworkSpec(num_actions=4), precision="float16")
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_torch_is_imported_only_by_the_torch_learner():
     code = "import sys, racecraft.learn; assert 'torch' not in sys.modules; "
     code += "racecraft.learn.make_learner(racecraft.learn.NetworkSpec(num_actions=2), backend='torch'); "

@@ -106,8 +106,8 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     # what is learned with a page of code
     "classic/a2c.py": (2, (NUMBERS, LESSONS)),
     "classic/distributions.py": (3, (NUMBERS,)),
-    "classic/dqn.py": (3, (LESSONS,)),
-    "classic/job.py": (4, (LESSONS,)),
+    "classic/dqn.py": (3, ("tests/classic/test_dqn.py", LESSONS)),
+    "classic/job.py": (4, ("tests/classic/test_dqn.py", LESSONS)),
     "classic/network.py": (4, (NUMBERS,)),
     "classic/policy.py": (3, (NUMBERS, "tests/classic/test_tables.py", LESSONS)),
     "classic/ppo.py": (3, (NUMBERS, LESSONS)),

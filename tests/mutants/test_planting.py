@@ -77,7 +77,7 @@ def test_a_sample_is_the_same_again_and_of_each_place_takes_one() -> None:
     assert len(sample("a + b", 20, seed="1")) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("module", ["race/marshal.py", "replay/codec.py", "run/simtrace.py"])  # the last with umlauts
 def test_with_a_fault_a_file_is_still_python_and_differs_in_that_place_alone(module: str) -> None:
     source = (SOURCES / module).read_text(encoding="utf-8")
@@ -89,7 +89,7 @@ def test_with_a_fault_a_file_is_still_python_and_differs_in_that_place_alone(mod
         assert source[:start].count("\n") + 1 == fault.line
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_there_are_faults_enough_and_tests_that_cover_them() -> None:
     for module, (number, tests) in COVERING.items():
         assert len(sample((SOURCES / module).read_text(encoding="utf-8"), number, seed="1")) == number, module
@@ -140,7 +140,7 @@ def test_that_kills():
 """
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_first_test_that_fails_has_noticed(tmp_path: Path) -> None:
     (tmp_path / "test_it.py").write_text(TESTS)
     (tmp_path / "pytest.ini").write_text("[pytest]\n")

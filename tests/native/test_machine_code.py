@@ -12,7 +12,7 @@ import pytest
 from racecraft import _native
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="these are instructions of x86-64")
 def test_no_product_is_fused_with_a_sum_and_a_difference_at_once() -> None:
     """Nobody writes such a pair by hand, so each would be a rounding lost, and bits that differ between machines."""

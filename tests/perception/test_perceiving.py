@@ -84,7 +84,7 @@ def unseen(perceiver: Perceiver) -> tuple[Belief, NDArray[np.float32]]:
     return perceiver(np.concatenate(frames)), np.concatenate(targets)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_offset_and_heading_on_roads_never_seen(unseen: tuple[Belief, NDArray[np.float32]]) -> None:
     belief, truth = unseen
     offset = np.abs(belief.offset - truth[:, 0] * NUMBERS["offset"])

@@ -25,7 +25,7 @@ def learned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[float]
     return path, losses
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_same_lessons_give_the_same_bits(learned: tuple[Path, list[float]], tmp_path: Path) -> None:
     train(FEW).save(tmp_path / "b.safetensors")
     assert (tmp_path / "b.safetensors").read_bytes() == learned[0].read_bytes()

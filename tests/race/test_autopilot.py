@@ -26,7 +26,7 @@ def test_the_state_is_what_it_is_taken_for():
     np.testing.assert_allclose(simulation.state[0, first:], track.curvature_at(s), atol=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("direction", ["forward", "reverse"])
 @pytest.mark.parametrize("speed", [1.0, 2.5])
 def test_it_laps_every_track_of_the_library_in_both_directions(direction, speed):

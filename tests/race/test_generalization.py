@@ -98,7 +98,7 @@ def test_mistakes(settings):
         generalize(LineFollower(), **{"tracks": TRACKS[:1], "camera": SMALL, **settings})
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_run_on_several_tracks_keeps_its_table(tmp_path: Path):
     ppo = PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1)
     run = train(

@@ -105,7 +105,7 @@ def interpreted(source: str, track, batches) -> np.ndarray:
         return np.concatenate([worker(batch) for batch in batches])
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_compiled_reward_is_the_interpreted_one_to_the_bit(track, batches):
     pytest.importorskip("numba")
     source = load_preset("racing")

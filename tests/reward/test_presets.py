@@ -228,7 +228,7 @@ def test_overtake_is_lap_time_with_something_for_passing():
     assert reward("overtake", steps=7.0, progress=50.0, **AHEAD) == 0.0  # the first step it sees
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_pictures_of_all_of_them_show_what_the_walled_worker_paints():
     track = load_track("oval")
     points, painted = paint_presets(track)

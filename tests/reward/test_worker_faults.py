@@ -139,7 +139,7 @@ def test_the_time_limit_is_for_one_call_and_not_for_the_batch(track, rows):
         assert worker(rows).sum() == 10.0
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_hang_in_the_middle_of_a_batch_names_its_row(track, rows):
     source = function("while params['x'] == 6.0:", "    pass", "return 1.0")
     with running(source, track, timeout_s=1.0) as worker, pytest.raises(RewardError) as caught:

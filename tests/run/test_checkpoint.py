@@ -359,7 +359,7 @@ while True:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_kill_in_the_middle_of_saving_loses_at_most_one(tmp_path):
     store = CheckpointStore(tmp_path / "checkpoints")
     dice = random.Random(1)

@@ -26,7 +26,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("name", starter_names())
 def test_a_starter_is_a_small_run_that_drives_where_it_never_was(name: str, here: Path) -> None:
     shipped = files(FOLDER / name)

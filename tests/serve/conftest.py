@@ -29,7 +29,7 @@ def postgres() -> Iterator[PostgresServer]:
         yield server
 
 
-ON_POSTGRESQL = pytest.param("postgresql", marks=pytest.mark.slow)
+ON_POSTGRESQL = pytest.param("postgresql", marks=pytest.mark.costly)
 """The second time that the same tests run."""
 
 

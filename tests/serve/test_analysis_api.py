@@ -19,7 +19,7 @@ from racecraft.car.export import read_exported
 from racecraft.race.policy import load_policy
 from racecraft.run import RunFolder
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.costly
 
 GATE = "def reward_function(params):\n    return params['speed']\n"
 

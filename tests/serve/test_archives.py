@@ -172,7 +172,7 @@ def test_a_hostile_run_of_ours_is_refused(
     assert not list((tmp_path / "runs").glob("*/run.json"))
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_hostile_uploads_are_refused(console: RunningConsole) -> None:
     before = {model["name"] for model in console.client.get("/api/models").json()}
     bomb = tar_of({**AWS_MODEL, "metrics/TrainingMetrics.json": b"\0" * (300 << 20)})

@@ -20,7 +20,7 @@ from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Reset, now
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.costly
 
 
 @pytest.fixture(scope="module")

@@ -107,7 +107,7 @@ def test_a_removed_contest_leaves_nothing(console: RunningConsole, cars: list[di
     assert console.client.get(f"/api/contests/{heat['id']}").status_code == 404
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_model_learns_against_itself_or_against_others(console: RunningConsole, cars: list[dict[str, str]]) -> None:
     wanted = {"track": "oval", "race": "head-to-head", "actions": "continuous", "critic": "lap", "until": "1000 steps"}
     found = {}

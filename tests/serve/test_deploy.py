@@ -177,7 +177,7 @@ def test_the_container_serves_on_postgresql_and_tells_whether_it_is_well(
     assert not is_well(port)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_composed_parts_fit_together() -> None:
     compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
     services = compose["services"]

@@ -94,7 +94,7 @@ def test_unknown_addresses_below_api_are_errors_in_the_one_shape(console: Runnin
         assert set(reply.json()) == {"error"}
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_no_reply_waits_for_an_acknowledgement(console: RunningConsole) -> None:
     """Headers and body are sent one after the other: with Nagle's algorithm on, the second waits some 40 ms."""
     seconds = [console.client.get("/api/nothing").elapsed.total_seconds() for _ in range(20)]

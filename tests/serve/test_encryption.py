@@ -67,14 +67,14 @@ def test_who_comes_unencrypted_through_the_proxy_is_refused(behind: RunningConso
         refused(client.get("/api/door", headers={**PROXY, "origin": "http://school.example"}), 403)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_proxy_that_is_not_trusted_is_not_believed(tmp_path: Path) -> None:
     with running_console(tmp_path / "runs", "--league", "--address", ADDRESS) as console:
         plain = {**PROXY, "x-forwarded-proto": "http"}
         ok(httpx.get(f"{console.client.base_url}/api/door", headers=plain))  # of this machine, whatever it says
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_league_with_a_certificate_of_its_own(tmp_path: Path) -> None:
     certificate, key = make_certificate(tmp_path)
     port = free_port()
@@ -97,7 +97,7 @@ def test_a_league_with_a_certificate_of_its_own(tmp_path: Path) -> None:
         end(process)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_files_that_are_no_certificate_are_named(tmp_path: Path) -> None:
     certificate, _ = make_certificate(tmp_path)
     for key, text in ((certificate, "cannot be used"), (tmp_path / "none.pem", "No such file")):

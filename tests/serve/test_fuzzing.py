@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from running_consoles import RunningConsole
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.costly
 
 DOCUMENT = json.loads((Path(__file__).parents[2] / "web" / "openapi.json").read_text())
 OPERATIONS = [f"{method.upper()} {path}" for path, item in DOCUMENT["paths"].items() for method in item]
@@ -29,10 +29,12 @@ def operations() -> dict[str, Any]:
     return {operation.label: operation for operation in found}
 
 
+@pytest.mark.slow
 def test_every_operation_is_tried(operations: dict[str, Any]) -> None:
     assert list(operations) == OPERATIONS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", OPERATIONS)
 def test_no_request_breaks_the_server(console: RunningConsole, operations: dict[str, Any], label: str) -> None:
     from requests import Session

@@ -11,7 +11,7 @@ from leagues import RunningLeague, ok, running_league, untrained_run
 
 from racecraft.race.entry_file import pack_entry
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.costly
 
 MODEL: dict[str, Any] = {"name": "adas-model"}
 RACE: dict[str, Any] = {"title": "adas-race", "track": "oval", "laps": 1, "trials": 1}

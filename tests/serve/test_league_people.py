@@ -58,7 +58,7 @@ def test_the_owners_link_is_the_first_admin(league: RunningLeague) -> None:
         assert "not signed in" in refused(stranger.get("/api/models"), 401)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_thirty_people_behind_one_address_come_in_by_card(league: RunningLeague) -> None:
     group = league.group("Thirty")
     people = [{"name": f"Racer {number}", "real_name": f"Real {number}"} for number in range(30)]
@@ -362,7 +362,7 @@ def test_who_leaves_takes_everything_along(league: RunningLeague, school: dict[s
     refused(league.owner.delete("/api/account"), 409)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_one_person_alone_notices_nothing(league: RunningLeague, tmp_path: Path) -> None:
     with running_console(tmp_path / "runs") as console, httpx.Client(base_url=console.client.base_url) as stranger:
         assert stranger.get("/api/door").status_code == 401

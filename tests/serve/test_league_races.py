@@ -465,7 +465,7 @@ def test_the_board_places_by_the_rules_of_every_race(database: Database) -> None
     assert [row.row for row in near.rows] == sorted(wanted)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_board_of_ten_thousand_is_read_at_once(database: Database) -> None:
     race = _fill(database, [(user, 20_000 + user % 977, 9000 + user % 13, user % 3, 1.0) for user in range(10_000)])
     took = []

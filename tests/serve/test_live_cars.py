@@ -12,7 +12,7 @@ from racecraft.serve.models.tasks import LiveReporter
 from racecraft.training import IterationReport, train
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_cars_move_before_the_first_iteration_ends_and_nobody_sees_them_after_the_last(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,7 +39,7 @@ def test_a_folder_is_counted_without_following_links(tmp_path: Path, monkeypatch
     assert not machine.describe_machine(ServeSettings(runs=runs)).is_used_complete
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_databases_password_is_told_to_nobody(tmp_path: Path) -> None:
     settings = ServeSettings(runs=tmp_path, database="postgresql+psycopg://me:secret@host/name")
     found = machine.describe_machine(settings)

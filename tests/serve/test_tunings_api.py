@@ -9,7 +9,7 @@ from running_consoles import RunningConsole
 
 pytest.importorskip("optuna")
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.costly
 
 REWARD = """BONUS = 2.0
 STEPS = 3
@@ -47,6 +47,7 @@ def test_what_may_be_searched(console: RunningConsole, model: str) -> None:
     refused(console.client.get("/api/models/nobody/tunings/space"), 404)
 
 
+@pytest.mark.slow
 def test_a_search_whose_best_trial_becomes_a_model(console: RunningConsole, model: str) -> None:
     client, path = console.client, f"/api/models/{model}/tunings"
     search = [{"name": "BONUS", "low": 1, "high": 4}, GAMMA]
@@ -83,6 +84,7 @@ def test_a_search_whose_best_trial_becomes_a_model(console: RunningConsole, mode
     assert client.get(f"/api/models/{kept['name']}").status_code == 200
 
 
+@pytest.mark.slow
 def test_a_search_is_stopped_and_one_that_fails_says_why(console: RunningConsole, model: str) -> None:
     client, path = console.client, f"/api/models/{model}/tunings"
     job = client.post(path, json={"search": [GAMMA], "trial_steps": 10**8, "minutes": 60}).json()

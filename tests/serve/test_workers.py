@@ -95,7 +95,7 @@ def weights(folder: RunFolder) -> dict[str, Any]:
     return {name: value for name, value in arrays.items() if name != "recent_episodes"}  # holds wall-clock times
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_training_elsewhere_is_seen_as_if_it_were_here(place: Place) -> None:
     console = place.console
     name = console.create(name="away", until="20 minutes", track="oval", seed=2)
@@ -255,7 +255,7 @@ def test_a_search_is_copied_as_its_last_transaction_left_it(tmp_path: Path) -> N
     assert (tmp_path / "left" / "a" / "result.json").is_file()
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_worker_needs_no_more_rights_than_it_is_said_to(place: Place, postgres: PostgresServer) -> None:
     import psycopg
 

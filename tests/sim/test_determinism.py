@@ -75,7 +75,7 @@ def test_golden_hash_on_every_instruction_set(every_isa, choose, record):
         assert drive(64, 1, choose, record) == GOLDEN
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_frames_do_not_depend_on_batch_threads_or_instruction_set(every_isa, choose, record):
     expected = drive(64, 1, choose, record, camera=SMALL)
     assert drive(7, 2, choose, record, camera=SMALL) == expected
@@ -84,7 +84,7 @@ def test_frames_do_not_depend_on_batch_threads_or_instruction_set(every_isa, cho
         assert drive(64, 7, choose, record, camera=SMALL) == expected
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_environment_chooses_the_instruction_set_and_a_training_says_so():
     def train(isa):
         verb = [
@@ -226,7 +226,7 @@ def test_a_mirrored_car_on_a_mirrored_track_is_the_mirror_image(choose):
 # --- memory and threads
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_views_keep_the_core_alive():
     simulation = Simulation(OVAL, num_envs=3, camera=SMALL)
     frames, rows, terminated = simulation.frames, simulation.rows, simulation.terminated
@@ -292,7 +292,7 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_thousand_simulations_leave_nothing_behind():
     track = octagon()
     for _ in range(100):

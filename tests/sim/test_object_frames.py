@@ -74,7 +74,7 @@ def world(*places: tuple[float, int], kind: str = "box", **settings) -> Simulati
     return Simulation(ROAD, objects=Objects(obstacles=obstacles), start=Start(mode="fixed"), **settings)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_boxes_are_where_rays_meet_them():
     # beyond 3 m the tape is left out, so that only cardboard is to be seen
     places = ((0.5, 1), (0.53, 1), (0.54, -1), (0.7, -1), (0.8, 1), (0.9, -1))

@@ -66,7 +66,7 @@ def test_golden_hash(races, num_threads, choose):
     assert drive(races, num_threads, choose) == GOLDEN
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_frames_do_not_depend_on_batch_threads_or_instruction_set(choose):
     best = _native.isa()
     expected = drive(6, 1, choose, camera=SMALL)

@@ -99,7 +99,7 @@ def compare(row: dict, expected: dict, *, skip: set[str]) -> None:
 MAKERS = {"generated": lambda: generate_track(5), "open": open_road}
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("name", ["oval", "reinvent_2018", "bowtie", "generated", "open"])
 def test_every_step_of_random_episodes(name):
     """One step at a time from the core's own pose: errors cannot add up, so the tolerance is float32's."""

@@ -28,7 +28,7 @@ def closest_waypoints(waypoints: np.ndarray, x: float, y: float) -> tuple[int, i
     return ahead - 1, ahead
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("direction", ["forward", "reverse"])
 def test_closest_waypoints_are_those_of_the_route(direction: str) -> None:
     plain = load_track("oval")

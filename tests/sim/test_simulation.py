@@ -10,7 +10,7 @@ import pytest
 from racecraft import _native
 from racecraft.sim import CONTROL_DT, ROW_COLUMNS, STATUS_NAMES, Simulation, Start, Vehicle
 from racecraft.sim.columns import STATE_COLUMNS
-from racecraft.track import load_track
+from racecraft.track import Track, load_track
 
 OVAL = load_track("oval")
 FIXED = Start(mode="fixed")
@@ -92,6 +92,17 @@ def test_starts_may_be_fixed_offset_spread_or_of_another_step():
     )
     spread = Simulation(OVAL, num_envs=4, camera=None, start=Start(spread=True, advance=0.1))
     assert on_circle(starts(spread, 3), 0.1 * np.arange(3)[:, None] + 0.25 * np.arange(4))
+
+
+def test_a_start_on_a_waypoint_points_along_the_road_ahead():
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
+    square = Track("square", 2.0 * corners, 1.5 * corners, 2.5 * corners)
+    for number in range(4):
+        start = Start(mode="fixed", offset=number / 4)
+        x, y, heading = Simulation(square, camera=None, start=start).vehicles[:3, 0].tolist()
+        assert [x, y] == (2.0 * corners[number]).tolist()
+        ahead = 0.5 * np.diff(corners, axis=0)[number]
+        assert [math.cos(heading), math.sin(heading)] == pytest.approx(ahead.tolist(), abs=1e-6)
 
 
 def test_starts_may_be_random():

@@ -19,7 +19,7 @@ def check(track: Track) -> None:
     assert np.ptp(track.widths) < 1e-4
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_three_hundred_seeds_are_valid_and_all_different() -> None:
     digests = set()
     for seed in range(300):

@@ -20,7 +20,7 @@ def restored_isa() -> Iterator[None]:
     _native.set_isa(before)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.usefixtures("restored_isa")
 @pytest.mark.parametrize("actions", ["default", "continuous"])
 def test_a_training_ends_in_the_same_bits(tiny: Train, actions: str) -> None:

@@ -24,7 +24,7 @@ MANY = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_resumed_run_ends_in_the_same_weights(tmp_path, tiny: Train):
     whole = tiny(**MANY, until="384 steps", name="whole").run
     part = tiny(**MANY, until="128 steps", name="part").run
@@ -32,7 +32,7 @@ def test_a_resumed_run_ends_in_the_same_weights(tmp_path, tiny: Train):
     assert_same(whole, part)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_it_drives_all_tracks_both_ways(tiny: Train):
     run = tiny(**MANY, until="2000 steps").run
     settings = RunFolder.open(run).read_info()

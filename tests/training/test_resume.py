@@ -32,7 +32,7 @@ def reward_function(params):
 """
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_run_killed_at_any_iteration_resumes_as_if_it_never_was(tiny: Train, tmp_path: Path) -> None:
     """The folder, copied while training goes on, is what a kill at that moment leaves."""
     copies: list[Path] = []

@@ -30,7 +30,7 @@ def test_the_name_that_errors_recommend_is_there() -> None:
     assert not hasattr(training, "Oponents")
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @pytest.mark.parametrize("cars", [2, 3])
 def test_a_run_against_itself_killed_at_any_iteration_resumes_as_if_it_never_was(
     tiny: Train, tmp_path: Path, cars: int

@@ -51,7 +51,7 @@ def test_a_run_with_two_lenses_and_a_lidar_resumes_to_the_same_bits(
     assert_same(half.run, whole.run)
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_run_with_such_sensors_is_evaluated_and_filmed(tiny: Train, tmp_path: Path) -> None:
     path = write_metadata(tmp_path / "metadata.json", ("STEREO_CAMERAS", "SECTOR_LIDAR"))
     result = tiny(model_metadata=path, until="64 steps", objects=BOXES)

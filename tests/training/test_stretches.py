@@ -115,7 +115,7 @@ def test_stretches_travel_in_an_archive_and_damaged_ones_are_told(tiny: Train, t
     assert len(read_stretches(RunFolder(report.run))) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_the_report_says_which_reward_drove_what(tiny: Train) -> None:
     folder = RunFolder.open(tiny().run)
     assert "<h2>Stretches</h2>" not in write_report(folder.path).read_text()

@@ -45,7 +45,7 @@ def begin(tmp_path: Path, **settings: Any) -> Path:
     return start_tuning(**{name: value for name, value in given.items() if value is not None})
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_every_trial_is_a_run_with_the_numbers_it_was_given(tmp_path: Path) -> None:
     told: list[TrialOutcome] = []
     outcome = Tuning(begin(tmp_path), on_trial=told.append).run(minutes=5, max_trials=3)
@@ -110,7 +110,7 @@ def test_a_seat_that_was_stopped_before_its_process_was_there_trains_nothing() -
         seat.run(Order(run="none", goal="laps", trial_steps=1))
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_who_is_ready_first_does_not_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drawing, "BEGINNERS", 2)
     space = [Parameter("gamma", "hyperparameter", 0.9, 0.99, False, False, 0.95)]
@@ -144,7 +144,7 @@ def test_what_kills_its_process_again_and_again_has_failed(tmp_path: Path) -> No
     assert book.next_place([]) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_at_the_end_of_the_time_the_trial_under_way_is_kept_for_later(tmp_path: Path) -> None:
     folder = begin(tmp_path, trial_steps=10**8)
     first = Tuning(folder).run(minutes=2 / 60)
@@ -155,7 +155,7 @@ def test_at_the_end_of_the_time_the_trial_under_way_is_kept_for_later(tmp_path: 
     assert second.trials[1].params == first.trials[0].params
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_trials_begin_with_a_parents_weights_and_awss_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # the parent may be named from another folder than the search is resumed in
     parent = Tuning(begin(tmp_path, name="first"))
@@ -194,7 +194,7 @@ def test_a_trial_that_lags_behind_is_ended(tmp_path: Path, monkeypatch: pytest.M
     assert not outcome.is_interrupted
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 def test_a_trial_that_fails_is_told_and_the_search_goes_on(tmp_path: Path) -> None:
     reward = tmp_path / "reward_function.py"
     reward.write_text("K = 1\n\ndef reward_function(params):\n    return 1.0 / max(0, 3 - K)\n")

@@ -51,7 +51,7 @@ def errno_of(statement: str) -> str:
 # --- walls
 
 
-@pytest.mark.slow
+@pytest.mark.costly
 @complete
 @pytest.mark.parametrize("name", SOURCES)
 def test_rewards_are_the_same_to_the_bit_within_walls(name):
