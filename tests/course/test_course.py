@@ -32,6 +32,7 @@ import sys
 # Text with `code`.
 
 # %% exercise one
+
 def answer():
     # %% is no mark here
     return 1

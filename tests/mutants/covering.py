@@ -121,6 +121,12 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "classic/until.py": (2, (LESSONS,)),
     "classic/views.py": (4, ("tests/classic/test_worlds.py",)),
     "classic/worlds.py": (4, ("tests/classic/test_worlds.py",)),
+    # the course
+    "course/page.py": (4, ("tests/serve/test_lessons_api.py",)),
+    "course/percent.py": (3, ("tests/course/test_course.py", "-k", "cells")),
+    "course/progress.py": (2, ("tests/course/test_course.py", "-k", "progress")),
+    "course/quiz.py": (2, ("tests/course/test_course.py", "tests/cli/test_lessons_verb.py", "-k", "quiz")),
+    "serve/lessons/studies.py": (3, ("tests/serve/test_lessons_api.py",)),
     # what comes from outside, what is shown
     "importing/archive_guard.py": (5, ("tests/importing/test_archive.py",)),
     "importing/tar_reader.py": (4, ("tests/importing/test_archive.py",)),

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from racecraft.course import find_lesson, lessons, read_progress
+from racecraft.course import checks_of, find_lesson, lessons, read_progress
 from racecraft.course import progress as progress_file
 from racecraft.course.page import page_of
+from racecraft.course.shown import read_shown
 from racecraft.errors import ConfigError
 from racecraft.serve.lessons.studies import progress_of, record, with_solved
 from racecraft.serve.problems import Conflict
@@ -57,6 +58,11 @@ def test_a_page_holds_what_the_lesson_printed_and_drew() -> None:
     for lesson in lessons():
         page = page_of(lesson)
         assert [cell.source for cell in page.cells] == [cell.source for cell in lesson.cells()]
-        assert len(page.exercises) == sum(bool(cell.exercise) for cell in page.cells) >= 1
+        assert page.exercises == [cell.exercise for cell in page.cells if cell.exercise]
+        assert page.exercises == [f"{lesson.number}.{name}" for name in checks_of(lesson.number)]
+        code = [cell for cell in page.cells if cell.kind == "code"]
+        assert {number: cell.outputs for number, cell in enumerate(code) if cell.outputs} == read_shown(lesson).outputs
+        named = [cell.title.removeprefix("plaything ") for cell in lesson.cells() if cell.title.startswith("plaything")]
+        assert [cell.plaything for cell in page.cells if cell.plaything] == named
         pictures = [one for cell in page.cells for one in cell.outputs if one.kind == "picture"]
         assert len(pictures) >= 2, lesson.path.stem

@@ -4,6 +4,7 @@ import * as world from "../src/course/playthings/grid";
 import { entropy, episode, lapOf, newPolicy, softmax } from "../src/course/playthings/lap";
 import { lot } from "../src/course/playthings/lot";
 import { advantages, clipped, pulls } from "../src/course/playthings/objectives";
+import { worth } from "../src/course/playthings/table";
 import * as road from "../src/course/playthings/track";
 
 describe("by lot", () => {
@@ -96,6 +97,19 @@ describe("the road", () => {
     const paid = road.solve(0.9, 0, "middle"); // 0.1 a step for ever
     expect(Math.max(...paid[road.placeAt(7, 2)]!)).toBeCloseTo(1, 3);
   });
+  it("is solved: Bellman's equation holds at every place, and nothing comes after an end", () => {
+    expect(worth([[5], [7]], { after: 1, reward: 1, isOver: false }, 0.5)).toBe(4.5);
+    expect(worth([[5], [7]], { after: 1, reward: 1, isOver: true }, 0.5)).toBe(1);
+    for (const pay of ["line", "middle"] as const) {
+      const truth = road.solve(0.7, 0.5, pay);
+      for (let place = 0; place < road.STATES; place++)
+        road.MOVES.forEach((_, action) => {
+          const told = road.outcomes(place, action, 0.5, pay);
+          const wanted = told.reduce((sum, one) => sum + one.chance * worth(truth, one, 0.7), 0);
+          expect(Math.abs(truth[place]![action]! - wanted)).toBeLessThan(1e-6);
+        });
+    }
+  });
   it("is learned as it is solved", () => {
     const table = road.newTable();
     const draw = lot(2);
@@ -132,6 +146,9 @@ describe("a policy over a lap", () => {
   it("gets round once it has learned, and not without a step size", () => {
     expect(lapOf(newPolicy(), 0.5).round).toBeLessThan(0.2);
     expect(lapOf(taught({}), 0.5).round).toBeGreaterThan(0.8);
+    const { baseline } = taught({});
+    expect(Math.max(...baseline)).toBeLessThanOrEqual(1); // no more than the line pays
+    expect(baseline[road.placeAt(road.LENGTH - 2, road.MIDDLE)]).toBeGreaterThan(0.7);
     expect(taught({ alpha: 0 }, 50).preferences).toEqual(newPolicy().preferences);
   });
   it("stays the more open the more entropy weighs", () => {
