@@ -13,6 +13,7 @@ import numpy as np
 
 from racecraft import __version__
 from racecraft.sim import core_build, instruction_set
+from racecraft.system import num_cores
 
 COPY_BYTES = 1 << 27  # far beyond every cache
 
@@ -21,7 +22,7 @@ def describe_machine() -> dict[str, Any]:
     """Processor, cores, memory, versions; no names of hosts or people."""
     return {
         "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "cores": num_cores(),
         "memory_gib": _memory_gib(),
         "instruction_set": instruction_set(),
         "system": f"{platform.system()} {platform.machine()}",

@@ -8,7 +8,6 @@ any number of threads.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -21,6 +20,7 @@ from racecraft.learn import torch_networks
 from racecraft.learn.learner import Minibatch, NetworkSpec, Objective, UpdateStats
 from racecraft.learn.torch_flat import BETA1, BETA2, FlatNetwork, dtype_of
 from racecraft.learn.torch_losses import samples_of
+from racecraft.system import num_cores
 
 _SHARD_SIZES = (64, 256)  # samples; a smaller shard is mostly overhead, a larger one leaves the L2 cache
 _CHUNK_SIZE = 256  # samples of one forward pass without gradient
@@ -43,7 +43,7 @@ class TorchLearner(FlatNetwork):
         has_bfloat16 = getattr(torch.cpu, "_is_avx512_bf16_supported", lambda: False)()
         dtype = dtype_of(precision, has_bfloat16=has_bfloat16)
         super().__init__(spec, seed=seed, device=torch.device("cpu"), dtype=dtype)
-        self._pool = ThreadPoolExecutor(num_threads or _num_cores(), "learner", initializer=_prepare_thread)
+        self._pool = ThreadPoolExecutor(num_threads or num_cores(), "learner", initializer=_prepare_thread)
         self._shards: list[tuple[Tensor, torch_networks.Parameters]] = []
 
     def policy(self, observations: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -117,10 +117,6 @@ class TorchLearner(FlatNetwork):
                 return np.asarray(forward(slice(start, start + _CHUNK_SIZE)).numpy())
 
         return np.concatenate(list(self._pool.map(run, range(0, max(size, 1), _CHUNK_SIZE))))
-
-
-def _num_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _prepare_thread() -> None:

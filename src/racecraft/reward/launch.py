@@ -7,19 +7,17 @@ working folder, four pipes and one piece of shared memory. Where bubblewrap work
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import select
-import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from racecraft import system
 from racecraft.errors import RewardError
 from racecraft.reward.sandbox.bubblewrap import around
 from racecraft.reward.sandbox.plan import package_folder
@@ -47,9 +45,9 @@ class WorkerProcess:
             return
         with contextlib.suppress(ProcessLookupError, PermissionError):
             if self.popen.poll() is None and self.interpreter != self.popen.pid:
-                os.kill(self.interpreter, signal.SIGKILL)
+                system.end(self.interpreter)
                 self.ending(timeout_s=1.0)  # bubblewrap ends when what it ran has ended
-            os.killpg(self.popen.pid, signal.SIGKILL)
+            system.end(self.popen.pid, with_group=True)
         self.popen.wait()
         for pipe in (self.popen.stdin, self.popen.stdout, self.popen.stderr):
             if pipe is not None:
@@ -75,7 +73,7 @@ class WorkerProcess:
             number = status - 128  # how bubblewrap reports that what it ran was ended by a signal
         if number <= 0:
             return "", status
-        return next((known.name for known in signal.Signals if known == number), f"signal {number}"), status
+        return system.end_of(-number), status
 
 
 def start_process(
@@ -107,10 +105,10 @@ def start_process(
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            pass_fds=(shared_memory, end, *([tells] if bubblewrap else [])),
             cwd="/",
             env=_environment(),
-            start_new_session=True,  # Ctrl-C is the trainer's affair, and one kill ends the whole group
+            # Ctrl-C is the trainer's affair, and one kill ends the whole group
+            **system.apart(shared_memory, end, *([tells] if bubblewrap else [])),
         )
     except BaseException:
         os.close(lifeline)
@@ -160,16 +158,3 @@ def package_paths(packages: Sequence[str]) -> list[str]:
     """The folders that hold packages which a reward function may import."""
     folders = [package_folder(name) for name in packages]
     return list(dict.fromkeys(str(folder.parent) for folder in folders if folder is not None))
-
-
-def create_shared_memory(size: int) -> int:
-    """A file descriptor of ``size`` zero bytes that lives in memory and has no name."""
-    if sys.platform == "linux":
-        descriptor = os.memfd_create("racecraft-reward", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
-        os.ftruncate(descriptor, size)
-        # A process that shrank the memory could crash the trainer at its next access.
-        fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
-        return descriptor
-    with tempfile.TemporaryFile() as file:
-        os.ftruncate(file.fileno(), size)
-        return os.dup(file.fileno())

@@ -18,7 +18,6 @@ import mmap
 import os
 import re
 import select
-import signal
 import time
 import weakref
 from collections.abc import Sequence
@@ -27,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from racecraft import system
 from racecraft.checks import require
 from racecraft.errors import ConfigError, RewardError, RewardTimeout, ShapeError, printable
 from racecraft.reward import launch
@@ -140,7 +140,7 @@ class RewardWorker:
             files=(str(launch.PROGRAM.with_name("kernel.py")), *paths) if kernel else (),
             memory_limit=memory_limit_mb * 2**20,
         )
-        descriptor = launch.create_shared_memory(size)
+        descriptor = system.unnamed_memory(size)
         try:
             memory = mmap.mmap(descriptor, size)
             self._process, lifeline = launch.start_process(
@@ -180,7 +180,7 @@ class RewardWorker:
             "package_paths": paths,
             "kernel": kernel,
             "kernel_path": str(launch.PROGRAM.with_name("kernel.py")),
-            "trace_signal": int(signal.SIGUSR1),
+            "trace_signal": system.TRACE,
         }
         self._start(marshal.dumps(setup), start_timeout_s)
 
@@ -301,8 +301,7 @@ class RewardWorker:
 
     def _stalled(self, rows: Rows | None, timeout_s: float, *, first: int = 0) -> RewardError:
         """The error of a process that makes no progress; asks it for its stack first."""
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self._process.interpreter, signal.SIGUSR1)
+        system.ask_where(self._process.interpreter)
         line = _line_in(self._read_stderr(timeout_s=1.0))
         text = f"did not {'load' if rows is None else 'return'} within {timeout_s:g} s"
         error = self._error(text, line, rows, 0 if rows is None else _num_done(self._rewards[: len(rows)]), first=first)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from racecraft import system
 from racecraft.errors import RunError
 
 
@@ -28,7 +28,7 @@ def exclusive_lock(path: Path) -> Iterator[None]:
         raise RunError(f"{path} cannot be opened: {error.strerror or error}.") from error
     try:
         try:
-            _acquire(descriptor)
+            system.lock(descriptor)
         except OSError as error:
             raise RunError(
                 f"{path.parent} is in use by process {_holder(descriptor)}.",
@@ -47,18 +47,3 @@ def _holder(descriptor: int) -> str:
         os.lseek(descriptor, 0, os.SEEK_SET)
         return str(int(json.loads(os.read(descriptor, 200))["pid"]))
     return "unknown"
-
-
-if sys.platform == "win32":
-    import msvcrt
-
-    def _acquire(descriptor: int) -> None:
-        os.lseek(descriptor, 1000, os.SEEK_SET)  # past the text, so that others can read it
-        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        os.lseek(descriptor, 0, os.SEEK_SET)
-
-else:
-    import fcntl
-
-    def _acquire(descriptor: int) -> None:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -13,6 +12,7 @@ from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
+from racecraft.system import STOPS
 
 
 def work_for(settings: ServeSettings, *, on_ready: Callable[[], None]) -> None:
@@ -44,7 +44,7 @@ def work_for(settings: ServeSettings, *, on_ready: Callable[[], None]) -> None:
 
 async def _until_signalled(supervisor: Supervisor, on_ready: Callable[[], None]) -> None:
     told = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOPS:
         asyncio.get_running_loop().add_signal_handler(number, told.set)
     tending = asyncio.create_task(supervisor.run())
     on_ready()

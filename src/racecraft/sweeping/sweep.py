@@ -9,7 +9,6 @@ them into its queue. Killed at any moment it goes on, and every run ends in the 
 
 from __future__ import annotations
 
-import os
 import queue
 import threading
 import time
@@ -27,6 +26,7 @@ from racecraft.run.folder import MAX_NAME, checked_name
 from racecraft.run.lock import exclusive_lock
 from racecraft.sweeping.board import Board, Outcome, board_of, outcome_of
 from racecraft.sweeping.plan import SweepPlan
+from racecraft.system import num_cores
 from racecraft.training.interruption import interruptible
 from racecraft.tuning.seats import HereSeat, ProcessSeat, Seat, SeatLost
 from racecraft.tuning.trial import Order, Report
@@ -150,9 +150,9 @@ class Sweep:
         names = [name for name in self.names() if (self.runs / name / "run.json").is_file()]
         for name in names:
             waiting.put(name)
-        count = max(1, min(processes or _num_cores(), len(names)))
+        count = max(1, min(processes or num_cores(), len(names)))
         self._seats = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
-        threads = max(1, _num_cores() // count)
+        threads = max(1, num_cores() // count)
         with exclusive_lock(self.file.with_suffix(".lock")), interruptible(self._stop, self.stop):
             workers = [
                 threading.Thread(target=self._work, args=(seat, waiting, threads, on_end), daemon=True)
@@ -203,7 +203,3 @@ class Sweep:
 
 def _run(sweep: str, setting: str, seed: int) -> str:
     return f"{sweep}-{setting}-{seed}"
-
-
-def _num_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

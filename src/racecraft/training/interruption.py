@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from racecraft import system
+
 
 @contextmanager
 def interruptible(stopping: threading.Event, stop: Callable[[], None]) -> Iterator[None]:
@@ -26,7 +28,7 @@ def interruptible(stopping: threading.Event, stop: Callable[[], None]) -> Iterat
             raise KeyboardInterrupt
         stop()
 
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, handle) for number in system.STOPS}
     try:
         yield
     finally:

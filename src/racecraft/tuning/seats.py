@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import threading
 from contextlib import suppress
 from typing import Any, Protocol
 
-from racecraft import errors
+from racecraft import errors, system
 from racecraft.errors import RacecraftError
 from racecraft.training.job import Training
 from racecraft.tuning.trial import Order, Report, run_trial
@@ -101,7 +100,7 @@ class ProcessSeat:
                 [sys.executable, "-P", "-m", "racecraft.tuning"],  # -P: no random.py of the user's instead of Python's
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                start_new_session=True,  # Ctrl-C is for who searches
+                **system.apart(),  # Ctrl-C is for who searches
             )
         return self._process
 
@@ -134,7 +133,7 @@ def serve_seat() -> None:
         for line in sys.stdin.buffer:
             orders.append(line)
             arrived.release()
-        os.kill(os.getpid(), signal.SIGKILL)  # who searches is gone, and begins this trial again
+        system.end(os.getpid())  # who searches is gone, and begins this trial again
 
     threading.Thread(target=listen, name="orders", daemon=True).start()
     while arrived.acquire():

@@ -13,7 +13,6 @@ once, each at a seat; which numbers they get does not depend on that, see `racec
 
 from __future__ import annotations
 
-import os
 import queue
 import threading
 import time
@@ -30,6 +29,7 @@ from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.run.lock import exclusive_lock
+from racecraft.system import num_cores
 from racecraft.training import Until
 from racecraft.training.interruption import interruptible
 from racecraft.training.parent import open_parent
@@ -108,7 +108,7 @@ class Tuning:
         require("minutes", minutes, 0 < minutes <= 30 * 24 * 60, "a number above 0, up to 43,200")
         check_whole("trials", max_trials, 0, 100_000)
         check_whole("processes", processes, 0, MAX_WINDOW)
-        most = processes or (_num_cores() if self.plan.settings.device == "cpu" else 1)
+        most = processes or (num_cores() if self.plan.settings.device == "cpu" else 1)
         count = min(most, self.window)
         seats: list[Seat] = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
         with exclusive_lock(self.folder / ".lock"):
@@ -184,7 +184,7 @@ class Tuning:
             goal=self.goal,
             trial_steps=self.trial_steps,
             bars=bars,
-            num_threads=0 if len(call.seats) == 1 else max(1, _num_cores() // len(call.seats)),
+            num_threads=0 if len(call.seats) == 1 else max(1, num_cores() // len(call.seats)),
         )
 
         def work() -> None:
@@ -286,7 +286,3 @@ class _Call:
             return None
         place = self.record.next_place([place for _, place in self.busy.values()])
         return None if place is None else (free, place)
-
-
-def _num_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

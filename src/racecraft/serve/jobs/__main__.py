@@ -15,6 +15,7 @@ from typing import Final
 
 from racecraft.serve.quick import loading
 from racecraft.serve.settings import ARTIFACTS, DATABASE
+from racecraft.system import lower_priority
 
 NICENESS: Final = 15
 """Jobs leave most of the processor to pages and 3D views, which stay smooth beside a training."""
@@ -24,8 +25,7 @@ def main(runs: str, lock: str, bell: str) -> int:
     """Do jobs; the exit status is 0 unless the process itself failed."""
     for file in (int(lock), int(bell)):
         os.set_inheritable(file, False)  # they are to end with this process, not with what that starts
-    if hasattr(os, "nice"):
-        os.nice(NICENESS)
+    lower_priority(NICENESS)
     with loading():
         from racecraft.serve.jobs.worker import do_job, load
 

@@ -9,7 +9,6 @@ child waits for another one itself. All ring a bell when a job has ended: a pipe
 from __future__ import annotations
 
 import asyncio
-import fcntl
 import logging
 import os
 import secrets
@@ -24,6 +23,7 @@ from typing import IO, Final
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from racecraft import system
 from racecraft.errors import RunError
 from racecraft.run.lock import exclusive_lock
 from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, JobQueue, Slot, kinds_of
@@ -237,15 +237,14 @@ class Standby:
 
     def _launch(self) -> subprocess.Popen[bytes]:
         with self._log.open("ab") as log, (self._workers / self._name).open("wb") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # of the open file, which the worker inherits
+            system.lock(lock.fileno())  # of the open file, which the worker inherits
             return subprocess.Popen(
                 [*self._command, str(lock.fileno()), str(self._rope)],
                 env=self._environment,
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                pass_fds=[lock.fileno(), self._rope],
-                start_new_session=True,  # Ctrl-C in the server's terminal is not for it
+                **system.apart(lock.fileno(), self._rope),  # Ctrl-C in the server's terminal is not for it
             )
 
 

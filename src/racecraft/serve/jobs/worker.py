@@ -107,8 +107,7 @@ class Worker:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which then tells us
         threading.Thread(target=self._keep, name="heartbeat", daemon=True).start()
         try:
-            if self._courier is not None:
-                move(self._courier.fetch())
+            move(self._courier.fetch() if self._courier is not None else {})  # not where another job's were
             result = work(self._task)
             if self._courier is not None:
                 self._courier.deliver()

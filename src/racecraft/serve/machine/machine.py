@@ -12,6 +12,7 @@ from racecraft.reward.sandbox import find_confinement
 from racecraft.serve.schemas import Message
 from racecraft.serve.settings import ServeSettings
 from racecraft.sim import instruction_set
+from racecraft.system import memory_bytes, num_cores
 
 MAX_FILES: Final = 50_000  # that are looked at to say how large a folder is
 NVIDIA: Final = Path("/proc/driver/nvidia/gpus")
@@ -70,9 +71,9 @@ def describe_machine(settings: ServeSettings) -> Machine:
         total_bytes=disk.total,
         sandbox="kernel" if find_confinement().is_complete else "process",
         processor=_processor(),
-        cores=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
+        cores=num_cores(),
         instruction_set=instruction_set(),
-        memory_bytes=_memory(),
+        memory_bytes=memory_bytes(),
         gpus=_gpus(),
         system=f"{platform.system()} {platform.machine()}",
         python=platform.python_version(),
@@ -107,13 +108,6 @@ def _processor() -> str:
     return next(
         (line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.processor()
     )
-
-
-def _memory() -> int | None:
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return None
 
 
 def _gpus() -> list[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import select
-import signal
 import subprocess
 import sys
 import threading
@@ -14,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, Final
 
+from racecraft import system
 from racecraft.errors import RunError
 
 PATIENCE: Final = 600.0  # s
@@ -66,15 +66,14 @@ class Bench:
             env=CALM,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            start_new_session=True,  # so that a child which hangs ends with it
+            **system.apart(),  # so that a child which hangs ends with it
         )
         return self._process
 
     def close(self) -> None:
         """End the judge's process with all that it has begun."""
         if self._process is not None:
-            with suppress(ProcessLookupError):
-                os.killpg(self._process.pid, signal.SIGKILL)
+            system.end(self._process.pid, with_group=True)
             self._process.wait()
             for pipe in _pipes(self._process):
                 with suppress(OSError):

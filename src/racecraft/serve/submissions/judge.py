@@ -16,12 +16,12 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from racecraft import system
 from racecraft.serve.quick import loading
 
 ENTRY: Final = "entry.safetensors"
@@ -72,9 +72,7 @@ def _judge_alone(told: dict[str, Any], pen: int) -> int:
     for file in (0, 1):
         os.dup2(nothing, file)
     os.chdir(told["folder"])
-    limits = {resource.RLIMIT_CPU: MOST_CPU, resource.RLIMIT_FSIZE: MOST_WRITTEN, resource.RLIMIT_CORE: 0}
-    for limit, most in limits.items():
-        resource.setrlimit(limit, (most, most))
+    system.limit(seconds=MOST_CPU, written=MOST_WRITTEN)
     try:
         said, status = _judge(told), 0
     except RacecraftError as error:
