@@ -169,6 +169,19 @@ def test_a_code_at_the_wall_and_a_card_that_was_lost(lesson: Lesson, race: int) 
     pupil.complaints = [one for one in pupil.complaints if "409" not in one and "401" not in one]  # both were wanted
 
 
+def test_what_may_be_used_is_said_by_the_teacher_and_seen_by_everybody(lesson: Lesson, race: int) -> None:
+    group = ok(lesson.league.owner.get("/api/groups"))[0]["id"]
+    page = lesson.visits["teacher"].open(f"/groups/{group}")
+    page.get_by_label("Minutes of training a day").fill("30")
+    page.locator("form", has=page.get_by_label("Jobs at once")).get_by_role("button", name="Save").click()
+    page.get_by_text("That is what they may use now.").wait_for()
+    row = page.get_by_role("region", name="What everybody may use").get_by_role("row", name="Comet")
+    row.get_by_text("0 of 30").wait_for()
+    page = lesson.visits["Comet"].open("/me")
+    page.get_by_text("0 of 30").wait_for()
+    page.get_by_text("1 of 200").wait_for()
+
+
 def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
     page = lesson.visits["Turbo"].open("/me")
     page.get_by_label("New password, at least 10 characters").fill("correct horse")

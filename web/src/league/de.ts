@@ -131,6 +131,18 @@ export const de: Record<LeagueKey, string> = {
   race_unfreeze: "Auftauen",
   race_frozen: "Eingefroren: zur Zeit meldet niemand",
   judge_again: "Neu werten",
+  quota: "Was alle benutzen dürfen",
+  quota_lead:
+    "Jedes Mitglied dieser Gruppe, das fährt. Ein leeres Feld überlässt es dem, der die Liga betreibt. Sind die Minuten verbraucht, wird ein Training gespeichert und kann weitergehen, wenn die von gestern einen Tag alt sind.",
+  quota_together: "Alle zusammen: {used} Minuten der letzten 24 Stunden.",
+  quota_minutes: "Trainingsminuten am Tag",
+  quota_models: "Modelle",
+  quota_places: "Aufträge zugleich",
+  quota_of: "{count} von {limit}",
+  quota_saved: "Das dürfen sie jetzt benutzen.",
+  quota_mine: "Was du benutzt",
+  quota_mine_lead:
+    "Die Plätze gehen reihum: Wer noch nie dran war, kommt als Nächstes, und was ruht, geht weiter, wo es war.",
   season: "Saison",
   season_points: "Punkte",
   season_races: "Rennen",
