@@ -55,7 +55,7 @@ def main() -> None:
     parser.add_argument("--vehicle", default="v5")
     parser.add_argument("--camera", default="2018", help="2026 has pictures as old as the original's")
     parser.add_argument("--num-threads", type=int, default=1)
-    parser.add_argument("-o", "--output", type=Path, help="the table; seeds in it are not trained again")
+    parser.add_argument("-o", "--output", type=Path, help="the table; seeds that are whole in it are not trained again")
     parser.add_argument("--picture", type=Path, help="draw the curves here")
     options = parser.parse_args()
 
@@ -66,7 +66,7 @@ def main() -> None:
     if options.output is not None and options.output.exists():
         learned = json.loads(options.output.read_text(encoding="utf-8"))["seeds"]
     for seed in options.seeds.split(","):
-        if seed not in learned:
+        if len(learned.get(seed, [])) < len(real):
             learned[seed] = learn(known, int(seed), options, num_episodes=per_iteration * len(real))
         found = learned[seed]
         print(f"seed {seed}: {shown(found, 'progress')} % of a lap, {shown(found, 'steps')} steps", flush=True)
@@ -77,7 +77,7 @@ def main() -> None:
     print(f"original: {shown(real, 'progress')} % of a lap, {shown(real, 'steps')} steps")
     inside = []
     for number, iteration in enumerate(real):
-        values = sorted(run[number]["progress"] for run in ours)
+        values = sorted(run[number]["progress"] for run in ours if number < len(run))
         inside.append(values[0] <= iteration["progress"] <= values[-1])
         print(
             f"iteration {number + 1}: original {iteration['progress']:.0f} %, here {values[0]:.0f} to {values[-1]:.0f},"
@@ -158,7 +158,8 @@ def draw(real: Iterations, ours: list[Iterations], path: Path) -> None:
         pen.text((at(0, percent)[0] - 10 * fine, at(0, percent)[1]), f"{percent} %", fill=ink, font=font, anchor="rm")
     for number in range(len(real)):
         pen.text((at(number, 0)[0], at(0, 0)[1] + 20 * fine), str(number + 1), fill=ink, font=font, anchor="mm")
-    middle = [statistics.median(run[number]["progress"] for run in ours) for number in range(len(real))]
+    driven = [[run[number]["progress"] for run in ours if number < len(run)] for number in range(len(real))]
+    middle = [statistics.median(values) for values in driven if len(values) == len(ours)]
     curves = [([iteration["progress"] for iteration in run], seed_color, 2) for run in ours]
     curves += [(middle, median_color, 4), ([iteration["progress"] for iteration in real], real_color, 4)]
     for values, color, thickness in curves:
