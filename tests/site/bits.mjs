@@ -198,7 +198,11 @@ async function session(core, asked) {
   const race = plan.races[type];
   const policy = policyFor(race, space, objects);
   const pay = () => payWith(rewards.own, track, race.cars.num_envs);
-  const wish = { plan, race, policy, objects, track, seed };
+  const begin = asked.begin && {
+    weights: read(asked.begin.weights),
+    layout: asked.begin.layout,
+  };
+  const wish = { plan, race, policy, objects, track, seed, begin };
   const trainer = new Trainer(core, wish, pay);
   let evaluation;
   let download; // of what was judged first

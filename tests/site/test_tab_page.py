@@ -34,6 +34,10 @@ AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"]
 PATIENCE = 60_000  # ms
+FADED = """new Promise(requestAnimationFrame)
+  .then(() => document.getAnimations().filter((one) => one instanceof CSSTransition))
+  .then((all) => Promise.allSettled(all.map((one) => one.finished)))
+  .then(() => 0)"""  # once colours have changed
 
 pytestmark = [
     pytest.mark.slow,
@@ -62,7 +66,7 @@ def page() -> Iterator[Page]:
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
         page.goto(f"http://127.0.0.1:{host.server_port}/site/")
-        page.get_by_role("button", name="Train").wait_for()
+        page.get_by_role("button", name="Train", exact=True).wait_for()
         yield page
         browser.close()
     host.shutdown()
@@ -75,7 +79,7 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
 
     page.get_by_label("Track").select_option("oval")
     page.get_by_role("button", name="Delete: 9").click()  # nine actions are left
-    page.get_by_role("button", name="Train").click()
+    page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text(re.compile("64 cars learning at once")).wait_for(timeout=PATIENCE)
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Race it: oval-racing-1").click()
@@ -104,11 +108,11 @@ def test_a_model_stays_when_the_page_is_closed_and_goes_when_it_is_deleted(page:
 def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
     page.get_by_label("Track").select_option("hairpin")
     page.get_by_label("What it is paid for").select_option("stay_inside")
-    page.get_by_role("button", name="Train").click()
+    page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Stop").click()
     page.get_by_text("Stopped after").wait_for()
-    page.get_by_role("button", name="Train").click()
+    page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Stop").click()
 
@@ -118,12 +122,32 @@ def test_cars_learn_among_bots_and_a_time_trial_follows(page: Page) -> None:
     page.get_by_role("button", name="Head to bot").click()
     page.get_by_label("Bot cars").fill("2")
     assert page.get_by_label("What it is paid for").input_value() == "dodge"
-    page.get_by_role("button", name="Train").click()
+    page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("128 cars learning at once").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Stop").click()
     page.get_by_role("button", name="Time trial").click()
     assert page.get_by_label("What it is paid for").input_value() == "racing"
     assert "dodge" not in page.get_by_label("What it is paid for").inner_text()
+
+
+def test_a_model_is_trained_on_with_another_reward(page: Page) -> None:
+    page.get_by_label("Track").select_option("oval")
+    page.get_by_label("What it is paid for").select_option("centerline")
+    page.get_by_role("button", name="Train", exact=True).click()
+    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    page.get_by_label("Track").select_option("kidney")
+    page.get_by_role("button", name="Train on: oval-centerline-1").click()
+    page.get_by_text("Begins with what oval-centerline-1 has learned.").wait_for()
+    assert page.get_by_label("Track").input_value() == "oval"
+    page.get_by_role("button", name="Head to bot").click()
+    page.get_by_text("oval-centerline-1 cannot begin here").wait_for()
+    assert page.get_by_role("button", name="Train", exact=True).is_disabled()
+    page.get_by_role("button", name="Time trial").click()
+    page.get_by_role("button", name="Train", exact=True).click()
+    page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Train on: oval-racing-1").wait_for()
+    page.get_by_role("button", name="Begin anew").click()
 
 
 def test_somebody_drives_a_lap_and_then_against_it(page: Page) -> None:
@@ -145,7 +169,7 @@ def test_what_runs_in_the_page_reaches_no_other_site(page: Page) -> None:
     other = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Files)
     ask = f"fetch('http://127.0.0.1:{other.server_port}/', {{mode: 'no-cors'}}).then(() => 'there', () => 'refused')"
     page.reload()  # its worker is no longer one that was just ended
-    page.get_by_role("button", name="Train").wait_for()
+    page.get_by_role("button", name="Train", exact=True).wait_for()
     found = page.workers[-1].evaluate(ask)
     other.server_close()
     assert found == "refused"
@@ -163,13 +187,13 @@ def test_a_reward_of_ones_own_is_checked_and_trains(page: Page) -> None:
     page.get_by_text("1: 'import numpy' is allowed, but numpy is not installed here.").wait_for(timeout=PATIENCE)
     page.get_by_text("the installed program, Racecraft, trains with numpy").wait_for()
     page.get_by_text("3: params has no key 'sped'. Did you mean 'speed'?").wait_for()
-    assert page.get_by_role("button", name="Train").is_disabled()
+    assert page.get_by_role("button", name="Train", exact=True).is_disabled()
     write(page, "#" * 2_000_000)
     page.get_by_text("The source has 2,000,000 characters").wait_for(timeout=PATIENCE)
     write(page, "def reward_function(params):\n    print('seen', params['steps'])\n    return params['speed']\n")
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
     page.get_by_text("seen 95.0").wait_for()  # what it printed when it was tried
-    page.get_by_role("button", name="Train").click()
+    page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
 
 
@@ -184,7 +208,7 @@ def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Pa
     page.goto(link)
     brought = page.get_by_label("This link brings a reward")
     brought.get_by_text("print('from afar')").wait_for()
-    page.get_by_role("button", name="Train").wait_for()
+    page.get_by_role("button", name="Train", exact=True).wait_for()
     assert len(page.workers) == 1  # the one that has no Python
     assert page.get_by_label("What it is paid for").input_value() == "racing"
     brought.get_by_role("button", name="Take it").click()
@@ -224,7 +248,7 @@ def test_a_reward_that_raises_late_stops_with_its_line_and_leaves_what_was_judge
     page.get_by_label("Track").select_option("kidney")
     write(page, FAILS_LATE.format(ending="raise ValueError('enough')"))
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
-    page.get_by_role("button", name="Train").click()
+    page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("reward_function.py, line 6: the reward function raised ValueError: enough").wait_for(
         timeout=PATIENCE
     )
@@ -235,7 +259,7 @@ def test_a_reward_that_raises_late_stops_with_its_line_and_leaves_what_was_judge
 def test_a_reward_that_hangs_is_ended_and_the_page_goes_on(page: Page) -> None:
     write(page, FAILS_LATE.format(ending="while True: print('again')"))
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
-    page.get_by_role("button", name="Train").click()
+    page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("the reward function did not return within 5 s").wait_for(timeout=PATIENCE)
     write(page, "def reward_function(params):\n    while True: pass\n")
     page.get_by_text("1: The reward function did not return within 5 s.").wait_for(timeout=PATIENCE)
@@ -253,7 +277,7 @@ def test_the_page_opens_and_trains_without_a_network_after_the_first_visit(page:
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)  # Python is kept, too
     page.get_by_label("What it is paid for").select_option("racing")
     page.get_by_label("Track").select_option("needle")  # never opened before
-    page.get_by_role("button", name="Train").click()
+    page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Stop").click()
     page.get_by_role("link", name="Documentation").click()
@@ -262,7 +286,7 @@ def test_the_page_opens_and_trains_without_a_network_after_the_first_visit(page:
     page.locator("#search-results").get_by_role("link", name="Evaluation", exact=True).click()
     page.get_by_role("heading", name="Evaluation", exact=True).wait_for()
     page.get_by_role("link", name="Train a car").click()
-    page.get_by_role("button", name="Train").wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Train", exact=True).wait_for(timeout=PATIENCE)
     page.context.set_offline(False)
 
 
@@ -271,7 +295,7 @@ def test_the_page_is_accessible_in_both_themes_and_fits_a_phone(page: Page) -> N
     page.evaluate(AXE.read_text(encoding="utf-8"))
     for theme in ("light", "dark"):
         page.get_by_label("Theme").select_option(theme)
-        page.wait_for_function("document.getAnimations().length === 0")  # colours have changed
+        page.evaluate(FADED)
         found = page.evaluate("axe.run().then((found) => found.violations.map((one) => [one.id, one.nodes[0].html]))")
         assert found == []
     for width in (390, 768):

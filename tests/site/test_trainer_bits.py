@@ -17,11 +17,12 @@ from racecraft.importing import import_run
 from racecraft.learn import NetworkSpec
 from racecraft.learn.flat_weights import join_weights
 from racecraft.learn.learner import below
+from racecraft.learn.networks import weight_shapes
 from racecraft.run import RunFolder
 from racecraft.run.checkpoint import Checkpoint
 from racecraft.sim.objects import objects_for_race
 from racecraft.site.javascript import javascript
-from racecraft.site.plan import plan, track_file
+from racecraft.site.plan import packed, plan, track_file
 from racecraft.training import resume
 
 pytestmark = pytest.mark.slow
@@ -111,6 +112,25 @@ def bits(saved: Checkpoint) -> dict[str, Any]:
         "lengths": digest(saved.arrays["ppo/episode_lengths"]),
         "returnScale": digest(saved.arrays["ppo/return_scale"]),
     }
+
+
+def test_a_training_begins_from_a_models_weights_as_in_the_installed_program(
+    runs: dict[str, RunFolder], tmp_path: Path
+) -> None:
+    options: dict[str, Any] = {"evaluate_every": 1500, "until": "1500 steps", "seed": SEED, "num_threads": 1}
+    parent = runs["time-trial"]  # of ten actions; these are more, so the policy's head begins anew
+    native = train(TRACK, reward=parent.reward_function, actions="aws", parent=parent.path, root=tmp_path, **options)
+    best = parent.checkpoints.load("best")
+    spec = NetworkSpec(**{**best.metadata["network"], "frame_shape": (120, 160)})
+    begin = {
+        "weights": packed(join_weights(below("weights/", best.arrays), spec)),
+        "layout": [[name, list(shape)] for name, shape in weight_shapes(spec).items()],
+    }
+    case = asked("time-trial", begin=begin, steps=1500)
+    case["space"] = next(space for space in case["plan"]["spaces"] if space["name"] == "aws")
+    [theirs] = in_node("core", [case], tmp_path)["results"]
+    ours = bits(RunFolder(native.run).checkpoints.load("last"))
+    assert {name: theirs[name] for name in ours} == ours
 
 
 @pytest.mark.parametrize("race", RACES)

@@ -37,6 +37,10 @@ export const de: Record<TabKey, string> = {
   drive: "Selbst fahren",
   drive_on: "Selbst fahren: {track}",
   drive_close: "Zurück",
+  train_on: "Weiter trainieren",
+  begins: "Beginnt mit dem, was {name} gelernt hat.",
+  begins_not: "{name} kann hier nicht beginnen: Dieses Rennen hat andere Sensoren.",
+  begins_anew: "Neu beginnen",
   race_it: "Gegen es fahren",
   own: "Eine eigene Belohnung",
   own_lead:

@@ -2,6 +2,7 @@
 import type { ActionPreset, RewardVerdict } from "../api/client";
 import { Curves, type Point } from "../lib/curves";
 import type { Look, Picture } from "../lib/poses";
+import { policyOf, type Model } from "./model";
 import { countOf } from "./objects";
 import type { Trace } from "./drivencar";
 import type { Judgement, TrainingState } from "./trainer";
@@ -26,6 +27,7 @@ export interface Wish {
   type: RaceType;
   objects: Objects;
   seed: number;
+  from: Model | undefined; // whose weights it begins with
   source: string | undefined; // of a reward of one's own, instead of the preset
 }
 
@@ -116,7 +118,7 @@ export class Lesson {
   }
 
   /** `source`: of a reward of one's own, instead of a preset. */
-  train({ track, reward, space, type, objects, seed, source }: Wish): void {
+  train({ track, reward, space, type, objects, seed, source, from }: Wish): void {
     [this.look, this.picture, this.judged] = [undefined, undefined, undefined];
     [this.seconds, this.failure] = [0, ""];
     [this.failedReward, this.printed] = ["", ""];
@@ -128,7 +130,9 @@ export class Lesson {
     const race = plan.races[type];
     const policy = policyFor(race, space, objects);
     const most = countOf(objects) ? MOST.among : MOST.alone;
-    const start: Start = { kind: "train", plan, race, policy, objects, track, reward: source ?? reward, seed, most };
+    const begin = from && { weights: from.weights, layout: policyOf(from, plan).weights };
+    const asked = { plan, race, policy, objects, track, seed, begin };
+    const start: Start = { kind: "train", ...asked, reward: source ?? reward, most };
     this.workers[this.running]!.postMessage(start);
   }
 

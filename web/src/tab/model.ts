@@ -2,7 +2,7 @@
 import type { ActionPreset } from "../api/client";
 import type { Trace } from "./drivencar";
 import { weightsAlone, wholeTraining } from "./checkpoint";
-import type { Plan, RaceType, TrackFile } from "./plan";
+import type { Plan, Policy, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
 import { gzip, tar } from "./tar";
 import type { Judgement, TrainingState } from "./trainer";
@@ -35,14 +35,19 @@ export const modelOf = (track: TrackFile, rest: Omit<Model, "track" | "trackDige
   created: new Date().toISOString(),
 });
 
+/** What it was trained as. */
+export function policyOf({ race, space }: Model, plan: Plan): Policy {
+  const { type, objects } = race ?? { type: "time-trial", objects: { obstacles: null, bots: null } };
+  return policyFor(plan.races[type], space ?? plan.spaces[0]!, objects);
+}
+
 const text = (value: unknown) => new TextEncoder().encode(typeof value === "string" ? value : JSON.stringify(value));
 
 /** A run folder that the installed program goes on with: where the training was kept whole, with the step that would
  * have come next, otherwise from its weights. */
 export async function archive(model: Model, plan: Plan): Promise<Blob> {
   const { created, seed, track, trackDigest: track_digest, weights, steps, seconds, state, judgement } = model;
-  const { type, objects } = model.race ?? { type: "time-trial", objects: { obstacles: null, bots: null } };
-  const policy = policyFor(plan.races[type], model.space ?? plan.spaces[0]!, objects);
+  const policy = policyOf(model, plan);
   const time_stamp = Date.parse(created) / 1000;
   const checkpoint =
     state && judgement

@@ -3,6 +3,7 @@ import type { Cars, Core, Episode, Learner, Training } from "./core";
 import type { Trace } from "./drivencar";
 import { toldObjects } from "./objects";
 import { startPose } from "./placement";
+import { firstWeights, type Beginning } from "./begin";
 import { NO_LAP } from "./checkpoint";
 import { arraysOf, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
 import type { Pay } from "./python";
@@ -72,6 +73,7 @@ export interface Asked {
   objects: Objects;
   track: TrackFile;
   seed: number;
+  begin?: Beginning | undefined; // fresh weights without one
 }
 
 const CONTROL_DT = 1 / 15; // s
@@ -115,7 +117,9 @@ export class Trainer {
     this.columns = core.names("row");
     this.table = Float64Array.from(policy.table);
     this.learner = core.learner(policy.network);
-    this.learner.write("weights", initialWeights(core, policy, seed));
+    const fresh = initialWeights(core, policy, seed);
+    const { begin } = asked;
+    this.learner.write("weights", begin ? firstWeights(policy.weights, fresh, begin) : fresh);
     this.training = this.learner.train(this.cars, policy.ppo, this.table);
   }
 

@@ -4,6 +4,7 @@ import type { RewardVerdict } from "../api/client";
 import type { Drive, DriveState, Settings } from "../api/drives";
 import type { Look, Picture } from "../lib/poses";
 import { loadCore, type LoadedCore } from "./core";
+import type { Beginning } from "./begin";
 import { DrivenCar, type Trace } from "./drivencar";
 import { objectsOf } from "./objects";
 import { read, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
@@ -42,6 +43,7 @@ export interface Start {
   track: TrackFile;
   reward: string; // name of a preset, or the source where there is Python
   seed: number;
+  begin: Beginning | undefined; // fresh weights without one
   most: number; // camera steps
 }
 
@@ -156,7 +158,7 @@ async function load({ site, hasPython }: Load): Promise<Loaded> {
 function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded): void {
   const began = performance.now();
   const seconds = () => (performance.now() - began) / 1000;
-  const { plan, race, policy, objects, track, reward, seed } = start;
+  const { plan, race, policy, objects, track, reward, seed, begin } = start;
   const numCars = race.cars["num_envs"]!;
   let printed = () => "";
   const payFor = (numColumns: number): Pay => {
@@ -165,7 +167,7 @@ function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded
     printed = paid.printed;
     return paid.pay;
   };
-  const trainer = new Trainer(core, { plan, race, policy, objects, track, seed }, payFor);
+  const trainer = new Trainer(core, { plan, race, policy, objects, track, seed, begin }, payFor);
   tell({ kind: "loaded", isSlow });
   let looked = -Infinity;
   const look = () => {
