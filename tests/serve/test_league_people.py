@@ -186,6 +186,18 @@ def test_a_stolen_card_is_worth_nothing_once_it_is_revoked(league: RunningLeague
     assert newest["link"].startswith(str(league.owner.base_url).rstrip("/") + "/card#")
 
 
+def test_who_comes_in_anew_ends_the_session_that_was_there(league: RunningLeague, school: dict[str, Any]) -> None:
+    people = [{"name": "Fred"}, {"name": "Emil"}]
+    cards = ok(school["teacher"].post(f"/api/groups/{school['group']}/members", json={"people": people}), 201)
+    browser, other = league.stranger(), league.stranger()
+    ok(browser.post("/api/door/card", json={"secret": cards[0]["link"].split("#")[1]}))
+    other.cookies.update(browser.cookies)
+    assert ok(other.get("/api/account"))["name"] == "Fred"
+    ok(browser.post("/api/door/card", json={"secret": cards[1]["link"].split("#")[1]}))
+    assert ok(browser.get("/api/account"))["name"] == "Emil"
+    refused(other.get("/api/account"), 401)
+
+
 def test_an_open_stream_ends_with_its_session(league: RunningLeague, school: dict[str, Any]) -> None:
     teacher, group = school["teacher"], school["group"]
     (card,) = ok(teacher.post(f"/api/groups/{group}/members", json={"people": [{"name": "Dora"}]}), 201)

@@ -76,6 +76,7 @@ def cup(league: RunningLeague) -> Cup:
     return Cup(league)
 
 
+@pytest.mark.costly
 def test_a_judge_that_fails_is_there_for_the_next_entry(run: RunFolder, tmp_path: Path) -> None:
     bench, conditions = Bench(), Conditions(track=load_track("oval"), rules=RaceRules(laps=1, max_resets=1))
     terms = Announcement.of(

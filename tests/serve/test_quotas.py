@@ -109,6 +109,7 @@ def test_trainings_of_who_has_no_minutes_left_are_stopped(database: Database, qu
         ]
 
 
+@pytest.mark.costly
 def test_who_may_say_what_and_what_is_refused_by_it(tmp_path: Path) -> None:
     with running_league(tmp_path / "runs", "--trainings", "0") as league:
         teacher = league.organiser("Teacher")

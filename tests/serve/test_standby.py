@@ -58,6 +58,7 @@ def test_the_waiting_worker_does_the_next_job(settings: ServeSettings, standby: 
     database.close()
 
 
+@pytest.mark.costly
 def test_after_a_short_job_it_waits_for_another(settings: ServeSettings, standby: Standby) -> None:
     database = Database(settings.database_url)
     database.migrate()

@@ -126,6 +126,7 @@ def sign_out(request: Request, consoles: InConsoles, person: InPerson) -> Respon
 def _let_in(request: Request, response: Response, consoles: Consoles, user: int) -> Me:
     guard: Guard = request.app.state.guard
     _write_down(request, consoles, user)
+    consoles.keys.close_session(request.cookies.get(COOKIE, ""))  # whoever was here before is so no longer
     guard.give_cookie(response, consoles.keys.open_session(user))
     return me_of(consoles.people.get(user))
 
