@@ -95,6 +95,7 @@ requirements: $(UV)  ## pin the newest allowed versions again
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/site.in -o requirements/site.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/docs.in -o requirements/docs.txt
 	$(UV) pip compile -q --no-deps --universal --python-version 3.11 --generate-hashes --no-header requirements/transfer.in -o requirements/transfer.txt
+	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/ray.in -o requirements/ray.txt
 
 $(UV): requirements/uv.txt
 	@test -n "$(PYTHON)" || { echo "Racecraft needs Python 3.11 or newer; none was found on PATH."; exit 1; }
@@ -127,6 +128,11 @@ $(ZIG): $(UV) requirements/site.txt
 $(SPHINX): $(UV) requirements/docs.txt
 	@echo "A generator of the documentation's pages from PyPI, some 20 MB ..."
 	@$(UV) pip install -q --python $(BIN)/python --target build/sphinx --require-hashes -r requirements/docs.txt
+	@touch $@
+
+build/ray: $(UV) requirements/ray.txt  # for tests/tuning/test_cluster.py alone
+	@echo "Ray from PyPI, some 80 MB ..."
+	@$(UV) pip install -q --python $(BIN)/python --target build/ray --require-hashes -r requirements/ray.txt
 	@touch $@
 
 build/mujoco: $(UV) requirements/transfer.txt  # for benchmarks/transfer.py alone

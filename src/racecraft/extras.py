@@ -16,6 +16,7 @@ EXTRAS: Final[dict[str, tuple[str, ...]]] = {
     "sb3": ("stable-baselines3",),
     "cuda": ("torch", "cuda-bindings"),
     "tune": ("optuna",),
+    "ray": ("ray",),
     "serve": ("fastapi", "uvicorn", "sse-starlette", "sqlalchemy", "alembic", "pwdlib[argon2]", "limits", "segno"),
     "postgres": ("psycopg[binary]",),
     "s3": ("obstore",),

@@ -26,6 +26,9 @@ def sweep(
     processes: Annotated[
         int, typer.Option("--processes", help="Trainings at once; 0 for one per core. Same results.")
     ] = 0,
+    cluster: Annotated[
+        str, typer.Option("--cluster", help="Train on a cluster of Ray: auto, or ray://HOST:10001.")
+    ] = "",
     resume: Annotated[str, typer.Option("--resume", help="Go on with the sweep of this name.")] = "",
     board: Annotated[bool, typer.Option("--board", help="Only show how it stands; with --resume NAME.")] = False,
     as_json: Json = False,
@@ -44,7 +47,7 @@ def sweep(
             sweep_text.say_run(run, how)
 
     swept = Sweep(runs, resume) if file is None else make_sweep(read_sweep(read_text(file)), runs=runs, name=name)
-    is_interrupted = False if board else swept.train(processes=processes, on_end=tell)
+    is_interrupted = False if board else swept.train(processes=processes, cluster=cluster, on_end=tell)
     found = swept.board()
     if as_json:
         print_json({"sweep": swept.name, **found.to_dict(), "is_interrupted": is_interrupted})

@@ -132,13 +132,20 @@ class Sweep:
                         outcomes.setdefault(setting, {})[seed] = outcome
         return board_of(self.goal, self.settings, outcomes)
 
-    def train(self, *, processes: int = 0, on_end: Callable[[str, Report | Exception], None] = lambda *_: None) -> bool:
+    def train(
+        self,
+        *,
+        processes: int = 0,
+        cluster: str = "",
+        on_end: Callable[[str, Report | Exception], None] = lambda *_: None,
+    ) -> bool:
         """Train all of its runs here, one seed of all settings after the other; whether that was interrupted.
 
         A run that cannot be trained is told, and the others go on. What was trained before is not trained again.
 
         Args:
             processes: Trainings at once; 0 takes one per core. The runs are the same for any number.
+            cluster: Address of a cluster of Ray that trains instead, see `racecraft.tuning.cluster`.
             on_end: Is told each run that ended, and how.
 
         Raises:
@@ -151,7 +158,12 @@ class Sweep:
         for name in names:
             waiting.put(name)
         count = max(1, min(processes or num_cores(), len(names)))
-        self._seats = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
+        if cluster:
+            from racecraft.tuning.cluster import cluster_seats
+
+            self._seats = cluster_seats(cluster, min(processes or len(names), len(names)))
+        else:
+            self._seats = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
         threads = max(1, num_cores() // count)
         with exclusive_lock(self.file.with_suffix(".lock")), interruptible(self._stop, self.stop):
             workers = [
@@ -188,7 +200,13 @@ class Sweep:
                 name = waiting.get_nowait()
             except queue.Empty:
                 return
-            order = Order(run=str((self.runs / name).resolve()), goal="laps", trial_steps=1, num_threads=num_threads)
+            order = Order(
+                run=str((self.runs / name).resolve()),
+                goal="laps",
+                trial_steps=1,
+                is_checked=False,  # it may have been edited
+                num_threads=num_threads,
+            )
             try:
                 on_end(name, seat.run(order))
             except SeatLost as error:

@@ -91,7 +91,7 @@ class ProcessSeat:
             raise SeatLost(f"The trial's process ended with status {process.returncode}.")
         answer = json.loads(line)
         if "error" in answer:
-            raise _error(answer["error"])
+            raise error_of(answer["error"])
         return Report.from_dict(answer)
 
     def _started(self) -> subprocess.Popen[bytes]:
@@ -140,12 +140,17 @@ def serve_seat() -> None:
         try:
             answer = run_trial(Order.from_dict(json.loads(orders.pop()))).to_dict()
         except RacecraftError as error:
-            answer = {"error": {"kind": type(error).__name__, "message": str(error), "hint": error.hint}}
+            answer = {"error": told(error)}
         answers.write(json.dumps(answer).encode() + b"\n")
         answers.flush()
 
 
-def _error(document: dict[str, Any]) -> RacecraftError:
+def told(error: RacecraftError) -> dict[str, Any]:
+    """An error for another process."""
+    return {"kind": type(error).__name__, "message": str(error), "hint": error.hint}
+
+
+def error_of(document: dict[str, Any]) -> RacecraftError:
     """The error that another process met."""
     kind = getattr(errors, document["kind"], RacecraftError)
     error: RacecraftError = kind(document["message"], hint=document["hint"])

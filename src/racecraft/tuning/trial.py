@@ -32,6 +32,8 @@ class Order:
     """Camera steps after which it ends."""
     bars: tuple[float, ...] = ()
     """By evaluation: who is worse by then lags behind and is ended."""
+    is_checked: bool = True
+    """Whether the reward function has just been checked, and not changed since."""
     num_threads: int = 0
     """Of simulator and learner where the run leaves it open; 0 takes one per core."""
 
@@ -84,7 +86,7 @@ def run_trial(order: Order, *, on_training: Callable[[Training], None] = lambda 
     """
     begun = time.monotonic()
     judge = _Judge(order)
-    training = Training(RunFolder.open(Path(order.run)), reporter=judge, is_checked=True)
+    training = Training(RunFolder.open(Path(order.run)), reporter=judge, is_checked=order.is_checked)
     if training.settings.num_threads == 0:
         training.settings = replace(training.settings, num_threads=order.num_threads)
     judge.training = training
