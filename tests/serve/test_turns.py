@@ -146,11 +146,21 @@ def test_what_has_rested_long_is_not_passed_over_for_ever(machine: Machine) -> N
     machine.rest(patient)
     (bobs,) = machine.tend()
     newer = machine.add(CYD)
+    machine.later(FIRST_TURN)
+    machine.tend()
     machine.rest(bobs)
     assert machine.tend() == [newer], "what never ran comes first"
     machine.later(PATIENCE)
     machine.rest(newer)
     assert machine.tend() == [patient]
+
+
+def test_what_is_lost_with_its_process_keeps_its_turn(machine: Machine) -> None:
+    lost = machine.add(ADA)
+    machine.tend()
+    machine.add(BOB)
+    JobQueue(machine.database).release(machine.row(lost).owner)
+    assert machine.tend() == [lost]
 
 
 @pytest.mark.slow

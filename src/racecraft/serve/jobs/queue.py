@@ -363,7 +363,9 @@ class JobQueue:
                 elif limit and job.losses >= limit - 1:
                     values |= {"state": "failed", "error": gone, "finished": moment}
                 else:
-                    values |= {"state": "queued", "owner": "", "losses": job.losses + int(limit > 0), "rested": moment}
+                    values |= {"state": "queued", "owner": "", "losses": job.losses + int(limit > 0)}
+                    if job.asked is not None:  # what was lost or stopped with the server keeps its turn
+                        values["rested"] = moment
                 is_it = sa.and_(Job.id == job.id, Job.owner == job.owner, Job.state == "running", condition)
                 session.execute(sa.update(Job).where(is_it).values(values))
 

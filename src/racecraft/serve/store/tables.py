@@ -205,7 +205,7 @@ class Job(Table):
     held_since: Mapped[datetime | None]
     """When it got the place that it has."""
     rested: Mapped[datetime | None]
-    """When it gave up the last one that it had without having ended."""
+    """When it last gave one up because others waited."""
     asked: Mapped[datetime | None]
     """Since when others wait for its place."""
     used: Mapped[float] = mapped_column(default=0.0)
