@@ -66,6 +66,19 @@ def test_the_nearest_word_counts_and_of_several_groups_the_most_generous(databas
     assert quotas.limits(TEACHER) == quotas.limits(1) == Limits()
 
 
+def test_many_at_once_have_to_fit(database: Database, quotas: Quotas) -> None:
+    quotas.say("person", Limits(minutes=5, places=4), ADA)
+    trained(database, ADA, 0.0, state="queued", finished=None)
+    quotas.require(ADA, "places", "minutes", count=3)
+    with pytest.raises(Conflict, match="4 jobs at once, and this takes 4 more"):
+        quotas.require(ADA, "places", "minutes", count=4)
+    quotas.require(ADA, "minutes", count=100)
+    quotas.say("group", Limits(models=2), CLASS)
+    quotas.require(ADA, "models", count=2)
+    with pytest.raises(Conflict, match="models of your group"):
+        quotas.require(ADA, "models", count=3)
+
+
 def test_minutes_are_those_of_a_day_with_the_ones_that_run(database: Database, quotas: Quotas) -> None:
     trained(database, ADA, 4.0)
     trained(database, ADA, 9.0, finished=now() - timedelta(hours=25))

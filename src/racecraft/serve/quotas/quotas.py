@@ -93,14 +93,19 @@ class Quotas:
         with self._database.transaction() as session:
             return self._usage(session, people)
 
-    def require(self, user_id: int, *what: Literal["minutes", "models", "places"]) -> None:
+    def require(self, user_id: int, *what: Literal["minutes", "models", "places"], count: int = 1) -> None:
         """Refuse what would be more than somebody, or their groups, may use.
+
+        Args:
+            user_id: Who.
+            what: They are about to use.
+            count: Models and places at once; of minutes there have to be some.
 
         Raises:
             Conflict: It would.
         """
         with self._database.transaction() as session:
-            over = self._over(session, user_id, what)
+            over = self._over(session, user_id, what, count)
         if over is not None:
             raise Conflict(*over[:1], hint=over[1])
 
@@ -116,7 +121,7 @@ class Quotas:
             moment = self._database.moment(session)
             session.execute(waiting.values(is_cancelled=True, state="cancelled", finished=moment))
 
-    def _over(self, session: Session, user_id: int, what: Iterable[str]) -> tuple[str, str] | None:
+    def _over(self, session: Session, user_id: int, what: Iterable[str], count: int = 1) -> tuple[str, str] | None:
         """A sentence and a hint about what is used up; None where nothing is."""
         own = _limits(session, user_id)
         if own == Limits():
@@ -124,19 +129,20 @@ class Quotas:
         groups = session.scalars(sa.select(Member.group_id).where(Member.user_id == user_id)).all()
         together = [(group, _said(session, "group", group)) for group in groups]
         for name in what:
-            limit = getattr(own, name)
-            if limit is not None and getattr(self._usage(session, [user_id]), name) >= limit:
-                return f"You have {limit} {WORDS[name]}, and they are used up.", HINTS[name]
-            if together and all(self._is_used_up(session, group, name, limits) for group, limits in together):
+            limit, more = getattr(own, name), count - 1 if name != "minutes" else 0
+            if limit is not None and getattr(self._usage(session, [user_id]), name) + more >= limit:
+                told = f"and this takes {count} more" if more else "and they are used up"
+                return f"You have {limit} {WORDS[name]}, {told}.", HINTS[name]
+            if together and all(self._is_used_up(session, group, name, limits, more) for group, limits in together):
                 return f"All the {WORDS[name]} of your group are used up.", HINTS[name]
         return None
 
-    def _is_used_up(self, session: Session, group: int, name: str, limits: Limits) -> bool:
+    def _is_used_up(self, session: Session, group: int, name: str, limits: Limits, more: int) -> bool:
         limit = getattr(limits, name)
         if limit is None:
             return False
         racers = sa.select(Member.user_id).where(Member.group_id == group, Member.role == "racer")
-        return bool(getattr(self._usage(session, session.scalars(racers).all()), name) >= limit)
+        return bool(getattr(self._usage(session, session.scalars(racers).all()), name) + more >= limit)
 
     def _usage(self, session: Session, people: Collection[int]) -> Usage:
         moment = self._database.moment(session)

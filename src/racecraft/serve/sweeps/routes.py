@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from racecraft.serve.context import InContext
+from racecraft.serve.context import InConsoles, InContext, InUser
 from racecraft.serve.sweeps.schemas import NewSweep, SweepCard, SweepDetail
 
 router = APIRouter(prefix="/api/sweeps", tags=["sweeps"])
@@ -21,9 +21,13 @@ def list_sweeps(context: InContext) -> list[SweepCard]:
 
 
 @router.post("", status_code=202)
-def start_sweep(request: NewSweep, context: InContext) -> SweepDetail:
+def start_sweep(request: NewSweep, context: InContext, consoles: InConsoles, user: InUser) -> SweepDetail:
     """Train a table of settings with several seeds each."""
-    started = context.sweeps.start(request)
+
+    def allow(count: int) -> None:
+        consoles.quotas.require(user, "models", "places", "minutes", count=count)
+
+    started = context.sweeps.start(request, allow=allow)
     context.supervisor.wake()
     return started
 
@@ -41,9 +45,11 @@ def stop_sweep(name: Name, context: InContext) -> SweepDetail:
 
 
 @router.post("/{name}/go-on", status_code=202)
-def resume_sweep(name: Name, context: InContext) -> SweepDetail:
+def resume_sweep(name: Name, context: InContext, consoles: InConsoles, user: InUser) -> SweepDetail:
     """Train what is not done yet."""
-    found = context.sweeps.go_on(name)
+    found = context.sweeps.go_on(
+        name, allow=lambda count: consoles.quotas.require(user, "places", "minutes", count=count)
+    )
     context.supervisor.wake()
     return found
 

@@ -46,8 +46,12 @@ class Sweeps:
         self._queue, self._garage, self._courses = queue, garage, courses
         self._mirror, self._see = mirror, see
 
-    def start(self, request: NewSweep) -> SweepDetail:
+    def start(self, request: NewSweep, *, allow: Callable[[int], None]) -> SweepDetail:
         """Make the models of a sweep and queue their trainings.
+
+        Args:
+            request: What is asked for.
+            allow: Is told how many models and trainings that is before there is any, and may refuse it.
 
         Raises:
             RacecraftError: It is none, or a setting cannot be trained.
@@ -61,13 +65,17 @@ class Sweeps:
         plan = read_sweep(request.text, resolve=self._resolve, load=self._load)
         if len(plan.settings) * len(plan.seeds) > MAX_RUNS:
             raise ConfigError(f"A sweep has at most {MAX_RUNS} trainings here.", hint="Take fewer settings or seeds.")
+        allow(len(plan.settings) * len(plan.seeds))
         sweep = make_sweep(plan, runs=runs, name=request.name)
         self._queue_trainings(sweep)
         return self.get(request.name)
 
-    def go_on(self, name: str) -> SweepDetail:
-        """Queue what is neither under way nor done."""
-        self._queue_trainings(self._sweep(name))
+    def go_on(self, name: str, *, allow: Callable[[int], None]) -> SweepDetail:
+        """Queue what is neither under way nor done, of which `allow` is told how much it is."""
+        sweep = self._sweep(name)
+        if left := self._left(sweep):
+            allow(len(left))
+        self._queue_trainings(sweep)
         return self.get(name)
 
     def stop(self, name: str) -> SweepDetail:
@@ -129,10 +137,14 @@ class Sweeps:
         return {name: self._see(newest[name]) if name in newest else None for name in there}
 
     def _queue_trainings(self, sweep: Sweep) -> None:
-        for model, job in self._jobs(sweep).items():
-            if self._state(model, job) not in ("queued", "running", "done"):
-                folder = RunFolder(self._garage.runs / model)
-                self._queue.add("train", model, {"until": None}, cargo=self._mirror.share_training(folder))
+        for model in self._left(sweep):
+            cargo = self._mirror.share_training(RunFolder(self._garage.runs / model))
+            self._queue.add("train", model, {"until": None}, cargo=cargo)
+
+    def _left(self, sweep: Sweep) -> list[str]:
+        """What is neither under way nor done."""
+        jobs = self._jobs(sweep)
+        return [model for model, job in jobs.items() if self._state(model, job) not in ("queued", "running", "done")]
 
     def _resolve(self, word: str, value: Any) -> Any:
         """What is meant by a word of the file; files of the server's machine are nobody's business."""
