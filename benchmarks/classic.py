@@ -7,8 +7,8 @@ Each run is a process of its own on one thread (A3C: as many as it starts). Time
 of learning, evaluations included, for both; imports do not count. `seconds` is wall clock, `cpu_seconds` processor time
 of the process and its children: on one thread the same thing on a machine with nothing else to do, and what can still
 be compared on a busy one. The rival learns with its PPO, A2C, DQN or SAC and the settings that its zoo of tuned agents
-publishes, or its defaults, is evaluated as often on as many episodes, and stops at the same return; `share` is our
-median processor time by its.
+publishes, or its defaults, is evaluated as often on as many episodes at once, and stops at the same return; `share` is
+our median processor time by its.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def rival(environment: str, algorithm: str, seed: int) -> dict[str, Any]:
     worlds = make_vec_env(environment, n_envs=settings.pop("num_envs", 1), seed=seed)
 
     def judge(model: Any, episodes: int, first: int) -> float:
-        judged = make_vec_env(environment, n_envs=1, seed=first)
+        judged = make_vec_env(environment, n_envs=episodes, seed=first)  # all at once, as ours
         mean, _ = evaluate_policy(model, judged, n_eval_episodes=episodes, warn=False)
         return float(np.mean(mean))
 
