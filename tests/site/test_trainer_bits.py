@@ -38,9 +38,10 @@ PAYS = """def reward_function(params):
                 reward -= 0.1
     return reward
 """  # what browsers and Python compute alike, to the bit
+NEAR_THE_START = ((0.02, 1), (0.4, -1), (0.7, 1))  # so that trials begin in the other lane
 RACES: dict[str, tuple[dict[str, Any], int]] = {  # what is chosen of a race's objects, and steps between evaluations
     "time-trial": ({}, 1500),
-    "object-avoidance": ({"count": 4}, 2500),
+    "object-avoidance": ({"count": 3, "placement": "fixed", "positions": NEAR_THE_START}, 2500),
     "head-to-bot": ({"count": 2, "speed": 0.5, "changes_lane": True}, 2500),
 }
 
