@@ -43,14 +43,14 @@ INLINE: Final = re.compile(r"\s*<script>\s*document\.body\.dataset\.theme.*?</sc
 UNUSED: Final = (".buildinfo", "objects.inv")
 
 
-def add_contents(_: Any, name: str, source: list[str]) -> None:
-    """The lists of docs/index.md are the table of contents: a page that is not in them is an error."""
+def add_contents(app: Any, name: str, source: list[str]) -> None:
+    """The lists of docs/index.md are the table of contents."""
     if name == root_doc:
-        source[0] += contents(source[0])
+        source[0] += contents(source[0], app.env.found_docs - {root_doc})
 
 
-def contents(index: str) -> str:
-    """Hidden toctrees of the lists below each heading."""
+def contents(index: str, pages: set[str]) -> str:
+    """Hidden toctrees of the lists below each heading, and one of the pages that are in none."""
     found: dict[str, list[str]] = {}
     caption = ""
     for line in index.splitlines():
@@ -58,7 +58,11 @@ def contents(index: str) -> str:
             caption = heading[1]
         elif page := PAGE.match(line):
             found.setdefault(caption, []).append(f"{page[1]} <{page[2]}>")
-    trees = (f"\n```{{toctree}}\n:hidden:\n:caption: {name}\n\n" + "\n".join(pages) for name, pages in found.items())
+    listed = {page[2] for line in index.splitlines() if (page := PAGE.match(line))}
+    found["More"] = sorted(pages - listed)
+    trees = (
+        f"\n```{{toctree}}\n:hidden:\n:caption: {name}\n\n" + "\n".join(those) for name, those in found.items() if those
+    )
     return "".join(f"{tree}\n```\n" for tree in trees)
 
 
