@@ -268,3 +268,62 @@ def test_a_model_of_many_tracks_names_one_that_there_is(console: RunningConsole)
         (console.runs / name / "run.json").write_text(json.dumps({**document, "track": track}))
         card = console.client.get(f"/api/models/{name}").json()
         assert (card["track"], card["num_tracks"]) == shown
+
+
+def test_a_lap_is_sent_as_one_file(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, stamp = raced
+    address = f"/api/models/{name}/evaluations/{stamp}/share"
+    page = console.client.get(f"{address}.html", params={"language": "de"})
+    assert page.headers["content-disposition"] == 'attachment; filename="raced.html"'
+    assert '<html lang="de">' in page.text
+    assert "raced.replay" in page.text
+    picture = console.client.get(f"{address}.png")
+    assert picture.headers["content-type"] == "image/png"
+    assert picture.content.startswith(b"\x89PNG")
+    refused(console.client.get(f"/api/models/{name}/evaluations/20200101000000/share.html"), 404)
+    assert console.client.get(f"{address}.html", params={"language": "xx"}).status_code == 422
+
+
+def test_how_it_learned_is_shown_and_filmed(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, _ = raced
+    found = console.client.get(f"/api/models/{name}/evolution").json()
+    laps = found["laps"]
+    assert len(laps) > 1
+    assert [lap["step"] for lap in laps] == sorted({lap["step"] for lap in laps})
+    ranks = [(lap["completion"], -(lap["seconds"] or 1e6)) for lap in laps[:-1]]
+    assert ranks == sorted(set(ranks))
+    starts = {tuple(lap["poses"][0]) for lap in laps[:-1]}
+    assert len(starts) == 1
+    assert found["film"] is None
+    job = console.client.post(f"/api/models/{name}/evolution").json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    film = console.client.get(f"/api/models/{name}/evolution").json()["film"]
+    assert console.client.get(f"/api/models/{name}/files/{film}").headers["content-type"] == "video/mp4"
+
+
+def test_notes_are_kept_in_the_run(raced: tuple[RunningConsole, str, str]) -> None:
+    console, name, _ = raced
+    address = f"/api/models/{name}"
+    assert console.client.get(address).json()["notes"] == ""
+    assert console.client.patch(address, json={"notes": "Läuft.\n<b>"}).status_code == 200
+    assert console.client.get(address).json()["notes"] == "Läuft.\n<b>"
+    assert (console.runs / name / "notes.md").read_text(encoding="utf-8") == "Läuft.\n<b>"
+    assert console.client.patch(address, json={"notes": "x" * 20_001}).status_code == 422
+    assert console.client.patch(address, json={"notes": " "}).status_code == 200
+    assert not (console.runs / name / "notes.md").exists()
+
+
+def test_a_model_says_what_it_is_made_of(raced: tuple[RunningConsole, str, str]) -> None:
+    """So that the request which it answers with makes the same one again."""
+    console, name, _ = raced
+    request = console.client.get(f"/api/models/{name}/again").json()
+    request["tuning"].pop("loss_type")
+    copy = console.client.post("/api/models", json={**request, "name": "again", "train": False})
+    assert copy.status_code == 201, copy.text
+    first, second = (console.client.get(f"/api/models/{one}").json() for one in (name, "again"))
+    for key in ("reward", "model_metadata", "settings", "seed", "track", "until"):
+        assert first[key] == second[key], key
+    boxes = {"name": "boxes", "track": "oval", "race": "object-avoidance", "objects": 4, "randomize": "light"}
+    console.create(train=False, **boxes)
+    request = console.client.get("/api/models/boxes/again").json()
+    assert boxes.items() <= {**request, "name": "boxes"}.items()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browsers import Visit, needs_browser, needs_pages, visiting
-from running_consoles import RunningConsole, running_console
+from running_consoles import PATIENCE, RunningConsole, running_console
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
@@ -212,3 +212,41 @@ def test_ones_own_car_is_driven_against(changed: Visit) -> None:
         page.wait_for_url("**/drive/oval/heron")
         page.locator("option:checked", has_text="heron · ").wait_for(state="attached")
         assert page.get_by_text("has no lap of an evaluation").count() == 0
+
+
+def test_how_it_learned_notes_and_a_copy_to_change(changed: Visit) -> None:
+    from playwright.sync_api import expect
+
+    client = changed.console.client
+    page = changed.open("/models/heron/watch")
+    shown = page.get_by_role("region", name="How it learned")
+    shown.locator("canvas").wait_for()
+    laps = client.get("/api/models/heron/evolution").json()["laps"]
+    assert shown.locator("li").count() == len(laps) > 1
+    shown.get_by_label("Moment of the lap").fill("0.5")
+    shown.get_by_text("0.50 /").wait_for()
+    notes = page.get_by_label("Notes")
+    notes.fill("The inside line is shorter.")
+    page.get_by_text("Kept", exact=True).wait_for()
+    assert client.get("/api/models/heron").json()["notes"] == "The inside line is shorter."
+    page.reload()
+    expect(page.get_by_label("Notes")).to_have_value("The inside line is shorter.", timeout=1000 * PATIENCE)
+
+    page = changed.open("/models/heron/setup")
+    page.get_by_role("button", name="Change a copy").click()
+    page.wait_for_url("**/create")
+    page.get_by_text("-params['speed']").first.wait_for()
+    page.get_by_role("radio", checked=True, name="Paperclip").wait_for()
+    page.evaluate("sessionStorage.clear()")
+
+
+def test_the_end_of_a_training_is_said_on_another_page(changed: Visit) -> None:
+    console = changed.console
+    page = changed.open("/models/other/watch")
+    steps = console.client.get("/api/models/other").json()["steps"]
+    console.client.post("/api/models/other/train", json={"until": f"{steps + 4000} steps"})
+    page.get_by_role("button", name="Stop").wait_for()
+    page.get_by_role("link", name="Garage").first.click()
+    page.locator(".toast").get_by_text("other has finished its training.").wait_for()
+    page.locator(".toast").get_by_role("button", name="Look").click()
+    page.wait_for_url("**/models/other")

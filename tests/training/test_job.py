@@ -284,3 +284,46 @@ def test_a_taken_name_is_refused(tiny: Train) -> None:
     with pytest.raises(RunError, match="exists"):
         tiny(name="mine")
     assert resume(run, until="128 steps").steps == 128
+
+
+# ---- how it learned
+
+
+def test_laps_of_a_training_are_kept_and_change_nothing(tiny: Train, monkeypatch: pytest.MonkeyPatch) -> None:
+    from racecraft.judging.evolution import drive_checkpoint, evolution_of
+    from racecraft.run.evolution import read_drives
+    from racecraft.training.job import Training
+
+    plain = tiny(seed=5)
+    monkeypatch.setattr(Training, "looks_on", True)
+    looked = tiny(seed=5)
+    assert_same(plain.run, looked.run)
+    seldom, often = (read_drives(RunFolder.open(result.run)) for result in (plain, looked))
+    assert [drive.step for drive in seldom] == [128, 256, 384, 512]
+    assert {drive.step for drive in often} == {64, 128, 192, 256, 320, 384, 448, 512}
+    for drive in seldom:
+        (same,) = [one for one in often if one.step == drive.step]
+        assert same.point() == drive.point()
+
+    folder = RunFolder.open(looked.run)
+    best = folder.checkpoints.best
+    assert best is not None
+    (kept,) = [drive for drive in often if drive.step == best.step]
+    driven = drive_checkpoint(folder, best.step, num_trials=1).trials[0].recording
+    rows = min(len(kept.poses), len(driven.poses))
+    start = len(driven.poses) - len(kept.poses)
+    assert start in (0, 1)  # a recording has the row of preparation, too
+    np.testing.assert_allclose(kept.poses[: rows - 1], 1000 * driven.poses[start:][: rows - 1], atol=1)
+    shown = evolution_of(folder)
+    assert shown[-1].step == best.step
+    assert [drive.step for drive in shown] == sorted({drive.step for drive in shown})
+    folder.evolution.unlink()  # as of a run from before
+    assert [drive.step for drive in evolution_of(folder)][-1] == best.step
+
+
+def test_a_film_needs_something_to_compare(tiny: Train) -> None:
+    from racecraft.judging.evolution import film_evolution
+
+    run = tiny(until="64 steps", evaluate_every=64).run
+    with pytest.raises(RunError, match="no earlier laps"):
+        film_evolution(run)

@@ -65,9 +65,9 @@ describe("cars between two looks", () => {
 
 describe("what is drawn", () => {
   it("has a colour for every number", () => {
-    expect(scale(0)).toBe("rgb(68 1 84)");
-    expect(scale(2)).toBe("rgb(253 231 37)");
-    expect(scale(Number.NaN)).toBe("rgb(68 1 84)");
+    expect(scale(0)).toBe("rgb(68, 1, 84)");
+    expect(scale(2)).toBe("rgb(253, 231, 37)");
+    expect(scale(Number.NaN)).toBe("rgb(68, 1, 84)");
   });
   it("has a range even when all values are the same, or none is known", () => {
     expect(span([3, 3, null])).toEqual([2.5, 3.5]);

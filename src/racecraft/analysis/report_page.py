@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Final
@@ -40,8 +42,8 @@ circle.dots{fill:var(--good)}.fan circle.dots{fill:var(--accent)}.arrow{stroke:v
 .band0{fill:transparent}.band1{fill:var(--second);opacity:.14}
 .car{fill:var(--ink)}.road{fill:var(--road);stroke:var(--border)}.start{stroke:#fff}
 .line path{stroke-linecap:round;fill:none}.exits{stroke:#ff5a4d;fill:none}
-.bar{justify-content:center;color:var(--quiet);font-weight:400;align-items:center;margin-top:8px}
-.bar span{display:inline-flex;border-radius:4px;overflow:hidden}.bar i{width:8px;height:10px}
+.bar{flex-wrap:nowrap;justify-content:center;color:var(--quiet);font-weight:400;align-items:center;margin-top:8px}
+.bar span{display:inline-flex;border-radius:4px;overflow:hidden}.bar i{width:min(8px,1.5vw);height:10px}
 table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums;font-size:.92rem}
 th{text-align:left;color:var(--quiet);font-weight:560;font-size:.84rem}
 th,td{padding:6px 14px 6px 0;border-bottom:1px solid var(--line);overflow-wrap:anywhere}
@@ -53,6 +55,13 @@ break-inside:avoid}.settings b{font-weight:600;color:var(--ink);text-align:right
 .two{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1.2fr);gap:28px;align-items:start}
 pre{margin:0;white-space:pre-wrap;overflow-wrap:anywhere;
 font:13.5px/1.55 ui-monospace,"SF Mono",Menlo,Consolas,monospace;tab-size:4}
+.stage{width:100%;aspect-ratio:16/9;display:block;border-radius:12px;background:#dfe6ea}
+.controls{display:flex;gap:12px;align-items:center;margin-top:12px;flex-wrap:wrap}
+.controls input{flex:1;min-width:120px;accent-color:var(--accent)}
+.controls span{font-variant-numeric:tabular-nums;font-size:.9rem}
+button,.button{font:inherit;font-weight:600;color:var(--ink);background:var(--page);border:1px solid var(--line);
+border-radius:10px;padding:8px 16px;min-height:42px;cursor:pointer;text-decoration:none;display:inline-block}
+button[aria-pressed=true]{border-color:var(--accent)}
 footer{color:var(--quiet);font-size:.84rem;margin-top:28px}
 @media(max-width:640px){.settings{columns:1}.two{grid-template-columns:minmax(0,1fr)}section{padding:16px}h1{font-size:1.8rem}}
 @media print{:root{--page:#fff;--card:#fff;--line:#ddd;--ink:#000;--quiet:#444;--accent:#a83806;--second:#5b6b80;
@@ -62,7 +71,7 @@ section{border:0;padding:0;margin-top:28px}svg.track{max-height:150mm}
 """
 
 POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'"
-"""What the page may load: nothing; its style is inside it."""
+"""What the page may load: nothing; its style is inside it, and so is the one script that it may have."""
 
 
 def page(
@@ -73,6 +82,8 @@ def page(
     sections: Sequence[str],
     *,
     versions: Mapping[str, str],
+    script: str = "",
+    language: str = "en",
 ) -> str:
     """The whole document.
 
@@ -83,20 +94,26 @@ def page(
         hero: The large picture, HTML.
         sections: As `section` makes them; empty ones are left out.
         versions: Of what made the run; plain text.
+        script: Runs at the end of the page, which allows none but this one.
+        language: Of its words.
     """
     listed = "".join(
         f"<div><dt>{escape(what)}</dt><dd>{escape(value)}{f'<small>{escape(note)}</small>' if note else ''}</dd></div>"
         for what, value, note in figures
     )
     made = " · ".join(f"{escape(what)} {escape(str(version))}" for what, version in versions.items())
+    policy, last = POLICY, ""
+    if script:
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        policy, last = f"{POLICY}; script-src 'sha256-{digest}'", f"<script>{script}</script>"
     return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<!doctype html>\n<html lang="{language}"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         f"<title>{escape(name)} · Racecraft</title><style>{STYLE}</style></head><body><main>"
         f'<p class="brand">Racecraft</p><h1>{escape(name)}</h1><p>{lead}</p><dl>{listed}</dl>'
         f"{f'<section>{hero}</section>' if hero else ''}{''.join(sections)}"
-        f"<footer>{made}</footer></main></body></html>\n"
+        f"<footer>{made}</footer></main>{last}</body></html>\n"
     )
 
 

@@ -164,18 +164,23 @@ def ladder(
 
 @app.command()
 def film(
-    replay: Annotated[Path, typer.Argument(help="Replay file.")],
+    replay: Annotated[Path, typer.Argument(help="Replay file, or a run's folder, of which it shows how it learned.")],
     car: Annotated[int, typer.Option("--car", help="Number of the car to follow, from 1; by default the best.")] = 0,
     ghost: race_options.Ghosts = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="MP4 file; by default beside the replay.")
+        Path | None, typer.Option("--output", "-o", help="MP4 file; by default beside the replay, or in the run's mp4.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make a film of a replay."""
-    from racecraft.film.replay_film import film_replay
+    """Make a film of a replay, or one of fifteen seconds of how a run learned: laps from its first to its best."""
+    if replay.is_dir():
+        from racecraft.judging.evolution import film_evolution
 
-    path = film_replay(replay, output, car=car, ghosts=ghost or ())
+        path = film_evolution(replay, output)
+    else:
+        from racecraft.film.replay_film import film_replay
+
+        path = film_replay(replay, output, car=car, ghosts=ghost or ())
     if as_json:
         print_json({"video": str(path)})
     else:

@@ -1,4 +1,4 @@
-"""`racecraft report`."""
+"""`racecraft report` and `racecraft share`."""
 
 from __future__ import annotations
 
@@ -26,3 +26,25 @@ def report(
         print_json({"run": str(run), "report": str(path), "bytes": path.stat().st_size})
     else:
         typer.echo(f"The report is in {path}.")
+
+
+@app.command()
+def share(
+    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    evaluation: Annotated[
+        str, typer.Option("--evaluation", help="Time stamp of the evaluation; by default the newest.")
+    ] = "",
+    language: Annotated[str, typer.Option("--language", help="Of the page: en or de.")] = "en",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; by default share.html in the run folder.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write an evaluation's best lap as one HTML page to send around: it opens offline, the replay is inside."""
+    from racecraft.analysis.share import write_share
+
+    path = write_share(run, output, stamp=evaluation, language=language)
+    if as_json:
+        print_json({"run": str(run), "share": str(path), "bytes": path.stat().st_size})
+    else:
+        typer.echo(f"The lap is in {path}.")

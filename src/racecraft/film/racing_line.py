@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -36,6 +37,7 @@ def draw_racing_line(
     *,
     title: str = "",
     subtitle: str = "",
+    figures: Sequence[tuple[str, str]] = (),
     width_px: int = 1600,
 ) -> Path:
     """Write the picture of a trial's or lap's racing line.
@@ -45,6 +47,7 @@ def draw_racing_line(
         path: Where to; the ending says how (.png, .jpg, .webp).
         title: Default: the track's name.
         subtitle: Whose line it is; default: the track's description.
+        figures: (label, value) pairs beside what the line itself says.
         width_px: Width of the picture, pixels.
 
     Raises:
@@ -76,7 +79,7 @@ def draw_racing_line(
         picture.canvas.disc(place, (255, 255, 255), radius_px=1.25 * width)
         picture.canvas.disc(place, MISTAKE, radius_px=0.95 * width)
     name, description = describe(recording.track)
-    picture.caption(title=title or name, subtitle=subtitle or description, figures=_figures(recording))
+    picture.caption(title=title or name, subtitle=subtitle or description, figures=[*_figures(recording), *figures])
     color_bar(picture.canvas, unit, low, high)
     return picture.save(path)
 

@@ -48,7 +48,7 @@ def role(name: str) -> Role:
     base, parent = parts[-1], parts[-2] if len(parts) > 1 else ""
     if base in PLACES or (parent == CUSTOM_FILES and base.endswith(".json")):
         return "settings"
-    if name == RUN or name.endswith((f"/{RUN}", "metrics/history.jsonl")):
+    if name == RUN or name.endswith((f"/{RUN}", "metrics/history.jsonl", "metrics/evolution.jsonl", "/notes.md")):
         return "own"
     if parent == "stretches" and base.endswith(".json"):
         return "own"

@@ -25,7 +25,7 @@ from racecraft.training.settings import TrainSettings
 
 _TRACKS: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_:.,+-]{0,199}")
 _WEIGHTS: Final = re.compile(r"checkpoints/(manifest\.json|\d{9,18}-[0-9a-f]{8}\.safetensors)")
-_HISTORY: Final = "metrics/history.jsonl"
+_PLAIN: Final = ("metrics/history.jsonl", "metrics/evolution.jsonl", "notes.md")
 _STRETCHES: Final = "stretches/"
 
 
@@ -38,10 +38,10 @@ class OwnRun:
     has_hyperparameters: bool
     """Whether the run follows AWS's hyperparameters."""
     files: dict[str, SourceFile]
-    """Checkpoints, curves and stretches, by their path in the run."""
+    """Checkpoints, curves, laps of the training, stretches and notes, by their path in the run."""
 
     def restore(self, folder: RunFolder, notes: list[str]) -> dict[str, str]:
-        """Put checkpoints, curves and stretches into a new run folder; what became of what.
+        """Put all of these into a new run folder; what became of what.
 
         Args:
             folder: Of the new run.
@@ -64,6 +64,7 @@ class OwnRun:
         except CheckpointError as error:
             shutil.rmtree(store.folder, ignore_errors=True)
             folder.history.unlink(missing_ok=True)
+            folder.evolution.unlink(missing_ok=True)
             shutil.rmtree(folder.stretches, ignore_errors=True)
             if any(path.startswith("checkpoints/") for path in self.files):
                 notes.append(f"No checkpoint is whole, so training begins with fresh weights: {error}")
@@ -110,4 +111,4 @@ def read_own(source: Source, root: str) -> OwnRun | None:
 
 def _is_restored(path: str) -> bool:
     is_stretch = path.startswith(_STRETCHES) and FILE_NAME.fullmatch(path.removeprefix(_STRETCHES)) is not None
-    return is_stretch or path == _HISTORY or _WEIGHTS.fullmatch(path) is not None
+    return is_stretch or path in _PLAIN or _WEIGHTS.fullmatch(path) is not None

@@ -211,6 +211,7 @@ def completion(
     sees: str = "frames",
     sensors: SensorSuite | None = None,
     max_seconds: float = 0.0,
+    on_row: Callable[[NDArray[np.float64]], None] | None = None,
 ) -> Completion:
     """How far a policy gets on the first lap with nobody to put it back: the judgement used during training.
 
@@ -222,6 +223,7 @@ def completion(
         sees: ``frames`` or ``state``, as for `evaluate`.
         sensors: What ``frames`` are read from, as for `evaluate`.
         max_seconds: Simulated seconds after which a slow car is stopped; 0 for none.
+        on_row: Is given every judged row of the first car's lap, a view that the next step overwrites.
 
     Raises:
         ConfigError: `sees` is unknown, or ``frames`` from a simulation without a camera.
@@ -232,7 +234,7 @@ def completion(
     if simulation.laps != 1:
         raise ConfigError(f"completion judges one lap; the simulation was made for {simulation.laps}.")
     line_up(simulation, rules, seed=seed)
-    return drive_lap(policy, simulation, sees=sees, sensors=sensors, max_seconds=max_seconds)
+    return drive_lap(policy, simulation, sees=sees, sensors=sensors, max_seconds=max_seconds, on_row=on_row)
 
 
 def drive_lap(
@@ -242,6 +244,7 @@ def drive_lap(
     sees: str = "frames",
     sensors: SensorSuite | None = None,
     max_seconds: float = 0.0,
+    on_row: Callable[[NDArray[np.float64]], None] | None = None,
 ) -> Completion:
     """The same from where the cars stand."""
     sensors = _sensors_of(policy, sensors)
@@ -250,6 +253,8 @@ def drive_lap(
     for _ in range(round(max_seconds / CONTROL_DT) if max_seconds > 0.0 else MAX_STEPS):
         simulation.step(_checked(policy(_sight(simulation, sees, sensors)), simulation.num_envs))
         rewards += is_running * centerline_rewards(simulation.rows)
+        if on_row is not None and is_running[0]:
+            on_row(simulation.rows[0])
         is_running = ~(simulation.terminated | simulation.truncated)
         if not is_running.any():
             break

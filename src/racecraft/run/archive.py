@@ -3,6 +3,7 @@
     model_metadata.json  reward_function.py  hyperparameters.json  training_params.yaml  race_rules.json
     model/  ip/  metrics/  training-simtrace/  evaluation-<time>/
     run.json  checkpoints/  stretches/   settings and weights (safetensors): `racecraft import` takes the run up again
+    notes.md                             what people wrote about it
 
 Videos, TensorBoard's files and logs stay behind.
 """
@@ -19,7 +20,8 @@ from typing import Final
 
 from racecraft.run.folder import RunFolder
 
-KEPT: Final = ("model", "ip", "metrics", "training-simtrace", "checkpoints", "stretches", "race_rules.json", "run.json")
+FILES: Final = ("notes.md", "race_rules.json", "run.json")
+KEPT: Final = ("model", "ip", "metrics", "training-simtrace", "checkpoints", "stretches", *FILES)
 FIRST: Final = ("model_metadata.json", "reward_function.py", "hyperparameters.json", "training_params.yaml")
 CHUNK: Final = 1 << 18  # bytes
 

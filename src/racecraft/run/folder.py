@@ -3,13 +3,14 @@
 runs/<name>/run.json                      what is needed to repeat the run
             reward_function.py  model_metadata.json  hyperparameters.json  training_params.yaml
             race_rules.json               rules of its evaluations, where it has its own
-            metrics/                      TrainingMetrics.json, EvaluationMetrics-<time>.json, history.jsonl
+            metrics/                      TrainingMetrics.json, EvaluationMetrics-<time>.json, curves and laps (jsonl)
             training-simtrace/            <iteration>-iteration.csv
             evaluation-<time>/            evaluation-simtrace/, pictures
             mp4/  events/                 videos, TensorBoard
             model/  ip/                   for AWS's tools: index of checkpoints, metadata; hyperparameters
             checkpoints/                  weights, see racecraft.run.checkpoint
             stretches/                    what it learned with from which step on, see racecraft.run.stretches
+            notes.md                      what people wrote about it
             parent/                       weights it began with, where another run gave them
             logs/                         reward.log: what the reward function printed
 """
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 FORMAT = 1
 MAX_NAME = 64  # characters, as in AWS's console
 MAX_REWARD_BYTES = 4 * 140_000  # AWS allows 140,000 characters
+MAX_NOTES_BYTES = 1 << 16
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # devices on Windows
 
@@ -175,6 +177,11 @@ class RunFolder:
         return self.path / "metrics" / "history.jsonl"
 
     @property
+    def evolution(self) -> Path:
+        """Laps driven while it learned, see racecraft.run.evolution."""
+        return self.path / "metrics" / "evolution.jsonl"
+
+    @property
     def training_simtrace(self) -> Path:
         """Every step of training, a file per iteration."""
         return self.path / "training-simtrace"
@@ -193,6 +200,11 @@ class RunFolder:
     def reward_log(self) -> Path:
         """What the reward function printed; made with the first of it."""
         return self.path / "logs" / "reward.log"
+
+    @property
+    def notes(self) -> Path:
+        """What people wrote about it; made with the first word."""
+        return self.path / "notes.md"
 
     @property
     def checkpoints(self) -> CheckpointStore:
@@ -296,6 +308,27 @@ class RunFolder:
         from racecraft.agent import ModelMetadata
 
         return ModelMetadata.load(self.model_metadata)
+
+    def read_notes(self) -> str:
+        """What people wrote about it; empty where there is nothing that can be read."""
+        try:
+            return read_text(self.notes, max_bytes=MAX_NOTES_BYTES) if self.notes.is_file() else ""
+        except ConfigError:
+            return ""
+
+    def write_notes(self, text: str) -> None:
+        """Replace what people wrote about it.
+
+        Raises:
+            RunError: It is too long, or the file cannot be written.
+        """
+        size = len(text.encode(errors="surrogatepass"))
+        if size > MAX_NOTES_BYTES:
+            raise RunError(f"The notes have {size:,} bytes; allowed are {MAX_NOTES_BYTES:,}.")
+        if text.strip():
+            self._write(self.notes, text)
+        else:
+            self.notes.unlink(missing_ok=True)
 
     def read_hyperparameters(self) -> Hyperparameters | None:
         """AWS's hyperparameters, or None where the run has no such file."""

@@ -97,6 +97,7 @@ class TrackPicture:
         title: str | None = None,
         subtitle: str | None = None,
         figures: Sequence[tuple[str, str]] | None = None,
+        has_scale: bool = True,
     ) -> None:
         """Writes the title above the track, and figures and a scale bar below it.
 
@@ -104,6 +105,7 @@ class TrackPicture:
             title: Default: the track's display name.
             subtitle: Default: the track's description.
             figures: (label, value) pairs. Default: length, width, tightest radius, corners, direction.
+            has_scale: Whether there is a scale bar.
         """
         own_title, own_subtitle = describe(self.track)
         title = own_title if title is None else title
@@ -120,7 +122,8 @@ class TrackPicture:
             )
             value_width = canvas.text((x, top + 3.2 * unit), value, INK, size=1.9 * unit, weight=0.018)
             x += max(label_width, value_width) + 3.4 * unit
-        self._scale_bar(right, top)
+        if has_scale:
+            self._scale_bar(right, top)
 
     def image(self) -> Image.Image:
         """The finished picture."""

@@ -10,13 +10,17 @@ from dataclasses import asdict, replace
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from racecraft.race.evaluation import Completion, completion, trial_simulation
 from racecraft.race.policy import NetworkPolicy
+from racecraft.race.recording import REFERENCE_AHEAD
 from racecraft.race.rules import RULE_SETS
 from racecraft.run import Episode, EpisodeCounter
-from racecraft.sim import CONTROL_DT
+from racecraft.run.evolution import MAX_POSES, Drive, is_kept
+from racecraft.sim import CONTROL_DT, Simulation
 from racecraft.sim.camera import CAMERAS
+from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.track import Track
 from racecraft.training.progress import EvaluationReport
 from racecraft.training.regimes import regime_of
@@ -25,6 +29,7 @@ from racecraft.training.settings import TrainSettings
 SLOWEST: Final = 0.3  # m/s; an evaluation does not wait for a car that needs longer for its lap
 SEED: Final = 0x6576616C  # evaluation starts never coincide with training's
 NO_LAP: Final = 1e6  # s, in a score, where no lap was completed
+_POSE: Final = [ROW_COLUMNS.index(name) for name in ("x", "y", "heading")]
 
 
 class Evaluator:
@@ -43,21 +48,16 @@ class Evaluator:
         direction = "reverse" if settings.direction == "reverse" else "forward"
         self._rules = replace(RULE_SETS["first_lap"], direction=direction)
         self._is_of_many = len(tracks) > 1
-        driven = _evenly(tracks, settings) if self._is_of_many else tracks[:1]
-        self._patience = max(track.length for track in driven) / SLOWEST
-        self._trials = trial_simulation(
-            driven,
-            rules=self._rules,
-            num_trials=settings.evaluation_trials,
-            vehicle=settings.vehicle,
-            randomize=settings.randomize,
-            objects=settings.objects,
-            camera=policy.sensors.camera(CAMERAS[settings.camera]),
-            has_lidar=bool(policy.sensors.lidar_name),
-            num_threads=settings.num_threads,
-        )
+        self._driven = _evenly(tracks, settings) if self._is_of_many else tracks[:1]
+        self._settings = settings
+        self._patience = max(track.length for track in self._driven) / SLOWEST
+        self._trials = self._simulation(settings.evaluation_trials)
+        self._alone: Simulation | None = None  # for looks, made with the first
         self._good = regime_of(objects=settings.objects).good
         self.last: EvaluationReport | None = None
+        self.drive: Drive | None = None
+        """What the first car drove in the last evaluation or look, where `racecraft.run.evolution` keeps it."""
+        self._looked_at = 0
         self.best_score: tuple[float, ...] | None = None
         self.best_lap: float | None = None
 
@@ -94,14 +94,7 @@ class Evaluator:
         Returns:
             The trials as episodes, for the metrics.
         """
-        outcome = completion(
-            self.policy,
-            self._trials,
-            rules=self._rules,
-            seed=self._seed,
-            sensors=self.policy.sensors,
-            max_seconds=self._patience,
-        )
+        outcome = self._drive(self._trials, step)
         lap_times = tuple(outcome.lap_times[np.isfinite(outcome.lap_times)].tolist())
         self.last = EvaluationReport(
             step=step,
@@ -117,6 +110,46 @@ class Evaluator:
             self.last = replace(self.last, is_best=True)
         self.best_lap = min((lap for lap in (self.best_lap, *lap_times) if lap is not None), default=None)
         return self._episodes(outcome, counter)
+
+    def look(self, step: int) -> None:
+        """See what one car drives, where that is to be kept; it is in `drive`, and judges nothing."""
+        self.drive = None
+        if self._keeps(step):
+            self._alone = self._alone or self._simulation(1)
+            self._drive(self._alone, step)
+
+    def _keeps(self, step: int) -> bool:
+        return not self._is_of_many and is_kept(step, max(self.evaluated_at, self._looked_at))
+
+    def _drive(self, simulation: Simulation, step: int) -> Completion:
+        rows: list[NDArray[np.float64]] = []
+        keeps = self._keeps(step)
+        outcome = completion(
+            self.policy,
+            simulation,
+            rules=self._rules,
+            seed=self._seed,
+            sensors=self.policy.sensors,
+            max_seconds=self._patience,
+            on_row=(lambda row: rows.append(row[_POSE])) if keeps else None,
+        )
+        self.drive = _lap_of(step, np.array(rows), outcome) if 2 <= len(rows) <= MAX_POSES else None
+        self._looked_at = step
+        return outcome
+
+    def _simulation(self, num_trials: int) -> Simulation:
+        settings, sensors = self._settings, self.policy.sensors
+        return trial_simulation(
+            self._driven,
+            rules=self._rules,
+            num_trials=num_trials,
+            vehicle=settings.vehicle,
+            randomize=settings.randomize,
+            objects=settings.objects,
+            camera=sensors.camera(CAMERAS[settings.camera]),
+            has_lidar=bool(sensors.lidar_name),
+            num_threads=settings.num_threads,
+        )
 
     def _episodes(self, outcome: Completion, counter: EpisodeCounter) -> list[Episode]:
         return [
@@ -146,6 +179,18 @@ class Evaluator:
             self.last = EvaluationReport(**{**last, **tuples})
         self.best_score = None if score is None else tuple(map(float, score))
         self.best_lap = None if lap is None else float(lap)
+
+
+def _lap_of(step: int, rows: NDArray[np.float64], outcome: Completion) -> Drive:
+    """The first car's lap, from x and y [m] of the point that rows speak of and its heading [rad]  (T, 3)."""
+    heading, lap_time = rows[:, 2], float(outcome.lap_times[0])
+    origins = rows[:, :2] - REFERENCE_AHEAD * np.column_stack([np.cos(heading), np.sin(heading)])
+    return Drive(
+        step=step,
+        lap_time=lap_time if np.isfinite(lap_time) else None,
+        completion=float(outcome.completions[0]),
+        poses=np.rint(1000.0 * np.column_stack([origins, heading])).astype(np.int64),
+    )
 
 
 def _evenly(tracks: Sequence[Track], settings: TrainSettings) -> list[Track]:

@@ -40,6 +40,9 @@ class Training:
             have edited it, or the run was imported.
     """
 
+    looks_on = False
+    """Whether a lap of a car alone is driven between evaluations, too, for the film of how it learned."""
+
     def __init__(
         self,
         folder: RunFolder,
@@ -126,6 +129,8 @@ class Training:
             if (is_due or reason) and reason != "interrupted":  # whoever interrupts does not want to wait
                 self._evaluate(session)
                 reason = reason or self._limit_reached(session)
+            elif self.looks_on and not reason:
+                self._look(session)
             if is_due or reason:
                 self._checkpoint(session)
         return reason
@@ -166,8 +171,20 @@ class Training:
         assert evaluator.last is not None
         session.logs.events.add_scalars(evaluator.last.scalars(), step=session.algorithm.total_steps)
         session.logs.history.add("evaluation", evaluator.last.point())
+        self._keep_drive(session)
         self.reporter.evaluation(evaluator.last)
         self.meter.parts["evaluation"] += time.perf_counter() - begun
+
+    def _look(self, session: Session) -> None:
+        begun = time.perf_counter()
+        with session.algorithm.driving():
+            session.evaluator.look(session.algorithm.total_steps)
+        self._keep_drive(session)
+        self.meter.parts["evaluation"] += time.perf_counter() - begun
+
+    def _keep_drive(self, session: Session) -> None:
+        if session.evaluator.drive is not None:
+            session.logs.evolution.add("lap", session.evaluator.drive.point())
 
     def _checkpoint(self, session: Session) -> None:
         """Logs first: what a checkpoint counts is then on disk, whatever happens in between."""

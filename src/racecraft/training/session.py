@@ -61,6 +61,7 @@ class Logs:
     metrics: TrainingMetrics
     events: EventWriter
     history: HistoryWriter
+    evolution: HistoryWriter
     prints: PrintLog
     aws: AwsLog | None
 
@@ -289,6 +290,7 @@ def _open_logs(run: _Run, stack: ExitStack, *, aws_log: str | Path | None) -> Lo
     per_iteration = settings.ppo.episodes_per_iteration or AWS_EPISODES
     events = stack.enter_context(EventWriter(folder.events, after_step=kept if saved is not None else -1))
     history = stack.enter_context(HistoryWriter(folder.history, step=kept))
+    evolution = stack.enter_context(HistoryWriter(folder.evolution, step=kept))
     aws = None
     if aws_log is not None:
         aws = stack.enter_context(AwsLog(aws_log, steps=kept))
@@ -313,6 +315,7 @@ def _open_logs(run: _Run, stack: ExitStack, *, aws_log: str | Path | None) -> Lo
         ),
         events=events,
         history=history,
+        evolution=evolution,
         prints=stack.enter_context(PrintLog(folder.reward_log)),
         aws=aws,
     )

@@ -6,6 +6,7 @@ import type { components } from "./schema";
 type Schemas = components["schemas"];
 export type ModelCard = Schemas["ModelCard"];
 export type Demonstration = Schemas["Demonstration"];
+export type Evolution = Schemas["Evolution"];
 export type MedalTimes = Schemas["MedalTimes"];
 export type ModelDetail = Schemas["ModelDetail"];
 export type TrainingStretch = Schemas["TrainingStretch"];
@@ -106,8 +107,11 @@ export const api = {
   models: () => ask<ModelCard[]>("GET", "/models"),
   model: (run: string) => ask<ModelDetail>("GET", `/models/${name(run)}`),
   demonstration: (run: string) => ask<Demonstration>("GET", `/models/${name(run)}/demonstration`),
+  evolution: (run: string) => ask<Evolution>("GET", `/models/${name(run)}/evolution`),
+  filmEvolution: (run: string) => ask<JobInfo>("POST", `/models/${name(run)}/evolution`),
+  again: (run: string) => ask<Schemas["NewModel"]>("GET", `/models/${name(run)}/again`),
   create: (model: NewModel) => ask<ModelCard>("POST", "/models", model),
-  change: (run: string, change: { name?: string; tags?: string[] }) =>
+  change: (run: string, change: { name?: string; tags?: string[]; notes?: string }) =>
     ask<ModelCard>("PATCH", `/models/${name(run)}`, change),
   clone: (run: string, step?: number) =>
     ask<ModelCard>("POST", `/models/${name(run)}/clone`, step === undefined ? {} : { step }),
@@ -158,6 +162,10 @@ export const exportedOf = (run: string, target: "car" | "onnx", checkpoint: stri
 
 /** Address of a model's report. */
 export const reportOf = (run: string) => `/api/models/${name(run)}/report`;
+
+/** Address of an evaluation's best lap as one file. */
+export const sharedOf = (run: string, stamp: string, kind: "html" | "png", language: string) =>
+  `/api/models/${name(run)}/evaluations/${stamp}/share.${kind}?language=${language}`;
 
 /** Address of one of a model's files. */
 export const fileOf = (run: string, path: string) =>

@@ -7,13 +7,13 @@ const STOPS = [
   [253, 231, 37],
 ] as const;
 
-/** CSS colour of a share from 0 to 1. */
+/** CSS colour of a share from 0 to 1, with commas, without which the 3D view does not read it. */
 export function scale(share: number): string {
   const place = Math.min(Math.max(Number.isFinite(share) ? share : 0, 0), 1) * (STOPS.length - 1);
   const index = Math.min(Math.floor(place), STOPS.length - 2);
   const [from, to] = [STOPS[index]!, STOPS[index + 1]!];
   const mixed = from.map((value, channel) => Math.round(value + (to[channel]! - value) * (place - index)));
-  return `rgb(${mixed.join(" ")})`;
+  return `rgb(${mixed.join(", ")})`;
 }
 
 /** Smallest and largest of some numbers, null left out; never equal, and no closer than `least`, so that noise is not painted as if it mattered. */

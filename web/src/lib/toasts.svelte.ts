@@ -12,10 +12,11 @@ export interface Toast {
 export const toasts = $state<Toast[]>([]);
 let next = 0;
 
-export function say(text: string, action?: Toast["action"]): void {
+/** `stays`: until it is closed. */
+export function say(text: string, action?: Toast["action"], stays = false): void {
   const id = next++;
   toasts.push({ id, text, hint: "", isError: false, action });
-  setTimeout(() => close(id), 8000);
+  if (!stays) setTimeout(() => close(id), 8000);
 }
 
 export function fail(error: unknown): void {

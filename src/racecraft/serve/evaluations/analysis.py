@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import base64
 import math
+import tempfile
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from fastapi import APIRouter, Query, Response
@@ -163,6 +164,30 @@ def get_report(name: str, context: InContext) -> Response:
     folder = context.garage.folder(name)
     headers = {"Content-Disposition": f'attachment; filename="{folder.name}-report.html"'}
     return Response(report(folder), media_type="text/html", headers=headers)
+
+
+@router.get("/evaluations/{stamp}/share.html", response_class=Response, responses={200: {"content": {"text/html": {}}}})
+def get_share(name: str, stamp: str, context: InContext, language: Literal["en", "de"] = "en") -> Response:
+    """An evaluation's best lap as one HTML file that opens offline, with the replay inside."""
+    from racecraft.analysis.share import share
+
+    folder = context.garage.folder(name)
+    trace_of(folder, stamp)
+    headers = {"Content-Disposition": f'attachment; filename="{folder.name}.html"'}
+    return Response(share(folder, stamp, language=language), media_type="text/html", headers=headers)
+
+
+@router.get("/evaluations/{stamp}/share.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
+def get_picture(name: str, stamp: str, context: InContext, language: Literal["en", "de"] = "en") -> Response:
+    """The same lap as a picture: racing line, time, medal."""
+    from racecraft.analysis.share import draw_share
+
+    folder = context.garage.folder(name)
+    trace_of(folder, stamp)
+    with tempfile.TemporaryDirectory() as place:
+        data = draw_share(folder, stamp, Path(place) / "share.png", language=language).read_bytes()
+    headers = {"Content-Disposition": f'attachment; filename="{folder.name}.png"'}
+    return Response(data, media_type="image/png", headers=headers)
 
 
 def trace_of(folder: RunFolder, stamp: str) -> Path:

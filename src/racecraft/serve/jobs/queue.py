@@ -66,6 +66,7 @@ KINDS: Final[Mapping[str, JobKind]] = {
         progress=".racecraft/tunings/{tuning}/result.json",
     ),
     "evaluate": JobKind(slot="other", work="racecraft.serve.evaluations.tasks:evaluate", travels=True),
+    "evolution": JobKind(slot="other", work="racecraft.serve.models.tasks:film_evolution"),
     "race": JobKind(slot="other", work="racecraft.serve.races.tasks:race", travels=True, folder="races/{job}"),
     "heat": JobKind(slot="other", work="racecraft.serve.contests.tasks:heat", travels=True, folder="contests/{job}"),
     "ladder": JobKind(

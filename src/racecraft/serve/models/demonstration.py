@@ -1,22 +1,20 @@
-"""What a model's page shows when nobody trains: the lap that its best checkpoint drives, as often as it is asked.
+"""What a model's page shows when nobody trains: the lap that its best checkpoint drives, and the laps of its training.
 
 run folder -> best checkpoint -> five starts, alone on its own road -> poses of the best
+           -> laps of its training from one start -> poses
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from racecraft.judging.trained import trained_camera, trained_track, trained_vehicle
-from racecraft.race import RULE_SETS, evaluate
-from racecraft.race.policy import load_policy
-from racecraft.run import RunFolder
-from racecraft.serve.models.schemas import Demonstration
+from racecraft.judging.evolution import drive_checkpoint, evolution_of
+from racecraft.run import RunFolder, read_stretches, stretch_at
+from racecraft.serve.models.schemas import Demonstration, Evolution, EvolutionLap
 
 KEPT: Final = 64
 """Demonstrations of different checkpoints; a lap is some 10 kB."""
@@ -29,27 +27,45 @@ def demonstration(folder: RunFolder) -> Demonstration | None:
         RacecraftError: Its files cannot be read.
     """
     best = folder.checkpoints.best
-    if best is None:
-        return None
-    changed = (folder.path / "run.json").stat().st_mtime_ns
-    return _drive(folder.path, best.step, changed)
+    return None if best is None else _drive(folder.path, best.step, _changed(folder))
+
+
+def evolution(folder: RunFolder) -> Evolution:
+    """The laps of a model's training, the best one last; none without a checkpoint.
+
+    Raises:
+        RacecraftError: Its files cannot be read.
+    """
+    best = folder.checkpoints.best
+    laps = [] if best is None else _evolve(folder.path, best.step, _changed(folder))
+    film = folder.videos / "evolution.mp4"
+    return Evolution(laps=laps, film=film.relative_to(folder.path).as_posix() if film.is_file() else None)
+
+
+def _changed(folder: RunFolder) -> int:
+    return (folder.path / "run.json").stat().st_mtime_ns
 
 
 @lru_cache(maxsize=KEPT)
 def _drive(path: Path, step: int, _changed: int) -> Demonstration:
-    folder = RunFolder(path)
-    info = folder.read_info()
-    direction = "reverse" if info.settings.get("direction") == "reverse" else "forward"
-    _, policy = load_policy(folder, checkpoint=step, num_threads=1)
-    driven = evaluate(
-        policy,
-        trained_track(info),
-        rules=replace(RULE_SETS["first_lap"], direction=direction),
-        vehicle=trained_vehicle(info),
-        camera=trained_camera(info),
-        num_threads=1,
-    )
+    driven = drive_checkpoint(RunFolder(path), step)
     lap = driven.best_trial.recording
     columns = [*lap.poses.T, lap.column("actual_speed"), lap.column("actual_steering_angle"), lap.column("progress")]
     milli = np.rint(1000.0 * np.column_stack(columns)).astype(int)
     return Demonstration(step=step, seconds=driven.best_lap, poses=milli.tolist())
+
+
+@lru_cache(maxsize=KEPT)
+def _evolve(path: Path, _best: int, _changed: int) -> list[EvolutionLap]:
+    folder = RunFolder(path)
+    stretches = read_stretches(folder)
+    return [
+        EvolutionLap(
+            step=drive.step,
+            stretch=stretch_at(stretches, drive.step).number,
+            seconds=drive.lap_time,
+            completion=drive.completion,
+            poses=drive.poses.tolist(),
+        )
+        for drive in evolution_of(folder)
+    ]

@@ -18,11 +18,13 @@ from racecraft.run.history import read_history
 from racecraft.run.starters import starter_names, unpack_starter
 from racecraft.serve.context import Context, InConsoles, InContext, InUser, MakesModel, Trains
 from racecraft.serve.jobs.schemas import JobInfo, job_info
-from racecraft.serve.models.demonstration import demonstration
+from racecraft.serve.models.again import again
+from racecraft.serve.models.demonstration import demonstration, evolution
 from racecraft.serve.models.garage import RACED, finite
 from racecraft.serve.models.schemas import (
     CloneModel,
     Demonstration,
+    Evolution,
     HistoryPage,
     ModelCard,
     ModelChange,
@@ -132,12 +134,16 @@ def get_model(name: str, context: InContext) -> ModelDetail:
         checkpoints=context.garage.checkpoints(folder),
         stretches=context.garage.stretches(folder),
         job=job_info(jobs[0]) if jobs else None,
+        notes=folder.read_notes(),
     )
 
 
 @router.patch("/{name}")
 def change_model(name: str, request: ModelChange, context: InContext) -> ModelCard:
-    """Rename or tag a model."""
+    """Rename or tag a model, or write about it."""
+    if request.notes is not None:
+        context.garage.folder(name).write_notes(request.notes)
+        context.mirror.copy(name)
     if request.tags is not None:
         context.garage.tag(name, request.tags)
     if request.name is not None and request.name != name:
@@ -215,14 +221,34 @@ def stop_model(name: str, context: InContext) -> JobInfo:
     return job_info(context.queue.get(job.id) or job)
 
 
+@router.get("/{name}/again")
+def get_again(name: str, context: InContext) -> NewModel:
+    """What a model is made of, as the request for a new one."""
+    return again(context.garage.folder(name), context.garage.card(name))
+
+
 @router.get("/{name}/demonstration")
 def get_demonstration(name: str, context: InContext) -> Demonstration:
     """The lap that a model's best checkpoint drives alone on its road."""
-    folder = context.garage.folder(name)
-    found = demonstration(folder) if context.garage.card(name).num_tracks == 1 else None
+    found = demonstration(_of_one_road(context, name))
     if found is None:
         raise NotFound(f"Model {name!r} has no checkpoint that could drive a lap on one road.")
     return found
+
+
+@router.get("/{name}/evolution")
+def get_evolution(name: str, context: InContext) -> Evolution:
+    """Laps of a model's training from one start, and where a film of them is."""
+    folder = _of_one_road(context, name)
+    return evolution(folder)
+
+
+@router.post("/{name}/evolution", status_code=202)
+def film_evolution(name: str, context: InContext) -> JobInfo:
+    """Film how a model learned."""
+    job = context.queue.add("evolution", _of_one_road(context, name).name, {})
+    context.supervisor.wake()
+    return job_info(job)
 
 
 @router.get("/{name}/history")
@@ -244,6 +270,13 @@ def get_file(name: str, path: str, context: InContext) -> FileResponse:
     if kind is None or not file.is_file() or not file.resolve().is_relative_to(folder.path.resolve()):
         raise NotFound(f"Model {name!r} has no file {path[:80]!r}.")
     return FileResponse(file, media_type=kind)
+
+
+def _of_one_road(context: Context, name: str) -> RunFolder:
+    folder = context.garage.folder(name)
+    if context.garage.card(name).num_tracks != 1:
+        raise NotFound(f"Model {name!r} learned on several roads, and no one lap shows that.")
+    return folder
 
 
 def _train(context: Context, folder: RunFolder, *, until: str | None) -> JobInfo:

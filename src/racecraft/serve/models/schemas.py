@@ -140,6 +140,30 @@ class Demonstration(Message):
     """X, y [mm], heading [mrad], speed [mm/s], steering [mrad] and share of the lap [1/1000], every 1/15 s."""
 
 
+class EvolutionLap(Message):
+    """A lap that a model drove while it learned, or the attempt at one, from the same start as all others."""
+
+    step: int
+    """Camera steps of training before it."""
+    stretch: int
+    """Number of the part of the training that it comes from."""
+    seconds: float | None
+    """Of a whole lap."""
+    completion: float
+    """Share of the lap driven."""
+    poses: list[list[int]]
+    """X, y [mm] and heading [mrad] every 1/15 s."""
+
+
+class Evolution(Message):
+    """How a model came to drive as it does."""
+
+    laps: list[EvolutionLap]
+    """Those that beat all before them, in the order trained, and the best checkpoint's last."""
+    film: str | None
+    """Address of the film, where one was made."""
+
+
 class Checkpoint(Message):
     """A saved state of a policy."""
 
@@ -186,13 +210,16 @@ class ModelDetail(ModelCard):
     stretches: list[TrainingStretch]
     """In the order trained; one at least. A step belongs to the last one that began before it."""
     job: JobInfo | None
+    notes: str
+    """What its people wrote about it, plain text."""
 
 
 class ModelChange(Message):
-    """Rename or tag a model."""
+    """Rename or tag a model, or write about it."""
 
     name: RunName | None = None
     tags: list[Annotated[str, Field(min_length=1, max_length=40)]] | None = Field(None, max_length=20)
+    notes: str | None = Field(None, max_length=20_000)
 
 
 class CloneModel(Message):

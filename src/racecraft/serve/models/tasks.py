@@ -44,7 +44,9 @@ class LiveReporter(SilentReporter):
 
 
 class ConsoleTraining(Training):
-    """A training whose errors are shown beside buttons."""
+    """A training whose errors are shown beside buttons, and whose page shows how it learned."""
+
+    looks_on = True
 
     def way_on(self, error: RacecraftError) -> str:
         """Nothing: the page has the way on."""
@@ -60,6 +62,13 @@ def train(task: Task) -> dict[str, Any]:
         task.on_stop(training.stop)
         result: TrainResult = training.run()
     return result.to_dict()
+
+
+def film_evolution(task: Task) -> dict[str, Any]:
+    """Film how a model learned."""
+    from racecraft.judging.evolution import film_evolution as film
+
+    return {"run": str(task.folder.path), "video": film(task.folder.path).name}
 
 
 def store(task: Task) -> dict[str, Any]:

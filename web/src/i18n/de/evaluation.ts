@@ -40,4 +40,9 @@ export const evaluation: Record<keyof typeof english, string> = {
   for_car_onnx: "Als ONNX herunterladen",
   for_car_notes: "Was ein Auto anders macht",
   train_first: "Trainiere das Modell zuerst: Noch gibt es nichts, womit es fahren könnte.",
+  share: "Zum Verschicken",
+  share_lead:
+    "Die beste Runde in einer Datei: Replay, Ideallinie, Medaille, Zeit und Belohnung. Sie öffnet sich überall, auch offline.",
+  share_page: "Als Seite",
+  share_picture: "Als Bild",
 };

@@ -36,4 +36,8 @@ export const evaluation = {
   for_car_onnx: "Download as ONNX",
   for_car_notes: "What a car does otherwise",
   train_first: "Train the model first: it has no checkpoint to drive with.",
+  share: "To send",
+  share_lead: "The best lap in one file: replay, racing line, medal, time and reward. It opens anywhere, offline, too.",
+  share_page: "As a page",
+  share_picture: "As a picture",
 } as const;

@@ -1,0 +1,105 @@
+"""A lap to send around: one page that needs nothing else, with the very replay inside, and a picture of it."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from racecraft.agent import ModelMetadata, action_space
+from racecraft.analysis.share import draw_share, share, write_share
+from racecraft.errors import RunError
+from racecraft.judging.evaluation import evaluate_run
+from racecraft.learn import PPOConfig
+from racecraft.replay import read_replay, verify
+from racecraft.run import RunFolder
+from racecraft.run.atomic import write_json
+from racecraft.training import Until
+from racecraft.training.job import Training
+from racecraft.training.settings import make_settings
+from racecraft.training.start import start_run
+
+REWARD = "def reward_function(params):\n    # </script><script>alert(1)</script>\n    return params['speed']\n"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    metadata = ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
+    ppo = PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1)
+    settings = make_settings(metadata=metadata, track="oval", until=Until(steps=64), seed=1, num_threads=1, ppo=ppo)
+    root = tmp_path_factory.mktemp("runs")
+    folder = start_run(settings, reward=REWARD, metadata=metadata, root=root, name="a-run")
+    Training(folder).run()
+    evaluate_run(folder.path, laps=1, num_trials=2, rules="drfc", video=False, num_threads=1, max_resets=9)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def stamp(run: RunFolder) -> str:
+    (found,) = run.path.glob("evaluation-*")
+    return found.name.removeprefix("evaluation-")
+
+
+def test_the_page_needs_nothing_else_and_runs_nothing_else(run: RunFolder, stamp: str) -> None:
+    text = share(run, stamp)
+    assert re.search(r"\ssrc=", text) is None
+    assert "http" not in text.replace("http-equiv", "")
+    assert str(run.path.parent) not in text
+    scripts = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+    assert len(scripts) == 1
+    digest = base64.b64encode(hashlib.sha256(scripts[0].encode()).digest()).decode()
+    assert f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'\"" in text
+    assert "&lt;script&gt;alert(1)" in text
+    assert "<script>alert" not in text
+
+
+def test_the_lap_and_its_replay_are_inside(run: RunFolder, stamp: str, tmp_path: Path) -> None:
+    text = share(run, stamp, language="de")
+    replay = run.evaluation(stamp) / "evaluation.replay"
+    (data,) = re.findall(r'download="a-run\.replay" href="data:application/octet-stream;base64,([^"]+)"', text)
+    (tmp_path / "sent.replay").write_bytes(base64.b64decode(data))
+    assert (tmp_path / "sent.replay").read_bytes() == replay.read_bytes()
+    assert verify(read_replay(tmp_path / "sent.replay")).is_genuine
+
+    (document,) = re.findall(r'<script type="application/json" id="lap">(.*?)</script>', text, re.DOTALL)
+    lap = json.loads(document)
+    laps = [(time, car) for car in read_replay(replay).cars for time in car.recording.lap_times.values()]
+    recording = min(laps, key=lambda one: one[0])[1].recording
+    np.testing.assert_allclose(np.column_stack([lap["x"], lap["y"]]), recording.origins, atol=1e-3)
+    edges = np.array(lap["inner"]) - np.array(lap["outer"])
+    np.testing.assert_allclose(np.hypot(*edges.T), recording.track.mean_width, rtol=0.1)
+    assert "<dt>Rundenzeit</dt>" in text
+    assert f"<dd>{min(laps, key=lambda one: one[0])[0]:.3f} s</dd>" in text
+    assert "<dt>Medaille</dt>" not in text  # nine resets win none
+
+
+def test_a_medal_is_told(run: RunFolder, stamp: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from racecraft.limits import TrackLimit
+
+    drawn: list[list[tuple[str, str]]] = []
+    monkeypatch.setattr("racecraft.analysis.share.draw_racing_line", lambda *_, figures, **__: drawn.append(figures))
+    draw_share(run, stamp, tmp_path / "plain.png")
+    monkeypatch.setattr("racecraft.analysis.share.known_limit", lambda *_: TrackLimit(ideal=900.0, driven=1000.0))
+    draw_share(run, stamp, tmp_path / "won.png", language="de")
+    assert drawn == [[], [("MEDAILLE", "Autor")]]
+    assert "<dt>Medal</dt><dd>Author</dd>" in share(run, stamp)
+
+
+def test_what_cannot_be_shared_is_told(run: RunFolder, stamp: str, tmp_path: Path) -> None:
+    for wrong in ("20200101000000", "..", "x"):
+        with pytest.raises(RunError, match="has no evaluation"):
+            share(run, wrong)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunError, match="cannot be written"):
+        write_share(run.path, tmp_path / "file" / "s.html")
+    assert write_share(run.path).read_text() == share(run, stamp)
+    (run.path / "share.html").unlink()
+    (tmp_path / "new").mkdir()
+    write_json(tmp_path / "new" / "run.json", json.loads((run.path / "run.json").read_text()))
+    with pytest.raises(RunError, match="no evaluation to share"):
+        write_share(tmp_path / "new")
