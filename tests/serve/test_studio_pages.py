@@ -231,6 +231,7 @@ def test_numbers_are_searched_and_the_best_becomes_a_model(studio: tuple[Running
     page.get_by_role("spinbutton", name="Steps per trial").fill("2000")
     page.get_by_role("button", name="Start searching").click()
     page.get_by_role("region", name="Trials").locator("tbody tr").nth(1).wait_for()
+    page.get_by_role("button", name="Make a model of the best").wait_for()  # the first is over
     page.get_by_role("button", name="Stop").last.click()
     page.locator(".badge.finished", has_text="Ended").wait_for()
     page.get_by_role("button", name="Make a model of the best").click()
