@@ -97,7 +97,7 @@ def violations_by_theme(page: Page) -> dict[str, list[Any]]:
     found = {}
     for theme in THEMES:
         page.emulate_media(color_scheme=theme)
-        page.wait_for_function("theme => document.documentElement.dataset.theme === theme", arg=theme)
+        page.locator(f"html[data-theme={theme}]").wait_for(state="attached")
         page.evaluate("Promise.all(document.getAnimations().map(one => one.finished.catch(() => {})))")
         found[theme] = violations(page)
     return found

@@ -104,7 +104,7 @@ def test_a_lap_is_scrubbed_with_a_ghost_beside_it(studio: tuple[RunningConsole, 
     assert slider.get_attribute("aria-valuetext") == "1.00 s"
     place = page.locator(".now").get_attribute("cx")
     page.get_by_role("img", name="Speed, m/s").click(position={"x": 300, "y": 60})
-    page.wait_for_function("place => document.querySelector('.now').getAttribute('cx') !== place", arg=place)
+    page.locator(f".now:not([cx='{place}'])").wait_for(state="attached")
     page.get_by_role("button", name="Driver").click()
     page.get_by_role("button", name="Play", exact=True).click()
     page.get_by_role("button", name="Pause", exact=True).wait_for()

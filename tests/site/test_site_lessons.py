@@ -68,7 +68,7 @@ def test_a_reader_finds_the_way_and_what_was_read_stays_in_the_browser(page: Pag
     page.get_by_text("1 steps; worth here 0.00").wait_for()
     picture = page.get_by_role("img", name="A table learns to drive")
     picture.scroll_into_view_if_needed()
-    page.wait_for_function("one => one.complete && one.naturalWidth > 300", arg=picture.element_handle())
+    assert picture.evaluate("one => one.decode().then(() => one.naturalWidth)") > 300
     for index, question in enumerate(find_lesson(5).facts.questions):
         choice = question.choices[question.answer]
         page.locator("fieldset").nth(index).get_by_label(choice.text.en, exact=True).check()

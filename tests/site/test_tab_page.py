@@ -74,6 +74,22 @@ def page() -> Iterator[Page]:
     assert complaints == []
 
 
+def test_a_car_that_has_learned_drives_until_somebody_trains(page: Page) -> None:
+    for track in ("reinvent_2018", "hairpin"):
+        page.get_by_label("Track").select_option(track)
+        page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)
+        eye = page.locator(".eye canvas")
+        before = eye.screenshot()
+        page.wait_for_timeout(500)
+        assert eye.screenshot() != before
+    still = page.context.browser.new_page(reduced_motion="reduce")
+    still.goto(page.url)
+    still.get_by_text("64 cars wait for you").wait_for()
+    still.wait_for_timeout(500)
+    assert still.get_by_text("It has learned already").count() == 0
+    still.close()
+
+
 def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_program(page: Page, tmp_path: Path) -> None:
     from playwright.sync_api import expect
 

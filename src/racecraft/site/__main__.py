@@ -15,6 +15,7 @@ from racecraft.site.calls import SHIPPED
 from racecraft.site.javascript import javascript
 from racecraft.site.lessons import write_lessons
 from racecraft.site.plan import plan, track_file
+from racecraft.site.starter import told_starter
 from racecraft.track import track_names
 
 FALLBACKS: Final = ("core/exact.wasm", "core/scalar.wasm")  # that few browsers need: not kept by all
@@ -24,7 +25,7 @@ PYTHON: Final = ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_s
 
 
 def main(site: Path, pyodide: Path) -> None:
-    """Write data/plan.json, data/rewards.js, a file a track, the lessons, python/, and files.js."""
+    """Write data/plan.json, data/rewards.js, data/starter.bin, a file a track, the lessons, python/, and files.js."""
     write_data(site / "data")
     write_lessons(site / "lessons")
     write_python(site / "python", pyodide)
@@ -43,7 +44,7 @@ def write_files(site: Path) -> None:
 
 
 def write_data(folder: Path) -> None:
-    """Plan, tracks and rewards."""
+    """Plan, tracks, rewards, and a policy to look at."""
     (folder / "tracks").mkdir(parents=True, exist_ok=True)
     sources = {name: load_preset(name) for name in preset_names()}
     rewards = [
@@ -55,7 +56,9 @@ def write_data(folder: Path) -> None:
         }
         for name, source in sources.items()
     ]
-    write(folder / "plan.json", {**plan(), "tracks": track_names(), "rewards": rewards})
+    starter, weights = told_starter()
+    (folder / "starter.bin").write_bytes(weights.astype("<f2").tobytes())
+    write(folder / "plan.json", {**plan(), "starter": starter, "tracks": track_names(), "rewards": rewards})
     for name in track_names():
         write(folder / "tracks" / f"{name}.json", track_file(name))
     (folder / "rewards.js").write_text(javascript(sources), encoding="utf-8")

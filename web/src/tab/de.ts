@@ -13,6 +13,7 @@ export const de: Record<TabKey, string> = {
   loading: "Der Simulator wird geladen …",
   learning: "{count} Autos lernen zugleich",
   ready: "64 Autos warten auf dich.",
+  shown: "Es hat schon gelernt; 64 andere warten.",
   reached: "Es fährt {laps} von {laps} Runden nach {time}.",
   unreached: "{time}, und es fährt noch nicht jede Runde. Eine andere Belohnung oder Strecke ist vielleicht leichter.",
   stopped: "Angehalten nach {time}.",

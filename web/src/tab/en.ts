@@ -11,6 +11,7 @@ export const en = {
   loading: "Loading the simulator …",
   learning: "{count} cars learning at once",
   ready: "64 cars wait for you.",
+  shown: "It has learned already; 64 others wait.",
   reached: "It drives {laps} of {laps} laps after {time}.",
   unreached: "{time}, and it does not drive every lap yet. Another reward or track may be easier.",
   stopped: "Stopped after {time}.",

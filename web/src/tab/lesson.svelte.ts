@@ -9,7 +9,7 @@ import type { Judgement, TrainingState } from "./trainer";
 import type { Plan, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
 import type { Objects } from "./verify/header";
-import type { Check, Load, Report, Start } from "./worker";
+import type { Check, Load, Report, Show, Start } from "./worker";
 import { openWorker } from "./open";
 
 const MOST = { alone: 400_000, among: 3_000_000 }; // camera steps
@@ -99,6 +99,13 @@ export class Lesson {
     worker.postMessage({ kind: "load", site: this.site, hasPython: kind === "python" } satisfies Load);
   }
 
+  /** Until somebody trains, a car that has learned already drives; not for who wants nothing to move. */
+  show(track: TrackFile): void {
+    if (this.state !== "ready" || matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+    [this.look, this.picture] = [undefined, undefined];
+    this.workers.plain!.postMessage({ kind: "show", plan: this.plan, track } satisfies Show);
+  }
+
   /** What is wrong with a reward function; what does not answer is ended. */
   check(source: string, track: TrackFile): Promise<RewardVerdict> {
     this.preparePython();
@@ -182,7 +189,7 @@ export class Lesson {
         [this.isSlow, this.state] = [report.isSlow, "learning"];
         break;
       case "look":
-        [this.look, this.picture] = [report.look, report.picture];
+        if (this.state !== "loading") [this.look, this.picture] = [report.look, report.picture];
         break;
       case "iteration": {
         const { steps, completion } = report.iteration;

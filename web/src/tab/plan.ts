@@ -51,6 +51,7 @@ export interface Plan {
   objectColumns: { header: string[]; each: string[] }; // behind a row's own
   spaces: ActionPreset[]; // the default first
   races: Record<RaceType, RacePlan>;
+  starter: { table: number[] }; // lowest and highest command of the car that drives at first (2, 2)
   known: Known; // rules, cars and randomisations of the library
   tracks: string[];
   rewards: RewardPreset[];

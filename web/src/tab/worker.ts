@@ -9,6 +9,7 @@ import { DrivenCar, type Trace } from "./drivencar";
 import { objectsOf } from "./objects";
 import { read, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
 import { type Pay, Python, RewardFailure } from "./python";
+import { ShownCar, shownWeights } from "./shown";
 import {
   payWith,
   Trainer,
@@ -26,6 +27,13 @@ export interface Load {
   kind: "load";
   site: string; // address of the site's folder
   hasPython: boolean;
+}
+
+/** A car that has learned already drives until a training begins. */
+export interface Show {
+  kind: "show";
+  plan: Plan;
+  track: TrackFile;
 }
 
 export interface Check {
@@ -67,7 +75,7 @@ export interface DriveOn {
   controls: { steering: number; speed: number; steps: number }; // rad, m/s, of 1/15 s
 }
 
-type Asked = Load | Check | Start | Verify | SitDown | DriveOn;
+type Asked = Load | Show | Check | Start | Verify | SitDown | DriveOn;
 
 export type Report =
   | { kind: "ready" } // all that was asked for is loaded
@@ -92,7 +100,7 @@ export type Report =
   | { kind: "unreadable"; key: ProblemKey; values: Record<string, string | number> }
   | { kind: "failed"; message: string; isReward: boolean };
 
-const OFTEN = 66; // ms between two looks
+const OFTEN = 66; // ms between two looks, and of a step
 
 const tell = (report: Report) => postMessage(report);
 
@@ -118,12 +126,33 @@ async function handle(asked: Asked): Promise<void> {
   }
   const loaded = await loading!;
   if (asked.kind === "check") tell({ kind: "checked", verdict: loaded.python!.check(asked.source, asked.track) });
+  else if (asked.kind === "show") await show(asked, loaded);
   else if (asked.kind === "verify") await prove(asked, loaded);
   else if (asked.kind === "sit") sit(asked, loaded);
   else if (asked.kind === "steer") {
     const { steering, speed, steps } = asked.controls;
     tell({ kind: "steered", ...driven!.step(steering, speed, steps) });
   } else train(asked, loaded);
+}
+
+let shown: { car: ShownCar; timer: number } | undefined;
+let starter: Promise<Float32Array> | undefined;
+async function show({ plan, track }: Show, { site, core: { core } }: Loaded): Promise<void> {
+  const weights = await (starter ??= shownWeights(site)).catch(() => undefined);
+  if (!weights) return; // is only there to be looked at
+  leave();
+  const [car, race] = [new ShownCar(core, plan, track, weights), plan.races["time-trial"]];
+  const drive = () => {
+    car.step();
+    tell({ kind: "look", ...lookOf(car, { plan, race }) });
+  };
+  shown = { car, timer: setInterval(drive, OFTEN) as unknown as number };
+}
+
+function leave(): void {
+  clearInterval(shown?.timer);
+  shown?.car.free();
+  shown = undefined;
 }
 
 let driven: DrivenCar | undefined;
@@ -156,6 +185,7 @@ async function load({ site, hasPython }: Load): Promise<Loaded> {
 }
 
 function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded): void {
+  leave();
   const began = performance.now();
   const seconds = () => (performance.now() - began) / 1000;
   const { plan, race, policy, objects, track, reward, seed, begin } = start;
@@ -198,7 +228,10 @@ function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded
 }
 
 /** This moment and what the foremost car sees, as the console's server streams them. */
-function lookOf({ cars, columns, steps }: Trainer, { plan, race }: Start): { look: Look; picture: Picture } {
+function lookOf(
+  { cars, columns, steps }: Pick<Trainer, "cars" | "columns" | "steps">,
+  { plan, race }: Pick<Start, "plan" | "race">,
+): { look: Look; picture: Picture } {
   const { vehicles, rows, rowWidth, count, frames, numPixels } = cars;
   const column = (name: string, car: number) => rows[car * rowWidth + columns.indexOf(name)]!;
   const field = (index: number, car: number) => Math.round(vehicles[index * count + car]! * 1000);
