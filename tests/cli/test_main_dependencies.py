@@ -75,6 +75,7 @@ COMMANDS: dict[str, list[str]] = {
         f"verify --race http://127.0.0.1:9/league/1 --commitment {64 * 'a'} --json",
     ],
     "report": ["report R/b -o report.html --json"],
+    "share": ["share R/b --evaluation Z --language de -o share.html --json"],
     "export": ["export R/b --to car --checkpoint last -o exported.tar.gz --json", "export R/b --to onnx"],
     "car": [
         "car calibrate --circle-left 0.8 --circle-right 0.9 --servo 1.7,1.45,1.2 --speed 40=1.1 --slider 40"
@@ -136,6 +137,11 @@ COMMANDS: dict[str, list[str]] = {
         "league reset you --runs R --database sqlite:///D.db --address https://x --json",
         "league backup B.tar --runs R --database sqlite:///D.db --json",
         "league restore B.tar --runs B --database sqlite:///E.db --json",
+    ],
+    "sweep": [
+        "sweep Q -n q --runs R --processes 1 --json",
+        "sweep --resume q --runs R --board",
+        "sweep Q -n r --runs R --cluster auto",
     ],
     "worker": [
         "worker --runs W --database sqlite:///D.db --artifacts file:///tmp/none --trainings 1 --others 1 --machine w"
@@ -209,6 +215,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]
     site, folder = tmp_path_factory.mktemp("site"), tmp_path_factory.mktemp("work")
     link_main_packages(site)
     (folder / "W").write_text("def reward_function(params):\n    return 1.0\n")
+    (folder / "Q").write_text('seeds = [1]\n[all]\ntrack = "oval"\nuntil = "64 steps"\n[settings.plain]\n')
     (folder / "H").write_text('{"lr": 0.001}')
     document = {"action_space": [{"steering_angle": a, "speed": 1.0, "index": i} for i, a in enumerate((-20, 20))]}
     (folder / "M").write_text(
@@ -232,6 +239,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]
         found.update(zip(lines, run(lines), strict=True))
 
     run_until("ladder")
+    places["Z"] = min(folder.glob("R/b/evaluation-*/evaluation.replay")).parent.name.removeprefix("evaluation-")
     places["P"] = next(str(path) for path in folder.glob("R/b/evaluation-*/evaluation.replay"))
     places["D"] = next(str(path) for path in sorted(folder.glob("X/*/*.replay")))
     places["C"] = str(Path(places["D"]).parent)
@@ -295,6 +303,7 @@ def test_what_needs_no_extra_works(told: dict[str, tuple[int, str]]) -> None:
         "tune ",
         "serve ",
         "worker ",
+        "sweep Q -n r",
         "league ",
         *ELSEWHERE,
         "learn --resume R/w --watch",

@@ -34,7 +34,7 @@ def share(
     evaluation: Annotated[
         str, typer.Option("--evaluation", help="Time stamp of the evaluation; by default the newest.")
     ] = "",
-    language: Annotated[str, typer.Option("--language", help="Of the page: en or de.")] = "en",
+    language: Annotated[str, typer.Option("--language", "-l", help="Of the page: en or de.")] = "en",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File to write; by default share.html in the run folder.")
     ] = None,
