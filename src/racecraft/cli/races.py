@@ -172,7 +172,10 @@ def film(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make a film of a replay, or one of fifteen seconds of how a run learned: laps from its first to its best."""
+    """Make a film of a replay, or of how a run learned.
+
+    The latter takes fifteen seconds: laps from its first to its best.
+    """
     if replay.is_dir():
         from racecraft.judging.evolution import film_evolution
 

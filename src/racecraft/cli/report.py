@@ -40,7 +40,10 @@ def share(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write an evaluation's best lap as one HTML page to send around: it opens offline, the replay is inside."""
+    """Write a best lap as one HTML page to send around.
+
+    It opens offline; the replay of that evaluation is inside.
+    """
     from racecraft.analysis.share import write_share
 
     path = write_share(run, output, stamp=evaluation, language=language)

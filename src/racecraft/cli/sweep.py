@@ -33,7 +33,10 @@ def sweep(
     board: Annotated[bool, typer.Option("--board", help="Only show how it stands; with --resume NAME.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Train a table of settings with several seeds each, and say which can be told apart."""
+    """Train a table of settings over seeds, and compare them.
+
+    What its seeds cannot tell apart is said to be so.
+    """
     if (file is None) == (not resume):
         context.fail("Give the file of a new sweep, or --resume NAME.")
     if resume and name is not None:
