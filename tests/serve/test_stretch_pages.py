@@ -88,6 +88,7 @@ def test_a_band_shows_its_change_and_a_model_branches_off_from_before_it(changed
     info = json.loads((changed.console.runs / "heron-2" / "run.json").read_text())
     taken = next(one for one in old["checkpoints"] if one["step"] == info["parent"]["step"])
     assert taken["stretch"] == 1
+    changed.open("/")  # no page follows what is gone
     assert client.delete("/api/models/heron-2").status_code < 300
 
 
@@ -134,7 +135,7 @@ def test_the_medal_of_the_best_lap_is_on_the_card_and_on_its_pages(changed: Visi
         card = page.get_by_role("listitem").filter(has=page.get_by_role("link", name="other", exact=True))
         card.get_by_text(medal.capitalize(), exact=True).wait_for()
         page = changed.open("/models/other/watch")
-        won = page.get_by_text(medal.capitalize(), exact=True)
+        won = page.get_by_role("complementary").get_by_text(medal.capitalize(), exact=True)
         won.wait_for()
         assert f"Bronze {model['medals']['bronze']:.2f} s" in str(won.get_attribute("title"))
         shutil.rmtree(folder)
@@ -154,7 +155,8 @@ def test_when_nobody_trains_the_best_car_drives_its_lap(changed: Visit) -> None:
     assert np.median(moved * 15 - poses[1:, 3]) == pytest.approx(0.0, abs=0.1)
     page = changed.open("/models/heron/watch")
     page.get_by_text(f"The best car on its lap: {lap['seconds']:.2f} s").wait_for()
-    assert page.get_by_role("button", name="Follow").get_attribute("aria-pressed") == "true"
+    follow = page.get_by_role("region", name="Live").get_by_role("button", name="Follow")
+    assert follow.get_attribute("aria-pressed") == "true"
     canvas = page.locator(".scene canvas")
     canvas.wait_for()
     first = canvas.screenshot()
