@@ -31,7 +31,7 @@ def test_what_is_on_the_road_is_seen_live_and_again_in_the_replay(
     visit: Visit, race: str, count: int, seen: tuple[str, str]
 ) -> None:
     console = visit.console
-    console.create(name=race, track="oval", race=race, objects=count, until="10 minutes", seed=1)
+    console.create(name=race, track="oval", race=race, objects=count, until="10 minutes", seed=1, algorithm="ppo")
     page = visit.open(f"/models/{race}/watch")
     there = f"canvas[data-boxes='{seen[0]}'][data-bots='{seen[1]}']"
     page.locator(there).wait_for()

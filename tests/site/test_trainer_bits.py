@@ -49,7 +49,7 @@ RACES: dict[str, tuple[dict[str, Any], int]] = {  # what is chosen of a race's o
 def settings_of(race: str) -> dict[str, Any]:
     chosen, every = RACES[race]
     objects = objects_for_race(race, settings=chosen)
-    common = {"objects": objects, "evaluate_every": every, "until": f"{2 * every} steps"}
+    common = {"algorithm": "ppo", "objects": objects, "evaluate_every": every, "until": f"{2 * every} steps"}
     return {**common, "actions": plan()["races"][race]["space"]}
 
 

@@ -17,6 +17,7 @@ from racecraft.errors import ConfigError
 from racecraft.learn import DistillConfig, SACConfig
 from racecraft.learn.sb3 import SB3Config
 from racecraft.run import RunFolder
+from racecraft.sim import Objects, Obstacles
 from racecraft.training import resume
 from racecraft.training.plan import make_plan
 from racecraft.training.start import read_settings
@@ -130,6 +131,25 @@ def test_a_student_laps_the_oval_after_a_few_thousand_frames(tmp_path: Path) -> 
     }
     result = train("oval", algorithm="distill", distill=DistillConfig(teacher_steps=100_000), seed=1, **settings)
     assert (result.reason, result.laps_completed) == ("laps", 5)
+
+
+@pytest.mark.slow
+def test_the_plain_command_finds_its_way_among_boxes(tmp_path: Path) -> None:
+    """PPO alone completes none of these laps in so many steps, nor does a student after its lessons complete all."""
+    recorder = Recorder()
+    train(
+        "oval",
+        objects=Objects(obstacles=Obstacles(count=6, placement="random")),
+        distill=DistillConfig(teacher_steps=200_000, student_steps=40_000),
+        until="62000 steps",
+        evaluate_every=62_000,
+        seed=1,
+        num_threads=1,
+        root=tmp_path,
+        reporter=recorder,
+    )
+    assert recorder.evaluations[-1].laps_completed >= 16  # of 20
+    assert any("A teacher" in note for note in recorder.notes)
 
 
 @pytest.mark.slow

@@ -268,6 +268,44 @@ def test_among_objects_training_takes_its_time(objects: Objects) -> None:
         train("oval", objects=objects, until="5 or minutes")
 
 
+@pytest.mark.parametrize("objects", [Objects(obstacles=Obstacles(count=2)), Objects(bots=Bots(count=1))])
+def test_among_objects_a_teacher_comes_first_unless_it_is_said_how_to_learn(objects: Objects) -> None:
+    plain = make_settings(metadata=DISCRETE, objects=objects)
+    assert (plain.algorithm, plain.distill) == ("distill", OBJECTS.distill)
+    several = make_settings(metadata=DISCRETE, objects=objects, track=["oval", "kidney"], critic="privileged")
+    assert (several.algorithm, several.distill) == ("distill", OBJECTS.distill)
+    said: list[dict[str, Any]] = [
+        {"algorithm": "ppo"},
+        {"ppo": PPOConfig()},
+        {"hyperparameters": Hyperparameters()},
+        {"critic": "camera"},  # has no teacher's critic to go on with
+        {"network": "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"},  # its frames are too large to be remembered
+        {"metadata": replace(DISCRETE, neural_network="DEEP_CONVOLUTIONAL_NETWORK")},
+    ]
+    for one in said:
+        assert make_settings(**{"metadata": DISCRETE, "objects": objects, **one}).algorithm == "ppo", one
+    soft = replace(CONTINUOUS, training_algorithm="sac")
+    assert make_settings(metadata=soft, objects=objects).algorithm == "sac"
+
+
+def test_a_training_of_few_steps_has_a_teacher_of_few() -> None:
+    def teacher_steps(until: str, **settings: Any) -> int:
+        made = make_settings(metadata=DISCRETE, until=Until.parse(until), algorithm="distill", **settings)
+        return made.distill.teacher_steps
+
+    assert teacher_steps("1000 steps") == teacher_steps("1000 steps or 5 minutes") == 5000
+    assert teacher_steps("50000 steps") == teacher_steps("5 laps") == DistillConfig().teacher_steps
+    assert teacher_steps("1000 steps", distill=DistillConfig(teacher_steps=9)) == 9
+
+
+def test_a_child_of_a_model_among_objects_goes_on_without_lessons(tmp_path: Path) -> None:
+    boxes = Objects(obstacles=Obstacles(count=2))
+    settings: dict[str, Any] = {"objects": boxes, "num_envs": 8, "evaluation_trials": 1, "root": tmp_path}
+    parent = train("oval", until="64 steps", num_threads=1, name="parent", **settings)
+    plan = make_plan(parent=parent.run)
+    assert (plan.settings.algorithm, plan.settings.objects) == ("ppo", boxes)
+
+
 def test_against_other_models_training_takes_its_time() -> None:
     rivals = Opponents()
     settings = make_settings(metadata=CONTINUOUS, opponents=rivals)

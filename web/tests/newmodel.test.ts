@@ -102,21 +102,37 @@ describe("another race", () => {
   const all = { rewards: [...known.rewards, duel], spaces: [space, continuous] };
 
   it("brings what suits it, and takes it back", () => {
-    const raced = suited("head-to-head", wishes, all);
+    const raced = suited({ from: "time-trial", to: "head-to-head" }, wishes, all);
     expect(raced).toEqual({
       source: duel.source,
       space: continuous,
       sensors: ["FRONT_FACING_CAMERA", "LIDAR"],
       until: "10 minutes",
       critic: "lap",
+      algorithm: "ppo",
     });
-    const { source, sensors, until, critic } = wishes;
-    expect(suited("time-trial", raced, all)).toEqual({ source, space, sensors, until, critic });
+    const { source, sensors, until, critic, algorithm } = wishes;
+    const alone = suited({ from: "head-to-head", to: "time-trial" }, raced, all);
+    expect(alone).toEqual({ source, space, sensors, until, critic, algorithm });
+  });
+
+  it("brings what learns among objects, from any race", () => {
+    const dodge = { name: "dodge", description: "", source: "def reward_function(params): return 1" };
+    const among = suited({ from: "time-trial", to: "object-avoidance" }, wishes, {
+      rewards: [...known.rewards, dodge],
+      spaces: [space, { ...space, name: "steady", actions: [{ steering_angle: 0, speed: 1 }] }],
+    });
+    expect([among.source, among.space.name, among.until]).toEqual([dodge.source, "steady", "20 laps or 10 minutes"]);
+    expect([among.algorithm, among.sensors]).toEqual(["distill", ["FRONT_FACING_CAMERA", "LIDAR"]]);
+    expect(suited({ from: "object-avoidance", to: "head-to-bot" }, among, all)).toEqual(among);
+    expect(suited({ from: "head-to-bot", to: "time-trial" }, { ...among, algorithm: "sac" }, all).algorithm).toBe(
+      "sac",
+    );
   });
 
   it("leaves alone what somebody chose", () => {
     const chosen = { ...wishes, source: "mine", until: "3 laps", sensors: ["LEFT_CAMERA"] };
-    const raced = suited("head-to-head", chosen, all);
+    const raced = suited({ from: "time-trial", to: "head-to-head" }, chosen, all);
     expect([raced.source, raced.until, raced.sensors]).toEqual(["mine", "3 laps", ["LEFT_CAMERA"]]);
   });
 

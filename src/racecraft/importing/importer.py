@@ -50,7 +50,7 @@ from racecraft.run.atomic import write_json
 from racecraft.run.training_params import TrainingParams
 from racecraft.track import Track, load_track, track_names
 from racecraft.training.regimes import TIME_TRIAL
-from racecraft.training.settings import DEFAULT_TRACK, make_settings
+from racecraft.training.settings import DEFAULT_TRACK, make_settings, of_the_files
 from racecraft.training.start import require_trainable, write_run
 
 ORIGINAL: Final = "original"
@@ -147,6 +147,7 @@ def import_run(
                 hyperparameters=hyperparameters,
                 network=network,
                 track=label,
+                algorithm=of_the_files(metadata),
                 critic="camera" if tensors is not None and has_critic(tensors) else "",
                 **job.values,
             )

@@ -210,7 +210,7 @@ def _metadata(space: ActionSpace, objects: Objects) -> ModelMetadata:
 
 def _settings(space: ActionSpace, objects: Objects = NO_OBJECTS) -> TrainSettings:
     until = Until.parse(regime_of(objects=objects).until)
-    return make_settings(metadata=_metadata(space, objects), objects=objects, until=until)
+    return make_settings(metadata=_metadata(space, objects), objects=objects, until=until, algorithm="ppo")
 
 
 def told_space(preset: ActionPreset) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def train(
         reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``, among objects ``dodge``,
             against opponents ``duel``.
         until: When to stop: ``"5 laps"`` (the default), ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or
-            several joined by ``or``; among objects by default ``"20 laps or 5 minutes"``, against opponents
+            several joined by ``or``; among objects by default ``"20 laps or 10 minutes"``, against opponents
             ``"10 minutes"``.
         actions: Action space or name of a preset, where no `model_metadata` is given; by default ``default``, among
             objects ``steady``, against opponents ``continuous``.

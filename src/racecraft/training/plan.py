@@ -13,7 +13,7 @@ from racecraft.run import RunFolder
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.training.parent import Parent, open_parent
 from racecraft.training.regimes import METHODS, TIME_TRIAL, regime_of
-from racecraft.training.settings import DEFAULT_TRACK, TrainSettings, make_settings
+from racecraft.training.settings import DEFAULT_TRACK, TrainSettings, make_settings, of_the_files
 from racecraft.training.start import read_settings, start_run
 from racecraft.training.stop import Until
 
@@ -117,6 +117,7 @@ def make_plan(
         of_the_parent = inherited.pop("track")
         track = of_the_parent if track is None else track
         settings = {**inherited, **settings}
+        algorithm = algorithm or of_the_files(metadata)  # lessons would begin anew what the weights know
     return Plan(
         settings=make_settings(
             metadata=metadata,

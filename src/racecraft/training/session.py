@@ -217,6 +217,9 @@ def open_session(
             meter=meter,
             since=since,
         )
+        if saved is None and settings.algorithm == "distill":
+            steps = settings.distill.teacher_steps
+            note(f"A teacher, told where everything is, learns first: {steps:,} steps without a camera.")
         if saved is not None:
             session.load(saved)
             forgotten = "; what the reward function remembered begins anew" if run.copies > 1 else ""

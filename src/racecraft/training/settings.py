@@ -222,7 +222,8 @@ def make_settings(
             says otherwise.
         randomize: Preset, file or ranges of what differs from episode to episode.
         num_envs: Cars driven at once; 0 decides by itself.
-        algorithm: One of `racecraft.training.regimes.METHODS`; by default the metadata's.
+        algorithm: One of `racecraft.training.regimes.METHODS`; by default the metadata's, or the one that suits the
+            race where nothing else says how the policy learns.
         critic: One of `CRITICS`; by default ``privileged``, against opponents on one track ``lap``.
         ppo: How the policy improves, instead of hyperparameters.
         settings: Other fields of `TrainSettings`.
@@ -238,17 +239,22 @@ def make_settings(
         vehicle = load_vehicle(vehicle or VEHICLE_OF_VERSION[metadata.version])
     if not isinstance(randomize, Randomization):
         randomize = load_randomization(randomize)
-    algorithm = algorithm or ("sac" if metadata.training_algorithm == "sac" else "ppo")
+    circumstances: dict[str, Any] = {
+        "objects": settings.get("objects", NO_OBJECTS),
+        "opponents": settings.get("opponents"),
+        "num_tracks": len(load_tracks(track)),
+        "device": settings.get("device", "cpu"),
+    }
+    network = network or metadata.neural_network
+    if not algorithm:
+        is_told = hyperparameters is not None or ppo is not None or network != "RACECRAFT_SMALL"
+        is_taught = not is_told and critic in ("", "privileged") and metadata.training_algorithm != "sac"
+        algorithm = regime_of(**circumstances).algorithm if is_taught else of_the_files(metadata)
     _check_actions(algorithm, metadata)
     method, is_continuous = METHODS[algorithm], metadata.action_space.kind == "continuous"
-    regime = regime_of(
-        objects=settings.get("objects", NO_OBJECTS),
-        opponents=settings.get("opponents"),
-        num_tracks=len(load_tracks(track)),
-        device=settings.get("device", "cpu"),
-        is_fast_distill=algorithm == "distill" and is_continuous,
-    )
-    usual = {"start": regime.start, "evaluation_trials": regime.evaluation_trials, "distill": regime.distill}
+    regime = regime_of(**circumstances, is_fast_distill=algorithm == "distill" and is_continuous)
+    lessons = _as_long_as(settings.get("until"), regime.distill)
+    usual = {"start": regime.start, "evaluation_trials": regime.evaluation_trials, "distill": lessons}
     settings = {**usual, **settings}
     if settings.get("evaluate_every", 0) == 0:
         settings["evaluate_every"] = regime.evaluate_every
@@ -281,12 +287,24 @@ def make_settings(
         track=join_names(track),
         randomize=randomize,
         vehicle=vehicle,
-        network=network or metadata.neural_network,
+        network=network,
         algorithm=algorithm,
         critic=critic or regime.critic,
         ppo=ppo,
         **settings,
     )
+
+
+def of_the_files(metadata: ModelMetadata) -> str:
+    """AWS's algorithm that a model's metadata names."""
+    return "sac" if metadata.training_algorithm == "sac" else "ppo"
+
+
+def _as_long_as(until: Until | None, distill: DistillConfig | None) -> DistillConfig | None:
+    """The same lessons, for a training of few steps by a teacher of few: at most five to one of the student's."""
+    if not isinstance(until, Until) or not until.steps or distill is None:
+        return distill
+    return replace(distill, teacher_steps=min(distill.teacher_steps, 5 * until.steps))
 
 
 def _with_num_envs(ppo: PPOConfig, num_envs: int, *, most: int) -> PPOConfig:

@@ -38,31 +38,41 @@ export interface Known {
 /** How many things stand in a race unless somebody says another number. */
 export const usualObjects = (race: string): number => (race === "head-to-bot" ? 3 : 6);
 
-type Suited = Pick<Wishes, "source" | "space" | "sensors" | "until" | "critic">;
+type Suited = Pick<Wishes, "source" | "space" | "sensors" | "until" | "critic" | "algorithm">;
+type Usual = Omit<Suited, "source" | "space"> & { reward: string; space: string };
 
-/** What `racecraft train --race head-to-head` does where nothing else is said, and what other races do. */
-const USUAL = {
-  alone: { reward: "racing", space: "default", sensors: [] as string[], until: "5 laps", critic: "privileged" },
-  raced: {
-    reward: "duel",
-    space: "continuous",
-    sensors: ["FRONT_FACING_CAMERA", "LIDAR"],
-    until: "10 minutes",
-    critic: "lap",
-  },
+/** What `racecraft train --race …` does where nothing else is said, by kind of race. */
+const ALONE: Usual = {
+  ...{ reward: "racing", space: "default", sensors: [], until: "5 laps", critic: "privileged", algorithm: "ppo" },
 };
+const AMONG: Usual = {
+  ...{ reward: "dodge", space: "steady", sensors: ["FRONT_FACING_CAMERA", "LIDAR"] },
+  ...{ until: "20 laps or 10 minutes", critic: "privileged", algorithm: "distill" },
+};
+const RACED: Usual = {
+  ...{ reward: "duel", space: "continuous", sensors: ["FRONT_FACING_CAMERA", "LIDAR"] },
+  ...{ until: "10 minutes", critic: "lap", algorithm: "ppo" },
+};
+const usualOf = (race: string): Usual =>
+  race === "head-to-head" ? RACED : ["object-avoidance", "head-to-bot"].includes(race) ? AMONG : ALONE;
 
 /** The same wishes for another race: what nobody chose becomes what suits it. */
-export function suited(race: string, wishes: Suited, { rewards, spaces }: Pick<Known, "rewards" | "spaces">): Suited {
-  const [from, to] = race === "head-to-head" ? [USUAL.alone, USUAL.raced] : [USUAL.raced, USUAL.alone];
+export function suited(
+  races: { from: string; to: string },
+  wishes: Suited,
+  { rewards, spaces }: Pick<Known, "rewards" | "spaces">,
+): Suited {
+  const [from, to] = [usualOf(races.from), usualOf(races.to)];
   const sourceOf = (name: string) => rewards.find((preset) => preset.name === name)?.source;
   const isUsual = presetOf(wishes.space, spaces)?.name === from.space;
+  const unless = <T>(wish: T, before: T, now: T): T => (wish === before ? now : wish);
   return {
     source: wishes.source === sourceOf(from.reward) ? (sourceOf(to.reward) ?? wishes.source) : wishes.source,
     space: (isUsual && spaces.find((preset) => preset.name === to.space)) || wishes.space,
     sensors: wishes.sensors.join() === from.sensors.join() ? to.sensors : wishes.sensors,
-    until: wishes.until === from.until ? to.until : wishes.until,
-    critic: wishes.critic === from.critic ? to.critic : wishes.critic,
+    until: unless(wishes.until, from.until, to.until),
+    critic: unless(wishes.critic, from.critic, to.critic),
+    algorithm: unless(wishes.algorithm, from.algorithm, to.algorithm),
   };
 }
 

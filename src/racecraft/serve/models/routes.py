@@ -77,7 +77,7 @@ def create_model(request: NewModel, context: InContext, consoles: InConsoles, us
         opponents=_opponents(context, request),
         randomize=_randomization(request.randomize),
         critic=request.critic,
-        algorithm=request.algorithm,
+        algorithm=request.algorithm or ("" if request.tuning is None else "ppo"),
     )
     if request.tuning is not None:
         if parameters is not None:
