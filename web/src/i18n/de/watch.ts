@@ -63,6 +63,7 @@ export const watch: Record<keyof typeof english, string> = {
     "Es lernt auf {count} Strecken zugleich, jedes Auto auf einer anderen. Eine Auswertung zeigt es auf einer davon.",
   starting_long: "Autos, Netz und Belohnung werden vorbereitet, seit {time}",
   cars_wait: "{count} Autos warten, während das Netz aus ihren Fahrten lernt: seit {time}",
+  cars_teacher: "Zuerst lernt ein Lehrer, dem alles gesagt wird: seit {time}. Von ihm lernen dann {count} Autos",
   cars: "{count} Autos lernen zugleich",
   on_machine: "{told} · auf {machine}",
   not_live: "Gerade wird nicht trainiert.",

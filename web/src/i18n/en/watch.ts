@@ -59,6 +59,7 @@ export const watch = {
     "It learns on {count} tracks at once, each car on another one. An evaluation shows it on one of them.",
   starting_long: "Preparing cars, network and reward, for {time}",
   cars_wait: "{count} cars wait while the network learns from what they drove: {time} so far",
+  cars_teacher: "A teacher, told where everything is, learns first: {time} so far. {count} cars will learn from it",
   cars: "{count} cars learning at once",
   on_machine: "{told} · on {machine}",
   not_live: "No training is running.",
