@@ -273,10 +273,14 @@ def test_a_reward_that_raises_late_stops_with_its_line_and_leaves_what_was_judge
 
 
 def test_a_reward_that_hangs_is_ended_and_the_page_goes_on(page: Page) -> None:
+    page.reload()
+    page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)  # this car's life is no sign of another's
     write(page, FAILS_LATE.format(ending="while True: print('again')"))
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_label("Track").select_option("kidney")  # so that the text is checked again, while it trains
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("the reward function did not return within 5 s").wait_for(timeout=PATIENCE)
+    assert page.get_by_role("button", name="Train", exact=True).is_enabled()  # and the check had its turn
     write(page, "def reward_function(params):\n    while True: pass\n")
     page.get_by_text("1: The reward function did not return within 5 s.").wait_for(timeout=PATIENCE)
     write(page, "def reward_function(params):\n    return 1.0\n")

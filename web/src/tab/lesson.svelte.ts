@@ -9,7 +9,7 @@ import type { Judgement, TrainingState } from "./trainer";
 import type { Plan, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
 import type { Objects } from "./verify/header";
-import type { Check, Load, Report, Show, Start } from "./worker";
+import type { Check, Hide, Load, Report, Show, Start } from "./worker";
 import { openWorker } from "./open";
 
 const MOST = { alone: 400_000, among: 3_000_000 }; // camera steps
@@ -38,6 +38,14 @@ const refusal = (message: string): RewardVerdict => ({
   painting: null,
   laps: [],
 });
+
+/** A check that has no answer yet. */
+interface Asked {
+  question: number;
+  answer: (verdict: RewardVerdict) => void;
+  timer: number | undefined;
+  post: () => void;
+}
 
 export type State = "ready" | "loading" | "learning" | "reached" | "unreached" | "stopped" | "failed";
 
@@ -68,7 +76,8 @@ export class Lesson {
   isPythonReady = $state(false);
   private readonly workers: Partial<Record<Kind, Worker>> = {};
   private running: Kind = "plain";
-  private asked: { answer: (verdict: RewardVerdict) => void; timer: number | undefined; post: () => void } | undefined;
+  private asked: Asked | undefined;
+  private questions = 0; // so far
   private quiet = 0; // ticks since a running reward was heard of
   private watch: number | undefined;
 
@@ -106,21 +115,24 @@ export class Lesson {
     this.workers.plain!.postMessage({ kind: "show", plan: this.plan, track } satisfies Show);
   }
 
-  /** What is wrong with a reward function; what does not answer is ended. */
+  /** What is wrong with a reward function; what does not answer is ended. While the worker trains, the question waits. */
   check(source: string, track: TrackFile): Promise<RewardVerdict> {
     this.preparePython();
     return new Promise((answer) => {
+      const question = ++this.questions;
       const post = () => {
-        this.workers.python!.postMessage({ kind: "check", source, track: $state.snapshot(track) } satisfies Check);
+        const asked = { kind: "check", question, source, track: $state.snapshot(track) } satisfies Check;
+        this.workers.python!.postMessage(asked);
         this.asked!.timer = window.setTimeout(() => {
-          this.load("python");
           answer(refusal(`The reward function did not return within ${PATIENCE} s.`));
           this.asked = undefined;
+          if (this.isTraining("python")) this.hang();
+          else this.load("python");
         }, 1000 * PATIENCE);
       };
       clearTimeout(this.asked?.timer);
-      this.asked = { answer, timer: undefined, post };
-      if (this.isPythonReady) post();
+      this.asked = { question, answer, timer: undefined, post };
+      if (this.isPythonReady && !this.isTraining("python")) post();
     });
   }
 
@@ -132,7 +144,10 @@ export class Lesson {
     [this.curves, this.state] = [new Curves(), "loading"];
     this.version++;
     this.running = source === undefined ? "plain" : "python";
-    if (source !== undefined) this.preparePython();
+    if (source !== undefined) {
+      this.workers.plain!.postMessage({ kind: "hide" } satisfies Hide);
+      this.preparePython();
+    }
     const { plan } = this;
     const race = plan.races[type];
     const policy = policyFor(race, space, objects);
@@ -147,6 +162,15 @@ export class Lesson {
     this.end("stopped");
   }
 
+  private isTraining(kind: Kind): boolean {
+    return this.isRunning && this.running === kind;
+  }
+
+  private hang(): void {
+    this.failedReward = `reward_function.py: the reward function did not return within ${PATIENCE} s.`;
+    this.end("failed");
+  }
+
   private end(state: State): void {
     this.attend(false);
     this.load(this.running);
@@ -159,14 +183,12 @@ export class Lesson {
     this.quiet = 0;
     if (!isPaying || this.running === "plain") return;
     this.watch = window.setInterval(() => {
-      if (++this.quiet < PATIENCE * TICKS) return;
-      this.failedReward = `reward_function.py: the reward function did not return within ${PATIENCE} s.`;
-      this.end("failed");
+      if (++this.quiet >= PATIENCE * TICKS) this.hang();
     }, 1000 / TICKS);
   }
 
   private hear(report: Report, kind: Kind): void {
-    this.quiet = 0;
+    if (kind === this.running) this.quiet = 0; // another worker's life says nothing of a reward that hangs in this one
     switch (report.kind) {
       case "ready":
         if (kind === "python") {
@@ -175,8 +197,9 @@ export class Lesson {
         }
         break;
       case "checked":
-        clearTimeout(this.asked?.timer);
-        this.asked?.answer(report.verdict);
+        if (report.question !== this.asked?.question) break; // of a text that has changed meanwhile
+        clearTimeout(this.asked.timer);
+        this.asked.answer(report.verdict);
         this.asked = undefined;
         break;
       case "paying":
@@ -189,7 +212,8 @@ export class Lesson {
         [this.isSlow, this.state] = [report.isSlow, "learning"];
         break;
       case "look":
-        if (this.state !== "loading") [this.look, this.picture] = [report.look, report.picture];
+        if (kind === this.running && this.state !== "loading")
+          [this.look, this.picture] = [report.look, report.picture];
         break;
       case "iteration": {
         const { steps, completion } = report.iteration;

@@ -36,8 +36,14 @@ export interface Show {
   track: TrackFile;
 }
 
+/** That car is not to be looked at any more. */
+export interface Hide {
+  kind: "hide";
+}
+
 export interface Check {
   kind: "check";
+  question: number;
   source: string;
   track: TrackFile;
 }
@@ -75,11 +81,11 @@ export interface DriveOn {
   controls: { steering: number; speed: number; steps: number }; // rad, m/s, of 1/15 s
 }
 
-type Asked = Load | Show | Check | Start | Verify | SitDown | DriveOn;
+type Asked = Load | Show | Hide | Check | Start | Verify | SitDown | DriveOn;
 
 export type Report =
   | { kind: "ready" } // all that was asked for is loaded
-  | { kind: "checked"; verdict: RewardVerdict }
+  | { kind: "checked"; question: number; verdict: RewardVerdict }
   | { kind: "loaded"; isSlow: boolean }
   | { kind: "paying"; isPaying: boolean } // rewards are computed from here on, or no longer
   | { kind: "printed"; text: string }
@@ -125,8 +131,11 @@ async function handle(asked: Asked): Promise<void> {
     return;
   }
   const loaded = await loading!;
-  if (asked.kind === "check") tell({ kind: "checked", verdict: loaded.python!.check(asked.source, asked.track) });
-  else if (asked.kind === "show") await show(asked, loaded);
+  if (asked.kind === "check") {
+    const { question, source, track } = asked;
+    tell({ kind: "checked", question, verdict: loaded.python!.check(source, track) });
+  } else if (asked.kind === "show") await show(asked, loaded);
+  else if (asked.kind === "hide") leave();
   else if (asked.kind === "verify") await prove(asked, loaded);
   else if (asked.kind === "sit") sit(asked, loaded);
   else if (asked.kind === "steer") {
@@ -193,7 +202,9 @@ function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded
   let printed = () => "";
   const payFor = (numColumns: number): Pay => {
     if (!python) return payWith(presets[reward]!, track, numCars);
+    tell({ kind: "paying", isPaying: true }); // what stands outside of the function may hang, too
     const paid = python.open(reward, track, numCars, numColumns, seed);
+    tell({ kind: "paying", isPaying: false });
     printed = paid.printed;
     return paid.pay;
   };
