@@ -15,20 +15,35 @@ import shutil
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from racecraft import load_track, train
 from racecraft.learn.learner import below
 from racecraft.run import RunFolder
 from racecraft.run.starters import FOLDER
+from racecraft.sim.objects import NO_OBJECTS, Objects, Obstacles
 from racecraft.track import joint_digest
 from racecraft.training.parent import WEIGHTS
 
-STARTERS = {"quick": ("everywhere", "1500000 steps"), "steady": ("steady", "400000 steps")}
-"""Recipe and length of the training."""
+BOXES = Objects(obstacles=Obstacles(placement="random"))
+
+
+class Starter(NamedTuple):
+    """How one is made, and where it drives unless told otherwise: one road says more than all that it learned on."""
+
+    recipe: str
+    until: str
+    track: str = "reinvent_2018"
+    objects: Objects = NO_OBJECTS
+
+
+STARTERS = {
+    "quick": Starter("everywhere", "1500000 steps"),
+    "steady": Starter("steady", "400000 steps"),
+    "dodger": Starter("traffic", "3000000 steps", track="speedway", objects=BOXES),
+}
 SEED = 1
 CREATED = "2026-11-23T00:00:00+00:00"
-TRACK = "reinvent_2018"
-"""Where a starter drives unless told otherwise: one road says more than all that it learned on."""
 FILES = ("reward_function.py", "model_metadata.json")
 
 
@@ -43,21 +58,21 @@ def main() -> None:
         parser.error(f"there is no starter {', '.join(sorted(unknown))}")
     digests = {}
     for name in options.names or STARTERS:
-        recipe, until = STARTERS[name]
+        starter = STARTERS[name]
         with tempfile.TemporaryDirectory() as scratch:
             trained = train(
-                recipe=recipe,
-                until=options.until or until,
+                recipe=starter.recipe,
+                until=options.until or starter.until,
                 seed=SEED,
                 num_threads=options.num_threads,
                 root=scratch,
                 name=name,
             )
-            digests[name] = write_starter(RunFolder.open(trained.run), options.output / name)
+            digests[name] = write_starter(RunFolder.open(trained.run), options.output / name, starter)
     print(json.dumps(digests))
 
 
-def write_starter(run: RunFolder, path: Path) -> dict[str, str]:
+def write_starter(run: RunFolder, path: Path, starter: Starter) -> dict[str, str]:
     """The best checkpoint's weights, without anything of its training, as a run of its own; file and digest of them."""
     shutil.rmtree(path, ignore_errors=True)
     path.mkdir(parents=True)
@@ -65,15 +80,17 @@ def write_starter(run: RunFolder, path: Path) -> dict[str, str]:
         shutil.copyfile(run.path / name, path / name)
     saved = run.checkpoints.load("best")
     weights = {f"{WEIGHTS}{name}": array for name, array in below(WEIGHTS, saved.arrays).items()}
-    starter = RunFolder(path)
+    made = RunFolder(path)
     origin = {"format": "racecraft", "recipe": path.name, "step": saved.step}
-    starter.checkpoints.save(0, weights, metadata={"network": saved.metadata["network"], "origin": origin})
-    info, track = run.read_info(), load_track(TRACK)
+    made.checkpoints.save(0, weights, metadata={"network": saved.metadata["network"], "origin": origin})
+    info, track = run.read_info(), load_track(starter.track)
     versions = {"racecraft": info.versions["racecraft"]}
-    starter.write_info(
-        replace(info, track=track.name, track_digest=joint_digest([track]), created=CREATED, versions=versions)
+    settings = {**info.settings, "objects": starter.objects.to_dict()}
+    digest = joint_digest([track])
+    made.write_info(
+        replace(info, track=track.name, track_digest=digest, settings=settings, created=CREATED, versions=versions)
     )
-    (entry,) = starter.checkpoints.entries()
+    (entry,) = made.checkpoints.entries()
     return {"file": entry.file, "sha256": entry.sha256}
 
 

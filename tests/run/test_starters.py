@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from racecraft import generalize
+from racecraft import evaluate, generalize
 from racecraft.errors import RunError
 from racecraft.run import RunFolder
 from racecraft.run.starters import FOLDER, starter_names, unpack_starter
+from racecraft.sim import Objects
 from racecraft.training.parent import open_parent
+from racecraft.training.recipes import TRAFFIC
 
 UNSEEN = "generated:500..503,radius=0.6"
 MOST_BYTES = 2 << 20
@@ -38,8 +41,19 @@ def test_a_starter_is_a_small_run_that_drives_where_it_never_was(name: str, here
     assert open_parent(f"starter:{name}").weights.keys() >= {"policy.head.weight", "policy.head.bias"}
 
 
-def test_both_are_there() -> None:
-    assert starter_names() == ["quick", "steady"]
+def test_all_are_there() -> None:
+    assert starter_names() == ["dodger", "quick", "steady"]
+
+
+@pytest.mark.costly
+@pytest.mark.parametrize("objects", [TRAFFIC, None])
+def test_the_dodger_gets_by(objects: Objects | None, here: Path) -> None:
+    """On a road it never saw, without a scratch in most laps; by itself among the boxes that it says."""
+    settings: dict[str, Any] = {"laps": 1, "max_resets": 0, "video": False, "num_threads": 1}
+    found = evaluate(
+        "starter:dodger", track="generated:700,width=1,radius=0.6", objects=objects, num_trials=10, **settings
+    )
+    assert found.evaluation.laps_clean >= 6
 
 
 def test_it_is_unpacked_once_and_then_a_run_like_any_other(here: Path) -> None:

@@ -13,8 +13,9 @@ from racecraft.errors import ConfigError
 from racecraft.learn import DistillConfig
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
+from racecraft.track import load_tracks
 from racecraft.training import train
-from racecraft.training.recipes import RECIPES, with_recipe
+from racecraft.training.recipes import RECIPES, TRAFFIC, WIDE_ROADS, with_recipe
 from racecraft.training.start import read_settings
 
 
@@ -25,7 +26,7 @@ def test_what_is_given_goes_before_the_recipe() -> None:
 
 
 def test_a_recipe_that_does_not_exist() -> None:
-    with pytest.raises(ConfigError, match="recipe is 'everwhere'; allowed are steady, everywhere") as caught:
+    with pytest.raises(ConfigError, match="recipe is 'everwhere'; allowed are steady, everywhere, traffic") as caught:
         train(recipe="everwhere")
     assert "everywhere" in caught.value.hint
 
@@ -43,3 +44,15 @@ def test_the_command_trains_with_what_the_recipe_says(tmp_path: Path) -> None:
     assert settings.randomize.friction == (0.6, 1.3)  # strong
     assert folder.read_reward_function() == load_reward("touring")
     assert folder.read_model_metadata().action_space.kind == "continuous"
+
+
+def test_traffic_is_learned_on_roads_with_room(tmp_path: Path) -> None:
+    command = ["train", "--recipe", "traffic", "--track", "oval", "--until", "1 second", "--num-threads", "1"]
+    done = CliRunner().invoke(every_verb(), [*command, "--runs", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    folder = RunFolder.open(json.loads(done.stdout.splitlines()[-1])["run"])
+    settings = read_settings(folder)
+    assert settings.objects == TRAFFIC
+    assert settings.distill == RECIPES["traffic"]["distill"]
+    assert folder.read_reward_function() == load_reward("dodge")
+    assert [track for track in load_tracks(WIDE_ROADS) if not 0.89 < track.mean_width < 1.11] == []

@@ -11,6 +11,7 @@ from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.errors import ConfigError, RunError
 from racecraft.learn import DistillConfig, PPOConfig, SACConfig
 from racecraft.reward import load_preset, load_reward
+from racecraft.run import RunFolder
 from racecraft.sim import Bots, Objects, Obstacles, Start, Vehicle
 from racecraft.training import Until, train
 from racecraft.training import settings as settings_module
@@ -18,7 +19,7 @@ from racecraft.training.opponents import Opponents
 from racecraft.training.plan import make_plan
 from racecraft.training.regimes import DUEL, FAST_DISTILL, MANY_TRACKS, OBJECTS, TIME_TRIAL
 from racecraft.training.settings import VEHICLE_OF_VERSION, TrainSettings, make_settings
-from racecraft.training.start import aws_hyperparameters
+from racecraft.training.start import aws_hyperparameters, read_settings
 
 DISCRETE = ModelMetadata(neural_network="RACECRAFT_SMALL")
 CONTINUOUS = replace(DISCRETE, action_space=action_space("continuous"))
@@ -298,12 +299,21 @@ def test_a_training_of_few_steps_has_a_teacher_of_few() -> None:
     assert teacher_steps("1000 steps", distill=DistillConfig(teacher_steps=9)) == 9
 
 
-def test_a_child_of_a_model_among_objects_goes_on_without_lessons(tmp_path: Path) -> None:
+def test_a_child_of_a_taught_model_among_objects_has_a_teacher_and_no_lessons(tmp_path: Path) -> None:
     boxes = Objects(obstacles=Obstacles(count=2))
-    settings: dict[str, Any] = {"objects": boxes, "num_envs": 8, "evaluation_trials": 1, "root": tmp_path}
-    parent = train("oval", until="64 steps", num_threads=1, name="parent", **settings)
-    plan = make_plan(parent=parent.run)
-    assert (plan.settings.algorithm, plan.settings.objects) == ("ppo", boxes)
+    settings: dict[str, Any] = {"objects": boxes, "num_envs": 8, "evaluation_trials": 1, "num_threads": 1}
+    parent = train("oval", until="64 steps", name="parent", root=tmp_path, **settings).run
+    made = make_plan(parent=parent, until="10 minutes").settings
+    assert OBJECTS.distill is not None
+    assert (made.algorithm, made.objects) == ("distill", boxes)
+    assert made.distill == replace(OBJECTS.distill, student_steps=1)
+    child = train(parent=parent, until="128 steps", num_envs=8, evaluation_trials=1, num_threads=1, root=tmp_path)
+    assert read_settings(RunFolder.open(child.run)).distill.teacher_steps == 640
+
+    assert make_plan(parent=parent, ppo=PPOConfig()).settings.algorithm == "ppo"
+    assert make_plan(parent=parent, objects=Objects()).settings.algorithm == "ppo"  # on a free road PPO finds its way
+    alone = train("oval", until="64 steps", num_envs=8, evaluation_trials=1, num_threads=1, root=tmp_path).run
+    assert make_plan(parent=alone, objects=boxes).settings.algorithm == "ppo"
 
 
 def test_against_other_models_training_takes_its_time() -> None:

@@ -32,7 +32,8 @@ def train(
     recipe: Annotated[
         str,
         typer.Option(
-            "--recipe", help="Options under one name, for roads it has never seen: everywhere, or slower steady."
+            "--recipe",
+            help="Options under one name, for roads it has never seen: everywhere, slower steady, or traffic.",
         ),
     ] = "",
     track: Annotated[

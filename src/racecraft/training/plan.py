@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_space
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
-from racecraft.sim.objects import NO_OBJECTS
+from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.training.parent import Parent, open_parent
 from racecraft.training.regimes import METHODS, TIME_TRIAL, regime_of
 from racecraft.training.settings import DEFAULT_TRACK, TrainSettings, make_settings, of_the_files
@@ -78,7 +78,7 @@ def make_plan(
     """
     if parent is not None and not isinstance(parent, Parent):
         parent = open_parent(parent)
-    theirs = None if parent is None else parent.folder
+    theirs, is_taught = None if parent is None else parent.folder, False
     before = None if theirs is None else read_settings(theirs)
     objects = settings.get("objects", NO_OBJECTS if before is None else before.objects)
     opponents = settings.get("opponents", None if before is None else before.opponents)
@@ -116,18 +116,24 @@ def make_plan(
             inherited.pop("vehicle")  # the file's version decides
         of_the_parent = inherited.pop("track")
         track = of_the_parent if track is None else track
+        is_taught = not algorithm and _is_taught(before, metadata, objects, {"hyperparameters": parameters, **settings})
+        if is_taught:
+            del inherited["distill"]
         settings = {**inherited, **settings}
-        algorithm = algorithm or of_the_files(metadata)  # lessons would begin anew what the weights know
+        algorithm = algorithm or ("distill" if is_taught else of_the_files(metadata))
+    made = make_settings(
+        metadata=metadata,
+        hyperparameters=parameters,
+        track=DEFAULT_TRACK if track is None else track,
+        until=limit,
+        seed=seed,
+        algorithm=algorithm,
+        **settings,
+    )
+    if is_taught:
+        made = replace(made, distill=replace(made.distill, student_steps=1))  # it knows its lessons
     return Plan(
-        settings=make_settings(
-            metadata=metadata,
-            hyperparameters=parameters,
-            track=DEFAULT_TRACK if track is None else track,
-            until=limit,
-            seed=seed,
-            algorithm=algorithm,
-            **settings,
-        ),
+        settings=made,
         reward=source,
         metadata=metadata,
         hyperparameters=parameters,
@@ -140,6 +146,15 @@ def _with_algorithm(metadata: ModelMetadata, algorithm: str) -> ModelMetadata:
     """The metadata that says, as far as AWS's file can, what trains."""
     is_sac = algorithm == "sac" and metadata.action_space.kind == "continuous"
     return replace(metadata, training_algorithm="sac" if is_sac else "clipped_ppo")
+
+
+def _is_taught(
+    before: TrainSettings | None, metadata: ModelMetadata, objects: Objects, said: Mapping[str, Any]
+) -> bool:
+    """Whether a child of a taught model gets a teacher as well: among objects, where PPO's step needs its critic."""
+    is_told = any(said.get(name) for name in ("hyperparameters", "ppo", "distill", "critic", "device", "opponents"))
+    was_taught = before is not None and before.algorithm == "distill"
+    return was_taught and objects != NO_OBJECTS and not is_told and of_the_files(metadata) == "ppo"
 
 
 def _inherited(folder: RunFolder, metadata: ModelMetadata, *, is_new_track: bool, follows_aws: bool) -> dict[str, Any]:

@@ -7,9 +7,19 @@ from typing import Any, Final
 
 from racecraft.checks import check_choice
 from racecraft.learn import DistillConfig
+from racecraft.sim.objects import Bots, Objects, Obstacles
 
 ROADS: Final = ("library", "generated:0..47,radius=0.45,difficulty=0.9")
 """Many and tight; of the official routes only `reinvent_2018`'s shape is among them."""
+
+WIDE_ROADS: Final = ("generated:0..23,width=0.9,radius=0.5", "generated:24..47,width=1.1,radius=0.5")
+"""With room to pass a box: as wide as the official routes that races among objects used."""
+
+TRAFFIC: Final = Objects(
+    obstacles=Obstacles(count=4, placement="random"),
+    bots=Bots(count=2, speed=0.3, placement="random", changes_lane=True),
+)
+"""Both, so that what learns among them knows either."""
 
 RECIPES: Final[Mapping[str, Mapping[str, Any]]] = {
     # Once round every road, at a walk: AWS's own default reward pays for being on the road, not for haste.
@@ -34,6 +44,18 @@ RECIPES: Final[Mapping[str, Mapping[str, Any]]] = {
         "evaluate_every": 100_000,
         "evaluation_trials": 48,  # roads differ more than laps do
         "distill": DistillConfig(teacher_steps=2_000_000, student_steps=400_000, buffer_size=64_000),
+    },
+    # Through boxes and bots on roads it has never seen; the reward, the actions and the LIDAR are those of such races.
+    "traffic": {
+        "track": WIDE_ROADS,
+        "objects": TRAFFIC,
+        "algorithm": "distill",
+        "direction": "alternate",
+        "randomize": "strong",
+        "until": "15 minutes",
+        "evaluate_every": 150_000,
+        "evaluation_trials": 48,
+        "distill": DistillConfig(teacher_steps=1_500_000, student_steps=300_000, buffer_size=64_000),
     },
 }
 """Arguments of `racecraft.training.train`, by name."""

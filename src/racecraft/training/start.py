@@ -51,8 +51,8 @@ def start_run(
     """
     require_trainable(settings, metadata)
     if parent is not None:
-        if settings.algorithm != "ppo":
-            raise ConfigError(f"A run of {settings.algorithm} cannot begin from another one; only ppo can.")
+        if settings.algorithm not in ("ppo", "distill"):
+            raise ConfigError(f"A run of {settings.algorithm} cannot begin from another one; only ppo and distill can.")
         parent.check(settings.network_spec(metadata), metadata)
     tracks = load_tracks(settings.track)
     track = tracks[0]
