@@ -244,6 +244,29 @@ async function downloaded(trainer, evaluation, asked) {
   return Buffer.from(await file.arrayBuffer()).toString("base64");
 }
 
+/** What the page takes of an archive, and how it drives there. */
+async function arrival(core, { plan, track, file }) {
+  const { arrivalOf } = await load("src/tab/arrive.ts");
+  const { policyOf } = await load("src/tab/model.ts");
+  const { Trainer } = await load("src/tab/trainer.ts");
+  const found = await arrivalOf(
+    new Blob([Buffer.from(file, "base64")]),
+    plan,
+    async () => track.digest,
+  );
+  const { weights, seed, steps, reward, race: told } = found;
+  const policy = policyOf(found, plan);
+  const begin = { weights, layout: policy.weights };
+  const race = plan.races[told.type];
+  const asked = { plan, race, policy, objects: told.objects, track, seed };
+  const trainer = new Trainer(core, { ...asked, begin }, () => () => []);
+  const { completions, lapTimes } = trainer.evaluate();
+  return {
+    ...{ weights: digest(weights), seed, steps, reward },
+    ...{ completions, lapTimes },
+  };
+}
+
 /** Somebody's drive, answer by answer. */
 async function driven(core, { plan, track, settings, controls }) {
   const { DrivenCar } = await load("src/tab/drivencar.ts");
@@ -259,7 +282,7 @@ const { Core, loadCore } = await load("src/tab/core.ts");
 const core = await Core.load(readFileSync(code));
 const run = {
   ...{ ask, check, drive, train, refuse },
-  ...{ verify, policies, session, driven },
+  ...{ verify, policies, session, driven, arrival },
 };
 const all = JSON.parse(readFileSync(cases, "utf8"));
 const files = all.find(({ files }) => files)?.files;

@@ -22,6 +22,8 @@ from racecraft.importing import import_run
 from racecraft.race import Autopilot, RaceRules
 from racecraft.race import evaluate as raced
 from racecraft.replay import Replay, read_replay, write_replay
+from racecraft.run import RunFolder
+from racecraft.run.archive import archive_chunks
 from racecraft.track import load_track
 from racecraft.training.evaluator import SEED
 
@@ -113,6 +115,17 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
     laps = [lap for trial in driven.trials for lap in trial.lap_times]
     assert len(laps) == 5
     assert f"best {min(laps):.2f} s" in shown
+    as_console = tmp_path / "back.tar.gz"
+    as_console.write_bytes(b"".join(archive_chunks(RunFolder(imported.run))))
+    chooser = page.get_by_label("Bring a model", exact=True).and_(page.locator("input"))
+    for file, name in ((archive, "oval-racing-1-1"), (as_console, RunFolder(imported.run).name)):
+        chooser.set_input_files(file)
+        brought = page.get_by_label("Your models").locator(".model", has=page.get_by_text(name, exact=True))
+        brought.get_by_text(shown.rsplit(",", 1)[0]).wait_for(timeout=PATIENCE)  # judged anew: the same laps
+        brought.get_by_role("button", name="Race it").wait_for()
+        brought.get_by_role("button", name="Delete").click()
+    chooser.set_input_files(AXE)
+    page.get_by_text("This archive is damaged").wait_for()
 
 
 def test_a_model_stays_when_the_page_is_closed_and_goes_when_it_is_deleted(page: Page) -> None:

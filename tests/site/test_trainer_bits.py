@@ -19,6 +19,7 @@ from racecraft.learn.flat_weights import join_weights
 from racecraft.learn.learner import below
 from racecraft.learn.networks import weight_shapes
 from racecraft.run import RunFolder
+from racecraft.run.archive import archive_chunks
 from racecraft.run.checkpoint import Checkpoint
 from racecraft.sim.objects import objects_for_race
 from racecraft.site.javascript import javascript
@@ -145,3 +146,25 @@ def test_a_downloaded_training_goes_on_in_the_installed_program_to_the_same_bits
     assert 0 < begun.step < straight.step
     resume(imported.path, until=f"{straight.step} steps")
     assert bits(imported.checkpoints.load("last")) == bits(straight)
+
+
+def test_models_of_the_installed_program_and_of_the_page_arrive_and_drive_as_they_did(
+    found: dict[str, Any], runs: dict[str, RunFolder], tmp_path: Path
+) -> None:
+    def case(race: str, file: bytes) -> dict[str, Any]:
+        told = {"plan": asked(race)["plan"] | {"tracks": [TRACK]}, "track": track_file(TRACK)}
+        return {"what": "arrival", **told, "file": base64.b64encode(file).decode()}
+
+    packed_runs = {race: b"".join(archive_chunks(runs[race])) for race in RACES}
+    downloads = [case(race, base64.b64decode(found[race]["download"])) for race in RACES]
+    results = in_node("core", [case(race, file) for race, file in packed_runs.items()] + downloads, tmp_path)["results"]
+    for race, arrived in zip(RACES, results, strict=False):
+        best = runs[race].checkpoints.load("best")
+        spec = NetworkSpec(**{**best.metadata["network"], "frame_shape": (120, 160)})
+        assert arrived["weights"] == digest(join_weights(below("weights/", best.arrays), spec))
+        judged = best.metadata["evaluator"]["last"]
+        assert {"seed": SEED, "steps": best.step, "reward": PAYS}.items() <= arrived.items()
+        assert arrived["completions"] == judged["completions"]
+        assert arrived["lapTimes"] == judged["lap_times"]
+    for race, arrived in zip(RACES, results[len(RACES) :], strict=True):
+        assert (arrived["seed"], arrived["reward"]) == (SEED, PAYS), race

@@ -29,6 +29,18 @@ export const de: Record<TabKey, string> = {
   download: "Herunterladen",
   drop: "Löschen",
   full: "Im Speicher dieses Browsers ist kein Platz mehr: Lösche ein Modell, oder lade dieses jetzt herunter.",
+  drop_here: "Loslassen, um dieses Modell zu holen oder dieses Replay zu prüfen",
+  arrive: "Ein Modell holen",
+  arrive_judging: "{name} fährt seine Auswertung …",
+  arrive_not:
+    "Das ist kein Archiv eines Modells: ein Download dieser Seite oder der Konsole, oder ein Laufordner als .tar.gz.",
+  arrive_large: "Dieses Archiv ist zu groß für eine Seite, die bis zu {size} MB nimmt.",
+  arrive_damaged: "Dieses Archiv ist beschädigt: Ihm fehlt, was ein Modell braucht.",
+  arrive_track:
+    "Die Strecke dieses Modells, {track}, gibt es auf dieser Seite nicht: Das installierte Programm fährt sie.",
+  arrive_sensors: "Dieses Modell hat andere Sensoren als die Autos dieser Seite: Das installierte Programm fährt es.",
+  arrive_other:
+    "Dieses Modell wurde mit anderem trainiert, als diese Seite hat ({what}): Das installierte Programm fährt es.",
   installed: "Alles andere, etwa Rennen zwischen Modellen, gibt es im installierten Programm.",
   docs: "Dokumentation (englisch)",
   race: "Rennen",
@@ -79,7 +91,6 @@ export const de: Record<TabKey, string> = {
   replays_lead:
     "Zieh eine .replay-Datei hierher: einer Bewertung, eines Rennens oder von jemand anderem. Dieser Tab fährt sie aus ihren gespeicherten Aktionen noch einmal und vergleicht jede Zahl, Bit für Bit. Die Datei geht nirgendwohin.",
   replay_choose: "Replay auswählen",
-  replay_drop: "Loslassen, um dieses Replay zu prüfen",
   replay_driving: "{name} wird noch einmal gefahren …",
   replay_genuine: "Echt",
   replay_false: "Nicht echt",

@@ -69,7 +69,8 @@ export async function archive(model: Model, plan: Plan): Promise<Blob> {
   return gzip(tar(Object.fromEntries(named), time_stamp));
 }
 
-async function sha256(data: Uint8Array): Promise<string> {
+/** In hexadecimal. */
+export async function sha256(data: Uint8Array): Promise<string> {
   if (!globalThis.crypto?.subtle)
     throw new Error("Browsers make archives only on pages of https and of this computer.");
   const digest = await crypto.subtle.digest("SHA-256", data as Uint8Array<ArrayBuffer>);

@@ -30,3 +30,46 @@ export function tensorFile(arrays: Record<string, Tensor>, metadata: Record<stri
   }
   return all;
 }
+
+const MOST_HEADER = 1 << 20; // bytes
+const MOST_SIDES = 8; // of a shape
+
+/** A stranger's file, of which nothing is believed: its texts, and arrays by name as they are asked for. */
+export class TensorReader {
+  readonly texts: Record<string, unknown>;
+  private readonly arrays: Record<string, unknown>;
+  private readonly body: Uint8Array<ArrayBuffer>;
+
+  /** An Error where it is no such file. */
+  constructor(file: Uint8Array<ArrayBuffer>) {
+    const length =
+      file.length < 8 ? Infinity : Number(new DataView(file.buffer, file.byteOffset).getBigUint64(0, true));
+    if (length > Math.min(MOST_HEADER, file.length - 8)) throw new Error("The file has no header.");
+    const head = new TextDecoder("utf-8", { fatal: true }).decode(file.subarray(8, 8 + length));
+    this.arrays = record(JSON.parse(head));
+    this.texts = record(own(this.arrays, "__metadata__") ?? {});
+    this.body = file.subarray(8 + length);
+  }
+
+  /** A float32 array of a shape; an Error where there is none, or a number of it is not finite. */
+  floats(name: string, shape: number[]): Float32Array {
+    const { dtype, shape: sides, data_offsets: ends } = record(own(this.arrays, name)) as Record<string, unknown>;
+    const size = shape.reduce((all, side) => all * side, 4);
+    const isAsked =
+      dtype === "F32" && Array.isArray(sides) && sides.length <= MOST_SIDES && sides.join() === shape.join();
+    const [begin, end] = Array.isArray(ends) && ends.every(Number.isSafeInteger) ? (ends as number[]) : [-1, -1];
+    if (!isAsked || begin! < 0 || end! - begin! !== size || end! > this.body.length)
+      throw new Error(`${name} is not what it should be.`);
+    const found = new Float32Array(this.body.slice(begin, end).buffer);
+    if (!found.every(Number.isFinite)) throw new Error(`${name} holds what is no number.`);
+    return found;
+  }
+}
+
+const own = (of: Record<string, unknown>, name: string) => (Object.hasOwn(of, name) ? of[name] : undefined);
+
+function record(value: unknown): Record<string, unknown> {
+  if (typeof value !== "object" || value === null || Array.isArray(value))
+    throw new Error("This is no table of names.");
+  return value as Record<string, unknown>;
+}

@@ -67,6 +67,18 @@ export interface Verify {
   file: File; // of anybody
 }
 
+/** A model that came from elsewhere drives its evaluation. */
+export interface Judge {
+  kind: "judge";
+  plan: Plan;
+  race: RacePlan;
+  policy: Policy;
+  objects: Objects;
+  track: TrackFile;
+  seed: number;
+  begin: Beginning;
+}
+
 /** Somebody takes the wheel, of the only car of this thread. */
 export interface SitDown {
   kind: "sit";
@@ -81,7 +93,7 @@ export interface DriveOn {
   controls: { steering: number; speed: number; steps: number }; // rad, m/s, of 1/15 s
 }
 
-type Asked = Load | Show | Hide | Check | Start | Verify | SitDown | DriveOn;
+type Asked = Load | Show | Hide | Check | Start | Verify | Judge | SitDown | DriveOn;
 
 export type Report =
   | { kind: "ready" } // all that was asked for is loaded
@@ -100,6 +112,7 @@ export type Report =
       judgement: Judgement;
     }
   | { kind: "ended"; isReached: boolean }
+  | { kind: "judged"; evaluation: Evaluation }
   | { kind: "seated"; drive: Drive }
   | { kind: "steered"; state: DriveState; trace: Trace }
   | { kind: "verified"; verdict: Verdict }
@@ -137,6 +150,11 @@ async function handle(asked: Asked): Promise<void> {
   } else if (asked.kind === "show") await show(asked, loaded);
   else if (asked.kind === "hide") leave();
   else if (asked.kind === "verify") await prove(asked, loaded);
+  else if (asked.kind === "judge")
+    tell({
+      kind: "judged",
+      evaluation: new Trainer(loaded.core.core, asked, () => () => new Float64Array()).evaluate(),
+    });
   else if (asked.kind === "sit") sit(asked, loaded);
   else if (asked.kind === "steer") {
     const { steering, speed, steps } = asked.controls;

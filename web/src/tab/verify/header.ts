@@ -162,6 +162,28 @@ const group = {
   min_distance: number(0, 1000),
 };
 
+const shapes = fields<Objects>({
+  obstacles: maybe(fields<Obstacles>({ ...group, kind: one<string>("box", "car") })),
+  bots: maybe(
+    fields<Bots>({
+      ...group,
+      speed: number(0, 10),
+      changes_lane: flag,
+      shortest_stay: number(0.1, 3600),
+      longest_stay: number(0.1, 3600),
+      change_distance: number(0.1, 100),
+    }),
+  ),
+});
+
+/** What is around a car: of places that are fixed, one for each. */
+export const around: Check<Objects> = (value, at) => {
+  const found = shapes(value, at);
+  for (const [kind, group] of Object.entries(found) as [string, Group | null][])
+    if (group?.placement === "fixed" && group.positions.length < group.count) wrong(`${at}.${kind}.positions`);
+  return found;
+};
+
 const header = fields<Header>({
   title: name,
   racecraft: name,
@@ -205,19 +227,7 @@ const header = fields<Header>({
       palette: one<string>("2018", "2020", "2026"),
     }),
   ),
-  objects: fields<Objects>({
-    obstacles: maybe(fields<Obstacles>({ ...group, kind: one<string>("box", "car") })),
-    bots: maybe(
-      fields<Bots>({
-        ...group,
-        speed: number(0, 10),
-        changes_lane: flag,
-        shortest_stay: number(0.1, 3600),
-        longest_stay: number(0.1, 3600),
-        change_distance: number(0.1, 100),
-      }),
-    ),
-  }),
+  objects: around,
   randomize: named(pair(number(-10, 10))),
   cars_per_race: whole(1, 8),
   race: maybe((value, at) => {
@@ -264,8 +274,5 @@ export function headerOf(text: string): Header {
   } catch {
     return wrong("JSON");
   }
-  const found = header({ race: null, ...document }, "header");
-  for (const [kind, group] of Object.entries(found.objects) as [string, Group | null][])
-    if (group?.placement === "fixed" && group.positions.length < group.count) wrong(`header.objects.${kind}.positions`);
-  return found;
+  return header({ race: null, ...document }, "header");
 }
