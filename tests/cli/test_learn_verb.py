@@ -86,6 +86,7 @@ def test_without_an_environment_it_lists_what_is_tuned(racecraft: Run) -> None:
         (("CartPole-v1", "--algorithm", "dqn", "--make", "wheels=4"), "cannot be made with wheels=4"),
         (("CartPole-v1", "--algorithm", "dqn", "--make", "=4"), "write it like NAME=VALUE"),
         (("CartPole-v1", "--algorithm", "dqn", "--until", "5 laps"), "laps are for 'racecraft train'"),
+        (("CartPole-v1", "--algorithm", "dqn", "--until", "no better lap"), "laps are for 'racecraft train'"),
         (("CartPole-v1", "--algorithm", "dqn", "--seed", "-1"), "seed is -1"),
         (("--resume", "runs/none"), "learned.json is missing"),
     ],

@@ -161,3 +161,38 @@ def test_what_a_resumed_run_is_told_goes_on_where_the_first_was(judge: Judge, ju
     assert (again.last, again.best_score, again.best_lap) == (judged.last, (1.0, -13.0), 13.0)
     assert again.evaluated_at == 128
     assert again.was_good
+
+
+def test_it_has_settled_when_no_lap_was_better_for_a_good_while(judged: Evaluator, judge: Judge) -> None:
+    judge(0.9, 9.0, step=100_000)  # not every lap is whole
+    judge(0.9, 9.0, step=900_000)
+    assert not judged.has_settled
+    judge(9.0, 9.5, step=1_000_000)
+    judge(9.0, 9.5, step=1_400_000)  # as good as the best is no gain
+    judge(8.9, 9.9, step=1_499_999)
+    assert not judged.has_settled
+    judge(9.0, 9.9, step=1_500_000)  # the gain was a moment ago
+    judge(0.5, 8.0, step=2_249_997)
+    assert not judged.has_settled
+    judge(0.5, 8.0, step=2_249_999)  # half as long again as to the best
+    assert judged.has_settled
+
+
+def test_what_is_soon_the_best_is_waited_for_longer(judged: Evaluator, judge: Judge) -> None:
+    judge(9.0, 9.0, step=4096)
+    judge(9.0, 9.0, step=154_095)
+    assert not judged.has_settled
+    judge(9.0, 9.0, step=154_096)
+    assert judged.has_settled
+    resumed = evaluator_for(SETTINGS)
+    resumed.load_state(judged.state())
+    assert resumed.has_settled
+
+
+def test_of_an_earlier_version_it_is_not_known_when_it_was_best(judged: Evaluator, judge: Judge) -> None:
+    judge(9.0, 9.0, step=1000)
+    state = judged.state()
+    del state["gained_at"]
+    resumed = evaluator_for(SETTINGS)
+    resumed.load_state(state)
+    assert not resumed.has_settled

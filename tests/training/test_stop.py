@@ -34,6 +34,8 @@ from racecraft.training import Until
         ("8.8 s lap", Until(lap_time=8.8)),
         ("9 seconds  lap or 90 s", Until(lap_time=9, seconds=90)),
         ("5 laps or 8.25s lap", Until(laps=5, lap_time=8.25)),
+        ("no better lap", Until(no_better_lap=True)),
+        (" No  better lap or 10 minutes", Until(no_better_lap=True, seconds=600)),
     ],
 )
 def test_a_text_is_read(text: str, limits: Until) -> None:
@@ -54,6 +56,10 @@ def test_a_text_is_read(text: str, limits: Until) -> None:
         "8.8 lap",
         "9 steps lap",
         "9 s lap or 8 s lap",
+        "no better lap or no better lap",
+        "no better laps",
+        "5 no better lap",
+        "better lap",
         "3601 s lap",
         "5 rounds",
         "-5 laps",
@@ -104,6 +110,7 @@ def test_anything_else_is_refused_with_what_is_allowed(text: str) -> None:
         {"seconds": float("nan")},
         {"seconds": float("inf")},
         {"seconds": -1.0},
+        {"no_better_lap": 1},
     ],
 )
 def test_limits_out_of_range_are_refused(limits: dict[str, float]) -> None:
@@ -115,8 +122,9 @@ def test_limits_out_of_range_are_refused(limits: dict[str, float]) -> None:
     laps=st.integers(0, 100),
     seconds=st.floats(0, 30 * 86400) | st.integers(0, 43_200).map(lambda minutes: 60.0 * minutes),
     steps=st.integers(0, 10**12),
+    no_better_lap=st.booleans(),
 )
-def test_its_own_text_means_the_same_to_the_bit(laps: int, seconds: float, steps: int) -> None:
-    if laps or seconds or steps:
-        limits = Until(laps=laps, seconds=seconds, steps=steps)
+def test_its_own_text_means_the_same_to_the_bit(laps: int, seconds: float, steps: int, no_better_lap: bool) -> None:
+    if laps or seconds or steps or no_better_lap:
+        limits = Until(laps=laps, seconds=seconds, steps=steps, no_better_lap=no_better_lap)
         assert Until.parse(str(limits)) == limits

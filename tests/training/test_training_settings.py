@@ -316,6 +316,16 @@ def test_a_child_of_a_taught_model_among_objects_has_a_teacher_and_no_lessons(tm
     assert make_plan(parent=alone, objects=boxes).settings.algorithm == "ppo"
 
 
+def test_who_is_taught_to_be_fast_trains_until_no_lap_is_better() -> None:
+    fast = make_plan(algorithm="distill", actions="continuous").settings
+    assert fast.until == Until(no_better_lap=True, seconds=600)
+    assert make_plan(algorithm="distill").settings.until == Until(laps=5)
+    boxes = Objects(obstacles=Obstacles(count=2))
+    assert make_plan(algorithm="distill", actions="continuous", objects=boxes).settings.until == Until.parse(
+        OBJECTS.until
+    )
+
+
 def test_against_other_models_training_takes_its_time() -> None:
     rivals = Opponents()
     settings = make_settings(metadata=CONTINUOUS, opponents=rivals)

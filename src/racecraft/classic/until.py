@@ -44,7 +44,7 @@ class Goal:
             limits = Until.parse(" or ".join(rest)) if rest else None
         except ConfigError as error:
             raise ConfigError(f"until is {text!r}, which is not understood.", hint=hint) from error
-        if limits is not None and (limits.laps or limits.lap_time):
+        if limits is not None and (limits.laps or limits.lap_time or limits.no_better_lap):
             raise ConfigError(f"until is {text!r}; laps are for 'racecraft train'.", hint=hint)
         return cls(
             mean_return=float(returns[0][1] or returns[0][2]) if returns else math.inf,

@@ -33,6 +33,7 @@ SHOWN_WIDTH = 200  # characters of such a line
 ENDED = {
     "laps": "Learned it",
     "lap_time": "The lap time is reached",
+    "no_better_lap": "No better lap has come for a while",
     "seconds": "Time is up",
     "steps": "All steps are done",
     "episodes": "All episodes are done",
@@ -75,7 +76,7 @@ def say_trained(result: TrainResult) -> None:
     _say(console, "Run folder: ", (str(result.run), "bold"))
     if (prints := RunFolder(result.run).reward_log).exists():
         _say(console, "Prints:     ", (str(prints), "bold"))
-    if result.reason != "laps":
+    if result.reason not in ("laps", "no_better_lap"):
         _say(console, "Continue:   ", (f"racecraft train --resume {result.run}", "bold"))
     if result.reason != "interrupted":
         _say(console, "Race it:    ", (f"racecraft evaluate {result.run}", "bold"))

@@ -49,7 +49,9 @@ def train(
     until: Annotated[
         str,
         typer.Option(
-            "--until", "-u", help="When to stop: '5 laps', '8.8 s lap', '10 minutes', '90000 steps', 'A or B'."
+            "--until",
+            "-u",
+            help="When to stop: '5 laps', '8.8 s lap', 'no better lap', '10 minutes', '90000 steps', 'A or B'.",
         ),
     ] = "",
     actions: Annotated[

@@ -68,9 +68,9 @@ def train(
             default ``reinvent_2018``.
         reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``, among objects ``dodge``,
             against opponents ``duel``.
-        until: When to stop: ``"5 laps"`` (the default), ``"8.8 s lap"``, ``"10 minutes"``, ``"200000 steps"``, or
-            several joined by ``or``; among objects by default ``"20 laps or 10 minutes"``, against opponents
-            ``"10 minutes"``.
+        until: When to stop: ``"5 laps"`` (the default), ``"8.8 s lap"``, ``"no better lap"``, ``"10 minutes"``,
+            ``"200000 steps"``, or several joined by ``or``; by default among objects ``"20 laps or 10 minutes"``,
+            against opponents ``"10 minutes"``, and for who is taught to be fast ``"no better lap or 10 minutes"``.
         actions: Action space or name of a preset, where no `model_metadata` is given; by default ``default``, among
             objects ``steady``, against opponents ``continuous``.
         sensors: AWS's names, one camera and at most one LIDAR, where no `model_metadata` is given; by default the front

@@ -28,6 +28,8 @@ from racecraft.training.settings import TrainSettings
 
 SLOWEST: Final = 0.3  # m/s; an evaluation does not wait for a car that needs longer for its lap
 SEED: Final = 0x6576616C  # evaluation starts never coincide with training's
+LEAST_WAIT: Final = 150_000  # camera steps without a better lap after which none is waited for
+SHARE_WAIT: Final = 0.5  # the same, of the steps it took to the best
 NO_LAP: Final = 1e6  # s, in a score, where no lap was completed
 _POSE: Final = [ROW_COLUMNS.index(name) for name in ("x", "y", "heading")]
 
@@ -59,6 +61,8 @@ class Evaluator:
         """What the first car drove in the last evaluation or look, where `racecraft.run.evolution` keeps it."""
         self._looked_at = 0
         self.best_score: tuple[float, ...] | None = None
+        self.gained_at = 0
+        """Camera steps of training behind the first evaluation that was as good as the best."""
         self.best_lap: float | None = None
 
     @property
@@ -83,6 +87,13 @@ class Evaluator:
         """Whether some evaluation so far completed every lap; among objects, enough of the way."""
         return self.best_score is not None and self.best_score[0] >= self._good
 
+    @property
+    def has_settled(self) -> bool:
+        """Whether every lap of some evaluation was complete, and for a good while none has been better."""
+        is_whole = self.best_score is not None and self.best_score[0] >= 1.0
+        waited = self.evaluated_at - self.gained_at
+        return is_whole and waited >= max(LEAST_WAIT, SHARE_WAIT * self.gained_at)
+
     def evaluate(self, *, step: int, seconds: float, counter: EpisodeCounter) -> list[Episode]:
         """Drive the trials; the outcome is in `last`.
 
@@ -105,6 +116,8 @@ class Evaluator:
         )
         score = self.score
         assert score is not None
+        if self.best_score is None or score > self.best_score:
+            self.gained_at = step
         if self.best_score is None or score >= self.best_score:
             self.best_score = score
             self.last = replace(self.last, is_best=True)
@@ -169,7 +182,7 @@ class Evaluator:
     def state(self) -> dict[str, Any]:
         """What a resumed run needs, as JSON."""
         last = None if self.last is None else asdict(self.last)
-        return {"last": last, "best_score": self.best_score, "best_lap": self.best_lap}
+        return {"last": last, "best_score": self.best_score, "best_lap": self.best_lap, "gained_at": self.gained_at}
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Continue from what `state` gave; KeyError or TypeError where it is not that."""
@@ -179,6 +192,7 @@ class Evaluator:
             self.last = EvaluationReport(**{**last, **tuples})
         self.best_score = None if score is None else tuple(map(float, score))
         self.best_lap = None if lap is None else float(lap)
+        self.gained_at = int(state.get("gained_at", 0))  # runs of earlier versions have none
 
 
 def _lap_of(step: int, rows: NDArray[np.float64], outcome: Completion) -> Drive:

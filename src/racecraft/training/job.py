@@ -100,7 +100,7 @@ class Training:
         meter.begin(steps=algorithm.total_steps)
         self.reporter.begin(session.environment.shown, session.evaluator.policy)
         reason = self._limit_reached(session)
-        if reason in ("laps", "lap_time", "seconds", "steps"):
+        if reason in ("laps", "lap_time", "no_better_lap", "seconds", "steps"):
             self.reporter.note(f"The limit of {self.settings.until} was reached before; --until sets another.")
         while not reason:
             stats = algorithm.iterate()
@@ -146,6 +146,8 @@ class Training:
             return "laps"
         if until.lap_time and last is not None and last.best_lap is not None and last.best_lap <= until.lap_time:
             return "lap_time"
+        if until.no_better_lap and last is not None and session.evaluator.has_settled:
+            return "no_better_lap"
         if until.steps and steps >= until.steps:
             return "steps"
         if until.seconds and self.meter.seconds >= until.seconds:

@@ -83,7 +83,6 @@ def make_plan(
     objects = settings.get("objects", NO_OBJECTS if before is None else before.objects)
     opponents = settings.get("opponents", None if before is None else before.opponents)
     regime, method = regime_of(objects=objects, opponents=opponents), METHODS.get(algorithm, METHODS["ppo"])
-    limit = Until.parse(until or regime.until) if isinstance(until, str) else until
     if reward or theirs is None:
         source, is_foreign = load_reward(reward or regime.reward), False
     else:
@@ -107,6 +106,9 @@ def make_plan(
         metadata = replace(metadata, sensors=tuple(sensors))
     if algorithm:
         metadata = _with_algorithm(metadata, algorithm)
+    is_fast = algorithm == "distill" and metadata.action_space.kind == "continuous"
+    usual = regime_of(objects=objects, opponents=opponents, is_fast_distill=is_fast).until
+    limit = Until.parse(until or usual) if isinstance(until, str) else until
     parameters = None if hyperparameters is None else Hyperparameters.load(hyperparameters)
     if theirs is not None:
         if parameters is None and "ppo" not in settings:

@@ -108,6 +108,7 @@ DUEL: Final = Regime(
 FAST_DISTILL: Final = Regime(
     # Every fourth episode starts as a race does, since a car that comes from standing meets the first corner otherwise
     # than one that flies past the line, as the other three do.
+    until="no better lap or 10 minutes",  # five laps are the least of it
     start=Start(advance=0.25, lateral_jitter=0.02, heading_jitter=math.radians(2.0)),
     distill=DistillConfig(teacher_steps=2_000_000),  # a teacher of continuous actions gets faster for so long
 )

@@ -1,4 +1,4 @@
-"""When training ends: laps driven in evaluation, a lap time, minutes of wall clock, or camera steps."""
+"""When training ends: laps driven in evaluation, a lap time, no better one, minutes of wall clock, or camera steps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ _UNITS: Final = {
     **dict.fromkeys(("s lap", "sec lap", "second lap", "seconds lap"), ("lap_time", 1)),
 }
 _LIMIT: Final = re.compile(r"\s*(\d{1,3}(?:[,_]\d{3})+|\d+)(\.\d+)?\s*([a-z]+(?:\s+lap)?)\s*", re.ASCII | re.IGNORECASE)
-_EXAMPLES: Final = "'5 laps', '8.8 s lap', '10 minutes', '90 s' or '200,000 steps'"
+_NO_BETTER: Final = re.compile(r"\s*no\s+better\s+lap\s*", re.ASCII | re.IGNORECASE)
+_EXAMPLES: Final = "'5 laps', '8.8 s lap', 'no better lap', '10 minutes', '90 s' or '200,000 steps'"
 _MAX_TEXT: Final = 400  # characters
 
 
@@ -34,16 +35,23 @@ class Until:
     """Wall clock since the run was started; when it is resumed, the time before counts."""
     steps: int = 0
     """Camera steps of the run, all cars together."""
+    no_better_lap: bool = False
+    """Every lap of some evaluation was complete, and for a good while none has been better."""
 
     @classmethod
     def parse(cls, text: str) -> Until:
-        """Read ``"5 laps"``, ``"8.8 s lap"``, ``"10 minutes"``, ``"200,000 steps"`` or several joined by ``or``.
+        """Read ``"5 laps"``, ``"8.8 s lap"``, ``"no better lap"``, ``"10 minutes"``, ``"9 steps"``, some with ``or``.
 
         Raises:
             ConfigError: The text has another form, names a limit twice, or a number is out of range.
         """
         limits: dict[str, Decimal] = {}
         for part in re.split(r"\bor\b", text) if isinstance(text, str) and len(text) <= _MAX_TEXT else [""]:
+            if _NO_BETTER.fullmatch(part):
+                if "no_better_lap" in limits:
+                    raise ConfigError(f"until is {text!r}; it asks twice for no better lap.")
+                limits["no_better_lap"] = Decimal(1)
+                continue
             match = _LIMIT.fullmatch(part)
             unit = _UNITS.get(" ".join(match[3].lower().split())) if match else None
             if match is None or unit is None:
@@ -61,6 +69,7 @@ class Until:
             lap_time=float(limits.get("lap_time", 0)),
             seconds=float(limits.get("seconds", 0)),
             steps=int(limits.get("steps", 0)),
+            no_better_lap="no_better_lap" in limits,
         )
 
     def __post_init__(self) -> None:
@@ -75,7 +84,9 @@ class Until:
             raise ConfigError(f"until asks for {self.seconds} s; allowed is up to 30 days.")
         if not 0 <= self.steps <= 10**12:
             raise ConfigError(f"until asks for {self.steps} steps; allowed is up to 10^12.")
-        if not (self.laps or self.lap_time or self.seconds or self.steps):
+        if not isinstance(self.no_better_lap, bool):
+            raise ConfigError(f"until asks for no_better_lap {self.no_better_lap!r}; allowed is true or false.")
+        if not (self.laps or self.lap_time or self.no_better_lap or self.seconds or self.steps):
             raise ConfigError(f"until sets no limit; write it like {_EXAMPLES}.")
 
     def __str__(self) -> str:
@@ -85,6 +96,8 @@ class Until:
             parts.append(f"{self.laps} laps")
         if self.lap_time:
             parts.append(f"{Decimal(repr(float(self.lap_time))):f} s lap")
+        if self.no_better_lap:
+            parts.append("no better lap")
         if self.seconds:
             seconds = Decimal(repr(float(self.seconds)))  # exact, and never in powers of ten as floats are
             parts.append(f"{int(seconds // 60)} minutes" if seconds % 60 == 0 else f"{seconds:f} s")

@@ -155,7 +155,7 @@ export const create: Record<keyof typeof english, string> = {
   pays: "Zahlt",
   more: "Weitere Einstellungen",
   until: "Trainieren bis",
-  until_hint: "'5 laps', '10 minutes', '200000 steps', oder mehrere mit 'or' verbunden.",
+  until_hint: "'5 laps', 'no better lap', '10 minutes', '200000 steps', oder mehrere mit 'or' verbunden.",
   seed: "Startzahl",
   seed_hint: "Dieselbe Zahl wiederholt ein Training.",
   car: "Auto",

@@ -152,7 +152,7 @@ export const create = {
   pays: "Pays",
   more: "More settings",
   until: "Train until",
-  until_hint: "'5 laps', '10 minutes', '200000 steps', or several joined by 'or'.",
+  until_hint: "'5 laps', 'no better lap', '10 minutes', '200000 steps', or several joined by 'or'.",
   seed: "Seed",
   seed_hint: "The same seed repeats a training.",
   car: "Car",
