@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -155,6 +156,12 @@ def test_who_may_say_what_and_what_is_refused_by_it(tmp_path: Path) -> None:
                 "used": {"minutes": 0.0, "models": 3, "places": 1},
             }
         ]
+        ok(teacher.put(f"/api/groups/{group}/members/{number}/quota", json={"models": 4, "minutes": 0}), 204)
+        with ThreadPoolExecutor(6) as pool:  # one of them fits, whichever comes first
+            asked = [pool.submit(ada.post, "/api/models", json={"train": False}) for _ in range(6)]
+            answers = sorted(one.result().status_code for one in asked)
+        assert answers == [201] + 5 * [409]
+        assert ok(ada.get("/api/quota"))["used"]["models"] == 4
         league.console.wait_for(lambda: ok(ada.get("/api/jobs"))[0]["state"] == "cancelled")
         assert "0 minutes of training" in refused(ada.post("/api/models/first/train", json={}), 409)
         for client, path in ((ada, f"/api/groups/{group}/quota"), (teacher, "/api/quotas")):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Final
@@ -170,15 +171,24 @@ OnlyAdmin = Depends(_admin)
 """A route with this dependency exists for admins only; alone at the console everybody is one."""
 
 
-def _makes_model(consoles: InConsoles, user: InUser) -> None:
+async def _takes_turn(consoles: InConsoles, user: InUser) -> AsyncIterator[None]:
+    async with consoles.quotas.turn(user):
+        yield
+
+
+TakesTurn = Depends(_takes_turn)
+"""A route with this dependency waits until one's earlier requests of the kind are done, so that a quota holds."""
+
+
+def _makes_model(consoles: InConsoles, user: InUser, turn: Annotated[None, TakesTurn]) -> None:
     consoles.quotas.require(user, "models")
 
 
-def _takes_place(consoles: InConsoles, user: InUser) -> None:
+def _takes_place(consoles: InConsoles, user: InUser, turn: Annotated[None, TakesTurn]) -> None:
     consoles.quotas.require(user, "places")
 
 
-def _trains(consoles: InConsoles, user: InUser) -> None:
+def _trains(consoles: InConsoles, user: InUser, turn: Annotated[None, TakesTurn]) -> None:
     consoles.quotas.require(user, "places", "minutes")
 
 

@@ -15,7 +15,7 @@ from fastapi.responses import StreamingResponse
 from racecraft.errors import RunError, SourceError, TrackNotFound
 from racecraft.run import archive_chunks
 from racecraft.run.folder import sanitize_name
-from racecraft.serve.context import Context, InContext, MakesModel
+from racecraft.serve.context import Context, InConsoles, InContext, InUser
 from racecraft.serve.models.schemas import ImportedModel
 from racecraft.serve.schemas import RunName
 
@@ -28,7 +28,6 @@ UPLOADS: Final = "uploads"  # inside the state folder
 @router.post(
     "/import",
     status_code=201,
-    dependencies=[MakesModel],
     openapi_extra={
         "requestBody": {
             "required": True,
@@ -37,13 +36,20 @@ UPLOADS: Final = "uploads"  # inside the state folder
     },
 )
 async def import_model(
-    filename: str, request: Request, context: InContext, name: RunName | None = None, track: str = ""
+    filename: str,
+    request: Request,
+    context: InContext,
+    consoles: InConsoles,
+    user: InUser,
+    name: RunName | None = None,
+    track: str = "",
 ) -> ImportedModel:
     """A model from an archive of DeepRacer, deepracer-for-cloud or Racecraft, or from a reward function's file.
 
     The request's body is the file. Nothing in it is run; the reward function is only read, and tried in its sandbox.
     """
     plain = _plain(filename)
+    await run_in_threadpool(consoles.quotas.require, user, "models")
     if name is not None:
         context.garage.require_new(name)
     uploads = context.settings.state / UPLOADS
@@ -53,7 +59,9 @@ async def import_model(
         with (place / plain).open("xb") as file:
             async for chunk in request.stream():
                 await run_in_threadpool(file.write, chunk)
-        return await run_in_threadpool(_import, context, place / plain, name, track)
+        async with consoles.quotas.turn(user):  # not before: a body may take minutes to come
+            await run_in_threadpool(consoles.quotas.require, user, "models")
+            return await run_in_threadpool(_import, context, place / plain, name, track)
     except OSError as error:
         raise RunError(f"The file cannot be kept: {error.strerror or error}.", hint="Free disk space.") from error
     finally:

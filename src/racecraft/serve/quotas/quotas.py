@@ -10,11 +10,13 @@ what is trained is saved, and goes on when there are minutes again.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, fields, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final, Literal
+from weakref import WeakValueDictionary
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -72,6 +74,17 @@ class Quotas:
 
     def __init__(self, database: Database, runs: Path) -> None:
         self._database, self._runs = database, runs
+        self._turns: WeakValueDictionary[int, asyncio.Lock] = WeakValueDictionary()
+
+    def turn(self, user_id: int) -> asyncio.Lock:
+        """To be held from `require` until what it let through is there, so that two requests at once do not both fit.
+
+        Of the server's event loop: who waits for it takes no thread from who has it.
+        """
+        turn = self._turns.get(user_id)
+        if turn is None:
+            turn = self._turns[user_id] = asyncio.Lock()
+        return turn
 
     def said(self, scope: Scope, number: int = WHOLE) -> Limits:
         """What was said of a scope itself."""

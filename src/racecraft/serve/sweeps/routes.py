@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from racecraft.serve.context import InConsoles, InContext, InUser
+from racecraft.serve.context import InConsoles, InContext, InUser, TakesTurn
 from racecraft.serve.sweeps.schemas import NewSweep, SweepCard, SweepDetail
 
 router = APIRouter(prefix="/api/sweeps", tags=["sweeps"])
@@ -20,7 +20,7 @@ def list_sweeps(context: InContext) -> list[SweepCard]:
     return context.sweeps.cards()
 
 
-@router.post("", status_code=202)
+@router.post("", status_code=202, dependencies=[TakesTurn])
 def start_sweep(request: NewSweep, context: InContext, consoles: InConsoles, user: InUser) -> SweepDetail:
     """Train a table of settings with several seeds each."""
 
@@ -44,7 +44,7 @@ def stop_sweep(name: Name, context: InContext) -> SweepDetail:
     return context.sweeps.stop(name)
 
 
-@router.post("/{name}/go-on", status_code=202)
+@router.post("/{name}/go-on", status_code=202, dependencies=[TakesTurn])
 def resume_sweep(name: Name, context: InContext, consoles: InConsoles, user: InUser) -> SweepDetail:
     """Train what is not done yet."""
     found = context.sweeps.go_on(
