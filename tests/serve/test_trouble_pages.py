@@ -300,3 +300,33 @@ def test_a_server_that_is_gone_is_said_over_cars_that_look_frozen(visit: Visit, 
             again.client.post("/api/models/stork/stop")
             again.wait_for(again.job_ended(job["id"]))
         context.close()
+
+
+def test_of_a_model_that_is_not_there_nothing_but_the_model_is_asked(visit: Visit) -> None:
+    asked: list[str] = []
+    page = visit.page
+    note = lambda request: asked.append(request.url.partition("/api/")[2])  # noqa: E731
+    page.on("request", note)
+    visit.open("/models/gone/watch")
+    page.get_by_text("There is no model gone; it may have been renamed or deleted.").wait_for()
+    page.remove_listener("request", note)
+    assert [path for path in asked if "gone" in path] == ["models/gone"]
+
+
+def test_what_one_tab_does_the_other_sees(visit: Visit) -> None:
+    console, first = visit.console, visit.page
+    console.create(name="two", track="oval", train=False)
+    visit.open("/models/two/watch")
+    second = first.context.new_page()
+    second.set_default_timeout(1000 * PATIENCE)
+    second.goto(first.url)
+    second.get_by_role("button", name="Train now").click()
+    for page in (first, second):
+        page.get_by_role("button", name="Stop").wait_for()
+    first.get_by_role("button", name="Stop").click()
+    for page in (first, second):
+        page.get_by_role("button", name="Go on training").wait_for()
+    console.client.delete("/api/models/two")
+    second.get_by_role("button", name="Go on training").click()
+    second.get_by_text("There is no model").first.wait_for()
+    second.close()
