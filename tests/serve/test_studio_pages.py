@@ -66,6 +66,10 @@ def test_an_action_is_pulled_and_pushed_and_the_model_is_made_of_it(studio: tupl
     page.get_by_role("group", name="Train until").get_by_role("button", name="Steps").click()
     page.get_by_role("spinbutton", name="Steps").fill("2000")
     page.locator("summary", has_text="Learning").click()
+    algorithm = page.get_by_label("Algorithm")
+    assert algorithm.input_value() == "distill"  # among bots a teacher goes first
+    assert page.locator("#hp-lr").count() == 0
+    algorithm.select_option("ppo")
     rate = page.locator("#hp-lr")
     rate.fill("0.005")
     rate.press("Tab")

@@ -315,7 +315,7 @@ def test_of_a_model_that_is_not_there_nothing_but_the_model_is_asked(visit: Visi
 
 def test_what_one_tab_does_the_other_sees(visit: Visit) -> None:
     console, first = visit.console, visit.page
-    console.create(name="two", track="oval", train=False)
+    console.create(name="two", track="oval", until="10 minutes", train=False)
     visit.open("/models/two/watch")
     second = first.context.new_page()
     second.set_default_timeout(1000 * PATIENCE)

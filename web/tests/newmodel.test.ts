@@ -112,7 +112,7 @@ describe("another race", () => {
       algorithm: "ppo",
     });
     const { source, sensors, until, critic, algorithm } = wishes;
-    const alone = suited({ from: "head-to-head", to: "time-trial" }, raced, all);
+    const alone = suited({ from: "head-to-head", to: "time-trial" }, { ...wishes, ...raced }, all);
     expect(alone).toEqual({ source, space, sensors, until, critic, algorithm });
   });
 
@@ -124,16 +124,19 @@ describe("another race", () => {
     });
     expect([among.source, among.space.name, among.until]).toEqual([dodge.source, "steady", "20 laps or 10 minutes"]);
     expect([among.algorithm, among.sensors]).toEqual(["distill", ["FRONT_FACING_CAMERA", "LIDAR"]]);
-    expect(suited({ from: "object-avoidance", to: "head-to-bot" }, among, all)).toEqual(among);
-    expect(suited({ from: "head-to-bot", to: "time-trial" }, { ...among, algorithm: "sac" }, all).algorithm).toBe(
-      "sac",
-    );
+    expect(suited({ from: "object-avoidance", to: "head-to-bot" }, { ...wishes, ...among }, all)).toEqual(among);
+    const sac = { ...wishes, ...among, algorithm: "sac" };
+    expect(suited({ from: "head-to-bot", to: "time-trial" }, sac, all).algorithm).toBe("sac");
   });
 
   it("leaves alone what somebody chose", () => {
     const chosen = { ...wishes, source: "mine", until: "3 laps", sensors: ["LEFT_CAMERA"] };
     const raced = suited({ from: "time-trial", to: "head-to-head" }, chosen, all);
     expect([raced.source, raced.until, raced.sensors]).toEqual(["mine", "3 laps", ["LEFT_CAMERA"]]);
+    const boxes = { from: "time-trial", to: "object-avoidance" };
+    expect(suited(boxes, { ...wishes, tuned: { lr: 1e-4 } }, all).algorithm).toBe("ppo");
+    expect(suited(boxes, { ...wishes, learning: "learning_aws" }, all).algorithm).toBe("ppo");
+    expect(suited(boxes, wishes, all).algorithm).toBe("distill");
   });
 
   it("says who drives the other cars, and no boxes", () => {

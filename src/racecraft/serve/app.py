@@ -18,7 +18,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.serve import replies, tab
 from racecraft.serve.audit import routes as audit
-from racecraft.serve.compression import BROTLI, Compressed, accepts, gzipped
+from racecraft.serve.compression import Compressed, accepts, gzipped
 from racecraft.serve.contests import routes as contests
 from racecraft.serve.contests.contests import Contests
 from racecraft.serve.context import Consoles, Context
@@ -164,11 +164,8 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         if "/" in name or path.suffix not in KINDS or not path.is_file():
             return replies.problem(404, "NotFound", f"There is no file {name[:80]!r}.")
         headers = {"Cache-Control": "public, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
-        small, wanted = path.with_name(name + BROTLI), request.headers.get("accept-encoding", "")
         kind = KINDS[path.suffix]
-        if small.is_file() and accepts(wanted, "br"):
-            return FileResponse(small, media_type=kind, headers={**headers, "Content-Encoding": "br"})
-        if small.is_file() and accepts(wanted, "gzip"):
+        if kind != "font/woff2" and accepts(request.headers.get("accept-encoding", ""), "gzip"):
             return Response(gzipped(path), media_type=kind, headers={**headers, "Content-Encoding": "gzip"})
         return FileResponse(path, media_type=kind, headers=headers)
 

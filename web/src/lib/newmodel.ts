@@ -59,7 +59,7 @@ const usualOf = (race: string): Usual =>
 /** The same wishes for another race: what nobody chose becomes what suits it. */
 export function suited(
   races: { from: string; to: string },
-  wishes: Suited,
+  wishes: Suited & Pick<Wishes, "learning" | "tuned">,
   { rewards, spaces }: Pick<Known, "rewards" | "spaces">,
 ): Suited {
   const [from, to] = [usualOf(races.from), usualOf(races.to)];
@@ -72,9 +72,13 @@ export function suited(
     sensors: wishes.sensors.join() === from.sensors.join() ? to.sensors : wishes.sensors,
     until: unless(wishes.until, from.until, to.until),
     critic: unless(wishes.critic, from.critic, to.critic),
-    algorithm: unless(wishes.algorithm, from.algorithm, to.algorithm),
+    algorithm: isTuned(wishes) ? wishes.algorithm : unless(wishes.algorithm, from.algorithm, to.algorithm),
   };
 }
+
+/** Whether numbers of PPO were chosen, which no other algorithm would hear of. */
+const isTuned = ({ algorithm, learning, tuned }: Pick<Wishes, "algorithm" | "learning" | "tuned">): boolean =>
+  algorithm === "ppo" && (learning === "learning_aws" || Object.keys(tuned).length > 0);
 
 /** The numbers that learning begins with unless they are changed. */
 export const defaultsOf = (learning: Learning, choices: Choices | undefined): Numbers | undefined =>
