@@ -36,7 +36,7 @@ together tells who listens which of their guesses is in there (BREACH, 2013)."""
 def gzipped(path: Path) -> bytes:
     """A file that stays as it is, compressed once.
 
-    Brotli would save another seventh, for browsers on this machine and over https alone, and make the wheel a tenth larger.
+    Brotli would save another seventh, over https and on this machine alone, and make the wheel a tenth larger.
     """
     return gzip.compress(path.read_bytes(), 9, mtime=0)
 
