@@ -19,11 +19,14 @@ import pytest
 
 from racecraft import evaluate
 from racecraft.importing import import_run
+from racecraft.limits import known_limit
 from racecraft.race import Autopilot, RaceRules
 from racecraft.race import evaluate as raced
+from racecraft.race.conditions import STANDARD_CAR
 from racecraft.replay import Replay, read_replay, write_replay
 from racecraft.run import RunFolder
 from racecraft.run.archive import archive_chunks
+from racecraft.sim.vehicle import PRESETS as VEHICLES
 from racecraft.track import load_track
 from racecraft.training.evaluator import SEED
 
@@ -115,6 +118,10 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
     laps = [lap for trial in driven.trials for lap in trial.lap_times]
     assert len(laps) == 5
     assert f"best {min(laps):.2f} s" in shown
+    limit = known_limit(load_track("oval"), VEHICLES[STANDARD_CAR])
+    assert limit is not None
+    missed = limit.medals.next_after(min(laps))
+    page.get_by_text(f"{missed.capitalize()} takes {getattr(limit.medals, missed):.2f} s.").wait_for()
     as_console = tmp_path / "back.tar.gz"
     as_console.write_bytes(b"".join(archive_chunks(RunFolder(imported.run))))
     chooser = page.get_by_label("Bring a model", exact=True).and_(page.locator("input"))
@@ -135,7 +142,7 @@ def test_a_model_stays_when_the_page_is_closed_and_goes_when_it_is_deleted(page:
 
 
 def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
-    page.get_by_label("Track").select_option("hairpin")
+    page.get_by_label("Track").select_option("generated:4")
     page.get_by_label("What it is paid for").select_option("stay_inside")
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)

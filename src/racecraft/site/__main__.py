@@ -14,10 +14,12 @@ from racecraft.reward import load_preset, preset_names
 from racecraft.site.calls import SHIPPED
 from racecraft.site.javascript import javascript
 from racecraft.site.lessons import write_lessons
-from racecraft.site.plan import plan, track_file
+from racecraft.site.plan import plan, told_medals, track_file
 from racecraft.site.starter import told_starter
 from racecraft.track import track_names
 
+GENERATED: Final = tuple(f"generated:{seed}" for seed in range(1, 13))
+"""Tracks of the generator that the page has beside the library's: it cannot draw others itself."""
 FALLBACKS: Final = ("core/exact.wasm", "core/scalar.wasm")  # that few browsers need: not kept by all
 
 
@@ -58,9 +60,12 @@ def write_data(folder: Path) -> None:
     ]
     starter, weights = told_starter()
     (folder / "starter.bin").write_bytes(weights.astype("<f2").tobytes())
-    write(folder / "plan.json", {**plan(), "starter": starter, "tracks": track_names(), "rewards": rewards})
-    for name in track_names():
-        write(folder / "tracks" / f"{name}.json", track_file(name))
+    tracks = [*track_names(), *GENERATED]
+    medals = {name: told_medals(name) for name in track_names()}
+    told = {"starter": starter, "tracks": tracks, "medals": medals, "rewards": rewards}
+    write(folder / "plan.json", {**plan(), **told})
+    for name in tracks:
+        write(folder / "tracks" / f"{name.replace(':', '-')}.json", track_file(name))
     (folder / "rewards.js").write_text(javascript(sources), encoding="utf-8")
 
 

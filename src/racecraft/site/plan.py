@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from racecraft.agent import ActionSpace, DiscreteActionSpace, ModelMetadata, action_space
 from racecraft.learn import NetworkSpec, PPOConfig, networks
+from racecraft.limits import known_limit
 from racecraft.race.conditions import STANDARD_CAR
 from racecraft.race.rules import RULE_SETS
 from racecraft.reward import situations
@@ -265,6 +266,12 @@ def track_file(name: str) -> dict[str, Any]:
             {"name": one.name, "description": one.description, "row": one.row.tolist()} for one in situations(track)
         ],
     }
+
+
+def told_medals(name: str) -> dict[str, float] | None:
+    """Lap times to reach on a track in the car of the page's trainings, s; none where no limit is known."""
+    limit = known_limit(load_track(name), _settings(action_space("default")).vehicle)
+    return None if limit is None else asdict(limit.medals)
 
 
 def _run(settings: TrainSettings) -> dict[str, Any]:

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { medalOf } from "./medals";
+import { medalOf, nextMedal } from "./medals";
 
 const TIMES = { author: 10, gold: 10.6, silver: 12, bronze: 15 };
 
@@ -19,4 +19,11 @@ test("a lap wins the best medal that it reaches, the very time included", () => 
 test("without a lap, and where no times are known, there is none", () => {
   expect(medalOf(TIMES, null)).toBe("");
   expect(medalOf(null, 9)).toBe("");
+});
+
+test("what is next is the medal just missed, the first one without a lap, and nothing behind the author's", () => {
+  expect([null, 16, 15, 12.5, 12, 10.6, 10.3, 10].map((seconds) => nextMedal(TIMES, seconds))).toEqual([
+    ...["bronze", "bronze", "silver", "silver", "gold", "author", "author", ""],
+  ]);
+  expect(nextMedal(undefined, 9)).toBe("");
 });

@@ -8,3 +8,9 @@ export function medalOf(times: MedalTimes | null | undefined, seconds: number | 
   if (!times || seconds == null) return "";
   return MEDALS.find((name) => seconds <= times[name] + 1e-9) ?? "";
 }
+
+/** The medal that a lap time just misses, or that comes first where there is none; nothing where all are won or none is known. */
+export function nextMedal(times: MedalTimes | null | undefined, seconds: number | null | undefined): MedalName | "" {
+  if (!times) return "";
+  return [...MEDALS].reverse().find((name) => seconds == null || seconds > times[name] + 1e-9) ?? "";
+}

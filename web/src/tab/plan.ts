@@ -1,5 +1,5 @@
 /** What the page is told of the training that it runs: the files that `python -m racecraft.site` writes beside it. */
-import type { ActionPreset, TrackGeometry } from "../api/client";
+import type { ActionPreset, MedalTimes, TrackGeometry } from "../api/client";
 import type { NetworkSettings, Settings, TrackArrays } from "./core";
 import type { Objects } from "./verify/header";
 import type { Known } from "./verify/provenance";
@@ -54,6 +54,7 @@ export interface Plan {
   starter: { table: number[] }; // lowest and highest command of the car that drives at first (2, 2)
   known: Known; // rules, cars and randomisations of the library
   tracks: string[];
+  medals: Record<string, MedalTimes | null>; // by track of the library; none where no limit is known
   rewards: RewardPreset[];
 }
 
@@ -89,6 +90,12 @@ export const arraysOf = ({ told }: TrackFile): TrackArrays => ({
   tables: new Float32Array(bytesOf(told.tables)),
   waypoints: new Int32Array(bytesOf(told.waypoints)),
 });
+
+export const readTrack = async (site: string, name: string): Promise<TrackFile> =>
+  (await (await read(site, `data/tracks/${name.replace(":", "-")}.json`)).json()) as TrackFile;
+
+/** As people read a track's name. */
+export const spaced = (name: string): string => name.replaceAll(/[_:]/g, " ");
 
 /** A file of the site, wherever the site lies. */
 export async function read(site: string, file: string): Promise<Response> {

@@ -7,7 +7,7 @@ import { loadCore, type LoadedCore } from "./core";
 import type { Beginning } from "./begin";
 import { DrivenCar, type Trace } from "./drivencar";
 import { objectsOf } from "./objects";
-import { read, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
+import { read, readTrack, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
 import { type Pay, Python, RewardFailure } from "./python";
 import { ShownCar, shownWeights } from "./shown";
 import {
@@ -192,7 +192,7 @@ function sit({ id, plan, track, settings }: SitDown, { core: { core } }: Loaded)
 /** Drive a replay again; what that needs is loaded now. */
 async function prove({ plan, file }: Verify, { core: { core }, site }: Loaded): Promise<void> {
   const { ReplayProblem, verifyFile } = await import("./verify/verify");
-  const track = async (name: string) => (await (await read(site, `data/tracks/${name}.json`)).json()) as TrackFile;
+  const track = (name: string) => readTrack(site, name);
   try {
     tell({ kind: "verified", verdict: await verifyFile(core, plan, file, track) });
   } catch (error) {
