@@ -330,3 +330,23 @@ def test_what_one_tab_does_the_other_sees(visit: Visit) -> None:
     second.get_by_role("button", name="Go on training").click()
     second.get_by_text("There is no model").first.wait_for()
     second.close()
+
+
+def test_what_is_wrong_is_said_in_the_language_of_the_page(visit: Visit) -> None:
+    visit.look("light", "de")
+    page = visit.page
+    page.evaluate("sessionStorage.clear()")
+    visit.open("/create")
+    page.get_by_text("Die Funktion ist in Ordnung.").wait_for()
+    _write(page, "def reward_function(params):\n    return params['sped']\n")
+    page.get_by_text("params hat keinen Schlüssel 'sped'. Meintest du 'speed'?").wait_for()
+    _write(page, "def reward_function(params):\n    return 1 / (params['speed'] * 0)\n")
+    page.get_by_text("Die Belohnungsfunktion löste ZeroDivisionError").first.wait_for()
+    _write(page, "def reward_function(params):\n    return 1.0\n")
+    page.get_by_text("Die Funktion ist in Ordnung.").wait_for()
+    page.locator("summary", has_text="Weitere Einstellungen").click()
+    page.get_by_role("textbox", name="Name").fill("heron")
+    page.get_by_role("button", name="Jetzt trainieren").first.click()
+    page.get_by_text("Ein Modell 'heron' gibt es schon.").first.wait_for()
+    visit.look("light")
+    assert visit.console.client.get("/api/models/gone").json()["error"]["message"] == "There is no model 'gone'."

@@ -221,14 +221,10 @@ def _check_module(node: ast.stmt, module: str) -> Iterator[Finding]:
         hint = "Leave it out if the function is to run there, too."
         yield node, f"'import {module}' is refused by AWS; here it is allowed.", hint, "warning"
     else:
-        hint = did_you_mean(top, AWS_MODULES)
-        allowed = f"Allowed are {', '.join(AWS_MODULES)}, and of the standard library what needs no files, networks or"
-        yield (
-            node,
-            f"'import {module}' is not allowed in a reward function.",
-            hint or f"{allowed} processes.",
-            "error",
-        )
+        modules = ", ".join(AWS_MODULES)
+        allowed = f"Allowed are {modules}, and of the standard library what needs no files, networks or processes."
+        hint = did_you_mean(top, AWS_MODULES) or allowed
+        yield node, f"'import {module}' is not allowed in a reward function.", hint, "error"
         return
     if any(f"{module}.".startswith(f"{forbidden}.") for forbidden in FORBIDDEN_MODULES):
         yield node, f"'import {module}' is not allowed: it reads or writes files.", "", "error"

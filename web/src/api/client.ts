@@ -1,6 +1,6 @@
 /** The server's answers, typed by its own OpenAPI; every error is one `Problem`. */
 import { back, connection, found, lost } from "../lib/connection.svelte";
-import { t } from "../i18n/index.svelte";
+import { learnErrors, said, t } from "../i18n/index.svelte";
 import type { components } from "./schema";
 
 type Schemas = components["schemas"];
@@ -89,10 +89,11 @@ async function send<T>(method: string, path: string, body: BodyInit | null, kind
   if (!reply.ok) {
     const error = document?.error ?? {};
     if (error.code === "NotSignedIn") connection.isStranger = true;
+    await learnErrors().catch(() => undefined); // in English, then
     throw new Problem(
       error.code ?? "Bug",
-      error.message ?? `The console answered ${reply.status}.`,
-      error.hint ?? "",
+      said(error.message ?? `The console answered ${reply.status}.`),
+      said(error.hint ?? ""),
       error.line ?? null,
       error.field ?? null,
     );

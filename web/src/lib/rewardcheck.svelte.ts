@@ -1,5 +1,6 @@
 /** The check of a reward function while it is typed: an answer counts for the text that it was asked about, and no longer. */
 import { api, Problem, type RewardVerdict } from "../api/client";
+import { said } from "../i18n/index.svelte";
 
 const PAUSE = 400; // ms without typing, after which the text is checked
 
@@ -30,7 +31,8 @@ export class RewardCheck {
   }
 
   get problems(): RewardVerdict["problems"] {
-    return this.verdict?.problems ?? [];
+    const found = this.verdict?.problems ?? [];
+    return found.map((one) => ({ ...one, message: said(one.message), hint: said(one.hint) }));
   }
 
   /** Check a text in a moment, unless another one comes. */

@@ -1,0 +1,103 @@
+"""What the server says, in the pages' other language: all of it, and nothing that it no longer says."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+SOURCES = ROOT / "src/racecraft"
+GERMAN = ROOT / "web/src/i18n/de/errors.json"
+
+PLACES = (
+    *("serve", "reward/check.py", "reward/imports.py", "reward/worker_process.py", "checks.py", "track/validate.py"),
+    *("track/sketch.py", "track/readers.py", "track/generator.py", "agent/model_metadata.py"),
+    *("importing", "sim/objects.py", "training/stop.py", "training/parent.py", "training/start.py"),
+)
+"""Where errors come from that a page shows."""
+OPERATORS = (
+    *(
+        "serve/store",
+        "serve/settings.py",
+        "serve/backup.py",
+        "serve/worker.py",
+        "serve/__init__.py",
+        "serve/station.py",
+    ),
+    "serve/server.py",
+    *("importing/history.py", "importing/own.py", "serve/jobs/bench.py"),
+)
+"""Where they come from that only terminals and logs show, or that quote others."""
+PLAIN = re.compile(r"(Value|Type|Key|Attribute|Assertion|Runtime|OS|Stop)\w*|HTTPException|SystemExit|BadParameter")
+
+
+def sentence(node: ast.expr) -> str | None:
+    """A text of the source, with ``{}`` for what is filled in; None for what is put together elsewhere."""
+    match node:
+        case ast.Constant(value=str(text)):
+            return text
+        case ast.JoinedStr(values=parts):
+            return "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in parts)
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            sides = sentence(left), sentence(right)
+            return None if None in sides else f"{sides[0]}{sides[1]}"
+    return None
+
+
+def said_in(path: Path) -> Iterator[str]:
+    """The errors and hints of one file."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        texts: list[ast.expr] = []
+        if isinstance(node, ast.Raise) and isinstance(call := node.exc, ast.Call):
+            name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
+            if not PLAIN.fullmatch(name):
+                texts = call.args[:1] + [word.value for word in call.keywords if word.arg == "hint"]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            places = {"problem": slice(2, 4), "Problem": slice(2, 4), "_at": slice(1, 3)}
+            texts = node.args[places[node.func.id]] if node.func.id in places else []
+        elif isinstance(node, ast.Yield) and isinstance(node.value, ast.Tuple):
+            texts = node.value.elts[1:3]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "refuse":
+            parts = [node.args[0].body, node.args[0].orelse] if isinstance(node.args[0], ast.IfExp) else node.args[:1]
+            yield from (f"{{}} {sentence(part)}." for part in parts)
+        for text in filter(None, map(sentence, texts)):
+            if text.strip("{}.; is") and text not in ("error", "warning"):
+                yield text
+
+
+def files() -> list[Path]:
+    found = [path for place in PLACES for path in (SOURCES / place).rglob("*.py") or [SOURCES / place]]
+    found += [SOURCES / place for place in PLACES if place.endswith(".py")]
+    left = tuple(str(SOURCES / place) for place in OPERATORS)
+    return [path for path in found if not str(path).startswith(left)]
+
+
+def test_every_error_that_a_page_can_show_is_said_in_german() -> None:
+    german = json.loads(GERMAN.read_text())
+    said = {text: path for path in files() for text in said_in(path)}
+    assert len(said) > 300
+    missing = [f"{path.relative_to(ROOT)}: {text}" for text, path in sorted(said.items()) if text not in german]
+    assert missing == []
+
+
+def test_what_is_filled_in_is_filled_in_there_too() -> None:
+    for english, german in json.loads(GERMAN.read_text()).items():
+        gaps, count = re.findall(r"\{(\d*)\}", german), english.count("{}")
+        assert sorted(gaps) in ([""] * count, [str(place) for place in range(count)]), english
+        assert german.strip()
+
+
+def test_nothing_is_translated_that_nobody_says() -> None:
+    """What stands between the gaps stands in the sources, if it is not put together of pieces or Pydantic's."""
+    trees = [ast.parse(path.read_text()) for path in SOURCES.rglob("*.py")]
+    nodes = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.expr))
+    spoken = "\n".join(text for node in nodes if (text := sentence(node)))
+    put_together = re.compile(
+        r"\{\}: .*|(You have|All the) .* (used up|more)\.|\{\} is \{\}; .*|did not (load|return).*"
+    )
+    for english in json.loads(GERMAN.read_text()):
+        if not put_together.fullmatch(english):
+            assert max(english.split("{}"), key=len).strip(" .") in spoken, english

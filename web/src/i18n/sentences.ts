@@ -1,0 +1,40 @@
+/** What the server says, in another language: sentences with gaps, of which the longest that fits a text is taken. */
+
+/** By the sentence as the server says it, `{}` for what it fills in: the other one, with `{}` in the same order or `{0}`, `{1}` in its own. */
+export type Sentences = Record<string, string>;
+
+interface Sentence {
+  /** What stands between the gaps. */
+  parts: string[];
+  pattern: RegExp;
+  other: string;
+}
+
+const GAP = "{}";
+const LONGEST = 600; // characters of a line that is looked for: names are short, and a stranger's text may not be
+
+/** Says a text in the other language, line by line; what it has no sentence for stays as it is. */
+export function translator(sentences: Sentences): (text: string) => string {
+  const known = Object.entries(sentences)
+    .map(([one, other]): Sentence => {
+      const parts = one.split(GAP);
+      const pattern = new RegExp(`^${parts.map((part) => part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")).join("(.*?)")}$`);
+      return { parts, pattern, other };
+    })
+    .sort((a, b) => b.parts.join("").length - a.parts.join("").length);
+
+  function line(text: string): string {
+    const whole = sentences[text];
+    if (whole !== undefined && !text.includes(GAP)) return whole;
+    if (!text || text.length > LONGEST) return text;
+    for (const { parts, pattern, other } of known) {
+      if (!parts.every((part) => text.includes(part))) continue;
+      const gaps = pattern.exec(text)?.slice(1);
+      if (!gaps || gaps.includes(text)) continue;
+      let next = 0;
+      return other.replace(/\{(\d*)\}/g, (_, place: string) => line(gaps[place ? Number(place) : next++] ?? ""));
+    }
+    return text;
+  }
+  return (text) => text.split("\n").map(line).join("\n");
+}
