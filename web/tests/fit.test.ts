@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { standBack } from "../src/lib/fit";
+import { standBack } from "../src/scene/fit";
 
 const length = Math.hypot(0.72, 0.62);
 const view = {

@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { scale, span } from "../src/lib/colors";
 import { viewBox } from "../src/lib/geometry";
 import { clock, percent, seconds } from "../src/lib/numbers";
-import { between, halfway, turn, type Look } from "../src/lib/poses";
+import { between, halfway, turn, type Look } from "../src/scene/poses";
 import { de } from "../src/i18n/de";
 import { en } from "../src/i18n/en";
 

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { Sharpness } from "../src/lib/sharpness";
+import { Sharpness } from "../src/scene/sharpness";
 
 const draw = (sharpness: Sharpness, frames: number, time: (frame: number) => number): number => {
   let changes = 0;

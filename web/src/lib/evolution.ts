@@ -1,7 +1,7 @@
 /** Laps that a model drove while it learned, all from the same start: where each car was, and colours from first to best. */
 import type { Evolution } from "../api/client";
 import { scale } from "./colors";
-import { turn } from "./poses";
+import { turn } from "../scene/poses";
 
 export type EvolutionLap = Evolution["laps"][number];
 

@@ -1,5 +1,5 @@
 import type { Demonstration } from "../api/client";
-import type { Look } from "./poses";
+import type { Look } from "../scene/poses";
 
 const STEP = 1000 / 15; // ms
 const PAUSE = 15; // steps that the car stands at the end before it begins again

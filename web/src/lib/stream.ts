@@ -1,7 +1,7 @@
 /** A model's live events. They go on where they broke off, however long the server was away or what it answered. */
 import type { JobInfo } from "../api/client";
 import type { Point } from "./curves";
-import type { Look, Picture } from "./poses";
+import type { Look, Picture } from "../scene/poses";
 
 export interface Handlers {
   points: (points: Point[]) => void;

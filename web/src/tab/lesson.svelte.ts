@@ -1,7 +1,7 @@
 /** A training as the page sees it: the workers, one of them with Python, and what they have told so far. */
 import type { ActionPreset, RewardVerdict } from "../api/client";
 import { Curves, type Point } from "../lib/curves";
-import type { Look, Picture } from "../lib/poses";
+import type { Look, Picture } from "../scene/poses";
 import { policyOf, type Model } from "./model";
 import { countOf } from "./objects";
 import type { Trace } from "./drivencar";

@@ -2,7 +2,7 @@
  * worker. */
 import type { RewardVerdict } from "../api/client";
 import type { Drive, DriveState, Settings } from "../api/drives";
-import type { Look, Picture } from "../lib/poses";
+import type { Look, Picture } from "../scene/poses";
 import { loadCore, type LoadedCore } from "./core";
 import type { Beginning } from "./begin";
 import { DrivenCar, type Trace } from "./drivencar";

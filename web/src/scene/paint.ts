@@ -58,15 +58,21 @@ export function painted(positions: number[], colors: number[]): three.BufferGeom
   return geometry;
 }
 
-/** Flat ground has one colour and looks up. */
-export function paintGround(geometry: three.BufferGeometry, color: number): three.BufferGeometry {
+/** One colour for faces that keep their own normals. */
+export function paintFaces(geometry: three.BufferGeometry, color: number): three.BufferGeometry {
   const count = geometry.getAttribute("position").count;
   const tint = new three.Color(color).toArray();
   geometry.setAttribute("color", new three.Float32BufferAttribute(Array.from({ length: count }, () => tint).flat(), 3));
+  geometry.deleteAttribute("uv");
+  return geometry;
+}
+
+/** Flat ground has one colour and looks up. */
+export function paintGround(geometry: three.BufferGeometry, color: number): three.BufferGeometry {
+  const count = geometry.getAttribute("position").count;
   geometry.setAttribute(
     "normal",
     new three.Float32BufferAttribute(Array.from({ length: count }, () => [0, 0, 1]).flat(), 3),
   );
-  geometry.deleteAttribute("uv");
-  return geometry;
+  return paintFaces(geometry, color);
 }

@@ -1,7 +1,9 @@
-/** What the cars drive on: the road with its lines, and the field around it. */
+/** What the cars drive on: the road with its lines, its kerbs and its start. */
 import * as three from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import type { TrackGeometry } from "../api/client";
+import { gantryGeometry } from "./gantry";
+import { kerbGeometry } from "./kerbs";
 import { paintGround } from "./paint";
 
 export const RISE = 0.004; // m between layers, so that none shows through another
@@ -69,15 +71,15 @@ function dashes(center: Points, isClosed: boolean): three.BufferGeometry {
 }
 
 /** The road as one mesh; what lies on top comes first, so that nothing below it is painted for nothing. */
-export function roadGeometry({ inner, outer, center, is_closed: isClosed }: TrackGeometry): three.BufferGeometry {
+export function roadGeometry(track: TrackGeometry): three.BufferGeometry {
+  const { inner, outer, center, is_closed: isClosed } = track;
+  const kerbs = kerbGeometry(track, RISE / 2);
   return mergeGeometries([
+    gantryGeometry(track, 2.5 * RISE),
     paintGround(dashes(center, isClosed), 0xffb02e),
     paintGround(band(inner, inward(inner, outer, LINE), isClosed, 2 * RISE), 0xf4f4ef),
     paintGround(band(outer, inward(outer, inner, LINE), isClosed, 2 * RISE), 0xf4f4ef),
     paintGround(band(inner, outer, isClosed, RISE), 0x3b4350),
+    ...(kerbs ? [kerbs] : []),
   ]);
 }
-
-/** A disc of many triangles, as the haze is worked out at their corners. */
-export const fieldGeometry = (radius: number, color: number): three.BufferGeometry =>
-  paintGround(new three.RingGeometry(0, radius, 48, 16), color);

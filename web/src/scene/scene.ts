@@ -1,13 +1,14 @@
-/** The track and all cars of a batch in 3D. Loaded when it is shown; draws only what has changed, in three draw calls, no
- * frame while nothing moves, and while it moves only as sharp as the machine can at a good pace. */
+/** The track and all cars of a batch in 3D. Loaded when it is shown; draws only what has changed, in a handful of draw
+ * calls, no frame while nothing moves, and while it moves only as sharp as the machine can at a good pace. */
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { TrackGeometry } from "../api/client";
 import { boxGeometry } from "./box";
 import { carGeometry } from "./car";
 import { standBack } from "./fit";
-import { fieldGeometry, RISE, roadGeometry } from "./ground";
-import { Paint, paintGround } from "./paint";
+import { RISE, roadGeometry } from "./ground";
+import { DAY, landscapeGeometry, NIGHT, skyGeometry } from "./landscape";
+import { Paint } from "./paint";
 import { between, halfway, type Look } from "./poses";
 import { Sharpness } from "./sharpness";
 
@@ -62,7 +63,8 @@ export class Scene {
   private readonly cars: three.InstancedMesh;
   private readonly boxes: three.InstancedMesh;
   private readonly bots: three.InstancedMesh;
-  private readonly field: three.Mesh;
+  private readonly land: three.Mesh;
+  private readonly sky: three.Mesh;
   private readonly paints = new Paint();
   private readonly sharpness: Sharpness;
   private readonly middle = new three.Vector3();
@@ -117,9 +119,11 @@ export class Scene {
       for (let index = 0; index < MAX_OBJECTS; index++) mesh.setColorAt(index, color);
     }
     const road = new three.Mesh(roadGeometry(track), this.paints);
-    this.field = new three.Mesh(fieldGeometry(this.size * 5 + 10, 0x7f9a78), this.paints);
-    this.field.position.copy(this.middle);
-    for (const [order, mesh] of [this.cars, this.boxes, this.bots, road, this.field].entries()) {
+    this.land = new three.Mesh(new three.BufferGeometry(), this.paints);
+    this.land.position.copy(this.middle);
+    const air = new three.MeshBasicMaterial({ vertexColors: true, side: three.BackSide, depthWrite: false });
+    this.sky = new three.Mesh(new three.BufferGeometry(), air);
+    for (const [order, mesh] of [this.cars, this.boxes, this.bots, road, this.land, this.sky].entries()) {
       mesh.renderOrder = order;
       mesh.frustumCulled = false;
       this.scene.add(mesh);
@@ -221,10 +225,18 @@ export class Scene {
   }
 
   paint(isDark: boolean): void {
-    const sky = new three.Color(isDark ? 0x11161c : 0xdfe6ea);
-    this.scene.background = sky;
-    this.paints.fade(sky, this.size * 1.6, this.size * 5);
-    paintGround(this.field.geometry, isDark ? 0x4d6350 : 0x86a37e);
+    const palette = isDark ? NIGHT : DAY;
+    const horizon = new three.Color(palette.horizon);
+    this.scene.background = horizon;
+    this.paints.fade(horizon, this.size * 1.6, this.size * 6.5);
+    const edges = this.edges.map(([x, y]) => [x, y] as const);
+    for (const [mesh, geometry] of [
+      [this.land, landscapeGeometry(this.size, edges, palette)],
+      [this.sky, skyGeometry(0.95 * this.camera.far, palette)],
+    ] as const) {
+      mesh.geometry.dispose();
+      mesh.geometry = geometry;
+    }
     this.wake();
   }
 
@@ -238,6 +250,7 @@ export class Scene {
     });
     for (const mesh of [this.cars, this.boxes, this.bots]) mesh.dispose();
     this.paints.dispose();
+    (this.sky.material as three.Material).dispose();
     this.renderer.dispose();
   }
 
@@ -298,6 +311,7 @@ export class Scene {
     this.isDirty = false;
     if (this.placed) this.placeCars(this.placed);
     else if (this.now) this.place(between(this.before, this.now, share));
+    this.sky.position.copy(this.camera.position);
     this.renderer.render(this.scene, this.camera);
   }
 
