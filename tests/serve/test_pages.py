@@ -68,7 +68,7 @@ def test_the_first_page_is_light_and_loads_nothing_from_elsewhere() -> None:
     assert scripts
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")  # a namespace is not loaded
     sizes = [len(gzip.compress((BUILT.parent / name.lstrip("/")).read_bytes())) for name in scripts]
-    assert sum(sizes) < 450_000
+    assert sum(sizes) < 200_000
 
 
 @needs_pages
