@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
@@ -104,6 +105,39 @@ def test_what_a_group_has_together_ends_for_all_of_it(database: Database, quotas
     quotas.require(ADA, "minutes")  # the club has some
 
 
+def test_of_two_who_share_what_their_groups_may_use_one_comes_first(database: Database, quotas: Quotas) -> None:
+    with database.transaction() as session:
+        session.add_all([Member(group_id=CLUB, user_id=user) for user in (BOB, ADA)])
+    for group in (CLASS, CLUB):
+        quotas.say("group", Limits(places=3), group)
+
+    async def ask(user: int) -> bool:
+        async with quotas.turn(user):
+            try:
+                await asyncio.to_thread(quotas.require, user, "places")
+            except Conflict:
+                return False
+            await asyncio.sleep(0.02)  # as a request that makes something takes its time
+            await asyncio.to_thread(trained, database, user, 0.0, state="queued", finished=None)
+            return True
+
+    async def ask_all() -> list[bool]:
+        return await asyncio.wait_for(asyncio.gather(*(ask(user) for user in 5 * (ADA, BOB))), 20.0)
+
+    assert sum(asyncio.run(ask_all())) == 3
+    assert quotas.usage([ADA, BOB]).places == 3
+
+
+def test_who_shares_nothing_does_not_wait_for_others(database: Database, quotas: Quotas) -> None:
+    quotas.say("each", Limits(places=3), CLASS)
+
+    async def both() -> None:
+        async with quotas.turn(ADA), quotas.turn(BOB):
+            pass
+
+    asyncio.run(asyncio.wait_for(both(), 20.0))
+
+
 def test_trainings_of_who_has_no_minutes_left_are_stopped(database: Database, quotas: Quotas) -> None:
     held = now() - timedelta(minutes=6)
     running = trained(database, ADA, 0.0, state="running", finished=None, held_since=held)
@@ -162,6 +196,14 @@ def test_who_may_say_what_and_what_is_refused_by_it(tmp_path: Path) -> None:
             answers = sorted(one.result().status_code for one in asked)
         assert answers == [201] + 5 * [409]
         assert ok(ada.get("/api/quota"))["used"]["models"] == 4
+        bob = league.join(league.code(group, teacher), "Bob")
+        ok(league.owner.put(f"/api/quotas/groups/{group}", json={"models": 5}), 204)
+        ok(teacher.put(f"/api/groups/{group}/quota", json={"models": 9}), 204)
+        ok(teacher.put(f"/api/groups/{group}/members/{number}/quota", json={"models": 9, "minutes": 0}), 204)
+        with ThreadPoolExecutor(2) as pool:  # of several people's too
+            asked = [pool.submit(one.post, "/api/models", json={"train": False}) for one in 3 * (ada, bob)]
+            answers = sorted(one.result().status_code for one in asked)
+        assert answers == [201] + 5 * [409]
         league.console.wait_for(lambda: ok(ada.get("/api/jobs"))[0]["state"] == "cancelled")
         assert "0 minutes of training" in refused(ada.post("/api/models/first/train", json={}), 409)
         for client, path in ((ada, f"/api/groups/{group}/quota"), (teacher, "/api/quotas")):

@@ -177,7 +177,7 @@ async def _takes_turn(consoles: InConsoles, user: InUser) -> AsyncIterator[None]
 
 
 TakesTurn = Depends(_takes_turn)
-"""A route with this dependency waits until one's earlier requests of the kind are done, so that a quota holds."""
+"""A route with this dependency waits until earlier ones of those who share a quota are done, so that it holds."""
 
 
 def _makes_model(consoles: InConsoles, user: InUser, turn: Annotated[None, TakesTurn]) -> None:

@@ -11,7 +11,8 @@ what is trained is saved, and goes on when there are minutes again.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection, Iterable
+from collections.abc import AsyncIterator, Collection, Iterable
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, fields, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -74,17 +75,34 @@ class Quotas:
 
     def __init__(self, database: Database, runs: Path) -> None:
         self._database, self._runs = database, runs
-        self._turns: WeakValueDictionary[int, asyncio.Lock] = WeakValueDictionary()
+        self._turns: WeakValueDictionary[tuple[Scope, int], asyncio.Lock] = WeakValueDictionary()
 
-    def turn(self, user_id: int) -> asyncio.Lock:
+    @asynccontextmanager
+    async def turn(self, user_id: int) -> AsyncIterator[None]:
         """To be held from `require` until what it let through is there, so that two requests at once do not both fit.
 
-        Of the server's event loop: who waits for it takes no thread from who has it.
+        Somebody's requests follow one another, and those of all who share what a group may use together. Of the
+        server's event loop: who waits for it takes no thread from who has it.
         """
-        turn = self._turns.get(user_id)
+        async with AsyncExitStack() as stack:
+            # everybody takes one person's turn and then those of groups in their order, so that nobody waits in a ring
+            await stack.enter_async_context(self._turn("person", user_id))
+            for group in await asyncio.to_thread(self._shared, user_id):
+                await stack.enter_async_context(self._turn("group", group))
+            yield
+
+    def _turn(self, scope: Scope, number: int) -> asyncio.Lock:
+        turn = self._turns.get((scope, number))
         if turn is None:
-            turn = self._turns[user_id] = asyncio.Lock()
+            turn = self._turns[scope, number] = asyncio.Lock()
         return turn
+
+    def _shared(self, user_id: int) -> list[int]:
+        """The groups of somebody that are limited together."""
+        limited = sa.select(Quota.number).where(Quota.scope == "group")
+        groups = sa.select(Member.group_id).where(Member.user_id == user_id, Member.group_id.in_(limited))
+        with self._database.transaction() as session:
+            return list(session.scalars(groups.order_by(Member.group_id)))
 
     def said(self, scope: Scope, number: int = WHOLE) -> Limits:
         """What was said of a scope itself."""
