@@ -1,6 +1,6 @@
 """How fast cars learn in a browser's tab, how smooth the page stays, and how much is loaded; on a quiet machine.
 
-python benchmarks/site.py [--seeds 5] [--json]
+python benchmarks/site.py [--only page pace python slow bits] [--seeds 5] [--json]
 
 Needs `make site`, Playwright and Chromium, and Brotli of Node. With --json the last line is one object; the bits are
 those of tests/site, which it runs.
@@ -13,7 +13,6 @@ import functools
 import http.server
 import json
 import os
-import re
 import shutil
 import signal
 import statistics
@@ -21,13 +20,12 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from racecraft import train
-
+PARTS = ["page", "pace", "python", "slow", "bits"]
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "build" / "site"
 OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"]
@@ -42,7 +40,35 @@ COUNT_FRAMES = """() => {
   requestAnimationFrame(count);
   window.stopCounting = () => ((isCounting = false), (1000 * frames) / (performance.now() - began));
 }"""
-LONG = 60_000  # camera steps of native's training, whose pace is compared
+TURNS = 3  # of the trainings whose pace is compared, without an evaluation
+NATIVE = """
+import shutil, sys, time
+from racecraft import train
+steps, seed = int(sys.argv[1]), int(sys.argv[2])
+began = time.monotonic()
+result = train("reinvent_2018", reward="racing", until=f"{steps} steps", seed=seed, num_threads=1, evaluate_every=10**9)
+seconds = time.monotonic() - began
+shutil.rmtree(result.run)
+print(steps / seconds)
+"""
+TRAIN = """async ([site, address, most, seed]) => {
+  const read = async (file) => (await fetch(new URL(file, site))).json();
+  const [plan, track] = await Promise.all([read("data/plan.json"), read("data/tracks/reinvent_2018.json")]);
+  const text = `import ${JSON.stringify(new URL(address, site).href)};`;
+  const worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })), { type: "module" });
+  const race = { ...plan.races["time-trial"], evaluateEvery: 1e9 };
+  const asked = { plan, race, policy: race.policies.default, objects: race.objects, track, seed };
+  return new Promise((told, failed) => {
+    let last;
+    worker.onmessage = ({ data }) => {
+      if (data.kind === "ready") worker.postMessage({ kind: "train", ...asked, reward: "racing", most });
+      else if (data.kind === "iteration") last = { steps: data.iteration.steps, seconds: data.seconds };
+      else if (data.kind === "failed") failed(new Error(data.message));
+      else if (data.kind === "ended") (worker.terminate(), told(last));
+    };
+    worker.postMessage({ kind: "load", site, hasPython: false });
+  });
+}"""
 
 
 class Files(http.server.SimpleHTTPRequestHandler):
@@ -77,22 +103,30 @@ def compressed(path: Path) -> int:
     return int(done.stdout)
 
 
-def in_the_tab(seeds: int) -> dict[str, Any]:
-    """Press Train on the page as it opens, once a seed."""
+@contextmanager
+def browsing() -> Iterator[tuple[Any, str]]:
+    """A browser, and the site's address."""
     from playwright.sync_api import sync_playwright
 
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     with hosted() as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
+        yield browser, address
+        browser.close()
+
+
+def in_the_tab(seeds: int) -> dict[str, Any]:
+    """Press Train on the page as it opens, once a seed."""
+    with browsing() as (browser, address):
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         opened = time.monotonic()
         page.goto(address)
-        button = page.get_by_role("button", name="Train")
+        button = page.get_by_role("button", name="Train", exact=True)
         button.wait_for()
         usable = time.monotonic() - opened
         page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)
         driving = time.monotonic() - opened
-        wall, steps, frames = [], 0, []
+        wall, frames = [], []
         before: list[str] = []
         for _ in range(seeds):
             began = time.monotonic()
@@ -102,38 +136,63 @@ def in_the_tab(seeds: int) -> dict[str, Any]:
             page.evaluate(COUNT_FRAMES)
             page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
             wall.append(time.monotonic() - began)
-            figures = page.locator("dl.figures").inner_text()
-            steps += int(re.search(r"Steps\s+([\d\u202f]+)", figures)[1].replace("\u202f", ""))  # type: ignore[index]
             frames.append(page.evaluate("stopCounting()"))
         version = browser.version
-        slow = slowly(browser, address)
-        browser.close()
+    laps, rate = statistics.median(wall), statistics.median(frames)
     loaded = [SITE / (path.lstrip("/") or "index.html") for path in before if path != "/favicon.ico"]
+    needed = sum(compressed(path) for path in loaded)
+    core = compressed(SITE / "core" / "core.wasm")
+    print(f"Chromium {version}: the page is usable after {usable:.2f} s, a car drives after {driving:.2f} s")
+    print(f"5 of 5 laps after {laps:.1f} s (worst {max(wall):.1f} s), {seeds} seeds")
+    print(f"{core:,} bytes the core, {needed:,} all before the first car, by Brotli")
+    print(f"{rate:.0f} frames/s while 64 cars learn, WebGL by the processor")
     return {
         "chromium": version,
         "usable_seconds": usable,
         "first_car_seconds": driving,
-        "five_laps": {"wall_seconds": wall, "median": statistics.median(wall), "worst": max(wall)},
-        "steps_per_second": steps / sum(wall),
-        "frames_per_second": statistics.median(frames),
-        "slow_five_laps_seconds": slow,
-        "before_first_car": sum(compressed(path) for path in loaded),
+        "five_laps": {"wall_seconds": wall, "median": laps, "worst": max(wall)},
+        "frames_per_second": rate,
+        "bytes": {"core": core, "before_first_car": needed},
     }
 
 
-def slowly(browser: Any, address: str) -> float:
-    """Seconds from Train to 5 of 5 laps where all of the browser's processes get a quarter of their time."""
-    page = browser.new_page(viewport={"width": 1280, "height": 900})
-    page.goto(address)
-    button = page.get_by_role("button", name="Train")
-    button.wait_for()
-    with slowed_down(descendants(os.getpid(), "--type=")):
-        began = time.monotonic()
-        button.click()
-        page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
-        seconds = time.monotonic() - began
-    page.close()
-    return seconds
+def python() -> dict[str, Any]:
+    """What Python adds to that."""
+    added = sum(compressed(path) for path in sorted((SITE / "python").iterdir()))
+    print(f"{added:,} bytes Python, by Brotli")
+    return {"python_bytes": added}
+
+
+def side_by_side(steps: int) -> dict[str, Any]:
+    """The same training in a page's worker and natively, in turns."""
+    worker = next((SITE / "assets").glob("worker-*.js")).name
+    tab, native = [], []
+    with browsing() as (browser, address):
+        page = browser.new_page()
+        page.goto(f"{address}docs/index.html")  # a page of the site on which nothing moves
+        for seed in range(1, TURNS + 1):
+            done = page.evaluate(TRAIN, [address, f"assets/{worker}", steps, seed])
+            tab.append(done["steps"] / done["seconds"])
+            native.append(natively(steps, seed))
+    pace, beside = statistics.median(tab), statistics.median(native)
+    print(f"{pace:,.0f} camera steps/s, {pace / beside:.0%} of native's on one thread with AVX2")
+    return {"train": {"steps_per_second": pace, "native_steps_per_second": beside, "of_native": pace / beside}}
+
+
+def slowly() -> dict[str, Any]:
+    """From Train to 5 of 5 laps where all of the browser's processes get a quarter of their time."""
+    with browsing() as (browser, address):
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.goto(address)
+        button = page.get_by_role("button", name="Train", exact=True)
+        button.wait_for()
+        with slowed_down(descendants(os.getpid(), "--type=")):
+            began = time.monotonic()
+            button.click()
+            page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+            seconds = time.monotonic() - began
+    print(f"5 of 5 laps after {seconds:.1f} s with a processor {SLOWER} times slower")
+    return {"slow_five_laps": {"wall_seconds": [seconds]}}
 
 
 def descendants(root: int, option: str) -> list[int]:
@@ -175,16 +234,15 @@ def slowed_down(processes: list[int]) -> Iterator[None]:
         thread.join()
 
 
-def natively() -> float:
-    """Camera steps per second of the same training on one thread."""
-    began = time.monotonic()
-    result = train("reinvent_2018", reward="racing", until=f"{LONG} steps", seed=1, num_threads=1, evaluate_every=10**9)
-    seconds = time.monotonic() - began
-    shutil.rmtree(result.run)
-    return LONG / seconds
+def natively(steps: int, seed: int) -> float:
+    """Camera steps per second of the same training on one thread with AVX2."""
+    environment = {**os.environ, "RACECRAFT_ISA": "avx2"}
+    command = [sys.executable, "-c", NATIVE, str(steps), str(seed)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return float(done.stdout.split()[-1])
 
 
-def bits() -> dict[str, bool]:
+def bits() -> dict[str, Any]:
     """Whether cars and weights are native's."""
     checks = {
         "simulator": "test_cars_on_every_track_are_the_native_ones[core]",
@@ -196,46 +254,29 @@ def bits() -> dict[str, bool]:
         command = [sys.executable, "-m", "pytest", "-q", "-rs", f"{file}::{test}"]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         found[name] = done.returncode == 0 and "SKIPPED" not in done.stdout
-    return found
+    print(f"bits as native's: {found}")
+    return {"bits": found}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=5, help="trainings, 1 to 8")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
+    parser.add_argument("--seeds", type=int, default=5, help="trainings until 5 of 5 laps, 1 to 8")
+    parser.add_argument("--steps", type=int, default=60_000, help="camera steps of trainings whose pace is compared")
     parser.add_argument("--json", action="store_true", help="end in one object")
     options = parser.parse_args()
-    tab, native = in_the_tab(options.seeds), natively()
-    document = {
-        "chromium": tab["chromium"],
-        "usable_seconds": tab["usable_seconds"],
-        "first_car_seconds": tab["first_car_seconds"],
-        "five_laps": {**tab["five_laps"], "slow_wall_seconds": tab["slow_five_laps_seconds"]},
-        "frames_per_second": tab["frames_per_second"],
-        "train": {
-            "steps_per_second": tab["steps_per_second"],
-            "native_steps_per_second": native,
-            "of_native": tab["steps_per_second"] / native,
-        },
-        "bytes": {
-            "core": compressed(SITE / "core" / "core.wasm"),
-            "before_first_car": tab["before_first_car"],
-            "with_python": tab["before_first_car"]
-            + sum(compressed(path) for path in sorted((SITE / "python").iterdir())),
-        },
-        "bits": bits(),
+    parts: dict[str, Callable[[], dict[str, Any]]] = {
+        "page": lambda: in_the_tab(options.seeds),
+        "pace": lambda: side_by_side(options.steps),
+        "python": python,
+        "slow": slowly,
+        "bits": bits,
     }
-    laps, pace, size = document["five_laps"], document["train"], document["bytes"]
-    print(
-        f"Chromium {document['chromium']}: the page is usable after {document['usable_seconds']:.2f} s, "
-        f"a car drives after {document['first_car_seconds']:.2f} s"
-    )
-    print(f"5 of 5 laps after {laps['median']:.1f} s (worst {laps['worst']:.1f} s), {len(laps['wall_seconds'])} seeds")
-    print(f"{pace['steps_per_second']:,.0f} camera steps/s, {pace['of_native']:.0%} of native's on one thread")
-    print(f"{size['core']:,} bytes the core, {size['before_first_car']:,} all before the first car, by Brotli")
-    print(f"{size['with_python']:,} bytes with Python, by Brotli")
-    print(f"{document['frames_per_second']:.0f} frames/s while 64 cars learn, WebGL by the processor")
-    print(f"5 of 5 laps after {laps['slow_wall_seconds']:.1f} s with a processor {SLOWER} times slower")
-    print(f"bits as native's: {document['bits']}")
+    document: dict[str, Any] = {}
+    for name in options.only:
+        document |= parts[name]()
+    if "bytes" in document and "python_bytes" in document:
+        document["bytes"]["with_python"] = document["bytes"]["before_first_car"] + document["python_bytes"]
     if options.json:
         print(json.dumps(document))
 
