@@ -79,8 +79,10 @@ RC_HD Lanes distance_lanes(Lanes texel, Lanes u, Lanes v) {
 
 // The second factor of shade_edge()'s blend: coverage above the border and the unit.
 RC_HD Lanes coverage_lanes(Lanes distance, Lanes sharpness) {
-    const Lanes ramp = shift_right_signed(distance * sharpness, 16) + splat(kCoverageUnit / 2);
-    return shift_left(clamp_lanes(ramp, splat(0), splat(kCoverageUnit)), 16) | splat(kCoverageUnit);
+    const Lanes middle = splat(kCoverageUnit / 2);
+    const Lanes ramp = shift_right_signed(distance * sharpness, 16);
+    return shift_left(clamp_lanes(ramp, splat(-kCoverageUnit / 2), middle) + middle, 16) |
+           splat(kCoverageUnit);
 }
 
 template <int kChannels, bool kIsEdge>

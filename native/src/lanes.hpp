@@ -1,12 +1,19 @@
 // Vectors of 32-bit integers for kernels, one definition per instruction set: 16 lanes with AVX-512, 8 with
-// AVX2, 4 with WebAssembly's SIMD. Include only from *_kernel.cpp. Without RC_HAS_LANES a kernel runs its
-// scalar code, which gives the same bits.
+// AVX2, 4 with SSE2, NEON and WebAssembly's SIMD. Include only from *_kernel.cpp. Without RC_HAS_LANES a
+// kernel runs its scalar code, which gives the same bits.
 #pragma once
 
 #include "racecraft/platform.hpp"
 
-#if defined(__AVX2__)
+#if defined(RC_SCALAR)  // the reference alone
+#elif defined(__AVX2__)
 #include <immintrin.h>
+#define RC_HAS_LANES 1
+#elif defined(__SSE2__) && defined(__x86_64__)
+#include <emmintrin.h>
+#define RC_HAS_LANES 1
+#elif defined(__aarch64__) && defined(__ARM_NEON)
+#include <arm_neon.h>
 #define RC_HAS_LANES 1
 #elif defined(__wasm_simd128__)
 #include <wasm_simd128.h>
@@ -21,7 +28,8 @@
 namespace racecraft::RC_ISA {
 namespace {
 
-#if defined(__AVX512VNNI__)
+#if defined(RC_SCALAR)
+#elif defined(__AVX512VNNI__)
 
 struct Lanes {
     static constexpr int kCount = 16;
@@ -62,6 +70,7 @@ RC_HD Lanes shift_right(Lanes a, int bits) {
 RC_HD Lanes shift_right_signed(Lanes a, int bits) {
     return {_mm512_srai_epi32(a.v, static_cast<unsigned>(bits))};
 }
+// All three within 16 bits.
 RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
     return {_mm512_min_epi32(_mm512_max_epi32(a.v, low.v), high.v)};
 }
@@ -168,6 +177,182 @@ RC_HD void store_halves(uint8_t* out, Lanes a) {
     const __m256i packed = _mm256_packus_epi32(a.v, a.v);
     const __m256i ordered = _mm256_permute4x64_epi64(packed, 0x08);
     _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm256_castsi256_si128(ordered));
+}
+
+#elif defined(__SSE2__) && defined(__x86_64__)
+
+struct Lanes {
+    static constexpr int kCount = 4;
+    __m128i v;
+};
+using LaneMask = __m128i;
+
+RC_HD Lanes splat(int32_t value) {
+    return {_mm_set1_epi32(value)};
+}
+RC_HD Lanes lane_numbers() {
+    return {_mm_setr_epi32(0, 1, 2, 3)};
+}
+RC_HD LaneMask first_lanes(int count) {
+    return _mm_cmpgt_epi32(_mm_set1_epi32(count), lane_numbers().v);
+}
+RC_HD Lanes operator+(Lanes a, Lanes b) {
+    return {_mm_add_epi32(a.v, b.v)};
+}
+RC_HD Lanes operator-(Lanes a, Lanes b) {
+    return {_mm_sub_epi32(a.v, b.v)};
+}
+// The lower halves of 64-bit products, which signs do not touch.
+RC_HD Lanes operator*(Lanes a, Lanes b) {
+    const __m128i even = _mm_mul_epu32(a.v, b.v);
+    const __m128i odd = _mm_mul_epu32(_mm_srli_epi64(a.v, 32), _mm_srli_epi64(b.v, 32));
+    const __m128 both = _mm_shuffle_ps(_mm_castsi128_ps(even), _mm_castsi128_ps(odd), 0x88);
+    return {_mm_shuffle_epi32(_mm_castps_si128(both), 0xD8)};
+}
+RC_HD Lanes operator&(Lanes a, Lanes b) {
+    return {_mm_and_si128(a.v, b.v)};
+}
+RC_HD Lanes operator|(Lanes a, Lanes b) {
+    return {_mm_or_si128(a.v, b.v)};
+}
+RC_HD Lanes shift_left(Lanes a, int bits) {
+    return {_mm_slli_epi32(a.v, bits)};
+}
+RC_HD Lanes shift_right(Lanes a, int bits) {
+    return {_mm_srli_epi32(a.v, bits)};
+}
+RC_HD Lanes shift_right_signed(Lanes a, int bits) {
+    return {_mm_srai_epi32(a.v, bits)};
+}
+// The upper half of a lane is its sign, which is compared as a number as well.
+RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
+    return {_mm_min_epi16(_mm_max_epi16(a.v, low.v), high.v)};
+}
+// Bytes 0 and 2 of each lane as halves, then bytes 1 and 3: there is no product of bytes.
+RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
+    const __m128i first =
+        _mm_madd_epi16(_mm_and_si128(a.v, _mm_set1_epi16(255)), _mm_srai_epi16(_mm_slli_epi16(b.v, 8), 8));
+    const __m128i second = _mm_madd_epi16(_mm_srli_epi16(a.v, 8), _mm_srai_epi16(b.v, 8));
+    return {_mm_add_epi32(first, second)};
+}
+RC_HD Lanes dot_halves(Lanes a, Lanes b) {
+    return {_mm_madd_epi16(a.v, b.v)};
+}
+RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
+    const auto lower = static_cast<uint64_t>(_mm_cvtsi128_si64(index.v));
+    const auto upper = static_cast<uint64_t>(_mm_cvtsi128_si64(_mm_unpackhi_epi64(index.v, index.v)));
+    const auto at = [base](uint64_t i) { return _mm_cvtsi32_si128(static_cast<int32_t>(base[i])); };
+    return {_mm_unpacklo_epi64(_mm_unpacklo_epi32(at(lower & 0xffffffff), at(lower >> 32)),
+                               _mm_unpacklo_epi32(at(upper & 0xffffffff), at(upper >> 32)))};
+}
+RC_HD Lanes look_up(const int32_t* table, Lanes index) {
+    return gather_all(reinterpret_cast<const uint32_t*>(table), index);
+}
+// Lanes outside the mask read the first entry.
+RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
+    return {_mm_and_si128(gather_all(base, {_mm_and_si128(index.v, mask)}).v, mask)};
+}
+RC_HD Lanes load(const int32_t* values) {
+    return {_mm_loadu_si128(reinterpret_cast<const __m128i*>(values))};
+}
+RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
+    const __m128i added = _mm_add_epi32(load(sums).v, _mm_and_si128(value.v, mask));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(sums), added);
+}
+RC_HD void store_halves(uint8_t* out, Lanes a) {
+    const __m128i low = _mm_shufflelo_epi16(a.v, 0x08);
+    const __m128i both = _mm_shuffle_epi32(_mm_shufflehi_epi16(low, 0x08), 0x08);
+    _mm_storel_epi64(reinterpret_cast<__m128i*>(out), both);
+}
+
+#elif defined(__aarch64__) && defined(__ARM_NEON)
+
+struct Lanes {
+    static constexpr int kCount = 4;
+    int32x4_t v;
+};
+using LaneMask = int32x4_t;
+
+// As halves and bytes, whatever they held before.
+RC_HD int16x8_t halves_of(int32x4_t a) {
+    return vreinterpretq_s16_s32(a);
+}
+RC_HD Lanes splat(int32_t value) {
+    return {vdupq_n_s32(value)};
+}
+RC_HD Lanes lane_numbers() {
+    return {int32x4_t{0, 1, 2, 3}};
+}
+RC_HD LaneMask first_lanes(int count) {
+    return vreinterpretq_s32_u32(vcgtq_s32(vdupq_n_s32(count), lane_numbers().v));
+}
+RC_HD Lanes operator+(Lanes a, Lanes b) {
+    return {vaddq_s32(a.v, b.v)};
+}
+RC_HD Lanes operator-(Lanes a, Lanes b) {
+    return {vsubq_s32(a.v, b.v)};
+}
+RC_HD Lanes operator*(Lanes a, Lanes b) {
+    return {vmulq_s32(a.v, b.v)};
+}
+RC_HD Lanes operator&(Lanes a, Lanes b) {
+    return {vandq_s32(a.v, b.v)};
+}
+RC_HD Lanes operator|(Lanes a, Lanes b) {
+    return {vorrq_s32(a.v, b.v)};
+}
+// Operators, since NEON's shifts by a constant take nothing that an optimiser makes one.
+RC_HD Lanes shift_left(Lanes a, int bits) {
+    return {vreinterpretq_s32_u32(vreinterpretq_u32_s32(a.v) << static_cast<uint32_t>(bits))};
+}
+RC_HD Lanes shift_right(Lanes a, int bits) {
+    return {vreinterpretq_s32_u32(vreinterpretq_u32_s32(a.v) >> static_cast<uint32_t>(bits))};
+}
+RC_HD Lanes shift_right_signed(Lanes a, int bits) {
+    return {a.v >> bits};
+}
+RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
+    return {vminq_s32(vmaxq_s32(a.v, low.v), high.v)};
+}
+// Bytes 0 and 2 of each lane as halves, then bytes 1 and 3; each product fits one.
+RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
+    const uint16x8_t bytes = vreinterpretq_u16_s32(a.v);
+    const int16x8_t first = vmulq_s16(vreinterpretq_s16_u16(vandq_u16(bytes, vdupq_n_u16(255))),
+                                      vshrq_n_s16(vshlq_n_s16(halves_of(b.v), 8), 8));
+    const int16x8_t second =
+        vmulq_s16(vreinterpretq_s16_u16(vshrq_n_u16(bytes, 8)), vshrq_n_s16(halves_of(b.v), 8));
+    return {vpadalq_s16(vpaddlq_s16(first), second)};
+}
+RC_HD Lanes dot_halves(Lanes a, Lanes b) {
+    const int16x8_t x = halves_of(a.v), y = halves_of(b.v);
+    return {vpaddq_s32(vmull_s16(vget_low_s16(x), vget_low_s16(y)), vmull_high_s16(x, y))};
+}
+// The table as two vectors of bytes.
+RC_HD Lanes look_up(const int32_t* table, Lanes index) {
+    const uint8_t* bytes = reinterpret_cast<const uint8_t*>(table);
+    const int32x4_t byte = vmlaq_s32(vdupq_n_s32(0x03020100), index.v, vdupq_n_s32(0x04040404));
+    const uint8x16x2_t entries = {{vld1q_u8(bytes), vld1q_u8(bytes + 16)}};
+    return {vreinterpretq_s32_u8(vqtbl2q_u8(entries, vreinterpretq_u8_s32(byte)))};
+}
+RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
+    const uint32x4_t i = vreinterpretq_u32_s32(index.v);
+    uint32x4_t all = vdupq_n_u32(base[vgetq_lane_u32(i, 0)]);
+    all = vld1q_lane_u32(base + vgetq_lane_u32(i, 1), all, 1);
+    all = vld1q_lane_u32(base + vgetq_lane_u32(i, 2), all, 2);
+    return {vreinterpretq_s32_u32(vld1q_lane_u32(base + vgetq_lane_u32(i, 3), all, 3))};
+}
+// Lanes outside the mask read the first entry.
+RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
+    return {vandq_s32(gather_all(base, {vandq_s32(index.v, mask)}).v, mask)};
+}
+RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
+    vst1q_s32(sums, vaddq_s32(vld1q_s32(sums), vandq_s32(value.v, mask)));
+}
+RC_HD Lanes load(const int32_t* values) {
+    return {vld1q_s32(values)};
+}
+RC_HD void store_halves(uint8_t* out, Lanes a) {
+    vst1_u8(out, vreinterpret_u8_s16(vmovn_s32(a.v)));
 }
 
 #elif defined(__wasm_simd128__)

@@ -11,7 +11,7 @@
 namespace racecraft::RC_ISA {
 namespace {
 
-#if defined(__AVX512F__)
+#if defined(__AVX512F__) || defined(__aarch64__)
 constexpr int kTileRows = 8;  // 16 of 32 registers hold sums
 #else
 constexpr int kTileRows = 4;  // 8 of 16

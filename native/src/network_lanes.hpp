@@ -1,5 +1,5 @@
 // Vectors of floats for the network's kernels, one definition per instruction set: 16 lanes with AVX-512, 8
-// with AVX2, 4 with SSE2, WebAssembly's SIMD or otherwise. Include only from *_kernel.cpp.
+// with AVX2, 4 with SSE2, NEON, WebAssembly's SIMD or otherwise. Include only from *_kernel.cpp.
 //
 // Lanes never meet: every operation works on each lane by itself, in IEEE 754 arithmetic with an explicit
 // fused multiply-add, so the width of a vector cannot change a result.
@@ -9,10 +9,13 @@
 
 #include "racecraft/platform.hpp"
 
-#if defined(__AVX2__)
+#if defined(RC_SCALAR)  // the reference alone
+#elif defined(__AVX2__)
 #include <immintrin.h>
 #elif defined(__SSE2__)
 #include <emmintrin.h>
+#elif defined(__aarch64__) && defined(__ARM_NEON)
+#include <arm_neon.h>
 #elif defined(__wasm_simd128__)
 #include <wasm_simd128.h>
 #endif
@@ -25,7 +28,7 @@
 namespace racecraft::RC_ISA {
 namespace {
 
-#if defined(__AVX512F__)
+#if !defined(RC_SCALAR) && defined(__AVX512F__)
 
 struct FloatLanes {
     static constexpr int kCount = 16;
@@ -62,7 +65,7 @@ RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
     return {_mm512_maskz_mov_ps(_mm512_cmp_ps_mask(a.v, _mm512_setzero_ps(), _CMP_GT_OQ), b.v)};
 }
 
-#elif defined(__AVX2__)
+#elif !defined(RC_SCALAR) && defined(__AVX2__)
 
 struct FloatLanes {
     static constexpr int kCount = 8;
@@ -97,7 +100,7 @@ RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
     return {_mm256_and_ps(_mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GT_OQ), b.v)};
 }
 
-#elif defined(__SSE2__)
+#elif !defined(RC_SCALAR) && defined(__SSE2__)
 
 struct FloatLanes {
     static constexpr int kCount = 4;
@@ -167,6 +170,42 @@ RC_HD FloatLanes relu(FloatLanes a) {
 }
 RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
     return {_mm_and_ps(_mm_cmpgt_ps(a.v, _mm_setzero_ps()), b.v)};
+}
+
+#elif !defined(RC_SCALAR) && defined(__aarch64__) && defined(__ARM_NEON)
+
+struct FloatLanes {
+    static constexpr int kCount = 4;
+    float32x4_t v;
+};
+
+RC_HD FloatLanes splat(float value) {
+    return {vdupq_n_f32(value)};
+}
+RC_HD FloatLanes load(const float* from) {
+    return {vld1q_f32(from)};
+}
+RC_HD void store(float* to, FloatLanes a) {
+    vst1q_f32(to, a.v);
+}
+RC_HD FloatLanes operator+(FloatLanes a, FloatLanes b) {
+    return {vaddq_f32(a.v, b.v)};
+}
+RC_HD FloatLanes operator-(FloatLanes a, FloatLanes b) {
+    return {vsubq_f32(a.v, b.v)};
+}
+RC_HD FloatLanes operator*(FloatLanes a, FloatLanes b) {
+    return {vmulq_f32(a.v, b.v)};
+}
+RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
+    return {vfmaq_f32(c.v, a.v, b.v)};
+}
+// Not by a maximum, which makes 0 of -0.
+RC_HD FloatLanes relu(FloatLanes a) {
+    return {vreinterpretq_f32_u32(vbicq_u32(vreinterpretq_u32_f32(a.v), vcltzq_f32(a.v)))};
+}
+RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
+    return {vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(b.v), vcgtzq_f32(a.v)))};
 }
 
 #elif defined(__wasm_simd128__)

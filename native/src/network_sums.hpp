@@ -26,7 +26,7 @@ struct FusedSums {
     }
 };
 
-#if defined(__SSE2__) && !defined(__FMA__)
+#if defined(__SSE2__) && !defined(__FMA__) && !defined(RC_SCALAR)
 
 #define RC_HAS_DOUBLED_SUMS 1
 

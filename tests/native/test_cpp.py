@@ -1,6 +1,6 @@
 """Builds the C++ tests with CMake and runs them: as users get the core, and with assertions under sanitizers.
 
-The golden hashes are also compared without any optimisation.
+The golden hashes are also compared without any optimisation nor vectors, and on an ARM processor, which is emulated.
 
     pytest tests/native -m "not slow"     only the release build
 
@@ -26,6 +26,14 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PROGRAMS = tuple(sorted(path.stem for path in (ROOT / "native/tests").glob("*_test.cpp")))
 GOLDEN = tuple(name for name in PROGRAMS if "golden" in (ROOT / f"native/tests/{name}.cpp").read_text())
+EMULATED = {  # and the word that chooses the tests: all but those that take an emulator minutes
+    "camera_test": "golden",
+    "network_test": "golden",
+    "lens_test": "",
+    "network_sums_test": "",
+}
+EMULATOR = ("qemu-aarch64", "-L", "/usr/aarch64-linux-gnu")
+CROSS_COMPILER = "aarch64-linux-gnu-g++"
 THREADED = ("engine_test", "thread_pool_test")
 TOOLS = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))  # cmake and ninja of this environment
 JOBS = max(1, (os.cpu_count() or 1) // int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
@@ -48,6 +56,7 @@ def build(
     programs: tuple[str, ...] = PROGRAMS,
     *,
     portable: bool = False,
+    cross: bool = False,
 ) -> Path:
     """Configure and compile, and give the folder of the programs."""
     folder = ROOT / "build" / f"cpp-{name}"
@@ -56,6 +65,12 @@ def build(
         "RACECRAFT_PORTABLE": "ON" if portable else "OFF",
         "CMAKE_BUILD_TYPE": build_type,
     }
+    if cross:
+        settings |= {
+            "CMAKE_SYSTEM_NAME": "Linux",
+            "CMAKE_SYSTEM_PROCESSOR": "aarch64",
+            "CMAKE_CXX_COMPILER": CROSS_COMPILER,
+        }
     run([cmake(), "-S", ROOT, "-B", folder, "-G", "Ninja", *(f"-D{key}={value}" for key, value in settings.items())])
     return compiled(folder, programs)
 
@@ -109,6 +124,17 @@ def test_without_optimisation_the_golden_hashes_are_the_same(program):
     folder = build("debug", "Debug", programs=GOLDEN, portable=True)
     told = runs(folder, GOLDEN, "golden")[program].result()
     assert re.search(r"^ok .*golden", told, flags=re.MULTILINE), told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", EMULATED)
+def test_an_arm_processor_computes_the_same_bits(program):
+    for tool in (CROSS_COMPILER, EMULATOR[0]):
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+    folder = build("aarch64", "Release", programs=tuple(EMULATED), cross=True)
+    told = run([*EMULATOR, folder / program, EMULATED[program]])
+    assert re.search(r"^ok ", told, flags=re.MULTILINE), told
 
 
 @pytest.mark.slow
