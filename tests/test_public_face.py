@@ -38,6 +38,7 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         from racecraft import trian  # type: ignore[attr-defined]  # noqa: F401
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     "first", ["import racecraft.training", "import racecraft.race.evaluation", "import racecraft.env"]
 )

@@ -42,6 +42,7 @@ def elsewhere(after: str, *, before: str = "") -> str:
     return done.stdout
 
 
+@pytest.mark.costly
 def test_every_verb_and_all_but_the_walls_load_without_posix() -> None:
     heavy = ("torch", "cuda", "casadi")  # libraries that ask the system themselves
     printed = elsewhere(

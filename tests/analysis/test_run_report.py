@@ -55,6 +55,7 @@ def test_a_report_needs_nothing_else(run: Path) -> None:
     assert len(text) < 2_000_000
 
 
+@pytest.mark.costly
 def test_a_run_that_was_never_trained_has_a_report_too(run: Path, tmp_path: Path) -> None:
     metadata = RunFolder(run).read_model_metadata()
     settings = make_settings(metadata=metadata, track="oval")

@@ -45,6 +45,7 @@ def stamp(run: RunFolder) -> str:
     return found.name.removeprefix("evaluation-")
 
 
+@pytest.mark.costly
 def test_the_page_needs_nothing_else_and_runs_nothing_else(run: RunFolder, stamp: str) -> None:
     text = share(run, stamp)
     assert re.search(r"\ssrc=", text) is None

@@ -44,6 +44,7 @@ def test_a_benchmark_alone_gives_its_figures_below_the_machines_limit(name: str)
         assert limit["what"]
 
 
+@pytest.mark.costly
 def test_walls_are_measured_beside_none(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Confinement] = []
 
@@ -66,6 +67,7 @@ def test_memory_of_a_car_is_below_25_kilobytes() -> None:
     assert suite.bytes_per_car(suite.load_track(suite.TRACK)) < 25_000
 
 
+@pytest.mark.costly
 def test_the_machine_names_no_person_or_host() -> None:
     import getpass
     import socket

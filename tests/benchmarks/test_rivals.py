@@ -28,6 +28,7 @@ def measure(name, seconds, *options):
     return json.loads(process.stdout.splitlines()[-1])
 
 
+@pytest.mark.costly
 def test_carracing():
     pytest.importorskip("pygame")
     if importlib.util.find_spec("Box2D") is None:

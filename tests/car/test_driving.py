@@ -119,6 +119,7 @@ def test_the_evaluation_drives_what_the_car_makes_of_it_and_says_so(run: Path) -
     assert verify(read_replay(outcome.files["replay"])).is_genuine
 
 
+@pytest.mark.costly
 def test_the_camera_has_the_look_that_the_run_was_trained_with(tmp_path: Path) -> None:
     run = trained(tmp_path, name="later", camera="2026")
     outcome = evaluate_as_car(run, laps=1, num_trials=1, max_resets=0, video=False, num_threads=1)

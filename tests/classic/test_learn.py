@@ -90,6 +90,7 @@ def test_what_was_learned_is_saved_and_goes_on(algorithm: str, tmp_path: Path) -
     assert load(folder)[2] == more.steps
 
 
+@pytest.mark.costly
 def test_it_ends_when_it_should() -> None:
     easy = short("q-table", until="5 return or 50000 steps", settings={})
     assert (easy.reason, easy.steps) == ("return", 50_000) or easy.steps < 50_000

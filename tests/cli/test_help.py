@@ -95,6 +95,7 @@ def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:
 HEAVY = ("torch", "gymnasium", "scipy", "shapely", "PIL", "av", "tensorboard")
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     ("arguments", "absent"),
     [

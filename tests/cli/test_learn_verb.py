@@ -44,6 +44,7 @@ def test_for_people_it_prints_lines_and_where_the_run_is(racecraft: Run) -> None
     assert outcome.err.count("\n") == 2
 
 
+@pytest.mark.costly
 def test_it_films_what_was_learned(racecraft: Run, tmp_path: Path) -> None:
     short = ("--until", "640 steps", "--make", "max_episode_steps=60")
     outcome = racecraft("learn", "Racecraft-v0", *short, "--name", "a", "--watch", "--json")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from command_line import Run
 from PIL import Image
 
@@ -28,6 +29,7 @@ def test_as_json(racecraft: Run) -> None:
     assert {"offset_m", "heading_rad", "offset_error_m", "heading_error_rad"} <= one.keys()
 
 
+@pytest.mark.costly
 def test_a_run_by_its_last_evaluation(racecraft: Run, trained: Path) -> None:
     short = ("-l", "1", "--trials", "1", "--max-resets", "0", "--no-video")
     assert racecraft("evaluate", str(trained), *short).status == 0
@@ -39,6 +41,7 @@ def test_a_run_by_its_last_evaluation(racecraft: Run, trained: Path) -> None:
     assert pictures[0]["middle"][1] is not None
 
 
+@pytest.mark.costly
 def test_learning(racecraft: Run) -> None:
     learn = ("--train", "w.safetensors", "--updates", "2", "--roads", "1", "--store", "256", "--seed", "3")
     document = racecraft("perceive", *learn, "--json").document

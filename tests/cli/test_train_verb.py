@@ -40,6 +40,7 @@ def test_train_against_itself_and_against_the_run_that_came_of_it(racecraft: Run
     assert json.loads(Path(bots.document["run"], "run.json").read_text())["settings"]["objects"]["bots"]["count"] == 2
 
 
+@pytest.mark.costly
 def test_train_tells_people_how_it_goes_and_how_to_go_on(racecraft: Run) -> None:
     outcome = racecraft("train", *SMALL, "--until", "1024 steps", "--name", "mine")
     assert outcome.status == 0

@@ -41,6 +41,7 @@ def race(models: list[Any], root: Path, **settings: Any):
     return race_models(models, root=root, **given)
 
 
+@pytest.mark.costly
 def test_a_race_writes_results_replays_and_sim_traces(models: list[Path], tmp_path: Path) -> None:
     found = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=5)
     document = json.loads((found.folder / "race.json").read_text())

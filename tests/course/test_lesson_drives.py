@@ -18,6 +18,7 @@ def driven() -> dict[str, Drives]:
     }
 
 
+@pytest.mark.costly
 def test_habits(driven: dict[str, Drives]) -> None:
     speeds = {name: float(np.nanmean(one.speed[8:])) for name, one in driven.items()}
     assert speeds["slow"] == pytest.approx(0.5, abs=0.1)

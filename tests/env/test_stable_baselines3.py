@@ -20,6 +20,7 @@ def test_its_checker_has_nothing_to_say(observation, action_space):
         check_env(env)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     ("policy", "observation"),
     [("CnnPolicy", "camera"), ("MlpPolicy", "state"), ("MultiInputPolicy", "both")],

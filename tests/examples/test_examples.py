@@ -48,6 +48,7 @@ def test_the_gymnasium_loop_drives_one_car_and_many():
     assert "episode 0: off_track" in printed
 
 
+@pytest.mark.costly
 def test_the_custom_reward_is_tried_and_driven():
     printed = run("custom_reward/try_reward.py", "--steps", "5", "--track", "oval")
     assert printed.count("reward") == 5

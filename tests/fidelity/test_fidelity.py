@@ -65,6 +65,7 @@ def test_the_car_on_runs_that_the_fit_never_saw():
     assert all(error < bar for error, bar in zip(turns, (3.0, 5.0, 6.5), strict=True))
 
 
+@pytest.mark.costly
 def test_the_car_of_2022():
     found = replay(OLDER, track=str(ROUTE), vehicle="v4").to_dict()
     assert all(error < bar for error, bar in zip(medians(found), (2.5, 5.5, 9.0), strict=True))

@@ -19,6 +19,8 @@ from racecraft.sim.camera import CameraSpec
 from racecraft.sim.views import Scene
 from racecraft.track import load_track
 
+pytestmark = pytest.mark.costly
+
 SHARED = Path(__file__).parents[3] / "shared"
 ROUTE = SHARED / "tracks" / "reinvent_base.npy"
 FRAMES = [SHARED / "frames" / f"frame_{number}.png" for number in (1, 2)]

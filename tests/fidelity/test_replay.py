@@ -323,6 +323,7 @@ def test_picture(lines, tmp_path):
         draw_comparison(replay(write(tmp_path / "b.csv", lines[:10]), track="oval"), tmp_path / "b.png")
 
 
+@pytest.mark.costly
 def test_the_verbs(lines, tmp_path, monkeypatch):
     from typer.testing import CliRunner
 

@@ -191,6 +191,7 @@ def test_advantages_are_those_of_the_reference():
     np.testing.assert_allclose(ppo._advantages.view(44, 16), normal, rtol=1e-3, atol=1e-3)
 
 
+@pytest.mark.costly
 def test_training_goes_on_from_its_state():
     first, _ = open_ppo()
     for _ in range(2):

@@ -85,6 +85,7 @@ def _native_width() -> int:
     return len(_native.ROW_COLUMNS)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("source", ["python", *TRANSLATED])
 def test_translation_and_interpreter_agree(source, device, rows):
     text = PYTHON if source == "python" else (PRESETS / f"{source}.py").read_text()

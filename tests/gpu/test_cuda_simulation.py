@@ -90,6 +90,7 @@ def test_kernels_and_engine_give_the_same_bits(name, device):
     assert kernels.save().tobytes() == engine.save().tobytes()
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", ["bots", "randomised", "camera of 2026"])
 def test_states_go_from_one_to_the_other(name, device):
     kernels, engine = pair(name, device, cars=9)
@@ -130,6 +131,7 @@ def test_only_frames_that_changed_are_drawn():
     assert (kernels.frames[0] != 7).any()
 
 
+@pytest.mark.costly
 def test_wrong_arguments_are_refused():
     kernels, _ = pair("no camera", cars=3)
     with pytest.raises(ShapeError, match=r"action is float32 of shape \(2, 2\)"):

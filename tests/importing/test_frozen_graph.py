@@ -102,6 +102,7 @@ def test_a_hostile_graph_is_one_sentence(data: bytes, says: str, tmp_path: Path)
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.costly
 @pytest.mark.skipif(not AWS_MODEL.is_dir(), reason="the models are not in the repository")
 def test_awss_networks_began_with_glorot_weights() -> None:
     """After thirty iterations most weights are about where they began; orthogonal ones of conv1 are six times those."""

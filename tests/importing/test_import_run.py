@@ -19,6 +19,7 @@ from racecraft.training.start import read_settings
 SHARED = Path(__file__).parents[3] / "shared"
 
 
+@pytest.mark.costly
 def test_a_virtual_model_gives_the_same_run_from_a_folder_and_from_archives(tmp_path: Path) -> None:
     files = {**models.MODEL, **models.HISTORY, **models.WEIGHTS, "mp4/camera-pip/0-video.mp4": "film"}
     sources = [

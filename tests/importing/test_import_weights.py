@@ -77,6 +77,7 @@ def imported(path: Path, **options: str) -> tuple[str, list[str]]:
     return (store.load().metadata["origin"]["file"] if store.entries() else "", found.notes)
 
 
+@pytest.mark.costly
 def test_best_last_a_named_one_or_none(tmp_path: Path) -> None:
     index = {"best_checkpoint": {"name": "7_Step-70.ckpt"}, "last_checkpoint": {"name": "9_Step-90.ckpt"}}
     files = {

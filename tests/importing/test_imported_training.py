@@ -15,6 +15,7 @@ from racecraft.race.policy import load_policy
 from racecraft.run import RunFolder
 
 
+@pytest.mark.costly
 def test_the_printed_command_trains_and_evaluation_follows_the_rules(tmp_path: Path) -> None:
     env = models.DRFC["run.env"] + "DR_EVAL_NUMBER_OF_TRIALS=1\nDR_EVAL_MAX_RESETS=1\nDR_EVAL_OFF_TRACK_PENALTY=0.5\n"
     files = {name: text for name, text in models.DRFC.items() if "hyperparameters" not in name}

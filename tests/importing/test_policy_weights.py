@@ -109,6 +109,7 @@ def test_our_network_answers_as_a_large_graph(model: AwsModel, tmp_path: Path) -
     check(model, tmp_path)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("kind", ["discrete", "continuous", "sac"])
 def test_a_checkpoint_says_what_the_graph_does_and_more(kind: str, tmp_path: Path) -> None:
     model = AwsModel(DEEP, kind=kind)

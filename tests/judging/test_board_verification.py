@@ -193,6 +193,7 @@ def test_a_replay_of_another_seed_or_by_other_rules_is_none_of_this_race(
         assert [one.name for one in found.rows if words in one.foul] == ["Ada"], [one.foul for one in found.rows]
 
 
+@pytest.mark.costly
 def test_another_promise_and_what_is_not_over(publish: Callable[..., str]) -> None:
     found = verify_board(publish(), commitment="0" * 64, num_threads=1)
     assert f"and {'0' * 64} was promised" in found.foul

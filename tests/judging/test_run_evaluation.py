@@ -40,6 +40,7 @@ def test_it_evaluates_as_it_was_trained(tmp_path: Path) -> None:
     assert best[0] == found.to_dict()["mean_completion"]
 
 
+@pytest.mark.costly
 def test_a_run_learns_and_is_evaluated_and_filmed_with_its_camera(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -66,6 +67,7 @@ def test_a_run_learns_and_is_evaluated_and_filmed_with_its_camera(
         evaluate(run, **QUICK)
 
 
+@pytest.mark.costly
 def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path: Path) -> None:
     run = trained(tmp_path)
     first, again = evaluate(run, **QUICK, seed=3), evaluate(run, **QUICK, seed=3)

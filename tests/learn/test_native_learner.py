@@ -95,6 +95,7 @@ def test_forward_agrees_with_numpy(name):
     np.testing.assert_allclose(learner.values(observations, np.zeros((3, 0), np.float32)), critic[:, 0], atol=2e-5)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("spec", BRANCHES, ids=name_of)
 def test_every_branch_agrees_with_numpy_and_torch(spec):
     native = NativeLearner(spec, seed=None, num_threads=2)
@@ -162,6 +163,7 @@ def test_gradient_of_the_small_network_is_exact(is_discrete, state_size, value_l
     assert_exact_gradient(spec, size=size, value_loss=value_loss)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", MARKED[1:])
 @pytest.mark.parametrize(("is_discrete", "state_size"), HEADS)
 def test_gradient_of_aws_networks_is_exact(name, is_discrete, state_size):

@@ -59,6 +59,7 @@ def test_learns_from_rewards_of_any_scale():
     assert stats[-1].explained_variance > 0.5
 
 
+@pytest.mark.costly
 def test_the_step_size_falls_with_the_steps_driven(config):
     config = dataclasses.replace(config, rate_steps=2 * config.num_envs * config.num_steps)
     ppo = ppo_for(config)
@@ -348,6 +349,7 @@ def test_advantages_are_normalized_over_the_rollout(config):
     assert everything.std() == pytest.approx(1, abs=1e-4)
 
 
+@pytest.mark.costly
 def test_e_greedy_falls_from_all_random_to_its_end(config):
     config = dataclasses.replace(
         config,

@@ -97,6 +97,7 @@ def test_the_same_seed_gives_the_same_weights_and_a_resumed_run_has_them() -> No
         third.load_state({n: a for n, a in state.items() if "conv1" not in n})
 
 
+@pytest.mark.costly
 def test_what_drives_is_the_actors_mean_squashed() -> None:
     sac = make()
     frames = StripeWorld(8).observe()[0]
@@ -233,6 +234,7 @@ def test_a_sample_is_whole_however_few_steps_can_be_drawn_and_none_where_there_i
         assert (found.rewards == 0).all()
 
 
+@pytest.mark.costly
 def test_gradient_steps_flush_subnormals_and_nothing_else_does() -> None:
     from racecraft.learn.torch_subnormals import subnormals_flushed
 

@@ -23,6 +23,7 @@ def setting(name: str, *, is_discrete: bool = True) -> tuple[NetworkSpec, dict[s
     return spec, weights, frame
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", NETWORKS)
 @pytest.mark.parametrize("is_discrete", [True, False])
 def test_the_forward_pass_is_the_learners(name: str, is_discrete: bool) -> None:
@@ -35,6 +36,7 @@ def test_the_forward_pass_is_the_learners(name: str, is_discrete: bool) -> None:
     assert found.target == (int(found.outputs.argmax()) if is_discrete else 0)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", NETWORKS)
 def test_the_picture_is_that_of_torch(name: str) -> None:
     torch = pytest.importorskip("torch")

@@ -48,6 +48,7 @@ def test_what_is_published_is_what_the_library_would_drive(name: str) -> None:
     np.testing.assert_allclose(ours, np.clip(theirs, -1, 3), atol=2e-5)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", SB3_ALGORITHMS)
 def test_it_resumes_with_its_weights_and_optimisers(name: str) -> None:
     first, second = make(name), make(name, seed=5)

@@ -28,6 +28,7 @@ def ring(radius: float, width: float = 1.0) -> Track:
     return Track("ring", *lines)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", ["v4", "v5", "v6"])
 def test_the_symbolic_car_is_the_simulators(name: str) -> None:
     ca, car = load_casadi(), load_vehicle(name)

@@ -19,6 +19,8 @@ from racecraft.race.autopilot import Autopilot
 from racecraft.sim import Simulation, Start
 from racecraft.track import load_tracks
 
+pytestmark = pytest.mark.costly
+
 FLOOR = Path(__file__).parents[3] / "shared" / "frames" / "car"
 TOLD = (60, 75, 90, 105)
 

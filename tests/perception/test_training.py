@@ -13,6 +13,8 @@ from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGET
 from racecraft.perception.network import MAX_WEIGHTS, WEIGHTS
 from racecraft.perception.training import slopes_of
 
+pytestmark = pytest.mark.costly
+
 FEW = Lessons(updates=60, minibatch_size=32, store=1024, roads=2, learning_rate=1e-3)
 
 

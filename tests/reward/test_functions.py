@@ -72,6 +72,7 @@ def test_it_is_accepted(path: Path):
     assert [problem for problem in check_reward(source_of(path)) if problem.severity == "error"] == []
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("path", FUNCTIONS, ids=lambda path: path.stem)
 def test_it_drives_and_remembers_as_in_a_process_per_car(path: Path, tracks: list[Track], steps: list[np.ndarray]):
     source = source_of(path)

@@ -77,6 +77,7 @@ def test_a_worker_that_takes_no_requests_does_not_block_the_trainer(track):
             ring_for_ever(worker)
 
 
+@pytest.mark.costly
 def test_progress_that_is_none_ends(track, rows, monkeypatch):
     """The first reward that is missing, now here, now there: every look finds another number of rows done, for ever."""
     monkeypatch.setattr(worker_module, "PATIENCE", 1.0)  # as it sleeps between looks

@@ -43,6 +43,7 @@ LATE = {
 }
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", LATE)
 def test_what_is_loaded_late_is_there(track, rows, name):
     top = "from numpy import *\n" if name == "everything of numpy" else ""

@@ -92,6 +92,7 @@ def test_the_row_at_fault_is_named(track, rows):
     assert caught.value.params["x"] == 4099.0
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     ("body", "line"),
     [
@@ -121,6 +122,7 @@ def test_a_busy_loop_is_ended_by_the_time_it_had_a_core(track, rows, monkeypatch
     assert time.perf_counter() - start < 45.0
 
 
+@pytest.mark.costly
 def test_a_worker_that_gets_no_core_is_waited_for(track, rows):
     """A busy machine is no fault of the function: here its process stands still for three times its limit."""
     with running(function("return 1.0"), track, timeout_s=0.3) as worker:
@@ -133,6 +135,7 @@ def test_a_worker_that_gets_no_core_is_waited_for(track, rows):
             wake.join()
 
 
+@pytest.mark.costly
 def test_the_time_limit_is_for_one_call_and_not_for_the_batch(track, rows):
     source = function("import time", "time.sleep(0.12)", "return 1.0")
     with running(source, track, timeout_s=1.0) as worker:  # ten calls take longer; the machine may be busy

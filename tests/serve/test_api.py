@@ -30,6 +30,7 @@ def error(reply: httpx.Response, status: int) -> dict[str, Any]:
     return dict(document["error"])
 
 
+@pytest.mark.costly
 def test_what_the_console_offers(console: RunningConsole) -> None:
     client = console.client
     assert client.get("/api/console").json()["runs"] == str(console.runs)
@@ -45,6 +46,7 @@ def test_what_the_console_offers(console: RunningConsole) -> None:
     assert client.get("/api/openapi.json").json()["paths"]["/api/models"]
 
 
+@pytest.mark.costly
 def test_a_reward_is_checked_and_painted(console: RunningConsole) -> None:
     client = console.client
     verdict = client.post("/api/rewards/check", json={"source": GATE, "track": "oval"}).json()
@@ -70,6 +72,7 @@ def test_every_preset_has_a_picture(console: RunningConsole) -> None:
     assert all([len(across) for across in paid] == grid for paid in pictures["rewards"].values())
 
 
+@pytest.mark.costly
 def test_from_a_click_to_a_race(console: RunningConsole) -> None:
     client = console.client
     name = console.create(name="first", until="2000 steps", tags=["mine"])
@@ -122,6 +125,7 @@ def test_from_a_click_to_a_race(console: RunningConsole) -> None:
     assert client.get("/api/models").json()[0]["picture"] == card["picture"]
 
 
+@pytest.mark.costly
 def test_a_training_is_stopped_and_goes_on(console: RunningConsole) -> None:
     client = console.client
     name = console.create(name="long", until="10 minutes")
@@ -241,6 +245,7 @@ def test_runs_of_the_command_line_appear(console: RunningConsole) -> None:
     assert console.client.get("/api/models/from-the-shell").json()["track"] == "oval"
 
 
+@pytest.mark.costly
 def test_the_garage_of_many_runs_is_read_once(console: RunningConsole) -> None:
     for number in range(20):
         console.create(name=f"many-{number}", train=False)
@@ -249,6 +254,7 @@ def test_the_garage_of_many_runs_is_read_once(console: RunningConsole) -> None:
     assert console.client.get("/api/models").json() == first
 
 
+@pytest.mark.costly
 def test_two_who_look_at_new_models_at_the_same_time(console: RunningConsole) -> None:
     for number in range(20):
         shutil.copytree(console.runs / "many-0", console.runs / f"twin-{number}")
@@ -325,6 +331,7 @@ def test_a_model_in_use_is_not_moved_away(console: RunningConsole) -> None:
     assert ended["state"] == "failed"
 
 
+@pytest.mark.costly
 def test_models_that_nobody_named_have_names_of_their_own_that_one_can_say(console: RunningConsole) -> None:
     with ThreadPoolExecutor(4) as pool:
         names = list(pool.map(lambda _: console.create(track="oval", train=False), range(8)))

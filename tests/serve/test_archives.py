@@ -18,6 +18,8 @@ from running_consoles import RunningConsole
 from racecraft.importing import import_run
 from racecraft.run import RunFolder, archive_chunks
 
+pytestmark = pytest.mark.costly
+
 REWARD = "def reward_function(params):\n    return float(params['progress'])\n"
 METADATA = {
     "action_space": [{"steering_angle": angle, "speed": 1.0, "index": i} for i, angle in enumerate((-30, 0, 30))],

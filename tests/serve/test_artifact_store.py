@@ -101,6 +101,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files if not path.name.startswith(".")}
 
 
+@pytest.mark.costly
 def test_a_run_comes_back_as_it_was(tmp_path: Path, url: str) -> None:
     store, folder = Artifacts(url), make_run(tmp_path / "runs")
     assert store.names() == []

@@ -11,6 +11,8 @@ from running_consoles import RunningConsole
 
 from racecraft.replay import read_replay, verify
 
+pytestmark = pytest.mark.costly
+
 
 @pytest.fixture(scope="module")
 def cars(console: RunningConsole) -> list[dict[str, str]]:

@@ -24,6 +24,8 @@ from test_encryption import free_port
 
 from racecraft.serve.settings import ServeSettings
 
+pytestmark = pytest.mark.costly
+
 DEPLOY = Path(__file__).parents[2] / "deploy"
 CADDY = shutil.which("caddy")
 FORGED = "203.0.113.5"

@@ -7,6 +7,7 @@ import pytest
 from running_consoles import RunningConsole
 
 
+@pytest.mark.costly
 def test_the_link_works_once(console: RunningConsole) -> None:
     with httpx.Client(base_url=console.client.base_url) as stranger:
         assert stranger.get(console.link).status_code == 303

@@ -45,6 +45,7 @@ def lap(console: RunningConsole, drive: dict[str, Any], track: Track, *, speed: 
     raise AssertionError("never came round")
 
 
+@pytest.mark.costly
 def test_laps_are_timed_and_the_fastest_is_ones_ghost(console: RunningConsole) -> None:
     client, track = console.client, load_track("oval")
     assert client.get("/api/ghosts", params={"track": "oval"}).json() == []

@@ -19,6 +19,8 @@ from racecraft.errors import ConfigError
 from racecraft.serve.server import serve
 from racecraft.serve.settings import ServeSettings
 
+pytestmark = pytest.mark.costly
+
 ADDRESS = "https://school.example"
 PROXY = {"host": "school.example", "x-forwarded-proto": "https", "x-forwarded-for": "203.0.113.9"}
 

@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src/racecraft"
 GERMAN = ROOT / "web/src/i18n/de/errors.json"
@@ -90,6 +92,7 @@ def test_what_is_filled_in_is_filled_in_there_too() -> None:
         assert german.strip()
 
 
+@pytest.mark.costly
 def test_nothing_is_translated_that_nobody_says() -> None:
     """What stands between the gaps stands in the sources, if it is not put together of pieces or Pydantic's."""
     trees = [ast.parse(path.read_text()) for path in SOURCES.rglob("*.py")]

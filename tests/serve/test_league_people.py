@@ -25,6 +25,8 @@ from racecraft.serve.people.names import checked_name, handle_of
 from racecraft.serve.problems import NotFound, NotLetIn, TooMany
 from racecraft.serve.settings import ServeSettings
 
+pytestmark = pytest.mark.costly
+
 
 @pytest.fixture(scope="module")
 def league(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningLeague]:

@@ -35,6 +35,8 @@ from racecraft.serve.submissions.bench import Bench
 from racecraft.serve.submissions.board import AROUND, read_board
 from racecraft.track import load_track
 
+pytestmark = pytest.mark.costly
+
 CUP: dict[str, Any] = {"title": "Cup", "track": "oval", "laps": 1, "trials": 2, "max_resets": 1}
 
 

@@ -13,6 +13,7 @@ from racecraft.serve.machine import machine
 from racecraft.serve.settings import ServeSettings
 
 
+@pytest.mark.costly
 def test_folders_storage_devices_and_the_sandbox(console: RunningConsole) -> None:
     found = console.client.get("/api/console/machine").json()
     assert found["runs"] == str(console.runs)

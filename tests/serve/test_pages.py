@@ -71,6 +71,7 @@ def test_the_first_page_is_light_and_loads_nothing_from_elsewhere() -> None:
     assert sum(sizes) < 200_000
 
 
+@pytest.mark.costly
 @needs_pages
 def test_scripts_are_sent_as_small_as_a_browser_takes_them(console: RunningConsole) -> None:
     import gzip

@@ -15,6 +15,8 @@ from racecraft.race.announcement import commitment_of, seed_of
 from racecraft.replay import read_replay, verify
 from racecraft.sim.vehicle import PRESETS
 
+pytestmark = pytest.mark.costly
+
 
 def refused(reply: httpx.Response, status: int) -> dict[str, Any]:
     assert reply.status_code == status, reply.text

@@ -36,6 +36,7 @@ def standby(settings: ServeSettings) -> Iterator[Standby]:
     standby.close()
 
 
+@pytest.mark.costly
 def test_the_waiting_worker_does_the_next_job(settings: ServeSettings, standby: Standby) -> None:
     database = Database(settings.database_url)
     database.migrate()
@@ -104,6 +105,7 @@ def test_it_holds_its_lock_from_its_first_moment_to_its_last(settings: ServeSett
         pass
 
 
+@pytest.mark.costly
 def test_without_a_server_nobody_waits(standby: Standby) -> None:
     standby.prepare()
     worker, standby._waiting = standby._waiting, None
@@ -113,6 +115,7 @@ def test_without_a_server_nobody_waits(standby: Standby) -> None:
     assert worker.wait(PATIENCE) == 0
 
 
+@pytest.mark.costly
 def test_a_worker_does_not_load_the_server() -> None:
     said = "import sys; from racecraft.serve.jobs.worker import load; load(); sys.exit('fastapi' in sys.modules)"
     subprocess.run([sys.executable, "-c", said], check=True)

@@ -15,6 +15,8 @@ from typing import Any
 import pytest
 from running_consoles import RunningConsole
 
+pytestmark = pytest.mark.costly
+
 
 @pytest.fixture(scope="module")
 def training(console: RunningConsole) -> Iterator[str]:

@@ -8,6 +8,8 @@ import pytest
 from browsers import needs_axe, needs_browser, needs_pages, visiting
 from running_consoles import RunningConsole
 
+pytestmark = pytest.mark.costly
+
 TEXT = """
 seeds = [1, 2]
 [all]

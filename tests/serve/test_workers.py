@@ -165,6 +165,7 @@ def test_races_and_searches_and_own_tracks_travel_too(place: Place) -> None:
         assert Artifacts(place.artifacts).shelf(shelf).names() == []
 
 
+@pytest.mark.costly
 def test_a_guests_training_on_an_own_track_against_another_run_travels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -283,6 +284,7 @@ def _rights() -> list[str]:
 RIGHTS = _rights()
 
 
+@pytest.mark.costly
 def test_two_machines_never_work_on_one_run(postgres: PostgresServer) -> None:
     database = Database(postgres.new_database())
     database.migrate()

@@ -56,6 +56,7 @@ def test_on_an_open_road_the_last_one_starts_at_its_beginning():
     )
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", track_names())
 def test_nobody_starts_on_anything(name):
     track = load_track(name)

@@ -27,6 +27,7 @@ numbers = { learning_rate = 0.002 }
 """
 
 
+@pytest.mark.costly
 def test_its_runs_are_those_that_each_would_be_alone(tmp_path: Path) -> None:
     sweep = make_sweep(read_sweep(FILE), runs=tmp_path, name="s")
     assert sweep_names(tmp_path) == ["s"]
@@ -49,6 +50,7 @@ def test_its_runs_are_those_that_each_would_be_alone(tmp_path: Path) -> None:
             np.testing.assert_array_equal(value, again, err_msg=name)
 
 
+@pytest.mark.costly
 def test_it_goes_on_where_it_was_and_says_what_cannot_be_trained(tmp_path: Path) -> None:
     sweep = make_sweep(read_sweep(FILE), runs=tmp_path, name="s")
 

@@ -29,6 +29,7 @@ def test_three_hundred_seeds_are_valid_and_all_different() -> None:
     assert len(digests) == 300
 
 
+@pytest.mark.costly
 @given(
     seed=st.integers(0, 2**63 - 1),
     width=st.floats(0.5, 2.0),

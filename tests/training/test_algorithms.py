@@ -32,6 +32,7 @@ TINY_DISTILL = DistillConfig(
 SHORT: dict[str, Any] = {"until": "96 steps", "evaluate_every": 64}
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     "algorithm",
     [

@@ -50,6 +50,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_reward_that_fails_late_stops_with_line_and_params(
     tiny: Train, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str
@@ -151,6 +152,7 @@ def test_a_full_disk_at_a_checkpoint_leaves_the_ones_before(
     assert_same(run, tiny().run)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("log", ["metrics", "sim-trace"])
 def test_a_full_disk_at_a_log_is_one_clear_error(
     tiny: Train, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: str

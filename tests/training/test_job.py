@@ -128,6 +128,7 @@ def test_a_limit_of_steps(tiny: Train) -> None:
     assert (result.reason, result.steps) == ("steps", 128)  # whole iterations
 
 
+@pytest.mark.costly
 def test_a_limit_of_seconds(tiny: Train) -> None:
     recorder = Recorder()
     result = tiny(until="1 s", reporter=recorder)

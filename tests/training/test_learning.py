@@ -20,6 +20,7 @@ from racecraft.training import Opponents, resume
 BUDGET = 60_000  # camera steps; about 8,000 are usual
 
 
+@pytest.mark.costly
 def test_a_car_learns_five_of_five_laps_of_the_oval(tmp_path: Path) -> None:
     recorder = Recorder()
     result = train("oval", until=f"5 laps or {BUDGET} steps", seed=1, root=tmp_path, reporter=recorder)

@@ -31,6 +31,7 @@ def test_a_recipe_that_does_not_exist() -> None:
     assert "everywhere" in caught.value.hint
 
 
+@pytest.mark.costly
 def test_the_command_trains_with_what_the_recipe_says(tmp_path: Path) -> None:
     command = ["train", "--recipe", "everywhere", "--track", "oval", "--track", "kidney", "--direction", "forward"]
     done = CliRunner().invoke(

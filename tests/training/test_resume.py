@@ -211,6 +211,7 @@ def _flip(path: Path) -> None:
     path.write_bytes(data)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("damage", [_flip, Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:1000])])
 def test_a_damaged_last_checkpoint_falls_back_to_the_one_before(tiny: Train, damage: Any) -> None:
     undisturbed = tiny().run

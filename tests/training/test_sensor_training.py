@@ -39,6 +39,7 @@ def test_every_combination_trains_and_drives(tiny: Train, tmp_path: Path, names:
     assert (spec.lenses, spec.lidar_size) == (policy.sensors.lenses, policy.sensors.lidar_size)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("randomize", ["none", "light"])
 def test_a_run_with_two_lenses_and_a_lidar_resumes_to_the_same_bits(
     tiny: Train, tmp_path: Path, randomize: str

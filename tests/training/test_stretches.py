@@ -66,6 +66,7 @@ def test_a_stretch_that_trained_nothing_is_forgotten(tiny: Train) -> None:
     assert len(read_stretches(folder)) == 1
 
 
+@pytest.mark.costly
 def test_what_was_driven_before_a_change_does_not_end_what_comes_after(tmp_path: Path) -> None:
     result = train("oval", reward="racing", until="1 laps or 60000 steps", seed=1, num_threads=1, root=tmp_path)
     assert result.reason == "laps"
@@ -99,6 +100,7 @@ def test_a_run_of_an_earlier_version_has_one_stretch_and_keeps_it(tiny: Train) -
     ]
 
 
+@pytest.mark.costly
 def test_stretches_travel_in_an_archive_and_damaged_ones_are_told(tiny: Train, tmp_path: Path) -> None:
     folder = RunFolder.open(tiny().run)
     change_reward(folder, OTHER)

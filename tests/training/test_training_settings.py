@@ -299,6 +299,7 @@ def test_a_training_of_few_steps_has_a_teacher_of_few() -> None:
     assert teacher_steps("1000 steps", distill=DistillConfig(teacher_steps=9)) == 9
 
 
+@pytest.mark.costly
 def test_a_child_of_a_taught_model_among_objects_has_a_teacher_and_no_lessons(tmp_path: Path) -> None:
     boxes = Objects(obstacles=Obstacles(count=2))
     settings: dict[str, Any] = {"objects": boxes, "num_envs": 8, "evaluation_trials": 1, "num_threads": 1}

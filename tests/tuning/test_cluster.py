@@ -44,6 +44,7 @@ def same(one: RunFolder, other: RunFolder) -> None:
             np.testing.assert_array_equal(second[name], value, err_msg=f"{one.name} {name}")
 
 
+@pytest.mark.costly
 def test_a_node_needs_nothing_but_what_it_is_sent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RACECRAFT_MOVED", "")  # which is put back
     text = FILE.replace("[1, 2, 3]", "[1]").replace("TRACK", own_track(tmp_path / "tracks"))

@@ -186,6 +186,7 @@ def test_trials_begin_with_a_parents_weights_and_awss_numbers(tmp_path: Path, mo
         Tuning(folder)
 
 
+@pytest.mark.costly
 def test_a_trial_that_lags_behind_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(record, "bars", lambda *_: (0.0, 0.5))  # nobody is that far after 128 steps
     outcome = Tuning(begin(tmp_path, trial_steps=10**6)).run(minutes=5, max_trials=2)

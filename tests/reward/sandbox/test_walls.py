@@ -284,6 +284,7 @@ def test_bubblewrap_hides_the_file_system(track, rows, tmp_path):
     assert answer(track, rows, NO_WALLS, f"libc.access({bytes(tmp_path)!r}, 0)") == 0
 
 
+@pytest.mark.costly
 @bubbles
 @pytest.mark.parametrize(
     ("body", "text", "line"),
