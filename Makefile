@@ -6,6 +6,9 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do command 
 VENV := .venv
 BIN := $(VENV)/bin
 UV := $(BIN)/uv
+# pip comes with Python; uv, which is faster, is there where more than the main job was asked for.
+# One at a time, as targets are made side by side.
+INSTALL = $$(test -x $(UV) && echo $(UV) pip install -q --python $(BIN)/python || echo $(BIN)/python -m pip install -q --disable-pip-version-check)
 # A file of tests stays in one process, with what its tests share; tests/conftest.py puts the long files first. One process
 # more than there are cores: tests wait for servers, browsers and deadlines a third of their time.
 WORKERS = $(shell $(BIN)/python -c 'import os; print(1 + (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1))')
@@ -15,6 +18,11 @@ NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hp
 PAGES := src/racecraft/serve/pages/index.html
 NODE := web/node_modules/.package-lock.json
 WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/* web/src/*/*/*)
+
+# CMake and Ninja: the system's where it has both, otherwise PyPI's, in a folder of their own that only compiling needs.
+TOOLS := $(shell cmake --version 2>/dev/null | awk '/^cmake version/ { split($$3, v, "."); if (v[1] > 3 || v[2] >= 20) found = 1 } END { exit !found }' \
+	&& command -v ninja >/dev/null || echo build/tools/bin/ninja)
+BUILD_PATH = $$PATH:$(CURDIR)/$(BIN):$(CURDIR)/build/tools/cmake/data/bin:$(CURDIR)/build/tools/bin
 
 # The compiler of WebAssembly, in a folder of its own: nothing else needs it.
 ZIG := build/zig/ziglang/zig
@@ -48,8 +56,8 @@ build/wasm/%.wasm: $(ZIG) FORCE
 
 FORCE:
 
-wheel: $(VENV)/.train $(PAGES)  ## build dist/: an sdist, and a wheel for this Python and machine with the console's pages inside
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(UV) build -q --sdist --wheel --python $(BIN)/python --no-build-isolation --out-dir dist
+wheel: $(UV) $(VENV)/.train $(TOOLS) $(PAGES)  ## build dist/: an sdist, and a wheel for this Python and machine with the console's pages inside
+	PATH="$(BUILD_PATH)" $(UV) build -q --sdist --wheel --python $(BIN)/python --no-build-isolation --out-dir dist
 
 test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every test, on every core
 	$(PYTEST) --durations=40
@@ -91,23 +99,33 @@ requirements: $(UV)  ## pin the newest allowed versions again
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header pyproject.toml requirements/build.in -o requirements/train.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/dev.in -o requirements/dev.txt
 	$(UV) pip compile -q --universal --python-version 3.11 --generate-hashes --no-header --extra serve --extra tune --extra multi -c requirements/dev.txt pyproject.toml -o requirements/serve.txt
+	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/tools.in -o requirements/tools.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/uv.in -o requirements/uv.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/site.in -o requirements/site.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/docs.in -o requirements/docs.txt
 	$(UV) pip compile -q --no-deps --universal --python-version 3.11 --generate-hashes --no-header requirements/transfer.in -o requirements/transfer.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/ray.in -o requirements/ray.txt
 
-$(UV): requirements/uv.txt
+$(VENV)/pyvenv.cfg:
 	@test -n "$(PYTHON)" || { echo "Racecraft needs Python 3.11 or newer; none was found on PATH."; exit 1; }
 	@echo "Set-up, once, in $(VENV): about a minute on two cores, three on slow ones."
 	@echo "1 of 3: an environment of its own for $$($(PYTHON) --version) ..."
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements/uv.txt
+	@$(BIN)/python -m pip uninstall -q -y setuptools 2>/dev/null || true  # which 3.11 brings and nothing here needs
+
+$(UV): requirements/uv.txt | $(VENV)/pyvenv.cfg
+	@flock $(VENV)/.build-lock $(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements/uv.txt
 	@touch $(UV)
 
-$(VENV)/.train: $(UV) requirements/train.txt
-	@echo "2 of 3: packages from PyPI, some 100 MB ..."
-	@$(UV) pip install -q --compile-bytecode --python $(BIN)/python --require-hashes -r requirements/train.txt
+# Without bytecode of what is not imported; the first run makes the rest.
+$(VENV)/.train: requirements/train.txt | $(VENV)/pyvenv.cfg
+	@echo "2 of 3: packages from PyPI, some 30 MB ..."
+	@flock $(VENV)/.build-lock $(SHELL) -c '$(INSTALL) $$(test -x $(UV) || echo --no-compile) --require-hashes -r requirements/train.txt'
+	@touch $@
+
+build/tools/bin/ninja: requirements/tools.txt | $(VENV)/pyvenv.cfg
+	@echo "CMake and Ninja from PyPI, some 30 MB, as this system has none that will do ..."
+	@$(BIN)/python -m pip install -q --disable-pip-version-check --upgrade --target build/tools --require-hashes -r requirements/tools.txt
 	@touch $@
 
 $(VENV)/.dev: $(UV) $(VENV)/.train requirements/dev.txt
@@ -151,8 +169,8 @@ $(PAGES): $(WEB) $(NODE)
 	@cd web && npm run --silent build
 	@touch $@
 
-$(VENV)/.built: $(VENV)/.train $(NATIVE)
+$(VENV)/.built: $(VENV)/.train $(TOOLS) $(NATIVE)
 	@echo "3 of 3: compiling the simulator and the learner: the longest part ..."
-	@PATH="$(CURDIR)/$(BIN):$$PATH" flock $(VENV)/.build-lock $(UV) pip install -q --python $(BIN)/python --no-build-isolation --no-deps -e .
+	@PATH="$(BUILD_PATH)" flock $(VENV)/.build-lock $(SHELL) -c '$(INSTALL) --no-build-isolation --no-deps -e .'
 	@$(BIN)/python -m compileall -q src/racecraft
 	@touch $@

@@ -10,6 +10,7 @@ from typing import Final
 from racecraft.errors import ConfigError
 
 EXTRAS: Final[dict[str, tuple[str, ...]]] = {
+    "video": ("av",),
     "limit": ("casadi", "scipy"),
     "compile": ("numba",),
     "torch": ("torch",),
@@ -17,7 +18,17 @@ EXTRAS: Final[dict[str, tuple[str, ...]]] = {
     "cuda": ("torch", "cuda-bindings"),
     "tune": ("optuna",),
     "ray": ("ray",),
-    "serve": ("fastapi", "uvicorn", "sse-starlette", "sqlalchemy", "alembic", "pwdlib[argon2]", "limits", "segno"),
+    "serve": (
+        "fastapi",
+        "uvicorn",
+        "sse-starlette",
+        "sqlalchemy",
+        "alembic",
+        "pwdlib[argon2]",
+        "limits",
+        "segno",
+        "av",
+    ),
     "postgres": ("psycopg[binary]",),
     "s3": ("obstore",),
     "multi": ("pettingzoo", "openskill"),

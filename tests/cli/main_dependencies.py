@@ -28,10 +28,10 @@ print(json.dumps(told))
 """Takes lists of arguments as JSON; prints the status and the words of each."""
 
 
-def main_packages() -> set[str]:
-    """Names of the distributions that racecraft needs without extras, and of all that those need."""
+def main_packages(*more: str) -> set[str]:
+    """Names of the distributions that racecraft needs without extras, and some more, and of all that those need."""
     found: set[str] = set()
-    waiting = ["racecraft"]
+    waiting = ["racecraft", *more]
     while waiting:
         name = waiting.pop()
         if name in found:

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -209,6 +210,17 @@ def test_a_module_of_no_extra_is_a_bug() -> None:
     assert ".venv/bin/pip install casadi scipy" in told.hint
 
 
+def test_the_environment_of_the_main_job_is_small() -> None:
+    """150 MB with bytecode of what is imported; docs/machine.md says what each package takes."""
+    needed = main_packages("pip", *(ROOT / "requirements/build.in").read_text().replace(">=", " ").split()[::2])
+    assert {"numpy", "nanobind", "scikit-build-core"} <= needed
+    size = {name: sum(file.size or 0 for file in metadata.files(name) or ()) for name in needed}
+    assert sum(size.values()) < 125e6, sorted(size.items(), key=lambda pair: -pair[1])[:5]
+    pinned = set(re.findall(r"^([\w.-]+)==", (ROOT / "requirements/train.txt").read_text(), flags=re.MULTILINE))
+    assert needed - {"racecraft", "pip"} <= pinned  # and nothing else but what other systems need
+    assert pinned - needed <= {"colorama"}
+
+
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str]]:
     """What every command said."""
@@ -261,14 +273,14 @@ def _run(words: list[list[str]], folder: Path, environment: dict[str, str]) -> l
 @pytest.mark.timeout(600)
 def test_only_the_main_dependencies_are_there(tmp_path: Path) -> None:
     link_main_packages(tmp_path)
-    assert {"numpy", "av", "typer"} <= main_packages()
+    assert {"numpy", "pillow", "typer"} <= main_packages()
     probe = "import sys\nfor name in sys.argv[1:]:\n    try: __import__(name)\n    except ImportError: print(name)"
-    names = ["numpy", "racecraft", "scipy", "torch", "casadi", "fastapi", "optuna"]
+    names = ["numpy", "racecraft", "scipy", "torch", "casadi", "fastapi", "optuna", "av"]
     done = subprocess.run(
         [sys.executable, "-S", "-c", probe, *names],
         env={**os.environ, "PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, timeout=60, check=True,
     )  # fmt: skip
-    assert done.stdout.split() == ["scipy", "torch", "casadi", "fastapi", "optuna"]
+    assert done.stdout.split() == ["scipy", "torch", "casadi", "fastapi", "optuna", "av"]
 
 
 @pytest.mark.slow

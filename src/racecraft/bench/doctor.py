@@ -119,10 +119,13 @@ def _learner() -> str:
 
 
 def _video() -> str:
+    from racecraft.film.encoding import AV1, encoder
+
+    if encoder() == AV1:
+        return "films are AV1, which browsers play, but few phones before 2023: with the package av they are H.264"
     import av
 
-    codec = av.codec.Codec("libx264", "w")
-    return f"H.264 encoder {codec.name} found"
+    return f"films are {encoder()}, by {av.codec.Codec('libx264', 'w').name}"
 
 
 def _disk() -> str:
@@ -138,6 +141,6 @@ CHECKS: list[tuple[str, Callable[[], str], str]] = [
     ("reward worker", _reward, "Racecraft must be allowed to start processes."),
     ("reward sandbox", _sandbox, "Look at the error: it is a bug in Racecraft."),
     ("learner", _learner, "Compile the native core again: make build."),
-    ("video", _video, "Install PyAV with H.264: pip install av."),
+    ("video", _video, "Install PyAV: pip install av."),
     ("folder", _disk, "Change into a folder that you may write to."),
 ]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, printable
+from racecraft.extras import needed_for
 from racecraft.replay.replay import read_replay
 from racecraft.sim.camera import LUMA, CameraSpec
 from racecraft.sim.views import Scene
@@ -116,7 +117,8 @@ def _from_file(path: Path) -> Picture:
 
 
 def _from_video(path: Path) -> Iterator[Picture]:
-    import av
+    with needed_for("Reading a video"):
+        import av
 
     try:
         with av.open(str(path), metadata_errors="ignore") as container:
