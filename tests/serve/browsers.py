@@ -59,7 +59,7 @@ class Visit:
         )
 
     def violations(self) -> list[Any]:
-        """What axe finds, but for trifles."""
+        """What axe finds."""
         return violations(self.page)
 
     def overflow(self) -> int:
@@ -81,15 +81,11 @@ class Visit:
 
 
 def violations(page: Page) -> list[Any]:
-    """What axe finds on a page, but for trifles."""
+    """What axe finds on a page."""
     if not page.evaluate("'axe' in window"):
         page.evaluate(AXE.read_text())
     found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
-    return [
-        (one["id"], [node["html"][:160] for node in one["nodes"][:3]])
-        for one in found
-        if one["impact"] in ("serious", "critical")
-    ]
+    return [(one["id"], [node["html"][:160] for node in one["nodes"][:3]]) for one in found]
 
 
 def violations_by_theme(page: Page) -> dict[str, list[Any]]:

@@ -92,4 +92,4 @@ def test_a_reader_finds_the_way_and_what_was_read_stays_in_the_browser(page: Pag
     if AXE.exists():
         page.evaluate(AXE.read_text())
         found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
-        assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+        assert [one["id"] for one in found] == []
