@@ -183,8 +183,9 @@ def browser() -> list[Figure]:
 
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     with tempfile.TemporaryDirectory() as folder, console(Path(folder)) as running, sync_playwright() as playwright:
-        options = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
-        opened = playwright.chromium.launch(executable_path=chromium, args=options)
+        # as Chromium does by itself without a GPU: what is in 3D and the page around it are drawn in different ways
+        software = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"]
+        opened = playwright.chromium.launch(executable_path=chromium, args=[*software, "--no-sandbox"])
         page = opened.new_page(viewport={"width": 1440, "height": 900})
         page.add_init_script(COUNT_FRAMES)
         cookie = running.client.cookies[COOKIE]
