@@ -13,6 +13,8 @@ namespace {
 
 #if defined(__AVX512F__) || defined(__aarch64__)
 constexpr int kTileRows = 8;  // 16 of 32 registers hold sums
+#elif defined(RC_HAS_DOUBLED_SUMS)
+constexpr int kTileRows = 2;  // 8 of 16, as a double takes two lanes
 #else
 constexpr int kTileRows = 4;  // 8 of 16
 #endif
@@ -44,20 +46,21 @@ template <int kRows, int kVectors, typename Add>
 
 // sums[r] += rows[r][i] * weights[i], for i in [0, length).
 template <int kRows, int kVectors, typename Sums>
-[[gnu::always_inline]] inline void multiply(Sums& arithmetic, typename Sums::Lanes (&sums)[kRows][kVectors],
+[[gnu::always_inline]] inline void multiply(Sums& sums_of, typename Sums::Lanes (&sums)[kRows][kVectors],
                                             const float* const (&rows)[kRows], size_t offset,
                                             const float* weights, size_t width, size_t length) {
-    for (size_t i = 0; i < length; ++i) {
-        typename Sums::Lanes w[kVectors];
+    add_steps(sums_of, sums, length, [&](auto& arithmetic, auto& to, size_t first, size_t last) {
+        const float* from = weights + first * width;
+        for (size_t i = offset + first; i < offset + last; ++i) {
+            typename Sums::Lanes w[kVectors];
 #pragma GCC unroll 2
-        for (int v = 0; v < kVectors; ++v) w[v] = arithmetic.lanes(load(weights + v * kLaneCount));
+            for (int v = 0; v < kVectors; ++v) w[v] = arithmetic.lanes(load(from + v * kLaneCount));
 #pragma GCC unroll 16
-        for (int r = 0; r < kRows; ++r) {
-            const auto x = arithmetic.lanes(splat(rows[r][offset + i]));
-            arithmetic.add_products(x, w, sums[r]);
+            for (int r = 0; r < kRows; ++r)
+                arithmetic.add_products(arithmetic.broadcast(rows[r][i]), w, to[r]);
+            from += width;
         }
-        weights += width;
-    }
+    });
 }
 
 // Walks over the positions of a layer's output, sample by sample, row by row.
@@ -199,19 +202,21 @@ void weight_gradient_tile(const Positions& p, size_t channels, const float* in, 
         const float* grad = grad_out;
         for (size_t s = 0; s < p.samples; ++s) {
             for (size_t y = 0; y < p.rows; ++y) {
-                const float* x = in + s * p.sample_step + y * p.row_step;
-                for (size_t column = 0; column < p.columns; ++column) {
-                    typename Sums::Lanes g[kVectors];
+                const float* row = in + s * p.sample_step + y * p.row_step;
+                add_steps(arithmetic, to, p.columns, [&](auto& sum, auto& next, size_t begin, size_t end) {
+                    const float* x = row + begin * p.column_step;
+                    const float* of = grad + begin * channels;
+                    for (size_t column = begin; column < end; ++column) {
+                        typename Sums::Lanes g[kVectors];
 #pragma GCC unroll 2
-                    for (int v = 0; v < kVectors; ++v) g[v] = arithmetic.lanes(load(grad + v * kLaneCount));
+                        for (int v = 0; v < kVectors; ++v) g[v] = sum.lanes(load(of + v * kLaneCount));
 #pragma GCC unroll 16
-                    for (int r = 0; r < kRows; ++r) {
-                        const auto value = arithmetic.lanes(splat(x[r]));
-                        arithmetic.add_products(value, g, to[r]);
+                        for (int r = 0; r < kRows; ++r) sum.add_products(sum.broadcast(x[r]), g, next[r]);
+                        x += p.column_step;
+                        of += channels;
                     }
-                    x += p.column_step;
-                    grad += channels;
-                }
+                });
+                grad += p.columns * channels;
             }
         }
     });
@@ -393,7 +398,8 @@ void layer_weight_gradient(const LayerShape& shape, int panel, size_t first, siz
 }
 
 double multiply_add_only(size_t steps, float* out) {
-    constexpr int kRows = 12;  // chains: latency times throughput of any CPU, and they fit 16 registers
+    // chains: latency times throughput of any CPU, and they fit 16 registers
+    constexpr int kRows = kTileRows == 2 ? 4 : 12;
     constexpr int kVectors = 1;
     const FloatLanes factor = load(out);
     FloatLanes sums[kRows][kVectors];

@@ -4,9 +4,9 @@
 // is below.
 //
 // That errs in two cases only. The double may itself have been rounded, onto the middle between two floats:
-// there the sum is made again, in the slow way. And a float's grid ends at 2^-149, which bits cut off a
-// double know nothing of: sums of products that are multiples of that stay on it, so the factors' range is
-// asked for beforehand.
+// that is noticed, and the last few steps are done again by ExactSums. And a float's grid ends at 2^-149,
+// which bits cut off a double know nothing of: sums of products that are multiples of that stay on it, so
+// the factors' range is asked for beforehand.
 #pragma once
 
 #include "network_lanes.hpp"
@@ -16,6 +16,8 @@ namespace {
 
 struct FusedSums {
     using Lanes = FloatLanes;
+    static constexpr bool kMayErr = false;
+    RC_HD Lanes broadcast(float a) { return splat(a); }
     RC_HD Lanes lanes(FloatLanes a) { return a; }
     RC_HD FloatLanes floats(Lanes a) { return a; }
     // sums[v] += x * w[v]
@@ -32,35 +34,53 @@ struct FusedSums {
 
 struct DoubledSums {
     using Lanes = DoubleLanes;
+    static constexpr bool kMayErr = true;
+    RC_HD Lanes broadcast(float a) {
+        const __m128d both = _mm_set1_pd(static_cast<double>(a));
+        return {both, both};
+    }
     RC_HD Lanes lanes(FloatLanes a) { return widen(a); }
     RC_HD FloatLanes floats(Lanes a) { return narrow(a); }
 
     template <int kVectors>
-    RC_HD void add_products(Lanes x, const Lanes (&w)[kVectors], Lanes (&sums)[kVectors]) {
-        Lanes rounded[kVectors];
-        __m128i middles = _mm_setzero_si128();
+    [[gnu::always_inline]] inline void add_products(Lanes x, const Lanes (&w)[kVectors],
+                                                    Lanes (&sums)[kVectors]) {
 #pragma GCC unroll 2
         for (int v = 0; v < kVectors; ++v) {
-            rounded[v].low = add(_mm_mul_pd(x.low, w[v].low), sums[v].low, middles);
-            rounded[v].high = add(_mm_mul_pd(x.high, w[v].high), sums[v].high, middles);
+            const __m128i low = add(x.low, w[v].low, sums[v].low);
+            const __m128i high = add(x.high, w[v].high, sums[v].high);
+            // of the 29 bits that are cut off, none is set: the lower halves of the doubles hold them
+            const __m128 lower = _mm_shuffle_ps(_mm_castsi128_ps(low), _mm_castsi128_ps(high), 0x88);
+            const __m128 cut = _mm_and_ps(lower, _mm_castsi128_ps(_mm_set1_epi32((1 << 29) - 1)));
+            least_ = _mm_min_ps(cut, least_);  // as integers, which those that are no NaN are ordered like
         }
-        constexpr int kLowerHalves = 0x0f0f;  // the upper half of each double says nothing
-        if ((_mm_movemask_epi8(middles) & kLowerHalves) != 0) [[unlikely]] {
-#pragma GCC unroll 2
-            for (int v = 0; v < kVectors; ++v) rounded[v] = widen(fused_multiply_add(x, w[v], sums[v]));
-        }
-#pragma GCC unroll 2
-        for (int v = 0; v < kVectors; ++v) sums[v] = rounded[v];
+    }
+    // Whether a sum since the last call was, in doubles, between two floats, so that it may be the wrong one.
+    [[gnu::always_inline]] inline bool has_erred() {
+        const bool found =
+            _mm_movemask_epi8(_mm_cmpeq_epi32(_mm_castps_si128(least_), _mm_setzero_si128())) != 0;
+        least_ = _mm_set1_ps(1.0f);
+        return found;
     }
 
   private:
-    // The sum rounded to 24 bits, middles away from zero; the lower half of `middles` is set for those.
-    RC_HD __m128d add(__m128d product, __m128d sum, __m128i& middles) {
+    // Makes the sum of it rounded to 24 bits, middles away from zero, and gives it with the bits cut off.
+    RC_HD __m128i add(__m128d x, __m128d w, __m128d& sum) {
         const __m128i raised =
-            _mm_add_epi64(_mm_castpd_si128(_mm_add_pd(product, sum)), _mm_set1_epi64x(1 << 28));
-        const __m128i below = _mm_and_si128(raised, _mm_set1_epi64x((1 << 29) - 1));
-        middles = _mm_or_si128(middles, _mm_cmpeq_epi32(below, _mm_setzero_si128()));
-        return _mm_castsi128_pd(_mm_xor_si128(raised, below));
+            _mm_add_epi64(_mm_castpd_si128(_mm_add_pd(_mm_mul_pd(x, w), sum)), _mm_set1_epi64x(1 << 28));
+        sum = _mm_castsi128_pd(_mm_and_si128(raised, _mm_set1_epi64x(-(int64_t{1} << 29))));
+        return raised;
+    }
+
+    __m128 least_ = _mm_set1_ps(1.0f);
+};
+
+// What DoubledSums ends in where it does not err, six times as slowly.
+struct ExactSums : DoubledSums {
+    template <int kVectors>
+    RC_HD void add_products(Lanes x, const Lanes (&w)[kVectors], Lanes (&sums)[kVectors]) {
+#pragma GCC unroll 2
+        for (int v = 0; v < kVectors; ++v) sums[v] = widen(fused_multiply_add(x, w[v], sums[v]));
     }
 };
 
@@ -107,6 +127,39 @@ inline bool fit_doubled_sums(const Magnitudes& x, const Magnitudes& w, double be
 }
 
 #endif
+
+template <typename Lanes, int kRows, int kVectors>
+RC_HD void copy_sums(Lanes (&to)[kRows][kVectors], const Lanes (&from)[kRows][kVectors]) {
+#pragma GCC unroll 16
+    for (int r = 0; r < kRows; ++r)
+#pragma GCC unroll 2
+        for (int v = 0; v < kVectors; ++v) to[r][v] = from[r][v];
+}
+
+// Calls steps(arithmetic, sums, first, last) for all of [0, count) in order; it adds products to the sums.
+template <typename Sums, int kRows, int kVectors, typename Steps>
+[[gnu::always_inline]] inline void add_steps(Sums& arithmetic, typename Sums::Lanes (&sums)[kRows][kVectors],
+                                             size_t count, const Steps& steps) {
+    if constexpr (!Sums::kMayErr) {
+        steps(arithmetic, sums, size_t{0}, count);
+    } else {
+#if defined(RC_HAS_DOUBLED_SUMS)
+        constexpr size_t kPiece = 64;
+        for (size_t first = 0; first < count; first += kPiece) {
+            const size_t last = first + kPiece < count ? first + kPiece : count;
+            typename Sums::Lanes next[kRows][kVectors];
+            copy_sums(next, sums);
+            steps(arithmetic, next, first, last);
+            if (arithmetic.has_erred()) [[unlikely]] {
+                copy_sums(next, sums);
+                ExactSums exact;
+                steps(exact, next, first, last);
+            }
+            copy_sums(sums, next);
+        }
+#endif
+    }
+}
 
 }  // namespace
 }  // namespace racecraft::RC_ISA

@@ -112,10 +112,13 @@ int check_doubled(float a, float b, float c) {
     if (!fits(a, b, c)) return 0;
     using Lanes = DoubledSums::Lanes;
     const Lanes w[2] = {widen(portable::splat(0.3f)), widen(portable::splat(b))};
-    Lanes sums[2] = {widen(portable::splat(0.7f)), widen(portable::splat(c))};
-    DoubledSums::add_products(widen(portable::splat(a)), w, sums);
+    Lanes sums[1][2] = {{widen(portable::splat(0.7f)), widen(portable::splat(c))}};
+    DoubledSums arithmetic;
+    add_steps(arithmetic, sums, 1, [&](auto& exactly, auto& to, size_t, size_t) {
+        exactly.add_products(exactly.broadcast(a), w, to[0]);
+    });
     float out[FloatLanes::kCount];
-    store(out, narrow(sums[1]));
+    store(out, narrow(sums[0][1]));
     for (const float value : out) CHECK(same(value, std::fma(a, b, c)));
     return 1;
 }
