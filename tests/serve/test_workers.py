@@ -270,9 +270,16 @@ def test_a_worker_needs_no_more_rights_than_it_is_said_to(place: Place, postgres
     with running_worker(place.folder / "lab-3", database=limited, artifacts=place.artifacts):
         place.done(job["id"])
     with psycopg.connect(f"user=pupil host={postgres.folder} dbname={database}") as pupil:
-        for table in ("users", "sessions", "races"):
+        refused = [f"SELECT * FROM {table}" for table in ("users", "sessions", "races")]
+        refused += [f"UPDATE jobs SET {column} = {column}" for column in ("id", "kind", "run", "user_id", "payload")]
+        refused += [f"UPDATE jobs SET {column} = {column}" for column in ("cargo", "travels", "is_cancelled")]
+        refused += ["DELETE FROM jobs", "INSERT INTO jobs (id, kind, run, user_id) VALUES ('a', 'train', 'b', 1)"]
+        for statement in refused:
             with pytest.raises(psycopg.errors.InsufficientPrivilege), pupil.transaction():
-                pupil.execute(f"SELECT * FROM {table}")
+                pupil.execute(statement)
+        with busy_at_home(place):
+            assert place.console.client.get("/api/jobs").status_code == 200  # which sees all
+            assert pupil.execute("SELECT count(*) FROM jobs WHERE NOT travels").fetchone() == (0,)
 
 
 def _rights() -> list[str]:
