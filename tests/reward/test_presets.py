@@ -233,11 +233,12 @@ def test_pictures_of_all_of_them_show_what_the_walled_worker_paints():
     track = load_track("oval")
     points, painted = paint_presets(track)
     assert set(painted) == set(preset_names())
-    for name in ("centerline", "racing", "stay_inside"):  # these remember nothing and look at no clock
+    for name in ("centerline", "racing", "stay_inside", "lap_time"):
         whole = paint_reward(load_preset(name), track)
         assert whole.points[::2] == pytest.approx(points)
         assert whole.rewards[::2] == pytest.approx(painted[name])
-    spacing = track.length / len(points)
-    assert painted["lap_time"] == pytest.approx(spacing)  # metres gained since the place before
+    driven = painted["lap_time"][:, len(OFFSETS) // 2]  # metres gained since the step before
+    assert driven == pytest.approx(1.5 / 15, rel=0.15)
+    assert driven == pytest.approx(driven[0])
     middle = len(OFFSETS) // 2
     assert (painted["centerline"][:, middle] > painted["centerline"][:, 0]).all()

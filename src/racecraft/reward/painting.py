@@ -1,7 +1,8 @@
 """What a reward function pays along a track, as a grid to be painted over its picture.
 
-The car drives ahead at a usual speed at every place, once per place: functions that remember something, or that pay
-for progress between two calls, are painted as they answer to that, place after place along the lap.
+The car drives laps at a usual speed, each at its own distance from the centre line and step after step, so that
+functions that remember something, or pay for progress between two calls, answer as they do in a training. Some of the
+steps are painted.
 """
 
 from __future__ import annotations
@@ -13,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import RewardError
-from racecraft.reward.dry_run import HALF_CAR, TYPICAL_SPEED, moment
+from racecraft.reward.dry_run import HALF_CAR, STEP_SECONDS, TYPICAL_SPEED, moment
 from racecraft.reward.params import make_params
 from racecraft.reward.source import load_preset, preset_names
 from racecraft.reward.worker import RewardWorker, waypoints_of
-from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.track.track import Track
 
 PLACES: Final = 96
+_X, _Y, _HEADING = (ROW_COLUMNS.index(name) for name in ("x", "y", "heading"))
 OFFSETS: Final = (-1.15, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.15)
 
 
@@ -50,20 +52,18 @@ def paint_reward(source: str, track: Track, *, timeout_s: float = 0.5, foreign: 
     Raises:
         RewardError: The source cannot be loaded at all, or is foreign and cannot be locked in.
     """
-    places = np.linspace(0.0, track.length, PLACES, endpoint=not track.is_closed)
-    offsets = np.array(OFFSETS)
-    shape = (len(places), len(offsets))
-    points, rewards = np.empty((*shape, 2)), np.full(shape, np.nan)
+    rows, between = _laps(track)
+    painted = slice(1, None, between)
+    rewards = np.full(rows.shape[:2], np.nan)
     with RewardWorker(source, track, timeout_s=timeout_s, foreign=foreign) as worker:
-        for column, offset in enumerate(offsets):
-            half = 0.5 * track.width_at(places)
-            rows = np.stack([_row(track, place, offset * width) for place, width in zip(places, half, strict=True)])
-            points[:, column] = rows[:, 2:4]
+        for across in range(len(OFFSETS)):
             try:
-                rewards[:, column] = worker(rows)
+                rewards[:, across] = worker(rows[:, across])
             except RewardError:
                 break
-    return Painting(places=places, offsets=offsets, points=points, rewards=rewards)
+    places = np.linspace(0.0, track.length, PLACES, endpoint=not track.is_closed)
+    points = rows[painted][..., [_X, _Y]]
+    return Painting(places=places, offsets=np.array(OFFSETS), points=points, rewards=rewards[painted])
 
 
 def paint_presets(track: Track) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]]]:
@@ -77,11 +77,8 @@ def paint_presets(track: Track) -> tuple[NDArray[np.float64], dict[str, NDArray[
     Returns:
         Points, x and y in m  (P, O, 2), and by each preset's name its rewards  (P, O).
     """
-    count = PLACES // 2
-    places = track.length * np.arange(-1, count) / count  # the first is only the step before the lap
-    half = 0.5 * track.width_at(places)
-    rows = np.array([[_row(track, s, o * w) for o in OFFSETS] for s, w in zip(places, half, strict=True)])
-    rows[:, :, ROW_COLUMNS.index("steps")] = np.arange(1, count + 2)[:, None]
+    rows, between = _laps(track)
+    shown = slice(1, None, 2 * between)
     waypoints = waypoints_of([track])
     painted = {name: np.empty(rows.shape[:2]) for name in preset_names()}
     for name, paid in painted.items():
@@ -92,18 +89,34 @@ def paint_presets(track: Track) -> tuple[NDArray[np.float64], dict[str, NDArray[
             paid[:, across] = [
                 preset["reward_function"](make_params(row.tolist(), waypoints)) for row in rows[:, across]
             ]
-    return rows[1:, :, 2:4], {name: paid[1:] for name, paid in painted.items()}
+    return rows[shown][..., [_X, _Y]], {name: paid[shown] for name, paid in painted.items()}
 
 
-def _row(track: Track, place: float, offset: float) -> NDArray[np.float64]:
-    half = 0.5 * float(track.width_at(place))
-    is_off = abs(offset) > half + HALF_CAR
-    return moment(
-        track,
-        float(place),
-        offset=float(offset),
-        speed=TYPICAL_SPEED,
-        steps=2 + int(place / track.length * 150),
-        wheels_on_track=abs(offset) + HALF_CAR <= half,
-        status="off_track" if is_off else "in_progress",
+def _laps(track: Track) -> tuple[NDArray[np.float64], int]:
+    """A lap at each of the offsets, step after step.
+
+    Returns:
+        Rows, the first of a step before the lap, which an open track has at its first place  (N, O, columns), and how
+        many steps it is from one of the grid's places to the next.
+    """
+    parts = PLACES if track.is_closed else PLACES - 1
+    steps = max(1, round(track.length / parts / (TYPICAL_SPEED * STEP_SECONDS)))  # from one place to the next
+    ahead = np.arange(-1, steps * parts if track.is_closed else steps * parts + 1) / (steps * parts)
+    places = track.length * (ahead if track.is_closed else ahead.clip(0.0))
+    middle = np.array(  # the first step of an episode is not paid for
+        [moment(track, float(place), steps=step + 2) for step, place in enumerate(places)]
     )
+    half = 0.5 * track.width_at(places)[:, None]
+    offset = half * np.array(OFFSETS)
+    is_off = np.abs(offset) > half + HALF_CAR
+    rows = np.repeat(middle[:, None], len(OFFSETS), axis=1)
+    rows[..., _X] -= offset * np.sin(rows[..., _HEADING])
+    rows[..., _Y] += offset * np.cos(rows[..., _HEADING])
+    for column, values in (
+        ("offset", offset),
+        ("all_wheels_on_track", np.abs(offset) + HALF_CAR <= half),
+        ("is_offtrack", is_off),
+        ("status", np.where(is_off, STATUS_NAMES.index("off_track"), STATUS_NAMES.index("in_progress"))),
+    ):
+        rows[..., ROW_COLUMNS.index(column)] = values
+    return rows, steps

@@ -32,7 +32,7 @@ export const de: Record<CourseKey, string> = {
   run_lead: "Auf deinem Rechner, von oben bis unten oder als Notebook:",
   previous: "Zurück",
   next: "Weiter",
-  go_on: "Weiter im Kurs",
+  further: "Weiter im Kurs",
   course: "Kurs",
   missing: "Diese Lektion gibt es nicht.",
   play: "Zum Spielen",

@@ -30,7 +30,7 @@ export const en = {
   run_lead: "On your own machine, from top to bottom or as a notebook:",
   previous: "Previous",
   next: "Next",
-  go_on: "On in the course",
+  further: "On in the course",
   course: "Course",
   missing: "There is no such lesson.",
   play: "To play with",

@@ -10,6 +10,10 @@ export const percent = (value: number | null | undefined): string =>
 export const count = (value: number | null | undefined): string =>
   value == null ? NONE : Math.round(value).toLocaleString("en-US").replaceAll(",", "\u202f");
 
+/** The number of a graph's axis: 12500 → 12 500, 0.25 → 0.25. */
+export const tick = (value: number): string =>
+  Number.isInteger(value) && Math.abs(value) >= 1000 ? count(value) : String(+value.toPrecision(6));
+
 /** 0.000123456 → 0.0001235: four digits that count. */
 export const short = (value: number): string => String(Number(value.toPrecision(4)));
 

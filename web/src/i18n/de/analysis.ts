@@ -24,7 +24,7 @@ export const analysis: Record<keyof typeof english, string> = {
   usage_share: "Anteil",
   saliency: "Worauf die Strategie schaut",
   saliency_lead: "Grad-CAM: Was im Kamerabild glüht, spricht für die Aktion.",
-  saliency_none: "Fahr zuerst ein Rennen: Durch seine Runden lässt sich blättern.",
+  saliency_none: "Starte zuerst eine Auswertung: Durch ihre Runden lässt sich blättern.",
   saliency_target: "Erkläre",
   saliency_chosen: "die gewählte Aktion",
   saliency_strength: "Stärke",

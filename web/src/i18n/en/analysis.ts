@@ -21,7 +21,7 @@ export const analysis = {
   usage_share: "Share",
   saliency: "What the policy looks at",
   saliency_lead: "Grad-CAM: what glows in the camera's image speaks for the action.",
-  saliency_none: "Race the model first: its laps are what can be scrubbed through.",
+  saliency_none: "Start an evaluation first: its laps are what can be scrubbed through.",
   saliency_target: "Explain",
   saliency_chosen: "the action it takes",
   saliency_strength: "Strength",
