@@ -65,6 +65,7 @@ export const create: Record<keyof typeof english, string> = {
   estimate_most: "Höchstens etwa {time}",
   estimate_usual: "Etwa {time}: üblich bei {count} Modellen auf dieser Strecke",
   estimate_laps: "Auf einer leichten Strecke meist unter einer Minute",
+  estimate_laps_among: "In der Regel ein bis drei Minuten",
   estimate_unknown: "Noch keine Schätzung",
   learning_changed: "geändert",
   learning_reset: "Zurück zur Vorgabe",

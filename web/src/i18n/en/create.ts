@@ -63,6 +63,7 @@ export const create = {
   estimate_most: "At most about {time}",
   estimate_usual: "About {time}: usual of {count} models on this track",
   estimate_laps: "Mostly less than a minute on an easy track",
+  estimate_laps_among: "One to three minutes as a rule",
   estimate_unknown: "No estimate yet",
   learning_changed: "changed",
   learning_reset: "Back to the defaults",
