@@ -105,6 +105,7 @@ requirements: $(UV)  ## pin the newest allowed versions again
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header requirements/docs.in -o requirements/docs.txt
 	$(UV) pip compile -q --no-deps --universal --python-version 3.11 --generate-hashes --no-header requirements/transfer.in -o requirements/transfer.txt
 	$(UV) pip compile -q -U --universal --python-version 3.11 --generate-hashes --no-header -c requirements/train.txt requirements/ray.in -o requirements/ray.txt
+	$(UV) pip compile -q -U --no-deps --universal --python-version 3.11 --generate-hashes --no-header requirements/rllib.in -o requirements/rllib.txt
 
 $(VENV)/pyvenv.cfg:
 	@test -n "$(PYTHON)" || { echo "Racecraft needs Python 3.11 or newer; none was found on PATH."; exit 1; }
@@ -148,9 +149,14 @@ $(SPHINX): $(UV) requirements/docs.txt
 	@$(UV) pip install -q --python $(BIN)/python --target build/sphinx --require-hashes -r requirements/docs.txt
 	@touch $@
 
-build/ray: $(UV) requirements/ray.txt  # for tests/tuning/test_cluster.py alone
+build/ray: $(UV) requirements/ray.txt  # for tests/tuning/test_cluster.py and examples/rllib_ppo.py
 	@echo "Ray from PyPI, some 80 MB ..."
 	@$(UV) pip install -q --python $(BIN)/python --target build/ray --require-hashes -r requirements/ray.txt
+	@touch $@
+
+build/rllib: build/ray $(VENV)/.dev requirements/rllib.txt  # for examples/rllib_ppo.py alone, beside what tests need
+	@echo "What RLlib needs from PyPI, some 60 MB ..."
+	@$(UV) pip install -q --python $(BIN)/python --target build/rllib --no-deps --require-hashes -r requirements/rllib.txt
 	@touch $@
 
 build/mujoco: $(UV) requirements/transfer.txt  # for benchmarks/transfer.py alone

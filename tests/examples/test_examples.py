@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,18 +18,21 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CUSTOM = EXAMPLES / "custom_reward"
 
 
-def run(script, *arguments):
+BUILD = EXAMPLES.parent / "build"
+
+
+def run(script, *arguments, is_quiet=True, **environment):
     """What an example prints; warnings of our own code are errors."""
     process = subprocess.run(
         [sys.executable, EXAMPLES / script, *arguments],
         capture_output=True,
         text=True,
         timeout=240,
-        env={"OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "error:::racecraft"},
+        env={"OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "error:::racecraft", **environment},
         check=False,
     )
     assert process.returncode == 0, process.stderr
-    assert "Warning" not in process.stderr
+    assert not is_quiet or "Warning" not in process.stderr
     return process.stdout
 
 
@@ -35,6 +40,7 @@ def test_every_script_is_tested_here():
     scripts = {str(path.relative_to(EXAMPLES)) for path in EXAMPLES.rglob("*.py")}
     assert scripts == {
         "gymnasium_loop.py",
+        "rllib_ppo.py",
         "stable_baselines3_ppo.py",
         "custom_reward/reward_function.py",
         "custom_reward/try_reward.py",
@@ -77,3 +83,18 @@ def test_stable_baselines3_trains_and_drives():
     pytest.importorskip("stable_baselines3")
     printed = run("stable_baselines3_ppo.py", "--steps", "1")
     assert "of a lap and" in printed
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_rllib_trains_on_the_vector_environment():
+    if not (BUILD / "rllib").is_dir():
+        pytest.skip("RLlib is not installed: make build/rllib")
+    pytest.importorskip("torch")
+    environment = {
+        "PYTHONPATH": os.pathsep.join(map(str, (BUILD / "ray", BUILD / "rllib"))),
+        "RAY_raylet_start_wait_time_s": "200",  # the machine may be busy
+        **{name: os.environ[name] for name in ("HOME", "PATH")},
+    }
+    printed = run("rllib_ppo.py", "--steps", "512", "--cars", "8", is_quiet=False, **environment)
+    assert re.search(r"^ +5\d\d camera steps  return +-?\d+\.\d\d  +\d+ steps/s$", printed, flags=re.MULTILINE), printed
