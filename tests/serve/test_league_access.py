@@ -182,6 +182,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "GET /api/league/races/{cup}/submissions/{submission_id}": ("own", None),
     "POST /api/league/races/{cup}/submissions/{submission_id}/disqualify": ("organiser", {"reason": "x"}),
     "POST /api/league/races/{cup}/submissions/{submission_id}/restore": ("organiser", None),
+    "POST /api/league/races/{cup}/submissions/{submission_id}/accept": ("organiser", None),
 }
 MAY = {  # who may do what is theirs by role; everybody else gets 404
     "own": ("ada",),

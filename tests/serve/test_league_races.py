@@ -24,10 +24,12 @@ from racecraft.errors import RunError
 from racecraft.race.announcement import Announcement, draw_secret
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry_file import pack_entry, read_entry_file
+from racecraft.race.likeness import FRAMES
 from racecraft.race.policy import WEIGHTS
 from racecraft.race.rules import RaceRules
 from racecraft.run import RunFolder
 from racecraft.run.checkpoint import HEADER_KEY
+from racecraft.run.starters import unpack_starter
 from racecraft.run.tensor_file import tensor_file
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Race, Submission, User, now
@@ -84,7 +86,13 @@ def test_a_judge_that_fails_is_there_for_the_next_entry(run: RunFolder, tmp_path
     terms = Announcement.of(
         conditions, kind="time-trial", ranking="total", minimum_laps=1, num_trials=1, secret=draw_secret()
     )
-    told = {"document": dict(terms.document), "commitment": terms.commitment, "seed": 1, "track": "oval", "name": "x"}
+    told: dict[str, Any] = {
+        "document": dict(terms.document),
+        "commitment": terms.commitment,
+        "track": "oval",
+        "name": "x",
+    }
+    told |= {"seed": 1, "frames": 2}
     try:
         with pytest.raises(RunError, match="judge's process failed"):
             bench.ask(told, folder=tmp_path / "nowhere")
@@ -94,7 +102,9 @@ def test_a_judge_that_fails_is_there_for_the_next_entry(run: RunFolder, tmp_path
         with pytest.raises(RunError, match="no safetensors file"):
             bench.ask(told, folder=tmp_path)
         (tmp_path / "entry.safetensors").write_bytes(pack_entry(run))
-        assert bench.ask(told, folder=tmp_path)["step"] == 64
+        answer = bench.ask(told, folder=tmp_path)
+        assert answer["step"] == 64
+        assert np.shape(answer["choices"]) == (FRAMES, 2)
         assert bench._process is judge
         environment = Path(f"/proc/{judge.pid}/environ").read_bytes().decode().split("\0")
         assert sorted(filter(None, environment)) == ["OMP_NUM_THREADS=1", "OPENBLAS_NUM_THREADS=1"]
@@ -191,6 +201,61 @@ def test_what_is_no_entry_is_refused_with_its_sentence(cup: Cup, run: RunFolder,
     assert ok(cup.bob.get(cup.address)) == []
     assert len(list(kept.iterdir())) == len(ok(cup.owner.get(f"{cup.address}?everybody=true")))
     refused(cup.submit(cup.bob, good, "../../etc"), 422)
+
+
+def test_who_drives_like_somebody_else_is_shown_to_a_person(league: RunningLeague, tmp_path: Path) -> None:
+    owner, group = league.owner, league.group("Copies")
+    code = league.code(group)
+    ada, bob, mia = (league.join(code, name) for name in ("Lovelace", "Copycat", "Honest"))
+    race = ok(owner.post(f"/api/groups/{group}/races", json={**CUP, "title": "Copies"}), 201)["id"]
+    address = f"/api/league/races/{race}/submissions"
+    header, arrays = _parts(pack_entry(RunFolder(unpack_starter("quick", tmp_path))))
+    draw = np.random.default_rng(1)
+    noised = {
+        name: (one + 0.03 * one.std() * draw.standard_normal(one.shape)).astype(one.dtype)
+        for name, one in arrays.items()
+    }
+
+    def judged(client: httpx.Client, data: bytes) -> dict[str, Any]:
+        number = ok(client.post(f"{address}?model=mine", content=data), 202)["id"]
+
+        def ended() -> Any:
+            found = ok(client.get(f"{address}/{number}"))
+            return found if found["state"] in ("done", "failed") else None
+
+        found = dict(league.console.wait_for(ended))
+        assert found["state"] == "done", found
+        return found
+
+    def packed(arrays: dict[str, Any]) -> bytes:
+        return b"".join(tensor_file(arrays, {HEADER_KEY: json.dumps(header)}))
+
+    first = judged(ada, packed(arrays))
+    own = judged(ada, packed({name: one * np.float32(1.0000001) for name, one in noised.items()}))
+    copy = judged(bob, packed(noised))
+    honest = judged(mia, pack_entry(RunFolder(unpack_starter("steady", tmp_path))))
+    assert [one["is_looked_at"] for one in (first, own, copy, honest)] == [False, False, True, False]
+    assert copy["like"] is None, "whose it is like is for who holds the race"
+    assert copy["score"] is not None, "it counts until a person says otherwise"
+
+    def seen() -> dict[int, Any]:
+        return {one["id"]: one for one in ok(owner.get(f"{address}?everybody=true"))}
+
+    like = seen()[copy["id"]]["like"]
+    assert (like["submission"], like["name"], like["model"]) == (first["id"], "Lovelace", "mine")
+    assert 0.75 <= like["likeness"] < 1
+    assert [seen()[one["id"]]["like"] for one in (first, own, honest)] == [None, None, None]
+
+    refused(bob.post(f"{address}/{copy['id']}/accept"), 404)
+    assert "like nobody else's" in refused(owner.post(f"{address}/{honest['id']}/accept"), 409)
+    ok(owner.post(f"{address}/{copy['id']}/accept"), 204)
+    assert not ok(bob.get(f"{address}/{copy['id']}"))["is_looked_at"]
+    assert seen()[copy["id"]]["like"] == like
+
+    # driven once more it is not shown again; taken out it is no longer looked at, and let in again it was
+    ok(owner.post(f"{address}/{copy['id']}/judge"), 202)
+    league.console.wait_for(lambda: ok(bob.get(f"{address}/{copy['id']}"))["state"] == "done")
+    assert not ok(bob.get(f"{address}/{copy['id']}"))["is_looked_at"]
 
 
 def _parts(data: bytes) -> tuple[dict[str, Any], dict[str, Any]]:

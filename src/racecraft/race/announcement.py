@@ -4,6 +4,7 @@
     secret       32 random bytes, known to nobody but who holds the race while it is open
     commitment   SHA-256(secret + document), published when the race opens
     seed         the first 8 bytes, little-endian, of SHA-256(secret + "seed"): of starts, objects and randomisation
+    frames seed  the same of SHA-256(secret + "frames"): of hidden frames, by which a league knows copies
 
 When the race is over its secret is published. Then everybody can see that the starts were drawn before anybody entered
 (the commitment is that of this secret and document) and that every entry was driven from them (a replay's conditions
@@ -137,6 +138,11 @@ class Announcement:
             return None
         return seed_of(bytes.fromhex(self.secret)) if self.secret else int(self.document["seed"])
 
+    @property
+    def frames_seed(self) -> int:
+        """Of hidden frames; hidden from nobody where the race has no secret, or none is known here."""
+        return _drawn(bytes.fromhex(self.secret), b"frames")
+
     def conditions(self, track: Track) -> Conditions:
         """What everybody drives under, on the track that the document names; with seed 0 while that is a secret.
 
@@ -200,7 +206,11 @@ def commitment_of(document: Mapping[str, Any], secret: bytes) -> str:
 
 def seed_of(secret: bytes) -> int:
     """What a race is drawn from."""
-    return int.from_bytes(hashlib.sha256(secret + b"seed").digest()[:8], "little")
+    return _drawn(secret, b"seed")
+
+
+def _drawn(secret: bytes, purpose: bytes) -> int:
+    return int.from_bytes(hashlib.sha256(secret + purpose).digest()[:8], "little")
 
 
 def _settings(conditions: Conditions) -> dict[str, Any]:

@@ -81,6 +81,7 @@ export const leagueApi = {
     ask<SubmissionInfo[]>("GET", `/league/races/${id}/submissions?everybody=${everybody}`),
   disqualify: (id: number, submission: number, reason: string) =>
     ask<void>("POST", `/league/races/${id}/submissions/${submission}/disqualify`, { reason }),
+  accept: (id: number, submission: number) => ask<void>("POST", `/league/races/${id}/submissions/${submission}/accept`),
   restore: (id: number, submission: number) =>
     ask<void>("POST", `/league/races/${id}/submissions/${submission}/restore`),
 

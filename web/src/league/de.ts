@@ -194,6 +194,11 @@ export const de: Record<LeagueKey, string> = {
   disqualify: "Herausnehmen",
   disqualify_reason: "Grund, den der Besitzer liest",
   restore: "Wieder zulassen",
+  looked_at:
+    "Das sieht sich ein Mensch an, weil es fast so fährt wie ein früheres von jemand anderem. Solange zählt es.",
+  like: "Fährt wie {model} von {name}: {percent} von dem, was beide auf geheimen Bildern wählen.",
+  accept: "Ist eigene Arbeit",
+  accepted: "Jemand hat es angesehen und stehen lassen.",
   screen_join: "Mach mit",
   screen_code: "oder der Code {code} auf {address}",
   screen_closed: "Das Rennen ist vorbei",

@@ -310,6 +310,22 @@ class Submission(Table):
     created: Mapped[datetime] = mapped_column(default=now)
 
 
+class Choices(Table):
+    """What a submission's driver chooses on its race's hidden frames, and whose earlier entry that is like."""
+
+    __tablename__ = "choices"
+
+    submission_id: Mapped[int] = mapped_column(ForeignKey("submissions.id"), primary_key=True)
+    commands: Mapped[str] = mapped_column(String(2000))
+    """Base64 of little-endian 16-bit integers: steering angle in mrad and speed in mm/s on one frame after another."""
+    like_id: Mapped[int | None] = mapped_column(ForeignKey("submissions.id"))
+    """The earliest submission that drives like it, where that is somebody else's."""
+    likeness: Mapped[float] = mapped_column(default=0.0)
+    """To that one, see racecraft.race.likeness."""
+    is_accepted: Mapped[bool] = mapped_column(default=False)
+    """Whether a person has looked at it and let it stand."""
+
+
 class DrivenRecord(Table):
     """Somebody's fastest lap by hand on a track, which is known by its geometry's digest."""
 

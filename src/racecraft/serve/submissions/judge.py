@@ -1,11 +1,11 @@
 """The judge's process: ``python -m racecraft.serve.submissions.judge``; every entry is judged by a child of its own.
 
-    standard input    a line of JSON: a submission's folder, the race's document, its commitment, the seed of its
-                      starts, its track; no secret, no address
+    standard input    a line of JSON: a submission's folder, the race's document, its commitment, the seeds of its
+                      starts and of its hidden frames, its track; no secret, no address
     FOLDER/entry      what drives, read by the child
     FOLDER/judged     what was driven
-    standard output   a line of JSON: the child's status, and what it said: how far the model was trained, or why it
-                      cannot drive
+    standard output   a line of JSON: the child's status, and what it said: how far the model was trained and what it
+                      chooses on hidden frames, or why it cannot drive
 
 It has no environment, no database and no key: a file that got the better of a child would find nothing, and dies with
 it. A child drives twice, with one thread and with two, and answers only if every bit came out the same. What all of
@@ -38,6 +38,7 @@ def main() -> int:
         import racecraft.contest.terms
         import racecraft.race.announcement
         import racecraft.race.entry_file
+        import racecraft.race.likeness
         import racecraft.replay.replay
         import racecraft.track  # noqa: F401  the children have all of it
 
@@ -88,6 +89,7 @@ def _judge(told: dict[str, Any]) -> dict[str, Any]:
     from racecraft.errors import RunError
     from racecraft.race.announcement import Announcement
     from racecraft.race.entry_file import read_entry_file
+    from racecraft.race.likeness import hidden_choices
     from racecraft.replay.replay import write_replay
     from racecraft.track import load_track
 
@@ -112,7 +114,8 @@ def _judge(told: dict[str, Any]) -> dict[str, Any]:
     path.unlink()
     if written[0] != written[1]:
         raise RunError("It drove differently the second time.", hint="This is a bug in Racecraft; please report it.")
-    return {"step": file.saved.step}
+    entry = file.entry(told["name"], num_threads=1)
+    return {"step": file.saved.step, "choices": hidden_choices(entry, conditions, seed=told["frames"]).tolist()}
 
 
 if __name__ == "__main__":

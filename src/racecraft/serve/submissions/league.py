@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -31,11 +31,12 @@ from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, is_withheld, state_of
 from racecraft.serve.races.standings import trial_scores
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
+from racecraft.serve.store.tables import Choices, Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions.admission import require_place, require_room
 from racecraft.serve.submissions.board import NONE, Board, read_board
+from racecraft.serve.submissions.copies import accept
 from racecraft.serve.submissions.judge import ENTRY
-from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, Stage, SubmissionInfo
+from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, Likeness, Stage, SubmissionInfo
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.vehicle import load_vehicle
@@ -191,7 +192,9 @@ class League:
         self.get(race_id, user_id, organiser=everybody, member=True)
         with self._database.transaction() as session:
             race = session.get_one(Race, race_id)
-            query = sa.select(Submission, Job, User.name).join(Job, Job.id == Submission.job_id)
+            marks = (Choices.like_id, Choices.likeness, Choices.is_accepted)
+            query = sa.select(Submission, Job, User.name, *marks).join(Job, Job.id == Submission.job_id)
+            query = query.outerjoin(Choices, Choices.submission_id == Submission.id)
             query = query.join(User, User.id == Submission.user_id).where(Submission.race_id == race_id)
             if not everybody:
                 query = query.where(Submission.user_id == user_id)
@@ -199,12 +202,18 @@ class League:
                 query = query.where(Submission.id == only)
             rows = session.execute(query.order_by(Submission.id.desc()).limit(MAX_LISTED)).all()
             pace = _pace(session)
+            likes = _likes(session, rows) if everybody else {}
             line = waiting_line(session, kinds_of(KINDS[KIND].slot), self._database.moment(session))
         # jobs that have the places which a waiting one needs, or come first
         ahead = {job.id: place for place, job in enumerate(line) if job.state == "queued"}
         return [
-            _submission(submission, job, name, ahead=ahead.get(job.id, 0), pace=pace, race=race)
-            for submission, job, name in rows
+            _submission(row[0], row[1], row.name, ahead=ahead.get(row[1].id, 0), pace=pace, race=race).model_copy(
+                update={
+                    "is_looked_at": row.like_id is not None and not row.is_accepted and not row[0].disqualified,
+                    "like": likes.get(row[0].id),
+                }
+            )
+            for row in rows
         ]
 
     def submission(self, race_id: int, submission_id: int, *, user_id: int) -> SubmissionInfo:
@@ -230,6 +239,23 @@ class League:
             changed = session.execute(sa.update(Submission).where(is_it).values(disqualified=reason.strip()))
             if changed.rowcount != 1:  # type: ignore[attr-defined]
                 raise NotFound(f"There is no submission {submission_id} in this race.")
+            if not reason:
+                accept(session, submission_id)
+
+    def accept(self, race_id: int, submission_id: int, *, user_id: int) -> None:
+        """A submission that drives like somebody else's stands, as a person has looked at it.
+
+        Raises:
+            NotFound: They do not organise the race, or it has no such submission.
+            Conflict: It drives like nobody else's.
+        """
+        self.get(race_id, user_id, organiser=True)
+        with self._database.transaction() as session:
+            submission = session.get(Submission, submission_id)
+            if submission is None or submission.race_id != race_id:
+                raise NotFound(f"There is no submission {submission_id} in this race.")
+            if not accept(session, submission_id):
+                raise Conflict("It drives like nobody else's entry.")
 
     def follow(self, race_id: int, stage: Stage, *, user_id: int) -> None:
         """Let a race take its drivers from another one of its group.
@@ -419,6 +445,23 @@ def _pace(session: Session) -> float | None:
     return statistics.median(took) if took else None
 
 
+def _likes(session: Session, rows: Sequence[Any]) -> dict[int, Likeness]:
+    """By submission, whose earlier entry it drives like."""
+    earlier = {row.like_id for row in rows if row.like_id is not None}
+    query = sa.select(Submission.id, Submission.model, User.name).join(User, User.id == Submission.user_id)
+    found = {row.id: row for row in session.execute(query.where(Submission.id.in_(earlier)))}
+    return {
+        row[0].id: Likeness(
+            submission=row.like_id,
+            name=found[row.like_id].name,
+            model=found[row.like_id].model,
+            likeness=round(row.likeness, 3),
+        )
+        for row in rows
+        if row.like_id is not None
+    }
+
+
 def _submission(
     submission: Submission, job: Job, name: str, *, ahead: int, pace: float | None, race: Race
 ) -> SubmissionInfo:
@@ -437,6 +480,8 @@ def _submission(
             "completion": submission.completion,
             "error": job.error,
             "disqualified": submission.disqualified,
+            "is_looked_at": False,
+            "like": None,
             "created": submission.created,
             "has_replay": submission.judged is not None and not is_withheld(race),
         }

@@ -214,6 +214,13 @@ def restore_submission(race_id: Id, submission_id: Id, consoles: InConsoles, per
     return Response(status_code=204)
 
 
+@router.post("/league/races/{race_id}/submissions/{submission_id}/accept", status_code=204)
+def accept_submission(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> Response:
+    """Let stand what drives like somebody else's entry."""
+    consoles.league.accept(race_id, submission_id, user_id=person.id)
+    return Response(status_code=204)
+
+
 @router.post("/league/races/{race_id}/submissions/{submission_id}/judge", status_code=202)
 def judge_again(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> Response:
     """Have it driven once more."""

@@ -113,6 +113,16 @@ class BoardPage(Message):
     """Per cent of the other entrants that they are ahead of."""
 
 
+class Likeness(Message):
+    """Whose earlier entry a submission drives like."""
+
+    submission: int
+    name: str
+    model: str
+    likeness: float
+    """Of what both choose on hidden frames: 1 for the same, 0 for what chance gives."""
+
+
 class SubmissionInfo(Message):
     """One's own submission, or for an organiser anybody's."""
 
@@ -131,6 +141,10 @@ class SubmissionInfo(Message):
     error: dict[str, Any] | None
     disqualified: str
     """The reason."""
+    is_looked_at: bool
+    """Whether a person is to look at it, as it drives like somebody else's; it counts meanwhile."""
+    like: Likeness | None
+    """Whose, for an organiser who sees everybody's."""
     created: datetime
     has_replay: bool
 

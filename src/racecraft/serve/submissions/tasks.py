@@ -4,7 +4,8 @@
     FOLDER/entry.replay        what was driven, to be driven again by anybody once the race is over
 
 The judge is given no secret. This process has it, drives the replay again from its actions alone, and only believes
-what comes out the same, from the starts that the secret gives: laps and mistakes are taken from there.
+what comes out the same, from the starts that the secret gives: laps and mistakes are taken from there. What the judge
+says of choices on hidden frames is only compared with that of others, and never makes a place.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ from racecraft.serve.races.races import announcement_of
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.tables import Race, Submission, now
 from racecraft.serve.submissions.bench import Bench
+from racecraft.serve.submissions.copies import keep_choices, mark_copies, packed
 from racecraft.serve.submissions.judge import JUDGED
 
 FOLDER: Final = "submissions"
 REPLAY: Final = "entry.replay"
+BUG: Final = "This is a bug in Racecraft."
 BENCH: Final = Bench()
 """Of this process, which does one job at a time."""
 
@@ -47,20 +50,28 @@ def judge(task: Task) -> dict[str, Any]:
         "document": dict(announcement.document),
         "commitment": announcement.commitment,
         "seed": announcement.seed,
+        "frames": announcement.frames_seed,
         "track": payload["track"],
         "name": payload["name"],
     }
     result = BENCH.ask(told, folder=folder)
+    try:
+        choices = packed(result["choices"])
+    except (KeyError, ValueError) as error:
+        raise RunError("The judge's result does not hold: it has no choices.", hint=BUG) from error
     replay = read_replay(folder / JUDGED)
     found = verify(replay, race=announcement)
     if not found.is_genuine:
-        raise RunError(f"The judge's result does not hold: {found.sentence}", hint="This is a bug in Racecraft.")
+        raise RunError(f"The judge's result does not hold: {found.sentence}", hint=BUG)
     write_replay(replay, folder / REPLAY)
     (folder / JUDGED).unlink()
     terms = announcement.document
     (standing,) = classify([replay.cars], ranking=terms["ranking"], minimum_laps=terms["minimum_laps"])
     values = {**standing.in_whole_ms(), "judged": now()}
     with task.database.transaction() as session:
+        keep_choices(session, task.job.id, choices)
+    with task.database.transaction() as session:
+        mark_copies(session, task.job.id)
         session.execute(sa.update(Submission).where(Submission.job_id == task.job.id).values(values))
     return {**replay.evaluation.report(), "step": int(result["step"])}
 
