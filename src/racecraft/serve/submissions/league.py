@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import os
 import shutil
-import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -31,12 +30,13 @@ from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, is_withheld, state_of
 from racecraft.serve.races.standings import trial_scores
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Choices, Group, Job, Member, Race, Submission, User, now
+from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions.admission import require_place, require_room
 from racecraft.serve.submissions.board import NONE, Board, read_board
 from racecraft.serve.submissions.copies import accept
+from racecraft.serve.submissions.infos import pace, submission_info, told_of, whose
 from racecraft.serve.submissions.judge import ENTRY
-from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, Likeness, Stage, SubmissionInfo
+from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, Stage, SubmissionInfo
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.vehicle import load_vehicle
@@ -47,7 +47,6 @@ KIND: Final = "judge"
 MAX_LISTED: Final = 1000  # submissions at once
 PUBLISHED: Final = ("submission", "name", "model", "place", "score_ms", "best_lap_ms", "resets", "completion")
 """Of each row of the board of a race that is over."""
-LAST: Final = 20  # judged ones that the time left is taken from
 
 
 class League:
@@ -192,26 +191,20 @@ class League:
         self.get(race_id, user_id, organiser=everybody, member=True)
         with self._database.transaction() as session:
             race = session.get_one(Race, race_id)
-            marks = (Choices.like_id, Choices.likeness, Choices.is_accepted)
-            query = sa.select(Submission, Job, User.name, *marks).join(Job, Job.id == Submission.job_id)
-            query = query.outerjoin(Choices, Choices.submission_id == Submission.id)
-            query = query.join(User, User.id == Submission.user_id).where(Submission.race_id == race_id)
+            query = told_of().where(Submission.race_id == race_id)
             if not everybody:
                 query = query.where(Submission.user_id == user_id)
             if only is not None:
                 query = query.where(Submission.id == only)
             rows = session.execute(query.order_by(Submission.id.desc()).limit(MAX_LISTED)).all()
-            pace = _pace(session)
-            likes = _likes(session, rows) if everybody else {}
+            likes = whose(session, rows) if everybody else {}
+            took = pace(session, KIND)
             line = waiting_line(session, kinds_of(KINDS[KIND].slot), self._database.moment(session))
         # jobs that have the places which a waiting one needs, or come first
         ahead = {job.id: place for place, job in enumerate(line) if job.state == "queued"}
         return [
-            _submission(row[0], row[1], row.name, ahead=ahead.get(row[1].id, 0), pace=pace, race=race).model_copy(
-                update={
-                    "is_looked_at": row.like_id is not None and not row.is_accepted and not row[0].disqualified,
-                    "like": likes.get(row[0].id),
-                }
+            submission_info(
+                row, ahead=ahead.get(row.Job.id, 0), pace=took, race=race, like=likes.get(row.Submission.id)
             )
             for row in rows
         ]
@@ -435,62 +428,6 @@ def _write(path: Path, data: bytes) -> None:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
-
-
-def _pace(session: Session) -> float | None:
-    """Seconds that the last submissions took to be judged."""
-    query = sa.select(Job.started, Job.finished).where(Job.kind == KIND, Job.state == "done")
-    rows = session.execute(query.order_by(Job.created.desc()).limit(LAST)).all()
-    took = [(finished - started).total_seconds() for started, finished in rows if started and finished]
-    return statistics.median(took) if took else None
-
-
-def _likes(session: Session, rows: Sequence[Any]) -> dict[int, Likeness]:
-    """By submission, whose earlier entry it drives like."""
-    earlier = {row.like_id for row in rows if row.like_id is not None}
-    query = sa.select(Submission.id, Submission.model, User.name).join(User, User.id == Submission.user_id)
-    found = {row.id: row for row in session.execute(query.where(Submission.id.in_(earlier)))}
-    return {
-        row[0].id: Likeness(
-            submission=row.like_id,
-            name=found[row.like_id].name,
-            model=found[row.like_id].model,
-            likeness=round(row.likeness, 3),
-        )
-        for row in rows
-        if row.like_id is not None
-    }
-
-
-def _submission(
-    submission: Submission, job: Job, name: str, *, ahead: int, pace: float | None, race: Race
-) -> SubmissionInfo:
-    is_waiting = job.state in ("queued", "running")
-    return SubmissionInfo.model_validate(
-        {
-            "id": submission.id,
-            "name": name,
-            "model": submission.model,
-            "digest": submission.digest,
-            "state": job.state,
-            "ahead": ahead,
-            "seconds_left": round((ahead + 1) * pace, 1) if is_waiting and pace is not None else None,
-            "score": seconds_of(submission.score_ms),
-            "best_lap": seconds_of(submission.best_lap_ms),
-            "completion": submission.completion,
-            "error": job.error,
-            "disqualified": submission.disqualified,
-            "is_looked_at": False,
-            "like": None,
-            "created": submission.created,
-            "has_replay": submission.judged is not None and not is_withheld(race),
-        }
-    )
-
-
-def seconds_of(milliseconds: int | None) -> float | None:
-    """The same in s."""
-    return None if milliseconds is None else milliseconds / 1000
 
 
 def _info(race: Race, group_title: str, part: Part) -> LeagueRace:

@@ -19,7 +19,7 @@ from racecraft.serve.races.schemas import MAX_CARS, NewRace, RaceReplay, ReplayC
 from racecraft.serve.schemas import RunName
 from racecraft.serve.submissions.board import Row
 from racecraft.serve.submissions.data import data_of
-from racecraft.serve.submissions.league import seconds_of
+from racecraft.serve.submissions.infos import seconds_of
 from racecraft.serve.submissions.schemas import (
     BoardPage,
     BoardRow,
