@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -45,6 +47,11 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
 def test_train_and_evaluate_are_functions_whatever_was_imported_before(first: str) -> None:
     program = f"{first}; import racecraft; assert callable(racecraft.train) and callable(racecraft.evaluate)"
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_the_version_is_the_projects() -> None:
+    project = Path(__file__).parents[1] / "pyproject.toml"
+    assert racecraft.__version__ == tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"]
 
 
 def test_importing_racecraft_imports_nothing_else() -> None:

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "ground_coverage.hpp"
 #include "ground_lines.hpp"
 #include "refuse.hpp"
 
@@ -68,29 +69,6 @@ uint32_t edge_texel(const Border& border, double texel, int column, int row) {
     return pack(x, y, std::clamp(offset, -127, 127), border.pair);
 }
 
-// Share of the unit square above a straight line whose signed distance from the square's centre is `center`;
-// high and low are the larger and the smaller absolute component of its normal, in the same unit.
-double share_above(double center, double high, double low) {
-    const double depth = std::fabs(center);
-    const double reach = 0.5 * (high + low);
-    double share = 1.0;
-    if (depth < 0.5 * (high - low)) {
-        share = 0.5 + depth / high;
-    } else if (depth < reach) {
-        share = 1.0 - (reach - depth) * (reach - depth) / (2.0 * high * low);
-    }
-    return center < 0.0 ? 1.0 - share : share;
-}
-
-double share_above(uint32_t texel) {
-    const double x = static_cast<int8_t>(texel & 255);
-    const double y = static_cast<int8_t>(texel >> 8 & 255);
-    const double offset = static_cast<int8_t>(texel >> 16 & 255);
-    const double high = std::max(std::fabs(x), std::fabs(y)) * 256.0;
-    const double low = std::min(std::fabs(x), std::fabs(y)) * 256.0;
-    return share_above(127.5 * (x + y) + kEdgeOffsetScale * offset, high, low);
-}
-
 // The straight line that halves a texel around p as a corner of the dash does: same area, same direction.
 Border fit_corner(const Dash& dash, Point p, double texel) {
     constexpr int kSide = 8;
@@ -118,37 +96,6 @@ Border fit_corner(const Dash& dash, Point p, double texel) {
         (share_above(middle, high, low) < share ? below : above) = middle;
     }
     return {0.5 * (below + above) * texel, normal, kPairOfDash};
-}
-
-// Exact coverage while the pyramid is built, in 1/65536 of a texel; sums to 65536.
-struct Coverage {
-    uint32_t share[kNumMaterials];
-};
-
-Coverage coverage_of(uint32_t texel) {
-    const MaterialPair pair = kMaterialPairs[texel >> 24];
-    const uint32_t above = static_cast<uint32_t>(rounded(65536.0 * share_above(texel)));
-    Coverage coverage{};
-    coverage.share[pair.above] += above;
-    coverage.share[pair.below] += 65536u - above;
-    return coverage;
-}
-
-// Divides the parts, which sum to 4 * 65536, by divisor, which divides that sum, so that the results still
-// sum up: the largest remainders are rounded up.
-void share_out(const uint32_t* parts, uint32_t divisor, uint32_t* results) {
-    uint32_t missing = 4u * 65536u / divisor;
-    uint32_t remainders[kNumMaterials];
-    for (int i = 0; i < kNumMaterials; ++i) {
-        results[i] = parts[i] / divisor;
-        remainders[i] = parts[i] % divisor;
-        missing -= results[i];
-    }
-    for (; missing > 0; --missing) {
-        const auto largest = std::max_element(remainders, remainders + kNumMaterials) - remainders;
-        ++results[largest];
-        remainders[largest] = 0;
-    }
 }
 
 // Segments or dashes by the blocks that they may touch.
@@ -388,35 +335,16 @@ GroundMap::GroundMap(const TrackOutline& outline, const GroundOptions& options) 
     const GroundLevel& base = view_.levels[0];
     Painter painter(std::move(lines.borders), std::move(lines.dashes), {view_.min_x, view_.min_y}, texel,
                     base.columns, base.rows);
-    painter.paint(base.columns, base.rows,
-                  [&](int column, int row, uint32_t value) { texels_[index(base, column, row)] = value; });
-
-    std::vector<Coverage> finer;
+    Covered covered(base);
+    painter.paint(base.columns, base.rows, [&](int column, int row, uint32_t texel) {
+        texels_[index(base, column, row)] = texel;
+        covered.put(column, row, texel);
+    });
     for (int l = 1; l < view_.num_levels; ++l) {
-        const GroundLevel& below = view_.levels[l - 1];
         const GroundLevel& level = view_.levels[l];
-        std::vector<Coverage> coverage(size_t(level.columns) * level.rows);
-        for (int row = 0; row < level.rows; ++row) {
-            for (int column = 0; column < level.columns; ++column) {
-                uint32_t sum[kNumMaterials] = {};
-                for (int k = 0; k < 4; ++k) {
-                    const int x = 2 * column + (k & 1);
-                    const int y = 2 * row + (k >> 1);
-                    Coverage part = {{65536u, 0, 0, 0}};
-                    if (x < below.columns && y < below.rows) {
-                        part = l == 1 ? coverage_of(texels_[index(below, x, y)])
-                                      : finer[size_t(y) * below.columns + x];
-                    }
-                    for (int m = 0; m < kNumMaterials; ++m) sum[m] += part.share[m];
-                }
-                uint32_t bytes[kNumMaterials];
-                share_out(sum, 4u * 65536u / kCoverageUnit, bytes);
-                share_out(sum, 4, coverage[size_t(row) * level.columns + column].share);
-                texels_[index(level, column, row)] =
-                    bytes[0] | bytes[1] << 8 | bytes[2] << 16 | bytes[3] << 24;
-            }
-        }
-        finer = std::move(coverage);
+        covered = covered.coarser(level, [&](int column, int row, uint32_t texel) {
+            texels_[index(level, column, row)] = texel;
+        });
     }
 }
 

@@ -14,7 +14,9 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from racecraft.version import VERSION
+
+__version__ = VERSION
 
 _HOME = {
     "CameraSpec": "sim",

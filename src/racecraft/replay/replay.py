@@ -8,8 +8,7 @@ docs/replay-file.md describes the file. Reading trusts nothing in it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from importlib import metadata
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,6 +29,7 @@ from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, ST
 from racecraft.sim.objects import OBJECT_KINDS
 from racecraft.track.track import Track
 from racecraft.track.validate import check_rows
+from racecraft.version import VERSION
 
 SUFFIX: Final = ".replay"
 MAX_CELLS: Final = 64_000_000
@@ -59,7 +59,7 @@ class Replay:
     """As stored, of each car  (T,)."""
     race: Announcement | None = None
     """The race that it says it is of; None of an evaluation."""
-    written_by: str = field(default_factory=lambda: metadata.version("racecraft"))
+    written_by: str = VERSION
     """Version of Racecraft: another one may have other rules or physics."""
 
     @classmethod

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from importlib import metadata
 from typing import Any, Final
 
 import numpy as np
@@ -24,6 +23,7 @@ from racecraft.race.provenance import Provenance, provenance, track_note, vehicl
 from racecraft.race.results import Trial
 from racecraft.replay.replay import Replay
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
+from racecraft.version import VERSION
 
 SMALLEST_CAMERA: Final = 8
 """Pixels: only where the camera looks is part of the rules, not what it sees."""
@@ -82,7 +82,7 @@ class Verification:
     @property
     def version_note(self) -> str:
         """Why a genuine replay may come out otherwise; empty where it was written by this version."""
-        here, there = metadata.version("racecraft"), self.replay.written_by
+        here, there = VERSION, self.replay.written_by
         return (
             "" if here == there else f"It was written by Racecraft {there}; this is {here}, which may drive otherwise."
         )

@@ -24,9 +24,11 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime, timedelta
-from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.json_file import read_json_object, read_text
@@ -35,6 +37,7 @@ from racecraft.run.atomic import write_file, write_json
 from racecraft.run.checkpoint import CheckpointStore
 from racecraft.run.lock import exclusive_lock
 from racecraft.run.starters import STARTER, unpack_starter
+from racecraft.version import VERSION
 
 if TYPE_CHECKING:
     from racecraft.agent import Hyperparameters, ModelMetadata
@@ -410,10 +413,14 @@ def sanitize_name(text: str) -> str:
 
 
 def _versions() -> dict[str, str]:
-    versions = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    for package in ("racecraft", "numpy", "torch"):
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
+    versions = {
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "racecraft": VERSION,
+        "numpy": np.__version__,
+    }
+    if find_spec("torch") is not None:
+        from importlib.metadata import version  # late, as it takes its time
+
+        versions["torch"] = version("torch")
     return versions

@@ -47,7 +47,7 @@ from racecraft.serve.races import routes as races
 from racecraft.serve.races.races import Races
 from racecraft.serve.rewards import routes as rewards
 from racecraft.serve.schemas import ProblemReply
-from racecraft.serve.settings import ServeSettings, version
+from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
 from racecraft.serve.streams import routes as events
@@ -59,6 +59,7 @@ from racecraft.serve.tracks import routes as tracks
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning import routes as tunings
 from racecraft.serve.tuning.tunings import Tunings
+from racecraft.version import VERSION
 
 PAGES: Final = Path(__file__).parent / "pages"
 """The built web client, part of the package."""
@@ -135,7 +136,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
 
     app = FastAPI(
         title="Racecraft",
-        version=version(),
+        version=VERSION,
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import socket
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from importlib import metadata
 from ipaddress import ip_network
 from pathlib import Path
 from typing import Final
@@ -158,8 +157,3 @@ class ServeSettings:
 def runs_of(runs: Path, user_id: int) -> Path:
     """The folder of somebody's runs, where `runs` is the owner's."""
     return runs if user_id == OWNER else runs / STATE_FOLDER / PEOPLE / str(user_id)
-
-
-def version() -> str:
-    """Of Racecraft."""
-    return metadata.version("racecraft")

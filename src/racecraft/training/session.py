@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -167,36 +168,39 @@ def open_session(
     require_trainable(settings, metadata)
     saved, begun = _beginning(folder, note)
 
-    # The learner's backend takes longest to import, so it starts first, beside everything else.
-    with ThreadPoolExecutor(1) as pool:
-        spec = settings.network_spec(metadata)
-        future = pool.submit(
-            make_learner,
-            spec,
-            seed=settings.seed,
-            initial_weights=settings.initial_weights,
-            num_threads=settings.num_threads,
-            device=settings.device,
-        )
-        run = _Run(
-            folder=folder,
-            settings=settings,
-            metadata=metadata,
-            hyperparameters=folder.read_hyperparameters(),
-            source=folder.read_reward_function(),
-            is_foreign=folder.read_info().foreign,
-            tracks=_load_tracks(folder, settings),
-            saved=saved,
-        )
-        simulation = open_simulation(settings, run.tracks, metadata.suite)
-        if not is_checked:
-            require_valid_reward(run.source, run.tracks[0], foreign=run.is_foreign)
-        learner = future.result()
-        if begun is not None:
-            begin_from(learner, begun)
-
     with ExitStack() as stack:
-        worker = _open_worker(run, stack)
+        # The learner's backend takes longest to import, so it starts first. The cars come beside the process of the
+        # reward function, which takes as long to start as the ground to be painted.
+        with ThreadPoolExecutor(2) as pool:
+            spec = settings.network_spec(metadata)
+            learner_to_be = pool.submit(
+                make_learner,
+                spec,
+                seed=settings.seed,
+                initial_weights=settings.initial_weights,
+                num_threads=settings.num_threads,
+                device=settings.device,
+            )
+            run = _Run(
+                folder=folder,
+                settings=settings,
+                metadata=metadata,
+                hyperparameters=folder.read_hyperparameters(),
+                source=folder.read_reward_function(),
+                is_foreign=folder.read_info().foreign,
+                tracks=_load_tracks(folder, settings),
+                saved=saved,
+            )
+            open_cars = partial(open_simulation, settings, run.tracks, metadata.suite)
+            cars_to_be = pool.submit(open_cars) if settings.device == "cpu" else None  # a GPU stays with its thread
+            if not is_checked:
+                require_valid_reward(run.source, run.tracks[0], foreign=run.is_foreign)
+            worker = _open_worker(run, stack)
+            simulation = open_cars() if cars_to_be is None else cars_to_be.result()
+            learner = learner_to_be.result()
+            if begun is not None:
+                begin_from(learner, begun)
+
         since = _begin_stretch(run, note)
         logs = _open_logs(run, stack, aws_log=aws_log)
         environment = _make_environment(run, simulation, learner, worker, logs, note, on_step)

@@ -8,7 +8,8 @@ from fastapi import APIRouter, Response
 
 from racecraft.serve.context import InConsoles, InContext, InUser, OnlyAdmin
 from racecraft.serve.machine.machine import Console, Machine, describe_machine
-from racecraft.serve.settings import OWNER, version
+from racecraft.serve.settings import OWNER
+from racecraft.version import VERSION
 
 router = APIRouter(prefix="/api", tags=["console"])
 
@@ -17,7 +18,7 @@ router = APIRouter(prefix="/api", tags=["console"])
 def get_console(context: InContext, consoles: InConsoles, user: InUser) -> Console:
     """What this console is; where it lies on the disk is for who runs it."""
     runs = str(context.settings.runs) if user == OWNER else ""
-    return Console(version=version(), runs=runs, cores=os.cpu_count() or 1, user=consoles.people.get(user).name)
+    return Console(version=VERSION, runs=runs, cores=os.cpu_count() or 1, user=consoles.people.get(user).name)
 
 
 @router.get("/console/machine", dependencies=[OnlyAdmin])

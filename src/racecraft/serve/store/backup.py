@@ -24,9 +24,10 @@ import sqlalchemy as sa
 from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.errors import RunError
-from racecraft.serve.settings import INCOMING, STATE_FOLDER, ServeSettings, version
+from racecraft.serve.settings import INCOMING, STATE_FOLDER, ServeSettings
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Session, Table, UtcTime, now
+from racecraft.version import VERSION
 
 MANIFEST: Final = "manifest.json"
 ROWS: Final = "database.jsonl"
@@ -70,7 +71,7 @@ def back_up(settings: ServeSettings, to: Path) -> Backup:
         revision = database.require_current()
         with tempfile.TemporaryFile() as rows, _private(partial) as stream, tarfile.open(None, "w", stream) as tar:
             counts = _write_rows(database, rows)
-            about = {"format": 1, "created": now().isoformat(), "racecraft": version(), "revision": revision}
+            about = {"format": 1, "created": now().isoformat(), "racecraft": VERSION, "revision": revision}
             _add(tar, MANIFEST, json.dumps({**about, "rows": counts}).encode())
             described = tarfile.TarInfo(ROWS)
             described.size = rows.tell()
@@ -89,7 +90,7 @@ def back_up(settings: ServeSettings, to: Path) -> Backup:
     finally:
         partial.unlink(missing_ok=True)
         database.close()
-    return Backup(about["created"], version(), revision, counts, files)  # type: ignore[arg-type]
+    return Backup(about["created"], VERSION, revision, counts, files)  # type: ignore[arg-type]
 
 
 def restore(settings: ServeSettings, source: Path) -> Backup:
