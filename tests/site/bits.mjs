@@ -267,6 +267,26 @@ async function arrival(core, { plan, track, file }) {
   };
 }
 
+/** What rewards pay along tracks: presets by name, and one in Python. */
+async function paintings(core, { tracks, statuses, rewards, presets, source }) {
+  const { paint } = await load("src/tab/painting.ts");
+  const { payWith } = await load("src/tab/trainer.ts");
+  const address = `data:text/javascript,${encodeURIComponent(rewards)}`;
+  const made = (await import(address)).rewards;
+  const words = { columns: core.names("row"), statuses };
+  const always = async () => true;
+  const found = [];
+  for (const of of tracks) {
+    for (const name of presets)
+      found.push(
+        await paint(() => payWith(made[name], of, 1), of, words, always),
+      );
+    const open = () => python.open(source, of, 1, words.columns.length, 0).pay;
+    found.push(await paint(open, of, words, always));
+  }
+  return found;
+}
+
 /** Somebody's drive, answer by answer. */
 async function driven(core, { plan, track, settings, controls }) {
   const { DrivenCar } = await load("src/tab/drivencar.ts");
@@ -282,7 +302,7 @@ const { Core, loadCore } = await load("src/tab/core.ts");
 const core = await Core.load(readFileSync(code));
 const run = {
   ...{ ask, check, drive, train, refuse },
-  ...{ verify, policies, session, driven, arrival },
+  ...{ verify, policies, session, driven, arrival, paintings },
 };
 const all = JSON.parse(readFileSync(cases, "utf8"));
 const files = all.find(({ files }) => files)?.files;

@@ -79,9 +79,23 @@ def page() -> Iterator[Page]:
     assert complaints == []
 
 
+PAINTED = "What it pays along the track"
+
+
+def test_what_a_preset_pays_is_painted_along_the_track(page: Page) -> None:
+    painted = page.get_by_role("img", name=PAINTED)
+    painted.wait_for(timeout=PATIENCE)
+    before = painted.get_attribute("viewBox")
+    page.get_by_role("combobox", name="Track").select_option("hairpin")
+    another = "before => document.querySelector('figure svg[role=img]').getAttribute('viewBox') !== before"
+    page.wait_for_function(another, arg=before)
+    page.get_by_label("What it is paid for").select_option("stay_inside")
+    page.get_by_text("least").get_by_text("0.00100").wait_for()  # what it pays beside the road
+
+
 def test_a_car_that_has_learned_drives_until_somebody_trains(page: Page) -> None:
     for track in ("reinvent_2018", "hairpin"):
-        page.get_by_label("Track").select_option(track)
+        page.get_by_role("combobox", name="Track").select_option(track)
         page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)
         eye = page.locator(".eye canvas")
         before = eye.screenshot()
@@ -98,7 +112,7 @@ def test_a_car_that_has_learned_drives_until_somebody_trains(page: Page) -> None
 def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_program(page: Page, tmp_path: Path) -> None:
     from playwright.sync_api import expect
 
-    page.get_by_label("Track").select_option("oval")
+    page.get_by_role("combobox", name="Track").select_option("oval")
     page.get_by_role("button", name="Delete: 9").click()  # nine actions are left
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text(re.compile("64 cars learning at once")).wait_for(timeout=PATIENCE)
@@ -142,7 +156,7 @@ def test_a_model_stays_when_the_page_is_closed_and_goes_when_it_is_deleted(page:
 
 
 def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
-    page.get_by_label("Track").select_option("generated:4")
+    page.get_by_role("combobox", name="Track").select_option("generated:4")
     page.get_by_label("What it is paid for").select_option("stay_inside")
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
@@ -154,7 +168,7 @@ def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
 
 
 def test_cars_learn_among_bots_and_a_time_trial_follows(page: Page) -> None:
-    page.get_by_label("Track").select_option("oval")
+    page.get_by_role("combobox", name="Track").select_option("oval")
     page.get_by_role("button", name="Head to bot").click()
     page.get_by_label("Bot cars").fill("2")
     assert page.get_by_label("What it is paid for").input_value() == "dodge"
@@ -167,14 +181,14 @@ def test_cars_learn_among_bots_and_a_time_trial_follows(page: Page) -> None:
 
 
 def test_a_model_is_trained_on_with_another_reward(page: Page) -> None:
-    page.get_by_label("Track").select_option("oval")
+    page.get_by_role("combobox", name="Track").select_option("oval")
     page.get_by_label("What it is paid for").select_option("centerline")
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
-    page.get_by_label("Track").select_option("kidney")
+    page.get_by_role("combobox", name="Track").select_option("kidney")
     page.get_by_role("button", name="Train on: oval-centerline-1").click()
     page.get_by_text("Begins with what oval-centerline-1 has learned.").wait_for()
-    assert page.get_by_label("Track").input_value() == "oval"
+    assert page.get_by_role("combobox", name="Track").input_value() == "oval"
     page.get_by_role("button", name="Head to bot").click()
     page.get_by_text("oval-centerline-1 cannot begin here").wait_for()
     assert page.get_by_role("button", name="Train", exact=True).is_disabled()
@@ -187,7 +201,7 @@ def test_a_model_is_trained_on_with_another_reward(page: Page) -> None:
 
 
 def test_somebody_drives_a_lap_and_then_against_it(page: Page) -> None:
-    page.get_by_label("Track").select_option("straight")
+    page.get_by_role("combobox", name="Track").select_option("straight")
     page.get_by_role("button", name="Drive yourself").click()
     page.get_by_text("Press ↑ to drive off").wait_for(timeout=PATIENCE)
     page.keyboard.down("ArrowUp")
@@ -218,28 +232,30 @@ def write(page: Page, source: str) -> None:
 
 
 def test_a_reward_of_ones_own_is_checked_and_trains(page: Page) -> None:
-    page.get_by_label("Track").select_option("oval")
+    page.get_by_role("combobox", name="Track").select_option("oval")
     write(page, "import numpy\ndef reward_function(params):\n    return params['sped']\n")
     page.get_by_text("1: 'import numpy' is allowed, but numpy is not installed here.").wait_for(timeout=PATIENCE)
     page.get_by_text("the installed program, Racecraft, trains with numpy").wait_for()
     page.get_by_text("3: params has no key 'sped'. Did you mean 'speed'?").wait_for()
     assert page.get_by_role("button", name="Train", exact=True).is_disabled()
+    assert page.get_by_role("img", name=PAINTED).count() == 0
     write(page, "#" * 2_000_000)
     page.get_by_text("The source has 2,000,000 characters").wait_for(timeout=PATIENCE)
     write(page, "def reward_function(params):\n    print('seen', params['steps'])\n    return params['speed']\n")
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
     page.get_by_text("seen 95.0").wait_for()  # what it printed when it was tried
+    page.get_by_text("least").get_by_text("1.00").wait_for()  # around the 1.5 m/s at which it is painted
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
 
 
 def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Page) -> None:
-    page.get_by_label("Track").select_option("hairpin")
+    page.get_by_role("combobox", name="Track").select_option("hairpin")
     write(page, "def reward_function(params):\n    print('from afar')\n    return 1.0\n")
     page.get_by_role("button", name="Make a link").click()
     link = page.get_by_label("Link", exact=True).input_value()
     write(page, "def reward_function(params):\n    return 2.0\n")
-    page.get_by_label("Track").select_option("oval")
+    page.get_by_role("combobox", name="Track").select_option("oval")
     page.goto("about:blank")
     page.goto(link)
     brought = page.get_by_label("This link brings a reward")
@@ -250,7 +266,7 @@ def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Pa
     brought.get_by_role("button", name="Take it").click()
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
     page.get_by_text("from afar\n").first.wait_for()
-    assert page.get_by_label("Track").input_value() == "hairpin"
+    assert page.get_by_role("combobox", name="Track").input_value() == "hairpin"
     assert "#" not in page.url
 
 
@@ -281,7 +297,7 @@ def reward_function(params):
 
 
 def test_a_reward_that_raises_late_stops_with_its_line_and_leaves_what_was_judged(page: Page) -> None:
-    page.get_by_label("Track").select_option("kidney")
+    page.get_by_role("combobox", name="Track").select_option("kidney")
     write(page, FAILS_LATE.format(ending="raise ValueError('enough')"))
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Train", exact=True).click()
@@ -297,7 +313,9 @@ def test_a_reward_that_hangs_is_ended_and_the_page_goes_on(page: Page) -> None:
     page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)  # this car's life is no sign of another's
     write(page, FAILS_LATE.format(ending="while True: print('again')"))
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
-    page.get_by_label("Track").select_option("kidney")  # so that the text is checked again, while it trains
+    page.get_by_role("combobox", name="Track").select_option(
+        "kidney"
+    )  # so that the text is checked again, while it trains
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("the reward function did not return within 5 s").wait_for(timeout=PATIENCE)
     assert page.get_by_role("button", name="Train", exact=True).is_enabled()  # and the check had its turn
@@ -316,7 +334,7 @@ def test_the_page_opens_and_trains_without_a_network_after_the_first_visit(page:
     page.get_by_label("What it is paid for").select_option("own")
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)  # Python is kept, too
     page.get_by_label("What it is paid for").select_option("racing")
-    page.get_by_label("Track").select_option("needle")  # never opened before
+    page.get_by_role("combobox", name="Track").select_option("needle")  # never opened before
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Stop").click()

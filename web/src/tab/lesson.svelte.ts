@@ -1,5 +1,5 @@
 /** A training as the page sees it: the workers, one of them with Python, and what they have told so far. */
-import type { ActionPreset, RewardVerdict } from "../api/client";
+import type { ActionPreset, RewardPainting, RewardVerdict } from "../api/client";
 import { Curves, type Point } from "../lib/curves";
 import type { Look, Picture } from "../scene/poses";
 import { policyOf, type Model } from "./model";
@@ -9,7 +9,7 @@ import type { Judgement, TrainingState } from "./trainer";
 import type { Plan, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
 import type { Objects } from "./verify/header";
-import type { Check, Hide, Load, Report, Show, Start } from "./worker";
+import type { Check, Hide, Load, Paint, Report, Show, Start } from "./worker";
 import { openWorker } from "./open";
 
 const MOST = { alone: 400_000, among: 3_000_000 }; // camera steps
@@ -74,10 +74,14 @@ export class Lesson {
   failedReward = $state(""); // what a reward of one's own did wrong
   printed = $state(""); // by it, the last of it
   isPythonReady = $state(false);
+  painting = $state.raw<RewardPainting | undefined>(); // of the reward that was asked for last
   private readonly workers: Partial<Record<Kind, Worker>> = {};
   private running: Kind = "plain";
   private asked: Asked | undefined;
   private questions = 0; // so far
+  private painted = 0; // the question whose painting is waited for
+  private painter: number | undefined; // ends one that hangs
+  private started: Start | undefined; // what the worker was asked to train
   private quiet = 0; // ticks since a running reward was heard of
   private watch: number | undefined;
 
@@ -119,9 +123,11 @@ export class Lesson {
   check(source: string, track: TrackFile): Promise<RewardVerdict> {
     this.preparePython();
     return new Promise((answer) => {
-      const question = ++this.questions;
+      const question = (this.painted = ++this.questions);
       const post = () => {
-        const asked = { kind: "check", question, source, track: $state.snapshot(track) } satisfies Check;
+        clearTimeout(this.asked?.timer);
+        const { statuses } = this.plan;
+        const asked = { kind: "check", question, source, track: $state.snapshot(track), statuses } satisfies Check;
         this.workers.python!.postMessage(asked);
         this.asked!.timer = window.setTimeout(() => {
           answer(refusal(`The reward function did not return within ${PATIENCE} s.`));
@@ -134,6 +140,18 @@ export class Lesson {
       this.asked = { question, answer, timer: undefined, post };
       if (this.isPythonReady && !this.isTraining("python")) post();
     });
+  }
+
+  /** Paint what a preset pays along a track, while nothing trains. */
+  paint(reward: string, track: TrackFile): void {
+    const [question, { statuses }] = [(this.painted = ++this.questions), this.plan];
+    const asked = { kind: "paint", question, reward, track: $state.snapshot(track), statuses } satisfies Paint;
+    this.workers.plain!.postMessage(asked);
+  }
+
+  /** Of a reward that is not shown any more. */
+  forgetPainting(): void {
+    [this.painting, this.painted] = [undefined, 0];
   }
 
   /** `source`: of a reward of one's own, instead of a preset. */
@@ -155,11 +173,22 @@ export class Lesson {
     const begin = from && { weights: from.weights, layout: policyOf(from, plan).weights };
     const asked = { plan, race, policy, objects, track, seed, begin };
     const start: Start = { kind: "train", ...asked, reward: source ?? reward, most };
+    this.started = start;
     this.workers[this.running]!.postMessage(start);
   }
 
   stop(): void {
     this.end("stopped");
+  }
+
+  /** A function that answered in its situations may hang elsewhere on the track: what waits behind it is asked anew. */
+  private awaitLap(): void {
+    clearTimeout(this.painter);
+    this.painter = window.setTimeout(() => {
+      clearTimeout(this.asked?.timer);
+      this.load("python");
+      if (this.isTraining("python")) this.workers.python!.postMessage(this.started!);
+    }, 1000 * PATIENCE);
   }
 
   private isTraining(kind: Kind): boolean {
@@ -193,7 +222,7 @@ export class Lesson {
       case "ready":
         if (kind === "python") {
           this.isPythonReady = true;
-          this.asked?.post();
+          if (!this.isTraining("python")) this.asked?.post();
         }
         break;
       case "checked":
@@ -201,6 +230,16 @@ export class Lesson {
         clearTimeout(this.asked.timer);
         this.asked.answer(report.verdict);
         this.asked = undefined;
+        clearTimeout(this.painter);
+        if (report.verdict.ok) this.awaitLap();
+        else this.painting = undefined;
+        break;
+      case "painting":
+        this.awaitLap();
+        break;
+      case "painted":
+        clearTimeout(this.painter);
+        if (report.question === this.painted) this.painting = report.painting;
         break;
       case "paying":
         this.attend(report.isPaying);
@@ -209,6 +248,7 @@ export class Lesson {
         this.printed = (this.printed + report.text).slice(-MOST_PRINTED);
         break;
       case "loaded":
+        clearTimeout(this.painter);
         [this.isSlow, this.state] = [report.isSlow, "learning"];
         break;
       case "look":

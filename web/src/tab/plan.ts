@@ -91,6 +91,10 @@ export const arraysOf = ({ told }: TrackFile): TrackArrays => ({
   waypoints: new Int32Array(bytesOf(told.waypoints)),
 });
 
+/** Of every piece of the centre line, the waypoint where it begins  (W - 1,). */
+export const indicesOf = ({ told }: TrackFile): Int32Array =>
+  new Int32Array(bytesOf(told.waypoints)).subarray(0, told.count - 1);
+
 export const readTrack = async (site: string, name: string): Promise<TrackFile> =>
   (await (await read(site, `data/tracks/${name.replace(":", "-")}.json`)).json()) as TrackFile;
 

@@ -47,6 +47,18 @@ export class Road {
     return this.headings[Math.min(this.piece(this.onTrack(s)), this.headings.length - 1)]!;
   }
 
+  /** Between the places of both borders that are nearest to `s`, m. */
+  widthAt(s: number): number {
+    const [x, y] = this.pointAt(s);
+    const [[x0, y0], [x1, y1]] = [nearest(this.borders.left, x, y), nearest(this.borders.right, x, y)];
+    return Math.sqrt((x0 - x1) * (x0 - x1) + (y0 - y1) * (y0 - y1));
+  }
+
+  /** Number of the piece of the centre line at a place on it, the last one at the end. */
+  pieceOf(place: number): number {
+    return Math.min(Math.max(this.piece(place), 0), this.headings.length - 1);
+  }
+
   /** Midway between the centre line and a border. */
   laneAt(s: number, isLeft: boolean): Point {
     const border = isLeft ? this.borders.left : this.borders.right;
@@ -106,4 +118,21 @@ export class Road {
       return ((value(piece + 1, axis) - from) / (this.arc[piece + 1]! - begin)) * (s - begin) + from;
     }) as Point;
   }
+}
+
+/** The place of a line that is nearest to a point; of equal ones the first. Points may be repeated. */
+function nearest(line: Line, x: number, y: number): Point {
+  let best = Infinity;
+  let found: Point = [line[0]!, line[1]!];
+  for (let at = 0; at + 3 < line.length; at += 2) {
+    const [x0, y0] = [line[at]!, line[at + 1]!];
+    const [dx, dy] = [line[at + 2]! - x0, line[at + 3]! - y0];
+    const squared = dx * dx + dy * dy;
+    if (squared === 0) continue;
+    const along = Math.min(Math.max(((x - x0) * dx + (y - y0) * dy) / squared, 0), 1);
+    const [offX, offY] = [x - x0 - along * dx, y - y0 - along * dy];
+    const away = offX * offX + offY * offY;
+    if (away < best) [best, found] = [away, [x0 + along * dx, y0 + along * dy]];
+  }
+  return found;
 }

@@ -1,6 +1,6 @@
 /** The thread beside the page in which cars drive and learn, with Python where it is asked for; it is ended by ending the
  * worker. */
-import type { RewardVerdict } from "../api/client";
+import type { RewardPainting, RewardVerdict } from "../api/client";
 import type { Drive, DriveState, Settings } from "../api/drives";
 import type { Look, Picture } from "../scene/poses";
 import { loadCore, type LoadedCore } from "./core";
@@ -46,6 +46,16 @@ export interface Check {
   question: number;
   source: string;
   track: TrackFile;
+  statuses: string[];
+}
+
+/** What a preset pays along a track is to be painted. */
+export interface Paint {
+  kind: "paint";
+  question: number;
+  reward: string;
+  track: TrackFile;
+  statuses: string[];
 }
 
 export interface Start {
@@ -93,11 +103,13 @@ export interface DriveOn {
   controls: { steering: number; speed: number; steps: number }; // rad, m/s, of 1/15 s
 }
 
-type Asked = Load | Show | Hide | Check | Start | Verify | Judge | SitDown | DriveOn;
+type Asked = Load | Show | Hide | Check | Paint | Start | Verify | Judge | SitDown | DriveOn;
 
 export type Report =
   | { kind: "ready" } // all that was asked for is loaded
   | { kind: "checked"; question: number; verdict: RewardVerdict }
+  | { kind: "painting" }
+  | { kind: "painted"; question: number; painting: RewardPainting }
   | { kind: "loaded"; isSlow: boolean }
   | { kind: "paying"; isPaying: boolean } // rewards are computed from here on, or no longer
   | { kind: "printed"; text: string }
@@ -144,9 +156,15 @@ async function handle(asked: Asked): Promise<void> {
     return;
   }
   const loaded = await loading!;
-  if (asked.kind === "check") {
-    const { question, source, track } = asked;
-    tell({ kind: "checked", question, verdict: loaded.python!.check(source, track) });
+  if (asked.kind === "check") await check(asked, loaded);
+  else if (asked.kind === "paint") {
+    const { reward, track } = asked;
+    await painted(
+      asked,
+      loaded.core,
+      () => payWith(loaded.presets[reward]!, track, 1),
+      () => {},
+    );
   } else if (asked.kind === "show") await show(asked, loaded);
   else if (asked.kind === "hide") leave();
   else if (asked.kind === "verify") await prove(asked, loaded);
@@ -160,6 +178,33 @@ async function handle(asked: Asked): Promise<void> {
     const { steering, speed, steps } = asked.controls;
     tell({ kind: "steered", ...driven!.step(steering, speed, steps) });
   } else train(asked, loaded);
+}
+
+/** What is wrong with a reward, and then, where nothing is, its painting. */
+async function check({ question, source, track, statuses }: Check, { core, python }: Loaded): Promise<void> {
+  const verdict = python!.check(source, track);
+  tell({ kind: "checked", question, verdict });
+  const open = () => python!.open(source, track, 1, core.core.names("row").length, 0).pay;
+  if (verdict.ok) await painted({ question, track, statuses }, core, open, () => tell({ kind: "painting" }));
+}
+
+let newest = 0; // of the questions for paintings; a training is one, too
+async function painted(
+  { question, track, statuses }: Pick<Paint, "question" | "track" | "statuses">,
+  { core }: LoadedCore,
+  open: () => Pay,
+  sign: () => void, // of life, before every lap
+): Promise<void> {
+  newest = question;
+  const { paint } = await import("./painting");
+  const isWanted = async () => {
+    await new Promise((goOn) => setTimeout(goOn)); // newer questions have their turn
+    if (newest !== question) return false;
+    sign();
+    return true;
+  };
+  const painting = await paint(open, track, { columns: core.names("row"), statuses }, isWanted);
+  if (painting) tell({ kind: "painted", question, painting });
 }
 
 let shown: { car: ShownCar; timer: number } | undefined;
@@ -213,6 +258,7 @@ async function load({ site, hasPython }: Load): Promise<Loaded> {
 
 function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded): void {
   leave();
+  newest = 0;
   const began = performance.now();
   const seconds = () => (performance.now() - began) / 1000;
   const { plan, race, policy, objects, track, reward, seed, begin } = start;
