@@ -70,6 +70,20 @@ def test_notebooks_are_made_once(racecraft: Run, tmp_path: Path) -> None:
     assert "no lesson 88" in racecraft("lessons", "open", "88").err
 
 
+def test_a_notebook_in_german_has_the_same_code(racecraft: Run, tmp_path: Path) -> None:
+    made = [
+        racecraft("lessons", "open", "1", "--no-start", "--json", "--language", language).document["notebooks"][0]
+        for language in ("en", "de")
+    ]
+    assert [Path(one).name for one in made] == ["01_reward.ipynb", "01_reward.de.ipynb"]
+    english, german = (json.loads((tmp_path / one).read_text())["cells"] for one in made)
+    assert german[0]["source"][0] == "# Lektion 1 · Belohnung formt Verhalten\n"
+    assert [one["cell_type"] for one in german] == [one["cell_type"] for one in english]
+    for one, other in zip(english, german, strict=True):
+        assert (one["source"] == other["source"]) == (one["cell_type"] == "code")
+    assert racecraft("lessons", "open", "1", "--no-start", "--language", "fr").status == 1
+
+
 def test_opening_starts_the_server(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[list[str]] = []
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -14,6 +14,7 @@ from racecraft.cli.app import INTERRUPTED, Json, app, print_json
 
 if TYPE_CHECKING:
     from racecraft.course import Lesson
+    from racecraft.course.quiz import Language
 
 lessons_app = typer.Typer(help="Learn reinforcement learning by racing.", rich_markup_mode=None)
 app.add_typer(lessons_app, name="lessons")
@@ -70,14 +71,18 @@ def open_lessons(
     folder: Annotated[Path, typer.Option("--folder", help="Where the notebooks are kept.")] = Path("lessons"),
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser.")] = True,
     start: Annotated[bool, typer.Option("--start/--no-start", help="Start JupyterLab.")] = True,
+    language: LanguageOption = "en",
     as_json: Json = False,
 ) -> None:
     """Make the notebooks, where they are missing, and open them in JupyterLab."""
+    from racecraft.checks import check_choice
     from racecraft.course import find_lesson, lessons, write_notebook
+    from racecraft.course.quiz import LANGUAGES
     from racecraft.extras import check_installed
 
+    check_choice("language", language, LANGUAGES)
     chosen = lessons() if number is None else [find_lesson(number)]
-    paths = [write_notebook(lesson, folder) for lesson in chosen]
+    paths = [write_notebook(lesson, folder, cast("Language", language)) for lesson in chosen]
     if as_json:
         print_json({"notebooks": [str(path) for path in paths]})
     else:

@@ -1,13 +1,14 @@
 """The lessons: where their files are, and what is known of each without running it.
 
 A lesson is three files in ``lessons/``: ``04_q_table.py`` holds its text and code, ``04_q_table.toml`` its title, goal,
-run time and quiz, ``answers/04_q_table.py`` the right answers to its exercises, and wrong ones.
+run time and quiz, ``answers/04_q_table.py`` the right answers to its exercises, and wrong ones. ``de/04_q_table.md``
+holds its text in German.
 """
 
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -16,7 +17,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from racecraft.checks import check_whole
 from racecraft.course.percent import Cell, read_cells
-from racecraft.course.quiz import Question, Words
+from racecraft.course.quiz import Language, Question, Words
+from racecraft.course.translation import read_translation, text_digest, translation_path
 from racecraft.errors import ConfigError
 
 HERE: Final = Path(__file__).resolve()
@@ -61,9 +63,16 @@ class Lesson:
         """Its right and wrong answers."""
         return self.path.parent / "answers" / self.path.name
 
-    def cells(self) -> list[Cell]:
-        """Its text and code, piece by piece."""
-        return read_cells(self.path.read_text(encoding="utf-8"))
+    def cells(self, language: Language = "en") -> list[Cell]:
+        """Its text and code, piece by piece; text that nobody has translated is in English, code always the same."""
+        cells = read_cells(self.path.read_text(encoding="utf-8"))
+        if language == "en":
+            return cells
+        texts = read_translation(translation_path(self.path, language))
+        return [
+            replace(cell, source=texts.get(text_digest(cell.source), cell.source)) if cell.kind == "markdown" else cell
+            for cell in cells
+        ]
 
 
 def lessons_folder() -> Path:

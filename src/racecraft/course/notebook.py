@@ -9,6 +9,7 @@ from typing import Any
 
 from racecraft.course.lesson import Lesson
 from racecraft.course.percent import Cell
+from racecraft.course.quiz import Language
 from racecraft.run.atomic import write_file
 
 
@@ -25,16 +26,21 @@ def to_notebook(cells: Iterable[Cell]) -> dict[str, Any]:
     }
 
 
-def write_notebook(lesson: Lesson, folder: Path) -> Path:
+def write_notebook(lesson: Lesson, folder: Path, language: Language = "en") -> Path:
     """Make a lesson's notebook in a folder, unless it is there: it may hold what a learner wrote.
+
+    Args:
+        lesson: Whose cells it holds.
+        folder: Where it is kept; made where it is missing.
+        language: Of its text. One that is not English is part of the file's name, as in ``01_reward.de.ipynb``.
 
     Raises:
         OSError: It cannot be written.
     """
-    path = folder / f"{lesson.path.stem}.ipynb"
+    path = folder / f"{lesson.path.stem}{'' if language == 'en' else f'.{language}'}.ipynb"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        document = json.dumps(to_notebook(lesson.cells()), indent=1, ensure_ascii=False)
+        document = json.dumps(to_notebook(lesson.cells(language)), indent=1, ensure_ascii=False)
         write_file(path, document.encode() + b"\n", durable=False)
     return path
 

@@ -26,6 +26,8 @@ class PageCell(BaseModel):
     kind: Literal["text", "code"]
     source: str
     """Markdown, or Python."""
+    german: str = ""
+    """The text in German; empty where there is none, and for code."""
     exercise: str = ""
     """Such as ``4.bellman``, where this is the cell to change."""
     plaything: str = ""
@@ -83,12 +85,13 @@ def page_of(lesson: Lesson) -> LessonPage:
     """
     outputs, cells = read_shown(lesson).outputs, list[PageCell]()
     num_code = 0
-    for cell in lesson.cells():
+    for cell, german in zip(lesson.cells(), lesson.cells("de"), strict=True):
         is_code = cell.kind == "code"
         cells.append(
             PageCell(
                 kind="code" if is_code else "text",
                 source=cell.source,
+                german=german.source if german != cell else "",
                 exercise=_exercise(lesson, cell.title),
                 plaything=cell.title.removeprefix(PLAYTHING) if cell.title.startswith(PLAYTHING) else "",
                 outputs=outputs.get(num_code, []) if is_code else [],

@@ -15,7 +15,7 @@ export const de: Record<CourseKey, string> = {
   runs_for: "läuft {seconds} s",
   lesson: "Lektion {number}",
   goal: "Ziel",
-  english: "Der Text der Lektion ist englisch; Ziel, Spielzeuge und Fragen sind deutsch.",
+  english: "Ein Teil dieser Lektion ist noch nicht übersetzt und steht auf Englisch da.",
   prints: "Was herauskommt",
   exercise: "Übung",
   exercise_solved: "Gelöst",

@@ -13,7 +13,7 @@ export const en = {
   runs_for: "runs for {seconds} s",
   lesson: "Lesson {number}",
   goal: "Goal",
-  english: "The lesson's text is in English; goal, things to play with and questions are not.",
+  english: "A part of this lesson is not translated yet, and stands in English.",
   prints: "What it prints",
   exercise: "Exercise",
   exercise_solved: "Solved",
