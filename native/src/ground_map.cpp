@@ -342,9 +342,8 @@ GroundMap::GroundMap(const TrackOutline& outline, const GroundOptions& options) 
     });
     for (int l = 1; l < view_.num_levels; ++l) {
         const GroundLevel& level = view_.levels[l];
-        covered = covered.coarser(level, [&](int column, int row, uint32_t texel) {
-            texels_[index(level, column, row)] = texel;
-        });
+        covered = covered.coarser(
+            level, [&](int column, int row, uint32_t texel) { texels_[index(level, column, row)] = texel; });
     }
 }
 
