@@ -9,9 +9,11 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from leagues import running_league
 from postgres_servers import PostgresServer, binaries, postgres_server
 from running_consoles import RunningConsole, running_console
 from running_workers import processes_on
+from schools import School
 
 pytest.importorskip("fastapi")
 
@@ -68,3 +70,9 @@ def console(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
         options = ["--database", server.new_database()]
     with running_console(tmp_path_factory.mktemp("console") / "runs", *options) as running:
         yield running
+
+
+@pytest.fixture(scope="module")
+def school(tmp_path_factory: pytest.TempPathFactory) -> Iterator[School]:
+    with running_league(tmp_path_factory.mktemp("access") / "runs") as league:
+        yield School(league)

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import httpx
 import pytest
-from leagues import RunningLeague, ok, running_league, untrained_run
-
-from racecraft.race.entry_file import pack_entry
+from leagues import ok
+from schools import RACE, School, label_of
 
 pytestmark = pytest.mark.costly
-
-MODEL: dict[str, Any] = {"name": "adas-model"}
-RACE: dict[str, Any] = {"title": "adas-race", "track": "oval", "laps": 1, "trials": 1}
-SKETCH = [[0, 0], [8, 0], [8, 6], [0, 6]]
 
 REWARD = "def reward_function(params):\n    return 1.0\n"
 
@@ -204,84 +198,19 @@ SLIPPERY = (
 """To get out of a car that is not there is no error; what was driven in a race that is on nobody sees."""
 
 
-class School:
-    """A league in which Ada has one of everything."""
-
-    def __init__(self, league: RunningLeague) -> None:
-        self.league = league
-        teacher, other = league.organiser("Teacher"), league.organiser("Other")
-        group = league.group("adas-class", teacher)
-        code = league.code(group, teacher)
-        ada, bob = league.join(code, "Ada"), league.join(code, "Bob")
-        eve = league.join(league.code(league.group("Elsewhere", other), other), "Eve")
-        self.people = {"owner": league.owner, "teacher": teacher, "other": other, "ada": ada, "bob": bob, "eve": eve}
-        number = league.number(ada)
-        home = league.console.runs / ".racecraft" / "people" / str(number)
-        ok(ada.get("/api/models"))
-        run = untrained_run(home, "adas-model")
-        (home / ".racecraft" / "tracks" / "adas-track.npy").write_bytes(ada.get("/api/tracks/oval/route.npy").content)
-        cup = ok(teacher.post(f"/api/groups/{group}/races", json=RACE), 201)["id"]
-        data = pack_entry(run)
-        submission = ok(ada.post(f"/api/league/races/{cup}/submissions?model=adas-model", content=data), 202)["id"]
-        token = ok(ada.post("/api/account/tokens", json={"title": "adas-token"}), 201)["id"]
-        race = ok(ada.post("/api/races", json=RACE), 201)["id"]
-        heat = {"models": [{"model": "adas-model"}] * 2, "track": "oval", "max_resets": 0}
-        entry = ok(ada.post(f"/api/races/{race}/entries", json={"models": ["adas-model"]}), 202)["undecided"]
-        self.objects = {
-            "lesson": 4,
-            "picture": "lake",
-            "track": "adas-track",
-            "name": "adas-model",
-            "starter": "quick",
-            "drive_id": ok(ada.post("/api/drives", json={"track": "adas-track"}), 201)["id"],
-            "key": "model:adas-model",
-            "path": "metrics/x.json",
-            "stamp": "20260101000000",
-            "target": "car",
-            "tuning": "0" * 16,
-            "race_id": race,
-            "entry_id": entry[0]["entry"],
-            "contest": ok(ada.post("/api/contests/heats", json=heat), 202)["id"],
-            "job_id": ok(ada.get("/api/jobs"))[0]["id"],
-            "token_id": token,
-            "session_id": ok(ada.get("/api/account/sessions"))[0]["id"],
-            "group_id": group,
-            "member": number,
-            "cup": cup,
-            "submission_id": submission,
-        }
-
-    def request(self, client: httpx.Client, label: str) -> httpx.Response:
-        method, path = label.split()
-        body = ROWS[label][1]
-        if isinstance(body, dict):
-            body = {**body}
-            body |= {"members": [self.objects["member"]]} if "members" in body else {}
-            body |= {"member": self.objects["member"]} if "member" in body else {}
-        query = body if isinstance(body, str) else ""
-        json = body if isinstance(body, dict) else None
-        with client.stream(method, path.format(**self.objects) + query, json=json) as reply:
-            if not reply.headers.get("content-type", "").startswith("text/event-stream"):
-                reply.read()
-            return reply
-
-
-@pytest.fixture(scope="module")
-def school(tmp_path_factory: pytest.TempPathFactory) -> Iterator[School]:
-    with running_league(tmp_path_factory.mktemp("access") / "runs") as league:
-        yield School(league)
-
-
-def label_of(operation: str) -> str:
-    """As in the table, where a name says what kind of thing is named."""
-    for room, name, ours in (
-        ("/api/tracks/", "{name}", "{track}"),
-        ("/api/league/", "{race_id}", "{cup}"),
-        ("/api/boards/", "{race_id}", "{cup}"),
-    ):
-        if room in operation:
-            operation = operation.replace(name, ours)
-    return operation
+def request(school: School, client: httpx.Client, label: str) -> httpx.Response:
+    method, path = label.split()
+    body = ROWS[label][1]
+    if isinstance(body, dict):
+        body = {**body}
+        body |= {"members": [school.objects["member"]]} if "members" in body else {}
+        body |= {"member": school.objects["member"]} if "member" in body else {}
+    query = body if isinstance(body, str) else ""
+    json = body if isinstance(body, dict) else None
+    with client.stream(method, path.format(**school.objects) + query, json=json) as reply:
+        if not reply.headers.get("content-type", "").startswith("text/event-stream"):
+            reply.read()
+        return reply
 
 
 def test_every_route_has_a_row(school: School) -> None:
@@ -296,7 +225,7 @@ def test_what_is_not_yours_does_not_exist(school: School) -> None:
         for role, client in school.people.items():
             if label in SLIPPERY or role in MAY[kind]:
                 continue
-            reply = school.request(client, label)
+            reply = request(school, client, label)
             if reply.status_code != 404:
                 found[f"{role}: {label}"] = (reply.status_code, reply.text[:200])
     assert found == {}
@@ -308,7 +237,7 @@ def test_who_may_look_can_and_sees_nothing_of_others(school: School) -> None:
         for role in MAY[kind]:
             if not label.startswith("GET") or kind == "own":
                 continue
-            reply = school.request(school.people[role], label)
+            reply = request(school, school.people[role], label)
             is_related = role in ("ada", "bob", "teacher") or label == "GET /api/audit"  # of what all do
             if reply.status_code not in (200, 204) or (not is_related and "adas-" in reply.text):
                 found[f"{role}: {label}"] = (reply.status_code, reply.text[:200])
@@ -327,13 +256,13 @@ def test_what_is_hers_ada_finds(school: School) -> None:
         "GET /api/league/races/{cup}/submissions/{submission_id}",
         "GET /api/events/{name}",
     ):
-        assert school.request(school.people["ada"], label).status_code == 200, label
+        assert request(school, school.people["ada"], label).status_code == 200, label
 
 
 def test_strangers_are_sent_to_the_door(school: School) -> None:
     with school.league.stranger() as stranger:
         for label, (kind, _) in ROWS.items():
-            status = school.request(stranger, label).status_code
+            status = request(school, stranger, label).status_code
             is_board = label.startswith("GET /api/boards/")
             expected = (200, 201, 204, 401) if kind == "open" else (404,) if is_board else (401,)
             assert status in expected, (label, status)
@@ -345,7 +274,7 @@ def test_a_token_to_read_changes_nothing(school: School) -> None:
         base_url=school.league.owner.base_url, headers={"authorization": f"Bearer {secret}"}, timeout=60
     ) as program:
         for label in ROWS:
-            status = school.request(program, label).status_code
+            status = request(school, program, label).status_code
             may = label.startswith("GET") and not label.startswith("GET /api/account")
             assert (status != 403) == may, (label, status)
 
