@@ -17,6 +17,7 @@ NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hp
 
 PAGES := src/racecraft/serve/pages/index.html
 NODE := web/node_modules/.package-lock.json
+IDENTITY := tests/serve/identity_provider/node_modules/.package-lock.json
 WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/* web/src/*/*/*)
 
 # CMake and Ninja: the system's where it has both, otherwise PyPI's, in a folder of their own that only compiling needs.
@@ -59,7 +60,7 @@ FORCE:
 wheel: $(UV) $(VENV)/.train $(TOOLS) $(PAGES)  ## build dist/: an sdist, and a wheel for this Python and machine with the console's pages inside
 	PATH="$(BUILD_PATH)" $(UV) build -q --sdist --wheel --python $(BIN)/python --no-build-isolation --out-dir dist
 
-test: $(VENV)/.built $(VENV)/.dev $(PAGES)  ## set up if needed, then run every test, on every core
+test: $(VENV)/.built $(VENV)/.dev $(PAGES) $(IDENTITY)  ## set up if needed, then run every test, on every core
 	$(PYTEST) --durations=40
 
 test-fast: $(VENV)/.built $(VENV)/.dev  ## the tests that take seconds
@@ -168,6 +169,12 @@ $(NODE): web/package.json web/package-lock.json
 	@command -v npm >/dev/null || { echo "The console's pages are built with Node and npm; neither was found on PATH."; exit 1; }
 	@echo "Packages of the pages, from npm: half a minute ..."
 	@cd web && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
+$(IDENTITY): tests/serve/identity_provider/package.json tests/serve/identity_provider/package-lock.json
+	@command -v npm >/dev/null || { echo "Sign-in is tested against a provider that runs on Node; npm was not found on PATH."; exit 1; }
+	@echo "A provider to sign in through, for tests, from npm ..."
+	@cd tests/serve/identity_provider && npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
 
 $(PAGES): $(WEB) $(NODE)

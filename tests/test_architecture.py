@@ -48,6 +48,7 @@ LAYERS = (
 )
 CONSOLE = (
     "quick",
+    "provider_settings",
     "settings",
     "schemas",
     "compression",
@@ -56,6 +57,7 @@ CONSOLE = (
     "replies",
     "store",
     "people",
+    "provider",
     "live",
     "jobs",
     "streams",

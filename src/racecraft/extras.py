@@ -28,6 +28,8 @@ EXTRAS: Final[dict[str, tuple[str, ...]]] = {
         "limits",
         "segno",
         "av",
+        "authlib",
+        "joserfc",
     ),
     "postgres": ("psycopg[binary]",),
     "s3": ("obstore",),

@@ -129,6 +129,8 @@ COMMANDS: dict[str, list[str]] = {
         " --no-browser --json",
         "serve --runs R -p 0 --league --host 127.0.0.1 --address http://127.0.0.1:8321 --plain-http",
         "serve --runs R -p 0 --league --address https://x --trusted-proxy 127.0.0.1 --certificate C.pem --key K.pem",
+        "serve --runs R -p 0 --league --provider https://x --provider-client c --provider-secret-file W"
+        " --provider-name N --provider-domain x.example --provider-claim a=b --provider-group 1",
     ],
     "login": ["login http://127.0.0.1:9 --token rc_none --json", "login http://127.0.0.1:9"],
     "races": ["races --json"],

@@ -64,7 +64,7 @@ def test_who_comes_unencrypted_through_the_proxy_is_refused(behind: RunningConso
         plain = {**PROXY, "x-forwarded-proto": "http"}
         for path in ("/", "/api/door", "/api/health"):
             assert "https only" in refused(client.get(path, headers=plain), 403)
-        assert ok(client.get("/api/door", headers=PROXY)) == {"is_league": True, "me": None}
+        assert ok(client.get("/api/door", headers=PROXY)) == {"is_league": True, "me": None, "provider": None}
         ok(client.get("/api/health"), 204)  # a supervisor on this machine
         refused(client.get("/api/door", headers={**PROXY, "origin": "http://school.example"}), 403)
 

@@ -24,6 +24,7 @@ OPERATORS = (
     *(
         "serve/store",
         "serve/settings.py",
+        "serve/provider_settings.py",
         "serve/backup.py",
         "serve/worker.py",
         "serve/__init__.py",
@@ -33,7 +34,9 @@ OPERATORS = (
     *("importing/history.py", "importing/own.py", "serve/jobs/bench.py"),
 )
 """Where they come from that only terminals and logs show, or that quote others."""
-PLAIN = re.compile(r"(Value|Type|Key|Attribute|Assertion|Runtime|OS|Stop)\w*|HTTPException|SystemExit|BadParameter")
+PLAIN = re.compile(
+    r"(Value|Type|Key|Attribute|Assertion|Runtime|OS|Stop)\w*|HTTPException|SystemExit|BadParameter|NoAnswer"
+)
 
 
 def sentence(node: ast.expr) -> str | None:

@@ -122,6 +122,12 @@ ROWS: dict[str, tuple[str, Any]] = {
     "POST /api/door/reset": ("open", {"secret": "x", "password": "correct horse"}),
     "POST /api/door/devices": ("open", None),
     "POST /api/door/devices/token": ("open", {"secret": "x"}),
+    "POST /api/door/provider": ("provider", None),
+    "POST /api/door/provider/arrival": ("provider", {"code": "x", "state": "x"}),
+    "POST /api/door/provider/newcomer": ("provider", {"name": "x"}),
+    "GET /api/account/provider": ("me", None),
+    "POST /api/account/provider": ("own", None),
+    "DELETE /api/account/provider": ("own", None),
     "POST /api/account/devices": ("me", {"code": "x"}),
     "POST /api/door/sign-out": ("each", None),
     "GET /api/account": ("me", None),
@@ -145,6 +151,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "PATCH /api/groups/{group_id}/members/{member}": ("organiser", {"real_name": "x"}),
     "DELETE /api/groups/{group_id}/members/{member}": ("herself", None),
     "POST /api/groups/{group_id}/members/{member}/revoke": ("organiser", None),
+    "POST /api/groups/{group_id}/members/{member}/admit": ("organiser", None),
     "POST /api/groups/{group_id}/cards": ("organiser", {"members": [0]}),
     "GET /api/groups/{group_id}/models": ("organiser", None),
     "POST /api/groups/{group_id}/models/copy": ("organiser", {"member": 0, "model": "adas-model"}),
@@ -189,6 +196,7 @@ MAY = {  # who may do what is theirs by role; everybody else gets 404
     "organisers": ("teacher", "other", "owner"),
     "admin": ("owner",),
     "hidden": (),
+    "provider": (),  # there is none here
 }
 SLIPPERY = (
     "DELETE /api/drives/{drive_id}",
@@ -264,7 +272,7 @@ def test_strangers_are_sent_to_the_door(school: School) -> None:
         for label, (kind, _) in ROWS.items():
             status = request(school, stranger, label).status_code
             is_board = label.startswith("GET /api/boards/")
-            expected = (200, 201, 204, 401) if kind == "open" else (404,) if is_board else (401,)
+            expected = (200, 201, 204, 401) if kind == "open" else (404,) if is_board or kind == "provider" else (401,)
             assert status in expected, (label, status)
 
 

@@ -56,7 +56,7 @@ def test_the_owners_link_is_the_first_admin(league: RunningLeague) -> None:
     assert (me["id"], me["role"]) == (1, "admin")
     assert ok(league.owner.get("/api/console"))["runs"] == str(league.console.runs)
     with league.stranger() as stranger:
-        assert ok(stranger.get("/api/door")) == {"is_league": True, "me": None}
+        assert ok(stranger.get("/api/door")) == {"is_league": True, "me": None, "provider": None}
         assert "not signed in" in refused(stranger.get("/api/models"), 401)
 
 

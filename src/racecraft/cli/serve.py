@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from racecraft.cli.app import Json, app, print_json
+from racecraft.errors import ConfigError
 from racecraft.extras import needed_for
+
+if TYPE_CHECKING:
+    from racecraft.serve.provider_settings import ProviderSettings
 
 Database = Annotated[
     str,
@@ -55,6 +59,28 @@ def serve(
         Path | None, typer.Option("--certificate", help="PEM file of your own, where no proxy has one.")
     ] = None,
     key: Annotated[Path | None, typer.Option("--key", help="PEM file with the certificate's private key.")] = None,
+    provider: Annotated[
+        str, typer.Option("--provider", help="https://… of a school or company, through which people sign in.")
+    ] = "",
+    provider_client: Annotated[
+        str, typer.Option("--provider-client", help="Client id that the provider gave the league.")
+    ] = "",
+    provider_secret_file: Annotated[
+        Path | None,
+        typer.Option("--provider-secret-file", help="File with its secret, unless RACECRAFT_PROVIDER_SECRET has it."),
+    ] = None,
+    provider_name: Annotated[
+        str, typer.Option("--provider-name", help="What the button calls the provider, such as 'Hill School'.")
+    ] = "",
+    provider_domain: Annotated[
+        list[str], typer.Option("--provider-domain", help="Of e-mail addresses that come in; none lets in all.")
+    ] = [],  # noqa: B006
+    provider_claim: Annotated[
+        list[str], typer.Option("--provider-claim", help="NAME=VALUE that the provider has to say of who comes in.")
+    ] = [],  # noqa: B006
+    provider_group: Annotated[
+        int | None, typer.Option("--provider-group", help="Number of the group that newcomers join.")
+    ] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the link in a browser.")] = True,
     as_json: Json = False,
 ) -> None:
@@ -77,6 +103,9 @@ def serve(
 
             webbrowser.open(link)
 
+    named = (provider_client, provider_secret_file, provider_name, provider_domain, provider_claim)
+    if not provider and (any(named) or provider_group is not None):
+        raise ConfigError("There is no provider that these options are of.", hint="Give its address with --provider.")
     settings = ServeSettings(
         runs=runs,
         port=port,
@@ -91,8 +120,42 @@ def serve(
         trusted_proxies=tuple(trusted_proxy),
         certificate=certificate,
         key=key,
+        provider=_provider_settings(
+            provider,
+            client=provider_client,
+            secret_file=provider_secret_file,
+            label=provider_name,
+            domains=provider_domain,
+            claims=provider_claim,
+            group=provider_group,
+        ),
     )
     run_server(settings, on_ready=ready)
+
+
+def _provider_settings(
+    issuer: str,
+    *,
+    client: str,
+    secret_file: Path | None,
+    label: str,
+    domains: list[str],
+    claims: list[str],
+    group: int | None,
+) -> ProviderSettings | None:
+    from racecraft.serve.provider_settings import ProviderSettings, claim_of, secret_of
+
+    if not issuer:
+        return None
+    return ProviderSettings(
+        issuer=issuer,
+        client=client,
+        secret=secret_of(secret_file),
+        label=label,
+        domains=tuple(domains),
+        claims=tuple(claim_of(claim) for claim in claims),
+        group=group,
+    )
 
 
 @app.command()

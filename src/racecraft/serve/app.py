@@ -42,6 +42,7 @@ from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.people import routes as account
 from racecraft.serve.people.keys import Keys
+from racecraft.serve.provider import routes as provider
 from racecraft.serve.quotas import routes as quotas
 from racecraft.serve.races import routes as races
 from racecraft.serve.races.races import Races
@@ -153,7 +154,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     replies.install(app)
     parts = [console, tracks, drives, rewards, choices, archives, exports, models]
     parts += [evaluations, analysis, beliefs, tunings, sweeps, races]
-    parts += [contests, jobs, events, door, audit, lessons]
+    parts += [contests, jobs, events, door, provider, audit, lessons]
     for part in parts:
         app.include_router(part.router)
     for part in (account, groups, league, quotas):

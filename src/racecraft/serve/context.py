@@ -6,7 +6,7 @@ import threading
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from fastapi import Depends, Request
 
@@ -21,10 +21,12 @@ from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.people.devices import Devices
+from racecraft.serve.people.identities import Identities
 from racecraft.serve.people.keys import Keys
 from racecraft.serve.people.people import People, Person
 from racecraft.serve.people.tries import Tries
 from racecraft.serve.problems import NotFound
+from racecraft.serve.provider_settings import ProviderSettings
 from racecraft.serve.quotas.quotas import Quotas
 from racecraft.serve.races.races import Races
 from racecraft.serve.settings import OWNER, ServeSettings
@@ -34,6 +36,9 @@ from racecraft.serve.submissions.league import League
 from racecraft.serve.sweeps.sweeps import Sweeps
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning.tunings import Tunings
+
+if TYPE_CHECKING:
+    from racecraft.serve.provider.provider import Provider
 
 SAFE: Final = ("GET", "HEAD")
 
@@ -69,7 +74,10 @@ class Consoles:
 
     def __init__(self, owner: Context, keys: Keys) -> None:
         self.owner, self.keys = owner, keys
-        self.people, self.groups = People(owner.database), Groups(owner.database)
+        told = owner.settings.provider
+        self.people, self.groups = People(owner.database), Groups(owner.database, issuer=told.issuer if told else "")
+        self.identities = Identities(owner.database)
+        self._provider = _provider(told) if told is not None else None
         self.quotas = Quotas(owner.database, owner.settings.runs)
         self.audit, self.devices = Audit(owner.database), Devices()
         self.league = League(owner.database, owner.settings.state, self._courses)
@@ -90,6 +98,17 @@ class Consoles:
         """How often somebody may try to get in."""
         return Tries()
 
+    @property
+    def provider(self) -> Provider:
+        """Through whom people sign in.
+
+        Raises:
+            NotFound: Through nobody.
+        """
+        if self._provider is None:
+            raise NotFound("Nobody signs in through a provider here.")
+        return self._provider
+
     def _courses(self, user_id: int) -> Courses:
         return self.of(user_id).courses
 
@@ -97,6 +116,12 @@ class Consoles:
         """Somebody is gone."""
         with self._lock:
             self._others.pop(user_id, None)
+
+
+def _provider(settings: ProviderSettings) -> Provider:
+    from racecraft.serve.provider.provider import Provider  # leagues without one do without
+
+    return Provider(settings)
 
 
 def _console(owner: Context, user_id: int) -> Context:

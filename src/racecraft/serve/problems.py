@@ -22,3 +22,7 @@ class NotLetIn(RunError):
 
 class TooMany(RunError):
     """Too many failures; 429."""
+
+
+class Unreachable(RunError):
+    """Another machine, on which this depends, does not answer as it should; 502."""

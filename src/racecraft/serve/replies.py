@@ -13,9 +13,9 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from racecraft.errors import RacecraftError, TrackNotFound
-from racecraft.serve.problems import Conflict, NotFound, NotLetIn, TooMany
+from racecraft.serve.problems import Conflict, NotFound, NotLetIn, TooMany, Unreachable
 
-STATUS: Final = {NotFound: 404, TrackNotFound: 404, Conflict: 409, NotLetIn: 401, TooMany: 429}
+STATUS: Final = {NotFound: 404, TrackNotFound: 404, Conflict: 409, NotLetIn: 401, TooMany: 429, Unreachable: 502}
 """Of errors that are not simply something wrong with the request, which is 422."""
 
 

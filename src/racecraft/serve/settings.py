@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 from racecraft.checks import check_whole, require
 from racecraft.errors import ConfigError
+from racecraft.serve.provider_settings import ProviderSettings
 
 STATE_FOLDER: Final = ".racecraft"
 """Inside the runs folder: the database and the tracks that were drawn or imported."""
@@ -28,6 +29,10 @@ OWNER: Final = 1
 PEOPLE: Final = "people"
 """Inside the state folder: a folder for each other person of a league, by number, that is like the runs folder."""
 COOKIE: Final = "racecraft_session"
+PROVIDER_COOKIE: Final = "racecraft_provider"
+"""By which a browser is known that is at the provider, or chooses a name."""
+PROVIDER_PAGE: Final = "/oidc"
+"""Of the console, to which a provider sends people back."""
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 
 MAX_MACHINE: Final = 64
@@ -66,6 +71,8 @@ class ServeSettings:
     """PEM file with the chain of a league's own certificate, where no proxy has one."""
     key: Path | None = None
     """PEM file with its private key."""
+    provider: ProviderSettings | None = None
+    """A school's or company's provider, through which people of a league sign in."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "runs", self.runs.absolute())
@@ -104,6 +111,8 @@ class ServeSettings:
             )
         if (self.trusted_proxies or self.certificate or self.key) and not self.league:
             raise ConfigError("Proxies and certificates are for a league.", hint="Add --league for accounts.")
+        if self.provider is not None and not self.league:
+            raise ConfigError("Sign-in through a provider is for a league.", hint="Add --league for accounts.")
         for proxy in self.trusted_proxies:
             try:
                 ip_network(proxy)

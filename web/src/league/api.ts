@@ -24,6 +24,7 @@ export type GroupQuota = Schemas["GroupQuota"];
 export type OwnQuota = Schemas["OwnQuota"];
 export type QuotaInfo = Schemas["QuotaInfo"];
 export type UsageInfo = Schemas["UsageInfo"];
+export type ProviderLink = Schemas["ProviderLink"];
 export type TokenInfo = Schemas["TokenInfo"];
 
 export const leagueApi = {
@@ -31,6 +32,9 @@ export const leagueApi = {
   showCard: (secret: string) => ask<Me>("POST", "/door/card", { secret }),
   join: (code: string, name: string) => ask<Schemas["Joined"]>("POST", "/door/join", { code, name }),
   resetPassword: (secret: string, password: string) => ask<Me>("POST", "/door/reset", { secret, password }),
+  toProvider: () => ask<Schemas["ToProvider"]>("POST", "/door/provider"),
+  arrive: (answer: Schemas["FromProvider"]) => ask<Schemas["Arrived"]>("POST", "/door/provider/arrival", answer),
+  joinByProvider: (name: string) => ask<Me>("POST", "/door/provider/newcomer", { name }),
   letIn: (code: string) => ask<void>("POST", "/account/devices", { code }),
   makeReset: (person: string) => ask<ResetLink>("POST", "/resets", { person }),
   audit: (query: Record<string, string | number>) =>
@@ -52,6 +56,7 @@ export const leagueApi = {
     ask<void>("PATCH", `/groups/${id}/members/${member}`, change),
   removeMember: (id: number, member: number) => ask<void>("DELETE", `/groups/${id}/members/${member}`),
   revoke: (id: number, member: number) => ask<void>("POST", `/groups/${id}/members/${member}/revoke`),
+  admit: (id: number, member: number) => ask<void>("POST", `/groups/${id}/members/${member}/admit`),
   cards: (id: number, members: number[]) => ask<LoginCard[]>("POST", `/groups/${id}/cards`, { members }),
   quota: () => ask<OwnQuota>("GET", "/quota"),
   groupQuota: (id: number) => ask<GroupQuota>("GET", `/groups/${id}/quota`),
@@ -87,6 +92,9 @@ export const leagueApi = {
 
   rename: (name: string) => ask<Me>("PATCH", "/account", { name }),
   setPassword: (old: string, fresh: string) => ask<void>("PUT", "/account/password", { old, new: fresh }),
+  provider: () => ask<ProviderLink | null>("GET", "/account/provider"),
+  linkProvider: () => ask<Schemas["ToProvider"]>("POST", "/account/provider"),
+  unlinkProvider: () => ask<void>("DELETE", "/account/provider"),
   sessions: () => ask<SessionInfo[]>("GET", "/account/sessions"),
   endSession: (id: string) => ask<void>("DELETE", `/account/sessions/${id}`),
   endSessions: () => ask<void>("DELETE", "/account/sessions"),

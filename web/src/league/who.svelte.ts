@@ -7,11 +7,12 @@ export type Me = components["schemas"]["Me"];
 
 export const isLeague = document.querySelector('meta[name="rooms"]')?.getAttribute("content") === "league";
 
-/** `me` is null for a stranger, undefined until the server has said it. */
-export const who = $state<{ me: Me | null | undefined }>({ me: undefined });
+/** `me` is null for a stranger, undefined until the server has said it; `provider` is empty where there is none. */
+export const who = $state<{ me: Me | null | undefined; provider: string }>({ me: undefined, provider: "" });
 
 export async function askWho(): Promise<void> {
   const door = await ask<components["schemas"]["Door"]>("GET", "/door");
+  who.provider = door.provider ?? "";
   who.me = door.me;
 }
 
@@ -29,4 +30,7 @@ export const isRoom = (parts: string[]): boolean => isLeague && ROOMS.includes(p
 /** Pages that stand alone, without the console around them: the door, and what a projector shows. */
 export const isAlone = (parts: string[]): boolean =>
   isLeague &&
-  (!who.me || connection.isStranger || ["card", "join", "reset"].includes(parts[0] ?? "") || parts[2] === "screen");
+  (!who.me ||
+    connection.isStranger ||
+    ["card", "join", "reset", "oidc"].includes(parts[0] ?? "") ||
+    parts[2] === "screen");

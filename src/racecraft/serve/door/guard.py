@@ -25,7 +25,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from racecraft.serve.people.keys import Keys
 from racecraft.serve.replies import problem
-from racecraft.serve.settings import COOKIE, LOOPBACK, OWNER, ServeSettings
+from racecraft.serve.settings import COOKIE, LOOPBACK, OWNER, PROVIDER_COOKIE, ServeSettings
 
 MAX_BODY: Final = 8 << 20  # bytes
 MAX_SUBMISSION: Final = 32 << 20
@@ -33,7 +33,12 @@ LARGE: Final = {"/api/models/import": 1 << 30}
 """Addresses that take more, as much as an archive may have; they write to disk what comes, as it comes."""
 SAFE: Final = ("GET", "HEAD", "OPTIONS")
 DEVICES: Final = ("/api/door/devices", "/api/door/devices/token")
-OPEN: Final = ("/api/door", "/api/door/sign-in", "/api/door/card", "/api/door/join", "/api/door/reset", *DEVICES)
+PROVIDER: Final = ("/api/door/provider", "/api/door/provider/arrival", "/api/door/provider/newcomer")
+OPEN: Final = (
+    *("/api/door", "/api/door/sign-in", "/api/door/card", "/api/door/join", "/api/door/reset"),
+    *DEVICES,
+    *PROVIDER,
+)
 """What a league answers to strangers, beside the boards of public races."""
 HEALTH: Final = "/api/health"
 """What a supervisor asks, of any console; it tells nothing but that it works."""
@@ -188,6 +193,18 @@ class Guard:
         """Have a browser keep its session."""
         response.set_cookie(
             COOKIE, secret, httponly=True, samesite="strict", path="/", max_age=COOKIE_S, secure=self.is_secure
+        )
+
+    def send_away(self, response: Response, secret: str, *, seconds: int) -> None:
+        """Have a browser keep what it is known by when it comes back from a provider."""
+        response.set_cookie(
+            PROVIDER_COOKIE,
+            secret,
+            httponly=True,
+            samesite="strict",
+            path="/api/door/provider",
+            max_age=seconds,
+            secure=self.is_secure,
         )
 
     def _may_stay(self, request: Request) -> Callable[[], Awaitable[bool]]:

@@ -33,7 +33,11 @@ router = APIRouter(prefix="/api/door", tags=["door"])
 def look_at_door(request: Request, consoles: InLeague) -> Door:
     """Whether this is a league, and who is signed in."""
     user = request.state.user_id
-    return Door(me=me_of(consoles.people.get(user)) if user is not None else None)
+    told = consoles.owner.settings.provider
+    return Door(
+        me=me_of(consoles.people.get(user)) if user is not None else None,
+        provider=told.label if told is not None else None,
+    )
 
 
 @router.post("/sign-in")
@@ -44,9 +48,9 @@ def sign_in(request: Request, body: SignIn, response: Response, consoles: InLeag
     user = consoles.people.by_password(body.name, body.password)
     if user is None:
         consoles.tries.failed(account=account, address=address)
-        _write_down(request, consoles, _named(consoles, body.name), is_in=False)
+        write_down(request, consoles, _named(consoles, body.name), is_in=False)
         raise NotLetIn("There is nobody of that name with that password.")
-    return _let_in(request, response, consoles, user)
+    return let_in(request, response, consoles, user)
 
 
 @router.post("/card")
@@ -55,9 +59,9 @@ def show_card(request: Request, body: ShowCard, response: Response, consoles: In
     consoles.tries.check(account="", address=caller(request))
     user = consoles.keys.card_user(body.secret)
     if user is None:
-        _fail(request, consoles)
+        fail(request, consoles)
         raise NotLetIn("This card is no longer good.", hint="Ask for a new one.")
-    return _let_in(request, response, consoles, user)
+    return let_in(request, response, consoles, user)
 
 
 @router.post("/join", status_code=201)
@@ -66,9 +70,9 @@ def join(request: Request, body: Join, response: Response, consoles: InLeague) -
     consoles.tries.check(account="", address=caller(request))
     user = consoles.groups.join(body.code, body.name)
     if user is None:
-        _fail(request, consoles)
+        fail(request, consoles)
         raise NotLetIn("There is no such code, or it is no longer good.", hint="Look at the wall again.")
-    me = _let_in(request, response, consoles, user)
+    me = let_in(request, response, consoles, user)
     secret = consoles.keys.print_card(user)
     address = address_of(request, consoles.owner.settings)
     return Joined(me=me, card=card_of(address, secret, user_id=user, name=me.name))
@@ -82,9 +86,9 @@ def reset_password(request: Request, body: ResetPassword, response: Response, co
     if consoles.keys.reset_user(body.secret) is not None:
         user = consoles.keys.use_reset(body.secret, hash_password(body.password))
     if user is None:
-        _fail(request, consoles)
+        fail(request, consoles)
         raise NotLetIn("This link is no longer good.", hint="Ask for a new one.")
-    return _let_in(request, response, consoles, user)
+    return let_in(request, response, consoles, user)
 
 
 @router.post("/devices", status_code=201)
@@ -104,7 +108,7 @@ def take_token(request: Request, body: TakeToken, consoles: InLeague) -> TakenTo
     try:
         user = consoles.devices.take(body.secret)
     except NotLetIn:
-        _fail(request, consoles)
+        fail(request, consoles)
         raise
     if user is None:
         return TakenToken(token="")
@@ -116,27 +120,29 @@ def take_token(request: Request, body: TakeToken, consoles: InLeague) -> TakenTo
 @router.post("/sign-out", status_code=204)
 def sign_out(request: Request, consoles: InConsoles, person: InPerson) -> Response:
     """Out."""
-    _write_down(request, consoles, person.id)
+    write_down(request, consoles, person.id)
     consoles.keys.close_session(request.cookies.get(COOKIE, ""))
     response = Response(status_code=204)
     response.delete_cookie(COOKIE, path="/")
     return response
 
 
-def _let_in(request: Request, response: Response, consoles: Consoles, user: int) -> Me:
+def let_in(request: Request, response: Response, consoles: Consoles, user: int) -> Me:
+    """Give a browser a session of somebody; what it had ends."""
     guard: Guard = request.app.state.guard
-    _write_down(request, consoles, user)
+    write_down(request, consoles, user)
     consoles.keys.close_session(request.cookies.get(COOKIE, ""))  # whoever was here before is so no longer
     guard.give_cookie(response, consoles.keys.open_session(user))
     return me_of(consoles.people.get(user))
 
 
-def _fail(request: Request, consoles: Consoles) -> None:
+def fail(request: Request, consoles: Consoles) -> None:
+    """Count and keep that somebody was not let in, of whom nobody knows who they are."""
     consoles.tries.failed(account="", address=caller(request))
-    _write_down(request, consoles, None, is_in=False)
+    write_down(request, consoles, None, is_in=False)
 
 
-def _write_down(request: Request, consoles: Consoles, user: int | None, *, is_in: bool = True) -> None:
+def write_down(request: Request, consoles: Consoles, user: int | None, *, is_in: bool = True) -> None:
     """Keep who came and from where; of who was not let in, whom they said they were, if there is such a one."""
     what = request.scope["route"].name + ("" if is_in else "_failed")
     consoles.audit.note(user, what, request.url.path, address=caller(request))

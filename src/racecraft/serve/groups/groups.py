@@ -16,12 +16,13 @@ from typing import Final, Literal
 import sqlalchemy as sa
 from sqlalchemy.orm import Session, aliased
 
+from racecraft.serve.people.identities import add_identity
 from racecraft.serve.people.keys import SIGNS, plain_code
 from racecraft.serve.people.names import checked_name
 from racecraft.serve.people.people import Person, Role, add_person, use_invitation
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Card, Group, Invitation, Member, User, now
+from racecraft.serve.store.tables import Card, Group, Identity, Invitation, Member, User, now
 
 Part = Literal["organiser", "racer"]
 CODE_LENGTH: Final = 8
@@ -40,6 +41,9 @@ class GroupMember:
     role: Part
     real_name: str
     has_card: bool
+    comes_by_provider: bool
+    is_locked: bool
+    """Whether they did, and were locked out."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +56,15 @@ class Joining:
 
 
 class Groups:
-    """All groups."""
+    """All groups.
 
-    def __init__(self, database: Database) -> None:
-        self._database = database
+    Args:
+        database: That they are in.
+        issuer: The provider through which people sign in; empty where there is none.
+    """
+
+    def __init__(self, database: Database, *, issuer: str = "") -> None:
+        self._database, self._issuer = database, issuer
 
     def create(self, title: str, *, by: Person) -> int:
         """A new group, whose organiser is who makes it; its number.
@@ -130,11 +139,16 @@ class Groups:
     def members(self, group_id: int) -> list[GroupMember]:
         """Everybody in a group, organisers first, by name."""
         has_card = sa.exists().where(Card.user_id == User.id)
-        query = sa.select(User.id, User.name, Member.role, Member.real_name, has_card)
+        query = sa.select(User.id, User.name, Member.role, Member.real_name, has_card, Identity.is_locked)
         query = query.join(Member, Member.user_id == User.id).where(Member.group_id == group_id)
+        mine = sa.and_(Identity.user_id == User.id, Identity.issuer == self._issuer)
+        query = query.outerjoin(Identity, mine)
         with self._database.transaction() as session:
             rows = session.execute(query.order_by(Member.role, User.name)).all()
-        return [GroupMember(row[0], row[1], _part(row[2]), row[3], bool(row[4])) for row in rows]
+        return [
+            GroupMember(row[0], row[1], _part(row[2]), row[3], bool(row[4]), row[5] is not None, bool(row[5]))
+            for row in rows
+        ]
 
     def add(self, group_id: int, people: list[tuple[str, str]]) -> list[int]:
         """New accounts in a group, by name and real name; their numbers.
@@ -210,6 +224,31 @@ class Groups:
             if invitation.group_id is not None:
                 _require_room(session, invitation.group_id, 1)
                 session.add(Member(group_id=invitation.group_id, user_id=user_id, role="racer"))
+            return user_id
+
+    def welcome(self, name: str, whom: tuple[str, str], *, group_id: int | None, real_name: str) -> int:
+        """A new account of somebody whom a provider knows; its number.
+
+        Args:
+            name: That they chose.
+            whom: The provider's name, and its name for them.
+            group_id: That they join.
+            real_name: For its organisers; of who joins none it is not kept.
+
+        Raises:
+            Conflict: The name is taken, the group is full or not there, or they have an account.
+        """
+        with self._database.transaction() as session:
+            user_id = add_person(session, name)
+            add_identity(session, user_id, *whom)
+            if group_id is not None:
+                if session.get(Group, group_id) is None:
+                    raise Conflict(
+                        f"Newcomers join group {group_id}, which does not exist.",
+                        hint="Whoever holds the league looks at --provider-group.",
+                    )
+                _require_room(session, group_id, 1)
+                session.add(Member(group_id=group_id, user_id=user_id, role="racer", real_name=real_name))
             return user_id
 
     def join_on(self, code: str, user_id: int) -> int | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Request, Response
 
@@ -32,6 +32,8 @@ from racecraft.serve.problems import NotFound, NotLetIn
 
 router = APIRouter(prefix="/api", tags=["groups"])
 
+HIDDEN: Final = {"real_name": "", "has_card": False, "comes_by_provider": False, "is_locked": False}
+"""What racers see of a member that only organisers know."""
 Id = Annotated[int, Path(ge=0, lt=2**31)]
 
 
@@ -73,10 +75,7 @@ def get_group(group_id: Id, request: Request, consoles: InConsoles, person: InPe
         title=consoles.groups.title(group_id),
         part=part,
         racers=sum(member.role == "racer" for member in members),
-        members=[
-            MemberInfo(**{**vars(member), **({} if part == "organiser" else {"real_name": "", "has_card": False})})
-            for member in members
-        ],
+        members=[MemberInfo(**{**vars(member), **({} if part == "organiser" else HIDDEN)}) for member in members],
         joining=_joining(request, consoles, joining) if joining is not None else None,
     )
 
@@ -131,9 +130,17 @@ def remove_member(group_id: Id, member: Id, consoles: InConsoles, person: InPers
 
 @router.post("/groups/{group_id}/members/{member}/revoke", status_code=204)
 def revoke_member(group_id: Id, member: Id, consoles: InConsoles, person: InPerson) -> Response:
-    """A lost card: it, all sessions and all tokens of its owner are worth nothing from now on."""
+    """A lost card: it, all sessions and all tokens of its owner are worth nothing; no provider lets them in."""
     _require_ward(consoles, group_id, member, person.id)
     consoles.keys.revoke(member)
+    return Response(status_code=204)
+
+
+@router.post("/groups/{group_id}/members/{member}/admit", status_code=204)
+def admit_member(group_id: Id, member: Id, consoles: InConsoles, person: InPerson) -> Response:
+    """Who comes through a provider and was locked out is let in by it again."""
+    _require_ward(consoles, group_id, member, person.id)
+    consoles.keys.admit(member)
     return Response(status_code=204)
 
 
@@ -143,8 +150,12 @@ def print_cards(
 ) -> list[LoginCard]:
     """New cards for members; their earlier ones are worth nothing from now on."""
     members = list(dict.fromkeys(body.members))
+    by_provider = {member.id for member in consoles.groups.members(group_id) if member.comes_by_provider}
     for member in members:
         _require_ward(consoles, group_id, member, person.id)
+        if member in by_provider:
+            name = consoles.people.get(member).name
+            raise NotFound(f"{name} has an account of their own, through a provider.")
     return _cards(request, consoles, members)
 
 

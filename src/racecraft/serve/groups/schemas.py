@@ -40,6 +40,9 @@ class MemberInfo(Message):
     real_name: str
     """Empty for who is no organiser."""
     has_card: bool
+    comes_by_provider: bool
+    """These two are for organisers only as well."""
+    is_locked: bool
 
 
 class OpenGroup(Message):

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session as Transaction
 
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Card, Reset, Session, Token, User, now
+from racecraft.serve.store.tables import Card, Identity, Reset, Session, Token, User, now
 
 Scope = Literal["read", "submit"]
 SESSION_DAYS: Final = 30
@@ -30,6 +30,8 @@ SIGNS: Final = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
 """Of what people type, codes and cards: none of them is taken for another."""
 CARD_LENGTH: Final = 26
 """26 of 31 signs hold 128 bits."""
+OPENERS: Final = (Card, Reset, Session, Token)
+"""Tables of what opens the door by itself."""
 TOKEN_MARK: Final = "rc_"
 """What tokens begin with, so that whoever finds one knows what it is."""
 
@@ -156,9 +158,16 @@ class Keys:
         return user_id
 
     def revoke(self, user_id: int) -> None:
-        """Everything that opens the door to somebody: cards, sessions, tokens."""
+        """Everything that opens the door to somebody: cards, sessions, tokens; a provider does so no longer."""
         with self._database.transaction() as session:
-            revoke_all(session, user_id)
+            for table in OPENERS:
+                session.execute(sa.delete(table).where(table.user_id == user_id))
+            session.execute(sa.update(Identity).where(Identity.user_id == user_id).values(is_locked=True))
+
+    def admit(self, user_id: int) -> None:
+        """Somebody who was locked out comes in through a provider again."""
+        with self._database.transaction() as session:
+            session.execute(sa.update(Identity).where(Identity.user_id == user_id).values(is_locked=False))
 
     def make_token(self, user_id: int, *, title: str, scopes: list[Scope], days: int) -> tuple[int, str]:
         """A token's number and secret, which is shown once.
@@ -215,8 +224,8 @@ class Keys:
 
 
 def revoke_all(session: Transaction, user_id: int) -> None:
-    """Remove all keys of somebody."""
-    for table in (Card, Reset, Session, Token):
+    """Remove all keys of somebody, and that they come in through a provider."""
+    for table in (*OPENERS, Identity):
         session.execute(sa.delete(table).where(table.user_id == user_id))
 
 

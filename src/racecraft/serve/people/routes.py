@@ -9,7 +9,9 @@ from fastapi import APIRouter, Path, Request, Response
 
 from racecraft.errors import ConfigError
 from racecraft.serve.context import InConsoles, InPerson
+from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.people.keys import SESSION_ID
+from racecraft.serve.people.links import address_of
 from racecraft.serve.people.schemas import (
     AccountChange,
     LetIn,
@@ -17,12 +19,15 @@ from racecraft.serve.people.schemas import (
     Me,
     NewPassword,
     NewToken,
+    ProviderLink,
     SessionInfo,
     TokenInfo,
+    ToProvider,
     me_of,
 )
 from racecraft.serve.problems import NotFound
-from racecraft.serve.settings import COOKIE
+from racecraft.serve.provider.visits import SECONDS
+from racecraft.serve.settings import COOKIE, PROVIDER_PAGE
 
 router = APIRouter(prefix="/api/account", tags=["account"])
 
@@ -84,6 +89,37 @@ def let_device_in(body: LetIn, consoles: InConsoles, person: InPerson) -> Respon
     except NotFound:
         consoles.tries.failed(account=account, address="")
         raise
+    return Response(status_code=204)
+
+
+@router.get("/provider")
+def get_provider(consoles: InConsoles, person: InPerson) -> ProviderLink | None:
+    """Whether one comes in through the league's provider; null where it has none."""
+    if consoles.owner.settings.provider is None:
+        return None
+    link = consoles.identities.of(person.id, consoles.provider.issuer)
+    return ProviderLink(
+        label=consoles.provider.label,
+        since=link.since if link is not None else None,
+        may_unlink=link is not None and not link.is_only_way,
+    )
+
+
+@router.post("/provider")
+def begin_link(request: Request, response: Response, consoles: InConsoles, person: InPerson) -> ToProvider:
+    """To the provider, so that one comes in through it from now on, too."""
+    consoles.tries.begins(address=caller(request))
+    back = address_of(request, consoles.owner.settings) + PROVIDER_PAGE
+    to, secret = consoles.provider.begin(back=back, user_id=person.id)
+    guard: Guard = request.app.state.guard
+    guard.send_away(response, secret, seconds=SECONDS)
+    return ToProvider(to=to)
+
+
+@router.delete("/provider", status_code=204)
+def unlink_provider(consoles: InConsoles, person: InPerson) -> Response:
+    """One no longer comes in through the provider."""
+    consoles.identities.unlink(person.id, consoles.provider.issuer)
     return Response(status_code=204)
 
 

@@ -31,6 +31,8 @@ class Door(Message):
 
     is_league: Literal[True] = True
     me: Me | None
+    provider: str | None
+    """What the button says through whom people sign in; None where through nobody."""
 
 
 class SignIn(Message):
@@ -91,6 +93,44 @@ class LetIn(Message):
     """The code that a program shows."""
 
     code: str = Field(min_length=1, max_length=40)
+
+
+class ToProvider(Message):
+    """Where a browser goes to sign in."""
+
+    to: str
+
+
+class FromProvider(Message):
+    """What a browser brings back from there."""
+
+    code: str = Field("", max_length=4096)
+    state: str = Field("", max_length=200)
+    error: str = Field("", max_length=200)
+    iss: str = Field("", max_length=500)
+
+
+class Arrived(Message):
+    """Who came back; None of who has to choose a name."""
+
+    me: Me | None
+    is_linked: bool
+    """Whether the provider was added to an account."""
+
+
+class Newcomer(Message):
+    """The name that everybody is to see."""
+
+    name: Name
+
+
+class ProviderLink(Message):
+    """How somebody comes in through the provider."""
+
+    label: str
+    since: datetime | None
+    """None of who does not."""
+    may_unlink: bool
 
 
 class Join(Message):

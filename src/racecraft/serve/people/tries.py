@@ -16,7 +16,11 @@ class Tries:
         from limits import RateLimitItemPerMinute, storage, strategies  # consoles without accounts do without
 
         self._limiter = strategies.MovingWindowRateLimiter(storage.MemoryStorage())
-        self._limits = {"account": RateLimitItemPerMinute(10, 10), "address": RateLimitItemPerMinute(200, 10)}
+        self._limits = {
+            "account": RateLimitItemPerMinute(10, 10),
+            "address": RateLimitItemPerMinute(200, 10),
+            "beginning": RateLimitItemPerMinute(600, 10),
+        }
 
     def check(self, *, account: str, address: str) -> None:
         """Before a try.
@@ -39,3 +43,12 @@ class Tries:
         for kind, who in (("account", account), ("address", address)):
             if who:
                 self._limiter.hit(self._limits[kind], kind, who)
+
+    def begins(self, *, address: str) -> None:
+        """Somebody goes to the provider; each takes a place in memory, so these are counted, if they fail or not.
+
+        Raises:
+            TooMany: There were too many.
+        """
+        if not self._limiter.hit(self._limits["beginning"], "beginning", address):
+            raise TooMany("Too many sign-ins were begun from here.", hint="Wait ten minutes, or come in another way.")

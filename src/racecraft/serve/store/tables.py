@@ -107,6 +107,23 @@ class Reset(Table):
     expires: Mapped[datetime]
 
 
+class Identity(Table):
+    """By whom somebody is known at a school's or company's provider; never by an e-mail address."""
+
+    __tablename__ = "identities"
+    __table_args__ = (UniqueConstraint("issuer", "subject"), UniqueConstraint("user_id", "issuer"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    issuer: Mapped[str] = mapped_column(String(255))
+    """The provider's name."""
+    subject: Mapped[str] = mapped_column(String(255))
+    """Its name for them, which never changes."""
+    is_locked: Mapped[bool] = mapped_column(default=False)
+    """Whether they were locked out, and are not let in by it."""
+    created: Mapped[datetime] = mapped_column(default=now)
+
+
 class Group(Table):
     """A class, a club, an event."""
 

@@ -1,0 +1,75 @@
+"""The door through a school's or company's provider: there, back, and a name for who is new.
+
+The provider sends browsers back to a page of the console, which brings what it was given: no address is ever taken from
+anybody, so nobody is led elsewhere.
+"""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from racecraft.serve.context import InLeague
+from racecraft.serve.door.guard import Guard, caller
+from racecraft.serve.door.routes import fail, let_in
+from racecraft.serve.people.links import address_of
+from racecraft.serve.people.schemas import Arrived, FromProvider, Me, Newcomer, ToProvider, me_of
+from racecraft.serve.problems import NotLetIn
+from racecraft.serve.provider.visits import SECONDS
+from racecraft.serve.settings import PROVIDER_COOKIE, PROVIDER_PAGE
+
+router = APIRouter(prefix="/api/door/provider", tags=["door"])
+
+
+@router.post("")
+def begin_provider(request: Request, response: Response, consoles: InLeague) -> ToProvider:
+    """To the provider's page."""
+    provider = consoles.provider
+    consoles.tries.check(account="", address=caller(request))
+    consoles.tries.begins(address=caller(request))
+    back = address_of(request, consoles.owner.settings) + PROVIDER_PAGE
+    to, secret = provider.begin(back=back, user_id=None)
+    guard: Guard = request.app.state.guard
+    guard.send_away(response, secret, seconds=SECONDS)
+    return ToProvider(to=to)
+
+
+@router.post("/arrival")
+def sign_in_by_provider(request: Request, body: FromProvider, response: Response, consoles: InLeague) -> Arrived:
+    """Back from there: in, or as somebody new, who has to choose a name; or with an account that is linked now."""
+    from racecraft.serve.provider.provider import Answer  # there is one
+
+    provider, here = consoles.provider, request.state.user_id
+    consoles.tries.check(account="", address=caller(request))
+    browser = request.cookies.get(PROVIDER_COOKIE, "")
+    try:
+        whom, is_link = provider.arrive(Answer(**body.model_dump()), browser=browser, user_id=here)
+        if is_link:
+            consoles.identities.link(here, whom.issuer, whom.subject)
+            consoles.audit.note(here, "link_provider", request.url.path, address=caller(request))
+            return Arrived(me=me_of(consoles.people.get(here)), is_linked=True)
+        user = consoles.identities.user(whom.issuer, whom.subject)
+    except NotLetIn:
+        fail(request, consoles)
+        raise
+    if user is None:
+        provider.newcomers.meet(browser, whom)
+        return Arrived(me=None, is_linked=False)
+    return Arrived(me=let_in(request, response, consoles, user), is_linked=False)
+
+
+@router.post("/newcomer", status_code=201)
+def join_by_provider(request: Request, body: Newcomer, response: Response, consoles: InLeague) -> Me:
+    """In for the first time, under a name that one chose."""
+    provider = consoles.provider
+    consoles.tries.check(account="", address=caller(request))
+    browser = request.cookies.get(PROVIDER_COOKIE, "")
+    try:
+        whom = provider.newcomers.who(browser)
+    except NotLetIn:
+        fail(request, consoles)
+        raise
+    user = consoles.groups.welcome(
+        body.name, (whom.issuer, whom.subject), group_id=provider.settings.group, real_name=whom.real_name
+    )
+    provider.newcomers.forget(browser)
+    return let_in(request, response, consoles, user)
