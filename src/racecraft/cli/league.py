@@ -92,3 +92,5 @@ def submit(
     if not as_json and found["state"] == "done":
         score = "no score: too few laps" if found["score"] is None else f"{found['score']:.3f} s"
         typer.echo(f"Submission {found['id']}: {score}.")
+        if found.get("is_looked_at"):
+            typer.echo("It drives like somebody else's entry, so a person looks at it; it counts meanwhile.")
