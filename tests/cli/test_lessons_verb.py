@@ -31,7 +31,9 @@ def test_the_list(racecraft: Run) -> None:
     listed = racecraft("lessons", "--language", "de").out
     assert "Belohnung formt Verhalten" in listed
     assert "50 %" in listed
-    assert "0 of 5" in listed
+    assert "0 von 5" in listed
+    assert "racecraft lessons run 1 --language de" in listed
+    assert "0 of 5" in racecraft("lessons").out
     assert racecraft("lessons", "--language", "fr").status == 1
 
 
@@ -49,8 +51,9 @@ def test_a_quiz_says_why(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> Non
     typed = iter(["?", *wrong])
     monkeypatch.setattr("typer.prompt", lambda _: next(typed))
     asked = " ".join(racecraft("lessons", "quiz", "1", "-l", "de").out.split())
-    assert f"1 of {count} {question.text.de}" in asked
-    assert "A letter from a to c, please." in asked
+    assert f"1 von {count} {question.text.de}" in asked
+    assert "Bitte einen Buchstaben von a bis c." in asked
+    assert f"0 von {count} richtig." in asked
     assert question.choices[question.answer].why.de in asked, "the right answer is told after a wrong one"
     assert racecraft("lessons", "--json").document["progress"]["quizzes"] == {"1": 1.0}, "the best counts"
     assert len(racecraft("lessons", "quiz", "1", "--json").document["questions"]) == count
@@ -110,6 +113,8 @@ def test_a_lesson_that_stops_is_told(racecraft: Run, tmp_path: Path, monkeypatch
     outcome = racecraft("lessons", "run", "1", "--json")
     assert outcome.status == 1
     assert "Lesson 1 stopped with exit status 3" in outcome.document["error"]["message"]
-    (tmp_path / "course" / "01_stops.py").write_text("print('here')\n")
-    told = racecraft("lessons", "run", "1", "--json").document
-    assert (told["output"], told["pictures"]) == ("here\n", [])
+    (tmp_path / "course" / "01_stops.py").write_text("import os\nprint(os.environ['RACECRAFT_LANGUAGE'])\n")
+    told = racecraft("lessons", "run", "1", "--language", "de", "--json").document
+    assert (told["output"], told["pictures"]) == ("de\n", [])
+    assert racecraft("lessons", "run", "1", "--json").document["output"] == "en\n"
+    assert racecraft("lessons", "run", "1", "--language", "fr").status == 1

@@ -17,6 +17,7 @@ from said_in_lessons import FIGURES, STATEMENTS
 from racecraft.course import check, checks_of, find_lesson, lessons, read_cells, read_progress, show, to_notebook
 from racecraft.course import progress as progress_file
 from racecraft.course.lesson import Facts
+from racecraft.course.phrases import Phrases
 from racecraft.course.pictures import bar_chart, line_chart
 from racecraft.course.quiz import LANGUAGES
 from racecraft.course.show import Picture
@@ -111,6 +112,7 @@ def test_answers_are_judged(number: int) -> None:
         exec(compile(asks[name], f"check of {name}", "exec"), names)
         verdict = names["verdict"]
         assert verdict.is_right == (kind == "right"), f"{answer.title}: {verdict}"
+        assert Phrases.of("de").translated(verdict.sentence), f"not in German: {verdict.sentence}"
         if kind == "wrong":
             assert len(verdict.sentence) > 30
             refused[name].append(verdict.sentence)

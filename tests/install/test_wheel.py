@@ -81,8 +81,8 @@ def test_a_wheel_trains_evaluates_and_serves_without_a_compiler(installed: Path,
     listed = json.loads(run(installed / "racecraft", "lessons", "--json", path=path, cwd=tmp_path))["lessons"]
     assert [Path(one["path"]).name for one in listed] == [path.name for path in sorted(ROOT.glob("lessons/*.py"))]
     assert not [one for one in listed if ROOT in Path(one["path"]).parents]
-    german = {path.name: path.read_bytes() for path in ROOT.glob("lessons/de/*.md")}
-    assert {path.name: path.read_bytes() for path in Path(listed[0]["path"]).parent.glob("de/*.md")} == german != {}
+    german = {path.name: path.read_bytes() for path in ROOT.glob("lessons/de/*")}
+    assert {path.name: path.read_bytes() for path in Path(listed[0]["path"]).parent.glob("de/*")} == german != {}
     options = ("--until", "5 laps", "--seed", "1", "--name", "first", "--json")
     trained = json.loads(run(installed / "racecraft", "train", *options, path=path, cwd=tmp_path))
     assert trained["reason"] == "laps"

@@ -88,6 +88,8 @@ def test_a_reader_finds_the_way_and_what_was_read_stays_in_the_browser(page: Pag
     page.get_by_role("link", name="Eine Strategie ohne Werte").click()
     page.get_by_role("button", name="Eine Fahrt").click()
     page.get_by_text("1 Fahrten;").wait_for()
+    page.get_by_role("heading", name="Noch einmal eine Reihe Spielautomaten").wait_for()
+    page.get_by_text("✗ Noch nicht. Der erste Schritt bekam 1,").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
     if AXE.exists():
         page.evaluate(AXE.read_text())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -43,16 +44,22 @@ def lessons(context: typer.Context, language: LanguageOption = "en", as_json: Js
 
 
 @lessons_app.command("run")
-def run_lesson(number: Number, as_json: Json = False) -> None:
+def run_lesson(number: Number, language: LanguageOption = "en", as_json: Json = False) -> None:
     """Run a lesson from top to bottom; its pictures go to runs/."""
+    from racecraft.checks import check_choice
     from racecraft.course import find_lesson
+    from racecraft.course.phrases import LANGUAGE
+    from racecraft.course.quiz import LANGUAGES
     from racecraft.errors import TrainingError
 
+    check_choice("language", language, LANGUAGES)
     lesson = find_lesson(number)
     begun = time.perf_counter()
     folder = Path("runs") / lesson.path.stem
     command = [sys.executable, str(lesson.path)]
-    done = subprocess.run(command, check=False, stdout=subprocess.PIPE if as_json else None, text=True)
+    environment = os.environ | {LANGUAGE: language}
+    output = subprocess.PIPE if as_json else None
+    done = subprocess.run(command, check=False, stdout=output, text=True, env=environment)
     seconds = round(time.perf_counter() - begun, 3)
     if done.returncode in (-2, INTERRUPTED):
         raise typer.Exit(INTERRUPTED)
@@ -135,7 +142,7 @@ def take_quiz(
     if as_json:
         print_json({"lesson": number, "right": right, "of": len(questions)})
     else:
-        say_score(right, len(questions))
+        say_score(right, len(questions), language)
 
 
 def _facts(lesson: Lesson) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -16,16 +16,41 @@ if TYPE_CHECKING:
     from racecraft.course.progress import Progress
     from racecraft.course.quiz import Question
 
+WORDS: Final[dict[str, dict[str, str]]] = {
+    "en": {
+        "headings": "lesson runs exercises quiz",
+        "of": "of",
+        "begin": "Begin with ",
+        "otherwise": ", or without notebooks ",
+        "option": "",
+        "to": "to",
+        "letter": "A letter from {} to {}, please.",
+        "right": "{} of {} right.",
+    },
+    "de": {
+        "headings": "Lektion läuft Übungen Fragen",
+        "of": "von",
+        "begin": "Beginne mit ",
+        "otherwise": ", oder ohne Notebooks mit ",
+        "option": " --language de",
+        "to": "bis",
+        "letter": "Bitte einen Buchstaben von {} bis {}.",
+        "right": "{} von {} richtig.",
+    },
+}
+"""What is said around the lessons' own words."""
+
 
 def say_lessons(lessons: Sequence[Lesson], progress: Progress, language: str) -> None:
     """A line for each lesson."""
     from racecraft.course import checks_of
 
-    console = Console()
+    console, words = Console(), WORDS[language]
     table = Table(header_style="bold", box=SIMPLE_HEAD, pad_edge=False)
     table.add_column("", justify="right", style="bold")
-    table.add_column("lesson")
-    for heading in ("runs", "exercises", "quiz"):
+    first, *others = words["headings"].split()
+    table.add_column(first)
+    for heading in others:
         table.add_column(heading, justify="right", no_wrap=True)
     for lesson in lessons:
         facts = lesson.facts
@@ -36,24 +61,24 @@ def say_lessons(lessons: Sequence[Lesson], progress: Progress, language: str) ->
             str(lesson.number),
             Text.assemble((facts.title[language], "bold"), "\n", (facts.goal[language], "dim")),
             f"{facts.seconds:.0f} s",
-            Text(f"{solved} of {len(names)}", "green" if solved == len(names) else ""),
+            Text(f"{solved} {words['of']} {len(names)}", "green" if solved == len(names) else ""),
             Text("–" if share is None else f"{100 * share:.0f} %", "green" if share == 1.0 else ""),
         )
     console.print(table)
-    line = Text.assemble("Begin with ", ("racecraft lessons open 1", "bold"), ", or without notebooks ")
-    line.append("racecraft lessons run 1", "bold")
+    open_it, run_it = (f"racecraft lessons {verb} 1{words['option']}" for verb in ("open", "run"))
+    line = Text.assemble(words["begin"], (open_it, "bold"), words["otherwise"], (run_it, "bold"))
     console.print(line, soft_wrap=True)
 
 
 def ask(question: Question, place: int, count: int, language: str) -> int:
     """Put a question; the index of the choice."""
-    console = Console()
-    console.print(Text(f"\n{place + 1} of {count}  {question.text[language]}", "bold"))
+    console, words = Console(), WORDS[language]
+    console.print(Text(f"\n{place + 1} {words['of']} {count}  {question.text[language]}", "bold"))
     letters = [chr(ord("a") + index) for index in range(len(question.choices))]
     for letter, choice in zip(letters, question.choices, strict=True):
         console.print(Text(f"  {letter})  {choice.text[language]}"))
-    while (given := typer.prompt(f"{letters[0]} to {letters[-1]}").strip().lower()) not in letters:
-        console.print(Text(f"A letter from {letters[0]} to {letters[-1]}, please."))
+    while (given := typer.prompt(f"{letters[0]} {words['to']} {letters[-1]}").strip().lower()) not in letters:
+        console.print(Text(words["letter"].format(letters[0], letters[-1])))
     return letters.index(given)
 
 
@@ -67,6 +92,6 @@ def say_answered(question: Question, index: int, language: str) -> None:
         console.print(Text.assemble("  ", (best.text[language], "bold"), " ", (best.why[language], "dim")))
 
 
-def say_score(right: int, count: int) -> None:
+def say_score(right: int, count: int, language: str) -> None:
     """The end of a quiz."""
-    Console().print(Text(f"{right} of {count} right.", "bold green" if right == count else "bold"))
+    Console().print(Text(WORDS[language]["right"].format(right, count), "bold green" if right == count else "bold"))

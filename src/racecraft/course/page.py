@@ -10,8 +10,10 @@ from typing import Final, Literal
 from pydantic import BaseModel, ConfigDict
 
 from racecraft.course.lesson import Lesson
+from racecraft.course.phrases import said_in
 from racecraft.course.quiz import Question, Words
-from racecraft.course.shown import Output, read_shown
+from racecraft.course.shown import Output, Printed, read_shown
+from racecraft.course.verdict import MARKS
 
 PLAYTHING: Final = "plaything "
 EXERCISE: Final = "exercise "
@@ -27,7 +29,7 @@ class PageCell(BaseModel):
     source: str
     """Markdown, or Python."""
     german: str = ""
-    """The text in German; empty where there is none, and for code."""
+    """The text in German, and of code what its check says; empty where there is nothing of the kind."""
     exercise: str = ""
     """Such as ``4.bellman``, where this is the cell to change."""
     plaything: str = ""
@@ -87,18 +89,26 @@ def page_of(lesson: Lesson) -> LessonPage:
     num_code = 0
     for cell, german in zip(lesson.cells(), lesson.cells("de"), strict=True):
         is_code = cell.kind == "code"
+        printed = outputs.get(num_code, []) if is_code else []
         cells.append(
             PageCell(
                 kind="code" if is_code else "text",
                 source=cell.source,
-                german=german.source if german != cell else "",
+                german=_verdict(printed) if is_code else german.source if german != cell else "",
                 exercise=_exercise(lesson, cell.title),
                 plaything=cell.title.removeprefix(PLAYTHING) if cell.title.startswith(PLAYTHING) else "",
-                outputs=outputs.get(num_code, []) if is_code else [],
+                outputs=printed,
             )
         )
         num_code += is_code
     return LessonPage(**vars(facts_of(lesson)), cells=cells, quiz=list(lesson.facts.questions))
+
+
+def _verdict(outputs: list[Output]) -> str:
+    """What a check says of the exercise as it stands, in German, where it is all that was printed."""
+    text = outputs[0].text if len(outputs) == 1 and isinstance(outputs[0], Printed) else ""
+    mark = next((mark for mark in MARKS.values() if text.startswith(mark)), "")
+    return f"{said_in('de', mark)} {said_in('de', text.removeprefix(mark).strip())}" if mark else ""
 
 
 def _exercise(lesson: Lesson, title: str) -> str:

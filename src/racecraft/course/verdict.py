@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from racecraft.course.phrases import learner_language, said_in
+
+MARKS = {True: "✓ Solved.", False: "✗ Not yet."}
+"""What a verdict begins with, by whether the answer is right."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -11,9 +16,11 @@ class Verdict:
 
     is_right: bool
     sentence: str
+    """In English."""
 
     def __str__(self) -> str:
-        return f"{'✓ Solved.' if self.is_right else '✗ Not yet.'} {self.sentence}"
+        language = learner_language()
+        return f"{said_in(language, MARKS[self.is_right])} {said_in(language, self.sentence)}"
 
 
 def right(sentence: str) -> Verdict:

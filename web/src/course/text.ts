@@ -9,9 +9,9 @@ const catalogues: Record<Language, Record<CourseKey, string>> = { en, de };
 export const c = (key: CourseKey, values: Record<string, string | number> = {}): string =>
   catalogues[language.choice][key].replace(/\{(\w+)\}/g, (_, name: string) => String(values[name] ?? ""));
 
-/** What opens a lesson as a notebook in the chosen language. */
-export const opens = (lesson: { number: number }): string =>
-  `racecraft lessons open ${lesson.number}${language.choice === "en" ? "" : ` --language ${language.choice}`}`;
+/** The command that runs a lesson, or opens it as a notebook, in the chosen language. */
+export const command = (verb: "run" | "open", lesson: { number: number }): string =>
+  `racecraft lessons ${verb} ${lesson.number}${language.choice === "en" ? "" : ` --language ${language.choice}`}`;
 
 /** A lesson's words in the chosen language. */
 export const said = (words: { en: string; de: string }): string => words[language.choice];

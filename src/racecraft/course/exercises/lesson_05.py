@@ -31,7 +31,7 @@ def check_cuts(cuts: Any) -> Verdict:
             f"That makes {cells} cells; {MOST_CELLS} are allowed. k edges make k + 1 intervals, and those multiply."
         )
     laps = [table_driver(edges, seed=seed).laps for seed in SEEDS]
-    told = f"{cells} cells, and it drives {' and '.join(map(str, laps))} of 20 laps. "
+    told = f"{cells} cells, and it drives {laps[0]} and {laps[1]} of 20 laps. "
     if min(laps) >= LAPS:
         return right(told + "The original has 147.")
     if not edges["offset"]:

@@ -37,10 +37,8 @@ def check_steer(steer: Callable[..., Any]) -> Verdict:
             "which is 30 degrees."
         )
     if left > 0.0 or turned > 0.0:
-        what = "20 cm left of the middle" if left > 0.0 else "pointing 0.2 rad to the left"
-        return wrong(
-            f"{what[0].upper()}{what[1:]}, it steers further to the left. Steer against what is wrong: a minus."
-        )
+        where = "20 cm left of the middle" if left > 0.0 else "Pointing 0.2 rad to the left"
+        return wrong(f"{where}, it steers further to the left. Steer against what is wrong: a minus.")
     if bend < 0.0:
         return wrong("Before a bend to the left it steers to the right: go with the bend, against the errors.")
 

@@ -1,0 +1,91 @@
+"""What checks say in German: each of their sentences, nothing that none of them says, and in whose language."""
+
+from __future__ import annotations
+
+import ast
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from racecraft.course import check, exercises
+from racecraft.course.lesson import lessons_folder
+from racecraft.course.phrases import LANGUAGE, Phrases, said_in
+from racecraft.course.verdict import MARKS, right, wrong
+
+GERMAN = json.loads((lessons_folder() / "de/verdicts.json").read_text(encoding="utf-8"))
+
+
+def sentence(node: ast.expr) -> str:
+    """A text of the source, with ``{}`` for what is filled in."""
+    match node:
+        case ast.Constant(value=str(text)):
+            return text
+        case ast.JoinedStr(values=parts):
+            return "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in parts)
+    return ""
+
+
+def sentences(path: Path) -> Iterator[str]:
+    """What a module of checks says: its texts of several words, but for keys and docstrings."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    left: set[ast.AST] = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Subscript(slice=inner) | ast.Expr(value=ast.Constant() as inner):
+                left.update(ast.walk(inner))
+            case ast.JoinedStr():
+                left.update(inner for inner in ast.walk(node) if isinstance(inner, ast.Constant))
+            case ast.Raise(exc=ast.Call() as inner):
+                left.update(ast.walk(inner))
+    nodes = (node for node in ast.walk(tree) if isinstance(node, ast.expr) and node not in left)
+    yield from (text for node in nodes if " " in (text := sentence(node)))
+
+
+def test_every_sentence_of_a_check_is_there_in_german_and_no_other() -> None:
+    modules = Path(exercises.__file__).parent.glob("*.py")
+    said = {text for path in modules for text in sentences(path)} | set(MARKS.values())
+    assert len(said) > 130
+    assert sorted(said - set(GERMAN)) == []
+    assert sorted(set(GERMAN) - said) == []
+
+
+@pytest.mark.parametrize("english", GERMAN)
+def test_what_is_filled_in_is_filled_in_there_too(english: str) -> None:
+    german = GERMAN[english]
+    assert german.count("{}") == english.count("{}")
+    assert german.endswith(" ") == english.endswith(" ")
+    begun = english.endswith(" ")
+    told = Phrases.of("de").translated(filled(english) + "The original has 147." * begun)
+    assert told == filled(german) + "Das Original hat 147." * begun
+
+
+def filled(text: str) -> str:
+    """With 0 in its first gap, 1 in the second."""
+    return text.replace("{}", "{:d}").format(*range(9))
+
+
+def test_a_verdict_is_said_in_the_language_of_the_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
+    verdict = wrong("It finds 2 of 8. It always returns 3: look at the pictures, images[i] is the i-th of them.")
+    german = "✗ Noch nicht. Sie findet 2 von 8. Sie gibt immer 3 zurück: Sieh dir die Bilder an, "
+    german += "images[i] ist das i-te davon."
+    monkeypatch.delenv("JPY_SESSION_NAME", raising=False)
+    monkeypatch.delenv(LANGUAGE, raising=False)
+    assert str(verdict).startswith("✗ Not yet. It finds 2 of 8. It always")
+    monkeypatch.setenv(LANGUAGE, "de")
+    assert str(verdict) == german
+    assert str(right("Something that nobody has translated.")) == "✓ Gelöst. Something that nobody has translated."
+    monkeypatch.setenv("JPY_SESSION_NAME", "/home/ada/lessons/02_three_kinds.ipynb")
+    assert str(verdict).startswith("✗ Not yet."), "an English notebook beside German ones"
+    monkeypatch.setenv("JPY_SESSION_NAME", "/home/ada/lessons/02_three_kinds.de.ipynb")
+    assert str(verdict) == german
+    assert str(check("2.odd", lambda _: "none")).startswith("✗ Noch nicht. Sie gab 'none' zurück;")
+
+
+def test_what_stands_in_a_gap_is_german_too() -> None:
+    told = said_in("de", "Now the right way earns -0.25 a second, too: nothing is left to drive for.")
+    assert (
+        told == "Jetzt bringt auch die richtige Richtung -0,25 je Sekunde: Es bleibt nichts, wofür man fahren könnte."
+    )
+    assert said_in("en", "The original has 147.") == "The original has 147."
