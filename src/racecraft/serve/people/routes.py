@@ -148,6 +148,7 @@ def remove_account(consoles: InConsoles, person: InPerson) -> Response:
     """Forget somebody with all that is theirs; download it first."""
     console = consoles.of(person.id)
     consoles.people.remove(person.id)
+    consoles.league.forget(person.id)
     consoles.forget(person.id)
     shutil.rmtree(console.settings.runs, ignore_errors=True)
     console.mirror.forget_all()

@@ -166,7 +166,7 @@ class Races:
             Conflict: It is over and cannot be opened again.
         """
         with self._database.transaction() as session:
-            _hold(session, race_id)
+            hold(session, race_id)
             race = self._race(session, race_id)
             if "closes" in request.model_fields_set and _is_told(race):
                 reason = "it was driven under the old rules" if not race.commitment else "everybody knows its secret"
@@ -197,7 +197,7 @@ class Races:
             road = self._courses.path_or_name(self._race(session, race_id).track)
         cargo = {name: self._share(self._garage.folder(name), tracks=(road,)) for name in models}
         with self._database.transaction() as session:
-            _hold(session, race_id)
+            hold(session, race_id)
             race = self._race(session, race_id)
             for name in models:
                 if self._garage.folder(name).checkpoints.last is None:
@@ -272,7 +272,7 @@ class Races:
         return race
 
 
-def _hold(session: Any, race_id: int) -> None:
+def hold(session: Any, race_id: int) -> None:
     """Keep others from changing a race or entering it until the transaction ends, in either database.
 
     What a transaction writes first it holds, SQLite the whole file and PostgreSQL the row; what it reads first it does

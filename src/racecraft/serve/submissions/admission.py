@@ -13,13 +13,19 @@ from racecraft.serve.races.races import state_of
 from racecraft.serve.store.tables import Job, Race, Submission, now
 from racecraft.serve.submissions.board import read_board
 
+KIND: Final = "judge"
+"""Of a submission's job."""
 MAX_WAITING: Final = 3  # submissions of one person to one race that are not judged yet
 MAX_SUBMISSIONS: Final = 200  # of one person to one race
+MAX_FREE: Final = 10  # of one person's a day, in all races, that fail or are cancelled
 DAY: Final = timedelta(days=1)
 
 
 def require_room(session: Session, race: Race, user_id: int) -> None:
     """Refuse what is too many; what failed or was cancelled costs no attempt of the day.
+
+    That is no way to have a judge for nothing, or to find out bit by bit where a race starts by what makes a file
+    fail: only some a day are free. They are counted by their jobs, as the same file sent again is the same submission.
 
     Raises:
         Conflict: It is.
@@ -31,6 +37,13 @@ def require_room(session: Session, race: Race, user_id: int) -> None:
     if sum(state in ("queued", "running") for _, state in mine) >= MAX_WAITING:
         raise Conflict(f"{MAX_WAITING} of your submissions are not judged yet.", hint="Wait for one of them.")
     since = now() - DAY
+    free = sa.select(Job.created).where(Job.user_id == user_id, Job.kind == KIND, Job.created > since)
+    lost = session.scalars(free.where(Job.state.in_(("failed", "cancelled"))).order_by(Job.created)).all()
+    if len(lost) >= MAX_FREE:
+        raise Conflict(
+            f"{MAX_FREE} of your submissions failed or were cancelled within a day.",
+            hint=f"The next one is possible at {lost[-MAX_FREE] + DAY:%H:%M} UTC.",
+        )
     today = sorted(created for created, state in mine if created > since and state not in ("failed", "cancelled"))
     if race.attempts_per_day and len(today) >= race.attempts_per_day:
         raise Conflict(

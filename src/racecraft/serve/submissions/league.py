@@ -27,11 +27,11 @@ from racecraft.race.entry_file import read_entry_file
 from racecraft.serve.jobs.queue import KINDS, kinds_of, new_job
 from racecraft.serve.jobs.turns import waiting_line
 from racecraft.serve.problems import Conflict, NotFound
-from racecraft.serve.races.races import announcement_of, is_withheld, state_of
+from racecraft.serve.races.races import announcement_of, hold, is_withheld, state_of
 from racecraft.serve.races.standings import trial_scores
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
-from racecraft.serve.submissions.admission import require_place, require_room
+from racecraft.serve.submissions.admission import KIND, require_place, require_room
 from racecraft.serve.submissions.board import NONE, Board, read_board
 from racecraft.serve.submissions.copies import accept
 from racecraft.serve.submissions.infos import pace, submission_info, told_of, whose
@@ -43,7 +43,6 @@ from racecraft.sim.vehicle import load_vehicle
 from racecraft.track import Track
 
 Part = Literal["organiser", "racer", "spectator"]
-KIND: Final = "judge"
 MAX_LISTED: Final = 1000  # submissions at once
 PUBLISHED: Final = ("submission", "name", "model", "place", "score_ms", "best_lap_ms", "resets", "completion")
 """Of each row of the board of a race that is over."""
@@ -141,20 +140,23 @@ class League:
             folder.mkdir(parents=True)
             _write(folder / ENTRY, data)
             digest = read_entry_file(folder / ENTRY).digest
-            submission = self._enter(race_id, digest, job, model=model, user_id=user_id)
+            submission, earlier = self._enter(race_id, digest, job, model=model, user_id=user_id)
         except OSError as error:
             shutil.rmtree(folder, ignore_errors=True)
             raise RunError(f"The file cannot be kept: {error.strerror or error}.") from error
         except BaseException:
             shutil.rmtree(folder, ignore_errors=True)
             raise
-        if submission.job_id != job.id:
-            shutil.rmtree(folder, ignore_errors=True)
+        superseded = earlier if submission.job_id == job.id else job.id
+        if superseded:
+            shutil.rmtree(submission_folder(self._state, superseded), ignore_errors=True)
         return submission.id
 
-    def _enter(self, race_id: int, digest: str, job: Job, *, model: str, user_id: int) -> Submission:
+    def _enter(self, race_id: int, digest: str, job: Job, *, model: str, user_id: int) -> tuple[Submission, str]:
+        """The submission, and the job that it had before, if it failed."""
         try:
             with self._database.transaction() as session:
+                hold(session, race_id)  # two at the same moment count each other
                 race = session.get_one(Race, race_id)
                 if (state := state_of(race)) != "open":
                     raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
@@ -163,20 +165,21 @@ class League:
                 if known is not None and known.user_id != user_id:
                     raise Conflict("Somebody has entered exactly this model already.", hint="Train it on.")
                 if known is not None and session.get_one(Job, known.job_id).state not in ("failed", "cancelled"):
-                    return known
+                    return known, ""
                 require_room(session, race, user_id)
                 require_place(session, race, user_id)
                 track = self._courses(race.owner_id).path_or_name(race.track)
                 job.payload = {"track": track, "name": model}
                 session.add(job)
                 session.flush()
-                if known is not None:  # its job failed, which costs no attempt
-                    known.job_id, known.model = job.id, model
-                    return known
+                if known is not None:  # its job failed, which costs no attempt; this one is of today
+                    earlier = known.job_id
+                    known.job_id, known.model, known.created = job.id, model, now()
+                    return known, earlier
                 fresh = Submission(race_id=race_id, user_id=user_id, job_id=job.id, digest=digest, model=model)
                 session.add(fresh)
                 session.flush()
-                return fresh
+                return fresh, ""
         except IntegrityError as error:  # the same file twice at the same moment
             raise Conflict("Exactly this model is being entered already.") from error
 
@@ -308,6 +311,15 @@ class League:
             session.add(job)
             session.flush()
             submission.job_id, submission.judged = job.id, None
+        shutil.rmtree(submission_folder(self._state, old.id), ignore_errors=True)
+
+    def forget(self, user_id: int) -> None:
+        """Remove the files of somebody's submissions, weights and replays, in all races."""
+        query = sa.select(Submission.job_id).where(Submission.user_id == user_id)
+        with self._database.transaction() as session:
+            jobs = session.scalars(query).all()
+        for job in jobs:
+            shutil.rmtree(submission_folder(self._state, job), ignore_errors=True)
 
     def board(self, race_id: int, *, user_id: int | None, top: int) -> tuple[LeagueRace, Board, int]:
         """A race, its board, and how many submissions are not judged yet.

@@ -1,0 +1,142 @@
+"""How much one person may send in: a day's attempts hold, whatever fails, is cancelled or comes at the same moment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+from leagues import untrained_run
+
+from racecraft.race.entry_file import pack_entry
+from racecraft.serve.problems import Conflict
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User
+from racecraft.serve.submissions.admission import MAX_FREE
+from racecraft.serve.submissions.league import League
+from racecraft.serve.tracks.courses import Courses
+
+ADA = 2
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
+    """Entries of which no two drive alike."""
+    root = tmp_path_factory.mktemp("runs")
+    return [pack_entry(untrained_run(root, f"novice-{seed}", seed=seed)) for seed in range(1, 5)]
+
+
+@pytest.fixture
+def database(database_url: str) -> Iterator[Database]:
+    database = Database(database_url)
+    database.migrate()
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def league(database: Database, tmp_path: Path) -> League:
+    """A league in which Ada may enter race 1 once a day."""
+    with database.transaction() as session:
+        session.add(User(id=ADA, name="Ada", handle="ada"))
+        session.add(Group(id=1, title="Class"))
+        session.flush()
+        session.add(Member(group_id=1, user_id=ADA, role="racer"))
+        terms = {"track": "oval", "ranking": "total", "commitment": "0" * 64, "attempts_per_day": 1}
+        session.add(Race(owner_id=1, group_id=1, title="Cup", **terms))
+    return League(database, tmp_path / "state", lambda _: Courses(tmp_path / "tracks"))
+
+
+def race_of(database: Database) -> int:
+    with database.transaction() as session:
+        return int(session.scalars(sa.select(Race.id)).one())
+
+
+def enter(league: League, database: Database) -> Callable[[bytes], int]:
+    number = race_of(database)
+    return lambda data: league.submit(number, data, model="novice", user_id=ADA)
+
+
+def end(database: Database, submission: int, state: str, *, days_ago: int = 0) -> None:
+    """Let a submission's job be over, and everything that happened so far be some days ago."""
+    with database.transaction() as session:
+        job = session.get_one(Job, session.get_one(Submission, submission).job_id)
+        job.state = state
+        for row in (*session.scalars(sa.select(Submission)), *session.scalars(sa.select(Job))):
+            row.created -= timedelta(days=days_ago)
+
+
+def folders(tmp_path: Path) -> list[str]:
+    return sorted(path.name for path in (tmp_path / "state" / "submissions").iterdir())
+
+
+def test_what_was_cancelled_yesterday_and_is_sent_again_is_todays_attempt(
+    league: League, database: Database, files: list[bytes], tmp_path: Path
+) -> None:
+    submit = enter(league, database)
+    first = submit(files[0])
+    (before,) = folders(tmp_path)
+    end(database, first, "cancelled", days_ago=2)
+    assert submit(files[0]) == first
+    (after,) = folders(tmp_path)
+    assert after != before, "the file of the cancelled job is gone"
+    with pytest.raises(Conflict, match="takes 1 a day"):
+        submit(files[1])
+    assert folders(tmp_path) == [after]
+
+
+def test_of_many_at_the_same_moment_only_the_days_attempts_come_in(
+    league: League, database: Database, files: list[bytes], tmp_path: Path
+) -> None:
+    submit = enter(league, database)
+
+    def attempt(data: bytes) -> int | None:
+        try:
+            return submit(data)
+        except Conflict:
+            return None
+
+    with ThreadPoolExecutor(len(files)) as pool:
+        numbers = [number for number in pool.map(attempt, files) if number is not None]
+    assert len(numbers) == 1
+    assert len(folders(tmp_path)) == 1
+
+
+def test_only_some_that_fail_are_free(league: League, database: Database, files: list[bytes]) -> None:
+    submit = enter(league, database)
+    for _ in range(MAX_FREE):
+        end(database, submit(files[0]), "failed")
+    with pytest.raises(Conflict, match="failed or were cancelled") as refused:
+        submit(files[1])
+    assert refused.value.hint.startswith("The next one is possible at")
+    with database.transaction() as session:
+        for job in session.scalars(sa.select(Job)):
+            job.created -= timedelta(days=1)
+    submit(files[1])
+
+
+def test_judging_again_leaves_one_copy_of_the_file(
+    league: League, database: Database, files: list[bytes], tmp_path: Path
+) -> None:
+    submission = enter(league, database)(files[0])
+    (before,) = folders(tmp_path)
+    end(database, submission, "done")
+    with database.transaction() as session:
+        session.get_one(Member, (1, ADA)).role = "organiser"
+    league.judge_again(race_of(database), submission, user_id=ADA)
+    (after,) = folders(tmp_path)
+    assert after != before
+
+
+def test_who_leaves_takes_the_files_along(
+    league: League, database: Database, files: list[bytes], tmp_path: Path
+) -> None:
+    enter(league, database)(files[0])
+    assert len(folders(tmp_path)) == 1
+    league.forget(ADA + 1)
+    assert len(folders(tmp_path)) == 1
+    league.forget(ADA)
+    assert folders(tmp_path) == []
