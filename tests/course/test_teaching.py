@@ -61,3 +61,24 @@ def test_the_plan_adds_up_to_ninety_minutes_and_the_slides_keep_it() -> None:
         assert words(printed[1]) == what
         assert f"{start}–{end} minutes" in SLIDES
     assert SLIDES.count("<section>") == 12
+
+
+@pytest.mark.parametrize("name", ["slides", "lab-sheet"])
+def test_what_is_printed_in_german_is_the_same(name: str) -> None:
+    """Page for page and line for line: tags, code that is typed, minutes and numbers of slides and questions."""
+    english, german = ((DOCS / f"{name}{ending}.html").read_text(encoding="utf-8") for ending in ("", ".de"))
+    assert tags(german) == tags(english)
+    for kept in (r"<style>.*?</style>", r"<pre>((?:def|return|if|racecraft).*?)</pre>", r"<code>(\W+?)</code>", r"\d+"):
+        assert re.findall(kept, german, re.DOTALL) == re.findall(kept, english, re.DOTALL)
+    assert [text for text in texts(german) if text in texts(english)] == []
+
+
+def tags(page: str) -> list[str]:
+    """Its elements, in their order, without their attributes."""
+    return re.findall(r"</?(\w+)", page)
+
+
+def texts(page: str) -> list[str]:
+    """What is written in it in words, but for code."""
+    body = re.sub(r"<(pre|code)>.*?</\1>", "", page.partition("<body>")[2], flags=re.DOTALL)
+    return [text for text in re.findall(r">([^<>]+)<", body) if re.search("[a-z]{2} ", text)]
