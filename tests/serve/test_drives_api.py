@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from running_consoles import RunningConsole
 
+from racecraft.limits import known_limit
 from racecraft.race.recording import REFERENCE_AHEAD
 from racecraft.serve.driving.drives import MAX_DRIVES
+from racecraft.sim import load_vehicle
 from racecraft.track import Track, load_track
 
 
@@ -75,6 +77,16 @@ def test_laps_are_timed_and_the_fastest_is_ones_ghost(console: RunningConsole) -
     assert begin(console)["best"] == fast["seconds"]
     assert begin(console, direction="reverse")["best"] is None
     assert begin(console, vehicle="v4")["best"] is None
+
+
+def test_the_medals_are_those_of_the_road_the_car_and_the_direction(console: RunningConsole) -> None:
+    limit = known_limit(load_track("oval"), load_vehicle("v5"))
+    assert limit is not None
+    assert begin(console)["medals"] == vars(limit.medals)
+    assert begin(console, direction="reverse")["medals"] is None, "the table has one direction"
+    assert begin(console, vehicle="v4")["medals"] != vars(limit.medals)
+    points = [{"x": 4 * math.cos(0.6 * i), "y": 3 * math.sin(0.6 * i), "width": 0.9} for i in range(10)]
+    assert begin(console, track=None, sketch={"points": points})["medals"] is None
 
 
 def test_leaving_the_road_costs_a_second_and_the_car_goes_on(console: RunningConsole) -> None:

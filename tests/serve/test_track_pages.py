@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
@@ -157,6 +159,27 @@ def test_somebody_drives(visit: Visit) -> None:
     page.get_by_text("Press ↑ to drive off").wait_for()
     pedal = page.get_by_role("button", name="Faster")
     pedal.dispatch_event("pointerdown", {"pointerId": 1, "button": 0})
+
+
+def test_the_medal_of_ones_best_lap_and_what_the_next_asks_for(visit: Visit) -> None:
+    def of_day_before(route: Any) -> None:
+        told = route.fetch()
+        best = 6.53 if json.loads(route.request.post_data)["direction"] == "forward" else 6.0
+        route.fulfill(response=told, json=told.json() | {"best": best})
+
+    page = visit.open("/drive/oval")
+    times = page.locator(".times")
+    times.get_by_text("Bronze takes 7.63 s").wait_for()
+    page.route("**/api/drives", of_day_before)
+    page.reload()
+    times.get_by_text("0.42 s to silver").wait_for()
+    assert times.locator(".medal").inner_text() == "Bronze"
+    laps = page.locator("section", has=page.get_by_role("heading", name="Your laps"))
+    laps.get_by_text("0.42 s to silver").wait_for()
+    page.get_by_label("Direction").select_option("reverse")  # of which no minimum is known
+    times.get_by_text("6.00 s").wait_for()
+    assert page.locator(".medal").count() == page.locator(".coin").count() == 0
+    page.unroute("**/api/drives")
 
 
 @needs_axe

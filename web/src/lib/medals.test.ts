@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { medalOf, nextMedal } from "./medals";
+import { medalOf, missedBy, nextMedal } from "./medals";
 
 const TIMES = { author: 10, gold: 10.6, silver: 12, bronze: 15 };
 
@@ -26,4 +26,9 @@ test("what is next is the medal just missed, the first one without a lap, and no
     ...["bronze", "bronze", "silver", "silver", "gold", "author", "author", ""],
   ]);
   expect(nextMedal(undefined, 9)).toBe("");
+});
+
+test("who makes up what a lap misses a medal by has the medal", () => {
+  expect([12.42, 12.001, 12.009].map((seconds) => missedBy(TIMES, "silver", seconds))).toEqual([0.42, 0.01, 0.01]);
+  expect(missedBy({ ...TIMES, silver: 5.9 }, "silver", 6.32)).toBe(0.42);
 });

@@ -14,3 +14,7 @@ export function nextMedal(times: MedalTimes | null | undefined, seconds: number 
   if (!times) return "";
   return [...MEDALS].reverse().find((name) => seconds == null || seconds > times[name] + 1e-9) ?? "";
 }
+
+/** How much faster a lap has to be for a medal that it misses, in s: whole hundredths, rounded up, as the times are shown. */
+export const missedBy = (times: MedalTimes, medal: MedalName, seconds: number): number =>
+  Math.ceil(100 * (seconds - times[medal]) - 1e-6) / 100;

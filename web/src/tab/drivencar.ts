@@ -50,7 +50,8 @@ export class DrivenCar {
   }
 
   begin(id: string): Drive {
-    return { id, geometry: this.track.geometry, direction: this.settings.direction, start: this.pose, best: null };
+    const { geometry } = this.track;
+    return { id, geometry, direction: this.settings.direction, start: this.pose, best: null, medals: null };
   }
 
   free(): void {

@@ -19,7 +19,6 @@ export const en = {
   stopped: "Stopped after {time}.",
   laps: "Laps",
   laps_of: "{laps} of {trials}",
-  medal_next: "{medal} takes {time}.",
   slow: "This browser or machine has no fused multiply-add: learning gives the same numbers, but many times slower.",
   unable: "This browser cannot run the simulator: {why}",
   models: "Your models",

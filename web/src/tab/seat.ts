@@ -48,7 +48,11 @@ export class TabSeat implements Seat {
     const id = String(++this.round);
     const report = await this.ask({ kind: "sit", id, plan, track, settings: this.settings });
     const best = await drivenLap(this.key);
-    return { ...(report as Extract<Report, { kind: "seated" }>).drive, best: best?.seconds ?? null };
+    const { drive } = report as Extract<Report, { kind: "seated" }>;
+    // the plan knows the medals of the car and the direction of the page's own trainings
+    const isUsual = settings.vehicle === "v5" && settings.direction === "forward";
+    const medals = (isUsual && plan.medals[track.geometry.name]) || null;
+    return { ...drive, best: best?.seconds ?? null, medals };
   }
 
   async step(_id: string, controls: { steering: number; speed: number; steps: number }): Promise<DriveState> {

@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from racecraft.errors import ConfigError
+from racecraft.limits import known_limit
 from racecraft.serve.context import InContext, InUser
 from racecraft.serve.driving.schemas import (
     Controls,
@@ -18,7 +19,9 @@ from racecraft.serve.driving.schemas import (
     NewDrive,
     Vehicles,
 )
+from racecraft.serve.models.schemas import MedalTimes
 from racecraft.serve.tracks.courses import geometry
+from racecraft.sim import load_vehicle
 from racecraft.track import draw_road, validate
 
 router = APIRouter(prefix="/api", tags=["drives"])
@@ -38,12 +41,15 @@ def begin_drive(request: NewDrive, context: InContext, user: InUser) -> Drive:
         raise ConfigError("A drive needs a track or a sketch of one.")
     key, car = context.drives.begin(track, vehicle=request.vehicle, direction=request.direction, user_id=user)
     best = context.ghosts.best(track, vehicle=request.vehicle, direction=request.direction, user_id=user)
+    driven = track.reversed() if request.direction == "reverse" else track
+    limit = known_limit(driven, load_vehicle(request.vehicle))
     return Drive(
         id=key,
         geometry=geometry(request.track or "drawing", track),
         direction=request.direction,
         start=car.pose,
         best=best.seconds if best is not None else None,
+        medals=MedalTimes(**vars(limit.medals)) if limit is not None else None,
     )
 
 

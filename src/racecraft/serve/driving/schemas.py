@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from racecraft.serve.models.schemas import MedalTimes
 from racecraft.serve.schemas import Message
 from racecraft.serve.tracks.schemas import TrackGeometry, TrackSketch
 
@@ -32,6 +33,8 @@ class Drive(Message):
     """Where the car stands: x, y, heading, speed, steering, share of the lap."""
     best: float | None
     """One's fastest lap here with this vehicle, s."""
+    medals: MedalTimes | None
+    """For laps here this way round in this vehicle, where they are known."""
 
 
 class Controls(Message):
