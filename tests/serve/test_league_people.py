@@ -131,18 +131,6 @@ def test_twenty_wrong_passwords_on_one_account_are_stopped_and_the_others_come_i
         assert me["id"] == 1
 
 
-def test_guessed_codes_are_stopped(tmp_path: Path) -> None:
-    from racecraft.serve.people.tries import Tries
-
-    tries = Tries()
-    for _ in range(200):
-        tries.check(account="", address="1.2.3.4")
-        tries.failed(account="", address="1.2.3.4")
-    with pytest.raises(TooMany):
-        tries.check(account="", address="1.2.3.4")
-    tries.check(account="", address="1.2.3.5")
-
-
 def test_a_code_has_uses_and_an_end_and_can_be_closed(league: RunningLeague) -> None:
     group = league.group("Codes")
     first = league.code(group, uses=1)

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
 from racecraft.serve.door.guard import Guard, caller
+from racecraft.serve.door.known_browsers import known_as, remember
 from racecraft.serve.people.devices import SECONDS
 from racecraft.serve.people.links import address_of, card_of
 from racecraft.serve.people.names import handle_of
@@ -42,21 +43,22 @@ def look_at_door(request: Request, consoles: InLeague) -> Door:
 
 @router.post("/sign-in")
 def sign_in(request: Request, body: SignIn, response: Response, consoles: InLeague) -> Me:
-    """In by name and password."""
-    account, address = handle_of(body.name), caller(request)
-    consoles.tries.check(account=account, address=address)
-    user = consoles.people.by_password(body.name, body.password)
-    if user is None:
-        consoles.tries.failed(account=account, address=address)
-        write_down(request, consoles, _named(consoles, body.name), is_in=False)
-        raise NotLetIn("There is nobody of that name with that password.")
+    """In by name and password; a browser that was in with it before is counted by itself, whatever others try."""
+    known = known_as(request, consoles.people, body.name)
+    account, address = (f"known {known}", "") if known else (handle_of(body.name), caller(request))
+    with consoles.tries.attempt(account=account, address=address) as attempt:
+        user = consoles.people.by_password(body.name, body.password)
+        if user is None:
+            attempt.fail()
+            write_down(request, consoles, _named(consoles, body.name), is_in=False)
+            raise NotLetIn("There is nobody of that name with that password.")
+    remember(request, response, consoles.people, user)
     return let_in(request, response, consoles, user)
 
 
 @router.post("/card")
 def show_card(request: Request, body: ShowCard, response: Response, consoles: InLeague) -> Me:
     """In by a login card."""
-    consoles.tries.check(account="", address=caller(request))
     user = consoles.keys.card_user(body.secret)
     if user is None:
         fail(request, consoles)
@@ -67,11 +69,12 @@ def show_card(request: Request, body: ShowCard, response: Response, consoles: In
 @router.post("/join", status_code=201)
 def join(request: Request, body: Join, response: Response, consoles: InLeague) -> Joined:
     """In by a group's code, as somebody new."""
-    consoles.tries.check(account="", address=caller(request))
-    user = consoles.groups.join(body.code, body.name)
-    if user is None:
-        fail(request, consoles)
-        raise NotLetIn("There is no such code, or it is no longer good.", hint="Look at the wall again.")
+    with consoles.tries.attempt(address=caller(request), way="code") as attempt:
+        user = consoles.groups.join(body.code, body.name)
+        if user is None:
+            attempt.fail()
+            write_down(request, consoles, None, is_in=False)
+            raise NotLetIn("There is no such code, or it is no longer good.", hint="Look at the wall again.")
     me = let_in(request, response, consoles, user)
     secret = consoles.keys.print_card(user)
     address = address_of(request, consoles.owner.settings)
@@ -81,21 +84,20 @@ def join(request: Request, body: Join, response: Response, consoles: InLeague) -
 @router.post("/reset")
 def reset_password(request: Request, body: ResetPassword, response: Response, consoles: InLeague) -> Me:
     """In by a link for a new password, which ends every session, card and token that there was."""
-    consoles.tries.check(account="", address=caller(request))
     user = None
     if consoles.keys.reset_user(body.secret) is not None:
         user = consoles.keys.use_reset(body.secret, hash_password(body.password))
     if user is None:
         fail(request, consoles)
         raise NotLetIn("This link is no longer good.", hint="Ask for a new one.")
+    remember(request, response, consoles.people, user)
     return let_in(request, response, consoles, user)
 
 
 @router.post("/devices", status_code=201)
 def begin_device(request: Request, consoles: InLeague) -> Device:
     """A program wants to be let in: its code is typed into somebody's browser."""
-    consoles.tries.check(account="", address=caller(request))
-    consoles.tries.failed(account="", address=caller(request))  # counted like a failure: each takes a place
+    consoles.tries.begins("program", address=caller(request))
     secret, code = consoles.devices.begin()
     link = f"{address_of(request, consoles.owner.settings)}/me#{code}"
     return Device(secret=secret, code=f"{code[:4]}-{code[4:]}", link=link, seconds=SECONDS)
@@ -104,7 +106,6 @@ def begin_device(request: Request, consoles: InLeague) -> Device:
 @router.post("/devices/token")
 def take_token(request: Request, body: TakeToken, consoles: InLeague) -> TakenToken:
     """The token of a program that was let in; empty while it waits."""
-    consoles.tries.check(account="", address=caller(request))
     try:
         user = consoles.devices.take(body.secret)
     except NotLetIn:
@@ -137,8 +138,12 @@ def let_in(request: Request, response: Response, consoles: Consoles, user: int) 
 
 
 def fail(request: Request, consoles: Consoles) -> None:
-    """Count and keep that somebody was not let in, of whom nobody knows who they are."""
-    consoles.tries.failed(account="", address=caller(request))
+    """Count and keep that somebody was not let in by a secret that nobody guesses; nobody knows who they are.
+
+    Raises:
+        TooMany: There were too many such.
+    """
+    consoles.tries.wrong_secret(address=caller(request))
     write_down(request, consoles, None, is_in=False)
 
 

@@ -56,11 +56,11 @@ def create_group(request: NewGroup, consoles: InConsoles, person: InPerson) -> G
 @router.post("/groups/join")
 def join_group(body: JoinOn, request: Request, consoles: InConsoles, person: InPerson) -> GroupCard:
     """Into another group by its code, with the account that one has."""
-    consoles.tries.check(account="", address=caller(request))
-    number = consoles.groups.join_on(body.code, person.id)
-    if number is None:
-        consoles.tries.failed(account="", address=caller(request))
-        raise NotLetIn("There is no such code, or it is no longer good.", hint="Look at the wall again.")
+    with consoles.tries.attempt(account=f"code {person.id}", address=caller(request), way="code") as attempt:
+        number = consoles.groups.join_on(body.code, person.id)
+        if number is None:
+            attempt.fail()
+            raise NotLetIn("There is no such code, or it is no longer good.", hint="Look at the wall again.")
     return next(card for card in list_groups(consoles, person) if card.id == number)
 
 

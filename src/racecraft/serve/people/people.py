@@ -83,8 +83,7 @@ class People:
         Raises:
             ConfigError: It is too short.
         """
-        with self._database.transaction() as session:
-            kept = session.get_one(User, user_id).password
+        kept = self.kept_password(user_id)
         if kept and not is_password(old, kept):
             return False
         hashed = hash_password(password)
@@ -94,11 +93,21 @@ class People:
 
     def by_password(self, name: str, password: str) -> int | None:
         """Whose name and password these are; takes as long where there is nobody of that name."""
-        with self._database.transaction() as session:
-            query = sa.select(User.id, User.password).where(User.handle == handle_of(name), User.deleted.is_(None))
-            found = session.execute(query).first()
+        found = self.kept(name)
         is_right = is_password(password, found[1] if found is not None else "")
         return found[0] if found is not None and is_right else None
+
+    def kept(self, name: str) -> tuple[int, str] | None:
+        """Number, and what is kept of the password, of who has a name; None where nobody has."""
+        query = sa.select(User.id, User.password).where(User.handle == handle_of(name), User.deleted.is_(None))
+        with self._database.transaction() as session:
+            found = session.execute(query).first()
+        return None if found is None else (found[0], found[1])
+
+    def kept_password(self, user_id: int) -> str:
+        """What is kept of somebody's password; empty where they have none."""
+        with self._database.transaction() as session:
+            return session.get_one(User, user_id).password
 
     def remove(self, user_id: int) -> None:
         """Forget somebody: name, keys and groups; their places on boards stay, nameless and out of the race.

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Path, Request, Response
 from racecraft.errors import ConfigError
 from racecraft.serve.context import InConsoles, InPerson
 from racecraft.serve.door.guard import Guard, caller
+from racecraft.serve.door.known_browsers import remember
 from racecraft.serve.people.keys import SESSION_ID
 from racecraft.serve.people.links import address_of
 from racecraft.serve.people.schemas import (
@@ -46,14 +47,15 @@ def change_account(request: AccountChange, consoles: InConsoles, person: InPerso
 
 
 @router.put("/password", status_code=204)
-def set_password(request: NewPassword, consoles: InConsoles, person: InPerson) -> Response:
+def set_password(body: NewPassword, request: Request, consoles: InConsoles, person: InPerson) -> Response:
     """A first password, or another one; wrong old ones count like wrong ones at the door."""
-    account = f"password {person.id}"
-    consoles.tries.check(account=account, address="")
-    if not consoles.people.set_password(person.id, request.new, old=request.old):
-        consoles.tries.failed(account=account, address="")
-        raise ConfigError("That is not your password.")
-    return Response(status_code=204)
+    with consoles.tries.attempt(account=f"password {person.id}") as attempt:
+        if not consoles.people.set_password(person.id, body.new, old=body.old):
+            attempt.fail()
+            raise ConfigError("That is not your password.")
+    response = Response(status_code=204)
+    remember(request, response, consoles.people, person.id)
+    return response
 
 
 @router.get("/sessions")
@@ -82,13 +84,12 @@ def end_sessions(consoles: InConsoles, person: InPerson) -> Response:
 @router.post("/devices", status_code=204)
 def let_device_in(body: LetIn, consoles: InConsoles, person: InPerson) -> Response:
     """A program that shows this code gets a token of one's own."""
-    account = f"device {person.id}"
-    consoles.tries.check(account=account, address="")
-    try:
-        consoles.devices.confirm(body.code, person.id)
-    except NotFound:
-        consoles.tries.failed(account=account, address="")
-        raise
+    with consoles.tries.attempt(account=f"device {person.id}") as attempt:
+        try:
+            consoles.devices.confirm(body.code, person.id)
+        except NotFound:
+            attempt.fail()
+            raise
     return Response(status_code=204)
 
 
@@ -108,7 +109,7 @@ def get_provider(consoles: InConsoles, person: InPerson) -> ProviderLink | None:
 @router.post("/provider")
 def begin_link(request: Request, response: Response, consoles: InConsoles, person: InPerson) -> ToProvider:
     """To the provider, so that one comes in through it from now on, too."""
-    consoles.tries.begins(address=caller(request))
+    consoles.tries.begins("provider", address=caller(request))
     back = address_of(request, consoles.owner.settings) + PROVIDER_PAGE
     to, secret = consoles.provider.begin(back=back, user_id=person.id)
     guard: Guard = request.app.state.guard

@@ -24,8 +24,7 @@ router = APIRouter(prefix="/api/door/provider", tags=["door"])
 def begin_provider(request: Request, response: Response, consoles: InLeague) -> ToProvider:
     """To the provider's page."""
     provider = consoles.provider
-    consoles.tries.check(account="", address=caller(request))
-    consoles.tries.begins(address=caller(request))
+    consoles.tries.begins("provider", address=caller(request))
     back = address_of(request, consoles.owner.settings) + PROVIDER_PAGE
     to, secret = provider.begin(back=back, user_id=None)
     guard: Guard = request.app.state.guard
@@ -39,7 +38,6 @@ def sign_in_by_provider(request: Request, body: FromProvider, response: Response
     from racecraft.serve.provider.provider import Answer  # there is one
 
     provider, here = consoles.provider, request.state.user_id
-    consoles.tries.check(account="", address=caller(request))
     browser = request.cookies.get(PROVIDER_COOKIE, "")
     try:
         whom, is_link = provider.arrive(Answer(**body.model_dump()), browser=browser, user_id=here)
@@ -61,7 +59,6 @@ def sign_in_by_provider(request: Request, body: FromProvider, response: Response
 def join_by_provider(request: Request, body: Newcomer, response: Response, consoles: InLeague) -> Me:
     """In for the first time, under a name that one chose."""
     provider = consoles.provider
-    consoles.tries.check(account="", address=caller(request))
     browser = request.cookies.get(PROVIDER_COOKIE, "")
     try:
         whom = provider.newcomers.who(browser)
