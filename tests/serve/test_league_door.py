@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +15,7 @@ from racecraft.serve.door import known_browsers
 from racecraft.serve.door.known_browsers import make_mark
 from racecraft.serve.people.tries import Tries, network_of
 from racecraft.serve.problems import TooMany
-from racecraft.serve.settings import KNOWN_COOKIE
+from racecraft.serve.settings import COOKIE, KNOWN_COOKIE
 
 RIGHT = "a long password"
 
@@ -80,6 +81,25 @@ def test_who_signed_in_here_before_is_not_locked_out_by_who_guesses_elsewhere(le
         thief.cookies.set(KNOWN_COOKIE, mark)
         refused(sign_in(thief, "Mr Chips", RIGHT), 429)  # another password makes every browser unknown but this one
         assert [sign_in(home, "Mr Chips", "guess").status_code for _ in range(11)] == [401] * 10 + [429]
+
+
+@pytest.mark.costly
+def test_who_may_not_enter_is_told_before_a_file_is_read(league: RunningLeague) -> None:
+    teacher, url = league.organiser("Mr Nosy"), league.owner.base_url
+    race = {"title": "Cup", "track": "oval", "laps": 1, "trials": 1}
+    theirs = ok(league.owner.post(f"/api/groups/{league.group('Theirs')}/races", json=race), 201)["id"]
+    own = ok(teacher.post(f"/api/groups/{league.group('Own', teacher)}/races", json=race), 201)["id"]
+    for number in (theirs, 99999):
+        with socket.create_connection((url.host, url.port), timeout=20) as line:
+            head = f"POST /api/league/races/{number}/submissions?model=x HTTP/1.1\r\nHost: {url.host}:{url.port}\r\n"
+            head += f"Cookie: {COOKIE}={teacher.cookies[COOKIE]}\r\nContent-Length: {32 << 20}\r\n\r\n"
+            line.sendall(head.encode())
+            assert line.recv(4096).split()[1] == b"404"
+    address = f"/api/league/races/{theirs}/submissions?model=x"
+    assert "no race" in refused(teacher.post(address, content=bytes(20 << 20)), 404)  # and who sends on all the same
+    endless = (bytes(1 << 20) for _ in range(33))  # whose length is not told
+    address = f"/api/league/races/{own}/submissions?model=x"
+    assert "at most 32 MB" in refused(teacher.post(address, content=endless), 413)
 
 
 def test_a_mark_is_of_one_account_with_one_password_for_half_a_year(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -175,6 +175,7 @@ async def submit(
     race_id: Id, request: Request, consoles: InConsoles, person: InPerson, model: RunName
 ) -> SubmissionInfo:
     """A model's file, as `racecraft submit` packs it; judged as a job. The same file again is the same submission."""
+    await run_in_threadpool(consoles.league.get, race_id, person.id, member=True)  # before 32 MB are read for nothing
     data = await request.body()
     return await run_in_threadpool(_submit, consoles, race_id, data, model, person.id)
 
