@@ -115,7 +115,7 @@ def key_of(school: School, who: str) -> str:
         printed = school.people["teacher"].post(f"/api/groups/{school.objects['group_id']}/cards", json=wanted)
         if printed.status_code == 201:
             client = school.people["ada"] = school.league.stranger()
-            ok(client.post("/api/door/card", json={"secret": printed.json()[0]["link"].split("#")[1]}))
+            ok(client.post("/api/door/card", json={"secret": printed.json()["cards"][0]["link"].split("#")[1]}))
     return str(client.cookies.get("racecraft_session", ""))
 
 

@@ -169,9 +169,9 @@ def test_a_stolen_card_is_worth_nothing_once_it_is_revoked(league: RunningLeague
     refused(thief.get("/api/models"), 401)
     assert "no longer good" in refused(thief.post("/api/door/card", json={"secret": secret}), 401)
     refused(httpx.get(f"{league.owner.base_url}/api/models", headers={"authorization": f"Bearer {token}"}), 401)
-    (fresh,) = ok(teacher.post(f"/api/groups/{group}/cards", json={"members": [card["id"]]}), 201)
+    (fresh,) = ok(teacher.post(f"/api/groups/{group}/cards", json={"members": [card["id"]]}), 201)["cards"]
     ok(thief.post("/api/door/card", json={"secret": fresh["link"].split("#")[1]}))
-    (newest,) = ok(teacher.post(f"/api/groups/{group}/cards", json={"members": [card["id"]]}), 201)
+    (newest,) = ok(teacher.post(f"/api/groups/{group}/cards", json={"members": [card["id"]]}), 201)["cards"]
     refused(league.stranger().post("/api/door/card", json={"secret": fresh["link"].split("#")[1]}), 401)
     assert newest["link"].startswith(str(league.owner.base_url).rstrip("/") + "/card#")
 
@@ -336,6 +336,28 @@ def test_real_names_are_for_organisers_and_names_can_be_moderated(
     assert ok(ada.get("/api/account"))["name"] == "Countess"
     refused(teacher.patch(address, json={"name": "bob"}), 409)
     refused(school["other"].patch(address, json={"name": "Rude"}), 404)
+
+
+def test_who_has_a_password_is_left_out_when_the_class_gets_new_cards(league: RunningLeague) -> None:
+    group = league.group("Class 9")
+    people = [{"name": name} for name in ("Nine", "Ten", "Eleven")]
+    old = ok(league.owner.post(f"/api/groups/{group}/members", json={"people": people}), 201)
+    ten = league.stranger()
+    ok(ten.post("/api/door/card", json={"secret": old[1]["link"].split("#")[1]}))
+    ok(ten.put("/api/account/password", json={"old": "", "new": "correct horse"}), 204)
+    everybody = [card["id"] for card in old]
+    printed = ok(league.owner.post(f"/api/groups/{group}/cards", json={"members": everybody}), 201)
+    assert [card["name"] for card in printed["cards"]] == ["Nine", "Eleven"]
+    assert printed["left_out"] == ["Ten"]
+    ok(ten.get("/api/account"))
+    for card, status in zip(old, (401, 200, 401), strict=True):  # who is left out keeps the card that there was
+        ok(league.stranger().post("/api/door/card", json={"secret": card["link"].split("#")[1]}), status)
+    for card in printed["cards"]:
+        ok(league.stranger().post("/api/door/card", json={"secret": card["link"].split("#")[1]}))
+    alone = refused(league.owner.post(f"/api/groups/{group}/cards", json={"members": everybody[1:2]}), 404)
+    assert "Ten has an account of their own, with a password." in alone
+    strange = [everybody[0], league.number(league.owner)]  # who is no racer here
+    refused(league.owner.post(f"/api/groups/{group}/cards", json={"members": strange}), 404)
 
 
 def test_an_organiser_cannot_print_a_card_for_who_has_power(league: RunningLeague, school: dict[str, Any]) -> None:

@@ -93,6 +93,10 @@ def test_an_organiser_locks_out_and_lets_in_again(league: RunningLeague) -> None
     pupil = newcomer(league, "carl", "Turbo")
     number = league.number(pupil)
     assert "through a provider" in refused(league.owner.post("/api/groups/1/cards", json={"members": [number]}), 404)
+    people = {"people": [{"name": "Wheel"}]}
+    wheel = ok(league.owner.post("/api/groups/1/members", json=people), 201)[0]["id"]
+    printed = ok(league.owner.post("/api/groups/1/cards", json={"members": [number, wheel]}), 201)
+    assert ([card["name"] for card in printed["cards"]], printed["left_out"]) == (["Wheel"], ["Turbo"])
     ok(league.owner.post(f"/api/groups/1/members/{number}/revoke"), 204)
     refused(pupil.get("/api/account"), 401)
     assert "locked out" in refused(come(pupil, "carl"), 401)

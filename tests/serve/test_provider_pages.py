@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -119,6 +120,7 @@ def test_who_is_refused_is_told_why_and_may_begin_again(school: School) -> None:
 
 def test_a_teacher_locks_out_and_lets_in_again(school: School) -> None:
     pupil = newcomer(school, "carl", "Rocket").page
+    ok(school.league.owner.post("/api/groups/1/members", json={"people": [{"name": "Wheel"}]}), 201)
     teacher = school.visit()
     cookie = {"name": "racecraft_session", "value": school.league.owner.cookies["racecraft_session"]}
     teacher.page.context.add_cookies([{**cookie, "url": str(school.league.owner.base_url)}])
@@ -134,6 +136,10 @@ def test_a_teacher_locks_out_and_lets_in_again(school: School) -> None:
     pupil.get_by_role("alert").get_by_text("You are locked out.").wait_for()
     row.get_by_role("button", name="Let in again").click()
     row.get_by_role("button", name="Lock out").wait_for()
+    page.get_by_role("button", name=re.compile("Print [0-9]+ cards")).click()
+    page.get_by_text("No card for").get_by_text("Rocket").wait_for()
+    assert "Wheel" in page.locator(".sheet").inner_text()
+    page.get_by_role("button", name="Done").click()
     pupil.get_by_role("button", name="Begin again").click()
     agree_there(pupil)
     pupil.get_by_role("link", name="Class 7b").first.wait_for()

@@ -107,6 +107,7 @@ export const de: Record<LeagueKey, string> = {
   cards: "Anmeldekarten",
   cards_lead:
     "Nur dieses eine Mal zu sehen. Jetzt drucken, schneiden, austeilen. Eine verlorene Karte lässt sich neu drucken.",
+  cards_left_out: "Keine Karte für {names}: Ein eigenes Konto öffnet nur, wem es gehört.",
   cards_print_now: "Drucken",
   cards_done: "Fertig",
   cards_scan: "Scannen, und du bist drin. Zeig sie niemandem.",

@@ -102,6 +102,7 @@ export const en = {
   cancel: "Cancel",
   cards: "Login cards",
   cards_lead: "Shown this once. Print them now, cut them, hand them out. A lost card can be printed anew.",
+  cards_left_out: "No card for {names}: an account of one's own is opened by its owner alone.",
   cards_print_now: "Print",
   cards_done: "Done",
   cards_scan: "Scan, and you are in. Show it to nobody.",

@@ -23,10 +23,12 @@ from racecraft.serve.groups.schemas import (
     NewMembers,
     OpenGroup,
     PrintCards,
+    PrintedCards,
 )
 from racecraft.serve.live.cars import NAME as LIVE
 from racecraft.serve.models.schemas import ModelCard
 from racecraft.serve.people.links import address_of, card_of, picture
+from racecraft.serve.people.people import Person
 from racecraft.serve.people.schemas import JoinOn, LoginCard, NewReset, ResetLink
 from racecraft.serve.problems import NotFound, NotLetIn
 
@@ -147,16 +149,22 @@ def admit_member(group_id: Id, member: Id, consoles: InConsoles, person: InPerso
 @router.post("/groups/{group_id}/cards", status_code=201)
 def print_cards(
     group_id: Id, body: PrintCards, request: Request, consoles: InConsoles, person: InPerson
-) -> list[LoginCard]:
-    """New cards for members; their earlier ones are worth nothing from now on."""
-    members = list(dict.fromkeys(body.members))
+) -> PrintedCards:
+    """New cards for members but those who have accounts of their own; earlier cards are worth nothing from now on."""
+    consoles.groups.require(group_id, person.id, organiser=True)
     by_provider = {member.id for member in consoles.groups.members(group_id) if member.comes_by_provider}
-    for member in members:
-        _require_ward(consoles, group_id, member, person.id)
-        if member in by_provider:
-            name = consoles.people.get(member).name
-            raise NotFound(f"{name} has an account of their own, through a provider.")
-    return _cards(request, consoles, members)
+    wards: list[Person] = []
+    others: list[Person] = []
+    for member in dict.fromkeys(body.members):
+        consoles.groups.racer(group_id, member)
+        one = consoles.people.get(member)
+        (others if member in by_provider or _is_independent(one) else wards).append(one)
+    if not wards:
+        if others[0].id in by_provider:
+            raise NotFound(f"{others[0].name} has an account of their own, through a provider.")
+        raise NotFound(f"{others[0].name} has an account of their own, with a password.")
+    cards = _cards(request, consoles, [ward.id for ward in wards])
+    return PrintedCards(cards=cards, left_out=[one.name for one in others])
 
 
 @router.get("/groups/{group_id}/models")
@@ -232,5 +240,10 @@ def _require_ward(consoles: Consoles, group_id: int, member: int, user_id: int) 
     consoles.groups.require(group_id, user_id, organiser=True)
     consoles.groups.racer(group_id, member)
     ward = consoles.people.get(member)
-    if ward.has_password or ward.may_organise:
+    if _is_independent(ward):
         raise NotFound(f"{ward.name} has an account of their own, with a password.")
+
+
+def _is_independent(person: Person) -> bool:
+    """Whether somebody is nobody's to let in, as they have a password or power."""
+    return person.has_password or person.may_organise

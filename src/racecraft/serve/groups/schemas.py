@@ -9,7 +9,7 @@ from pydantic import Field
 
 from racecraft.serve.groups.groups import Part
 from racecraft.serve.models.schemas import ModelCard
-from racecraft.serve.people.schemas import Name
+from racecraft.serve.people.schemas import LoginCard, Name
 from racecraft.serve.schemas import Message, RunName
 
 RealName = Annotated[str, Field(max_length=100)]
@@ -95,6 +95,14 @@ class PrintCards(Message):
     """Whose cards to print."""
 
     members: list[Annotated[int, Field(ge=1, lt=2**31)]] = Field(min_length=1, max_length=500)
+
+
+class PrintedCards(Message):
+    """New cards, and who gets none."""
+
+    cards: list[LoginCard]
+    left_out: list[str]
+    """Names of those who have accounts of their own: a card would be a way to be them."""
 
 
 class MemberModels(Message):
