@@ -76,6 +76,7 @@ CONSOLE = (
     "lessons",
     "groups",
     "quotas",
+    "desks",
     "submissions",
     "context",
     "app",

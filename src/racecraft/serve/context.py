@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 
 from racecraft.serve.audit.audit import Audit
 from racecraft.serve.contests.contests import Contests
+from racecraft.serve.desks import Desks
 from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
 from racecraft.serve.groups.groups import Groups
@@ -97,6 +98,11 @@ class Consoles:
     def tries(self) -> Tries:
         """How often somebody may try to get in."""
         return Tries()
+
+    @cached_property
+    def desks(self) -> Desks:
+        """Where requests that compute take a place."""
+        return Desks()
 
     @property
     def provider(self) -> Provider:
@@ -217,6 +223,13 @@ def _trains(consoles: InConsoles, user: InUser, turn: Annotated[None, TakesTurn]
     consoles.quotas.require(user, "places", "minutes")
 
 
+async def _computes(consoles: InConsoles, user: InUser) -> AsyncIterator[None]:
+    async with consoles.desks.place(user):
+        yield
+
+
+Computes = Depends(_computes)
+"""A route with this dependency takes a thread for a while: somebody's follow one another, two at a time."""
 MakesModel = Depends(_makes_model)
 """A route with this dependency makes a model, where its quota lets somebody."""
 TakesPlace = Depends(_takes_place)

@@ -31,7 +31,7 @@ from racecraft.learn.learner import Weights
 from racecraft.learn.saliency import grad_cam
 from racecraft.race.policy import WEIGHTS, load_policy
 from racecraft.run import RunFolder
-from racecraft.serve.context import Context, InContext
+from racecraft.serve.context import Computes, Context, InContext
 from racecraft.serve.evaluations.objects import objects_of
 from racecraft.serve.evaluations.paid import rewards_of
 from racecraft.serve.evaluations.schemas import (
@@ -47,6 +47,8 @@ from racecraft.serve.tracks.schemas import TrackSector
 from racecraft.sim.views import driver_frames
 from racecraft.track import Track, load_tracks
 
+HTML: Final[dict[int | str, dict[str, Any]]] = {200: {"content": {"text/html": {}}}}
+PNG: Final[dict[int | str, dict[str, Any]]] = {200: {"content": {"image/png": {}}}}
 router = APIRouter(prefix="/api/models/{name}", tags=["analysis"])
 
 MAX_FILES: Final = 24
@@ -55,7 +57,7 @@ AHEAD: Final = 0.14
 """m from a car's origin to the point that a trace speaks of."""
 
 
-@router.get("/evaluations/{stamp}/laps")
+@router.get("/evaluations/{stamp}/laps", dependencies=[Computes])
 def get_laps(name: str, stamp: str, context: InContext) -> EvaluationLaps:
     """An evaluation's laps, step by step, and what each took for every sector of the track."""
     folder = context.garage.folder(name)
@@ -85,7 +87,7 @@ def get_laps(name: str, stamp: str, context: InContext) -> EvaluationLaps:
     )
 
 
-@router.get("/evaluations/{stamp}/saliency")
+@router.get("/evaluations/{stamp}/saliency", dependencies=[Computes])
 def get_saliency(
     name: str,
     stamp: str,
@@ -125,7 +127,7 @@ def get_saliency(
     )
 
 
-@router.get("/maps")
+@router.get("/maps", dependencies=[Computes])
 def get_maps(
     name: str,
     context: InContext,
@@ -156,7 +158,9 @@ def get_maps(
     )
 
 
-@router.get("/report", response_class=Response, responses={200: {"content": {"text/html": {}}}})
+@router.get(
+    "/report", response_class=Response, responses={200: {"content": {"text/html": {}}}}, dependencies=[Computes]
+)
 def get_report(name: str, context: InContext) -> Response:
     """The run's report: one HTML file that needs nothing else."""
     from racecraft.analysis import report
@@ -166,7 +170,12 @@ def get_report(name: str, context: InContext) -> Response:
     return Response(report(folder), media_type="text/html", headers=headers)
 
 
-@router.get("/evaluations/{stamp}/share.html", response_class=Response, responses={200: {"content": {"text/html": {}}}})
+@router.get(
+    "/evaluations/{stamp}/share.html",
+    response_class=Response,
+    responses={200: {"content": {"text/html": {}}}},
+    dependencies=[Computes],
+)
 def get_share(name: str, stamp: str, context: InContext, language: Literal["en", "de"] = "en") -> Response:
     """An evaluation's best lap as one HTML file that opens offline, with the replay inside."""
     from racecraft.analysis.share import share
@@ -177,7 +186,12 @@ def get_share(name: str, stamp: str, context: InContext, language: Literal["en",
     return Response(share(folder, stamp, language=language), media_type="text/html", headers=headers)
 
 
-@router.get("/evaluations/{stamp}/share.png", response_class=Response, responses={200: {"content": {"image/png": {}}}})
+@router.get(
+    "/evaluations/{stamp}/share.png",
+    response_class=Response,
+    responses={200: {"content": {"image/png": {}}}},
+    dependencies=[Computes],
+)
 def get_picture(name: str, stamp: str, context: InContext, language: Literal["en", "de"] = "en") -> Response:
     """The same lap as a picture: racing line, time, medal."""
     from racecraft.analysis.share import draw_share

@@ -13,7 +13,7 @@ from fastapi import APIRouter, Query
 
 from racecraft.analysis import driven_direction, read_laps
 from racecraft.judging.trained import trained_camera
-from racecraft.serve.context import InContext
+from racecraft.serve.context import Computes, InContext
 from racecraft.serve.evaluations.analysis import AHEAD, evaluation_track, trace_of
 from racecraft.serve.evaluations.objects import objects_of
 from racecraft.serve.evaluations.schemas import LapObject, RoadBelief
@@ -30,7 +30,7 @@ _LOOKING: Final = threading.Lock()
 """One network for everybody, which looks at one picture at a time."""
 
 
-@router.get("/evaluations/{stamp}/belief")
+@router.get("/evaluations/{stamp}/belief", dependencies=[Computes])
 def get_belief(
     name: str,
     stamp: str,

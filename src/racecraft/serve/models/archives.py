@@ -17,12 +17,14 @@ from racecraft.run import archive_chunks
 from racecraft.run.folder import sanitize_name
 from racecraft.serve.context import Context, InConsoles, InContext, InUser
 from racecraft.serve.models.schemas import ImportedModel
+from racecraft.serve.problems import Conflict
 from racecraft.serve.schemas import RunName
 
 router = APIRouter(prefix="/api/models", tags=["archives"])
 
 ENDINGS: Final = (".tar.gz", ".tgz", ".tar", ".zip", ".py")
 UPLOADS: Final = "uploads"  # inside the state folder
+RESERVE: Final = 1_000_000_000  # bytes of the disk that uploads leave to everybody else
 
 
 @router.post(
@@ -58,6 +60,7 @@ async def import_model(
     try:
         with (place / plain).open("xb") as file:
             async for chunk in request.stream():
+                require_disk(place)
                 await run_in_threadpool(file.write, chunk)
         async with consoles.quotas.turn(user):  # not before: a body may take minutes to come
             await run_in_threadpool(consoles.quotas.require, user, "models")
@@ -66,6 +69,20 @@ async def import_model(
         raise RunError(f"The file cannot be kept: {error.strerror or error}.", hint="Free disk space.") from error
     finally:
         await run_in_threadpool(shutil.rmtree, place, ignore_errors=True)
+
+
+def require_disk(folder: Path) -> None:
+    """Refuse to write more where little is left.
+
+    Raises:
+        Conflict: It is.
+    """
+    free = shutil.disk_usage(folder).free
+    if free < RESERVE:
+        raise Conflict(
+            f"The server's disk is nearly full: {free / 1e9:.1f} GB are left, {RESERVE / 1e9:.0f} GB have to be.",
+            hint="Delete what is no longer needed, or ask whoever runs the server.",
+        )
 
 
 @router.get(

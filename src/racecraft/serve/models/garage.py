@@ -36,6 +36,7 @@ from racecraft.track import load_track, single_names
 RACED: Final = "head-to-head"
 """The race of a training among other policies, which no race of models is called."""
 TRASH: Final = "trash"  # inside the state folder
+REMOVED: Final = 20  # models that a racer's trash keeps; the owner's keeps all
 PICTURE: Final = "racing-line.png"
 NEWEST: Final = 20  # evaluations that are looked into; older ones are counted
 SETTLED: Final = 600.0  # s after which an evaluation without a result is taken to have been killed
@@ -212,7 +213,7 @@ class Garage:
                 session.execute(sa.update(table).where(of_it).values(run=new))
 
     def remove(self, name: str) -> None:
-        """Put a model into the trash, from where `restore` brings it back.
+        """Put a model into the trash, from where `restore` brings it back; of a racer's the oldest there is forgotten.
 
         Raises:
             Conflict: It is in use.
@@ -222,6 +223,10 @@ class Garage:
             self._trash.mkdir(parents=True, exist_ok=True)
             shutil.rmtree(self._trash / name, ignore_errors=True)
             folder.path.rename(self._trash / name)
+            os.utime(self._trash / name)
+            if self._user_id != OWNER:  # a disk is filled by removing as well as by keeping
+                for path in sorted(self._trash.iterdir(), key=lambda path: path.stat().st_mtime)[:-REMOVED]:
+                    shutil.rmtree(path, ignore_errors=True)
         with self._database.transaction() as session:
             session.execute(sa.update(Model).where(self._named(name)).values(deleted=now()))
 

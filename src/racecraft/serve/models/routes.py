@@ -16,7 +16,16 @@ from racecraft.reward import load_preset, preset_names
 from racecraft.run import RunFolder, read_stretches, stretch_at
 from racecraft.run.history import read_history
 from racecraft.run.starters import starter_names, unpack_starter
-from racecraft.serve.context import Context, InConsoles, InContext, InUser, MakesModel, Trains
+from racecraft.serve.context import (
+    Computes,
+    Context,
+    InConsoles,
+    InContext,
+    InUser,
+    MakesModel,
+    TakesPlace,
+    Trains,
+)
 from racecraft.serve.jobs.schemas import JobInfo, job_info
 from racecraft.serve.models.again import again
 from racecraft.serve.models.demonstration import demonstration, evolution
@@ -227,7 +236,7 @@ def get_again(name: str, context: InContext) -> NewModel:
     return again(context.garage.folder(name), context.garage.card(name))
 
 
-@router.get("/{name}/demonstration")
+@router.get("/{name}/demonstration", dependencies=[Computes])
 def get_demonstration(name: str, context: InContext) -> Demonstration:
     """The lap that a model's best checkpoint drives alone on its road."""
     found = demonstration(_of_one_road(context, name))
@@ -236,14 +245,14 @@ def get_demonstration(name: str, context: InContext) -> Demonstration:
     return found
 
 
-@router.get("/{name}/evolution")
+@router.get("/{name}/evolution", dependencies=[Computes])
 def get_evolution(name: str, context: InContext) -> Evolution:
     """Laps of a model's training from one start, and where a film of them is."""
     folder = _of_one_road(context, name)
     return evolution(folder)
 
 
-@router.post("/{name}/evolution", status_code=202)
+@router.post("/{name}/evolution", status_code=202, dependencies=[TakesPlace])
 def film_evolution(name: str, context: InContext) -> JobInfo:
     """Film how a model learned."""
     job = context.queue.add("evolution", _of_one_road(context, name).name, {})

@@ -12,7 +12,7 @@ from fastapi.responses import FileResponse
 from racecraft.contest.terms import MAX_TRIALS
 from racecraft.errors import ConfigError
 from racecraft.judging.race import FORMAT
-from racecraft.serve.context import InContext, InUser, TakesPlace
+from racecraft.serve.context import InConsoles, InContext, InUser, TakesPlace
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.replays import replay_of, trial_poses
@@ -75,8 +75,9 @@ def restore_race(race_id: Id, context: InContext) -> RaceDetail:
 
 
 @router.post("/{race_id}/entries", status_code=202, dependencies=[TakesPlace])
-def enter_race(race_id: Id, request: Enter, context: InContext, user: InUser) -> RaceDetail:
+def enter_race(race_id: Id, request: Enter, context: InContext, consoles: InConsoles, user: InUser) -> RaceDetail:
     """Enter models; each drives as a job."""
+    consoles.quotas.require(user, "places", count=len(request.models))
     context.races.enter(race_id, request, user_id=user)
     context.supervisor.wake()
     return context.races.get(race_id)

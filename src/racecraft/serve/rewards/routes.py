@@ -17,7 +17,7 @@ from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
 from racecraft.reward import check_reward, dry_run, load_preset, preset_names
 from racecraft.reward.painting import paint_presets, paint_reward
-from racecraft.serve.context import Context, InContext
+from racecraft.serve.context import Computes, Context, InContext
 from racecraft.serve.rewards.schemas import (
     Action,
     ActionPreset,
@@ -99,7 +99,7 @@ def list_actions() -> list[ActionPreset]:
     return listed
 
 
-@router.post("/rewards/check")
+@router.post("/rewards/check", dependencies=[Computes])
 def check(request: RewardCheck, context: InContext) -> RewardVerdict:
     """Look at a reward function, try it in a car's situations, and paint it along a track."""
     problems = check_reward(request.source)

@@ -13,7 +13,7 @@ from racecraft.errors import ConfigError
 from racecraft.judging.race import FORMAT
 from racecraft.limits import Medals
 from racecraft.race.entry_file import pack_entry
-from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
+from racecraft.serve.context import Computes, Consoles, InConsoles, InLeague, InPerson
 from racecraft.serve.races.replays import replay_of, trial_poses
 from racecraft.serve.races.schemas import MAX_CARS, NewRace, RaceReplay, ReplayCar
 from racecraft.serve.schemas import RunName
@@ -139,7 +139,7 @@ def get_submission_replay(race_id: Id, submission_id: Id, request: Request, cons
     return FileResponse(path, media_type="application/octet-stream", filename=f"{race_id}-{submission_id}.replay")
 
 
-@router.get("/boards/{race_id}/film")
+@router.get("/boards/{race_id}/film", dependencies=[Computes])
 def get_film(
     race_id: Id,
     request: Request,
