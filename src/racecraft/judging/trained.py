@@ -49,6 +49,6 @@ def trained_track(info: RunInfo) -> Track:
     if joint_digest(tracks) != info.track_digest:
         raise ConfigError(
             f"Track {info.track!r} has changed since the run was trained on it.",
-            hint="Say which one you mean with --track, be it the same name.",
+            hint="Choose the track anew (--track), be it the same.",
         )
     return tracks[0]

@@ -117,7 +117,7 @@ class SAC:
         is_driven = config.num_envs == environment.num_envs
         require("num_envs", config.num_envs, is_driven, f"the environment's {environment.num_envs}")
         if spec.is_discrete or not spec.is_squashed:
-            raise ConfigError("SAC needs continuous actions.", hint="Give --actions continuous.")
+            raise ConfigError("SAC needs continuous actions.", hint="Choose continuous actions (--actions continuous).")
         self.config, self.backend, self.learner, self.environment = config, backend, learner, environment
         self.seed = seed
         self.iteration = 0

@@ -68,7 +68,7 @@ class Confinement:
                 "This reward function comes from somebody else and is not run here: the system cannot lock it in, "
                 f"for lack of {self.missing or 'limits'}.",
                 hint="Linux 5.13 or newer with Landlock can. If you have read the function and trust it, start a run "
-                "of your own with it: racecraft train --reward FILE.",
+                "of your own with it (New model, or racecraft train --reward FILE).",
             )
 
 
