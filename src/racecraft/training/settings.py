@@ -322,5 +322,6 @@ def _check_actions(algorithm: str, metadata: ModelMetadata) -> None:
     if kind not in allowed:
         preset = "default" if allowed[0] == "discrete" else allowed[0]
         raise ConfigError(
-            f"{algorithm} needs a {allowed[0]} action space; this one is {kind}.", hint=f"Choose other actions, such as {preset} (--actions {preset})."
+            f"{algorithm} needs a {allowed[0]} action space; this one is {kind}.",
+            hint=f"Choose other actions, such as {preset} (--actions {preset}).",
         )
