@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+from raced_models import write_raced
 from running_consoles import RunningConsole
 
 from racecraft.limits import known_limit
-from racecraft.race.recording import REFERENCE_AHEAD
 from racecraft.serve.driving.drives import MAX_DRIVES
 from racecraft.sim import load_vehicle
 from racecraft.track import Track, load_track
@@ -70,7 +69,8 @@ def test_laps_are_timed_and_the_fastest_is_ones_ghost(console: RunningConsole) -
     assert not lap(console, drive, track, speed=1.2)["finished"]["is_best"]
 
     ghosts = client.get("/api/ghosts", params={"track": "oval"}).json()
-    assert ghosts == [{"key": "you", "name": "", "seconds": fast["seconds"]}]
+    driven = {"direction": "forward", "vehicle": "v5"}
+    assert ghosts == [{"key": "you", "name": "", "seconds": fast["seconds"], **driven}]
     ghost = client.get("/api/ghosts/you", params={"track": "oval"}).json()
     assert len(ghost["trace"]) == pytest.approx(15 * fast["seconds"], abs=2)
     assert np.abs(track.project(np.array(ghost["trace"])[:, :2] / 1000)[1]).max() < track.mean_width
@@ -129,24 +129,14 @@ def test_a_drawing_can_be_tried_before_it_is_kept(console: RunningConsole) -> No
 def test_a_models_best_lap_is_a_ghost(console: RunningConsole) -> None:
     track = load_track("oval")
     folder = console.runs / "champion"
-    evaluation = folder / "evaluation-20260101000000"
-    (evaluation / "evaluation-simtrace").mkdir(parents=True)
+    evaluation = write_raced(folder, 12.0, 9.0)
     (folder / "run.json").write_text("{}")
-    (evaluation / "evaluation.json").write_text(json.dumps({"track": "oval", "best_lap_seconds": 9.0}))
-    rows = ["episode,steps,X,Y,yaw,steer,throttle,reward,progress,tstamp,episode_status"]
-    for episode, seconds in ((0, 12.0), (1, 9.0)):
-        count = round(15 * seconds)
-        for step in range(count + 1):
-            s = track.length * step / count
-            (x, y), heading = track.point_at(s), float(track.heading_at(s))
-            x, y = x + REFERENCE_AHEAD * math.cos(heading), y + REFERENCE_AHEAD * math.sin(heading)
-            status = "lap_complete" if step == count else "in_progress"
-            rows.append(f"{episode},{step},{x},{y},{math.degrees(heading)},0,1,1,0,{100 + step / 15},{status}")
-    (evaluation / "evaluation-simtrace" / "0-iteration.csv").write_text("\n".join(rows))
 
     listed = console.client.get("/api/ghosts", params={"track": "oval"}).json()
-    assert {"key": "model:champion", "name": "champion", "seconds": 9.0} in listed
+    card = {"key": "model:champion", "name": "champion", "seconds": 9.0, "direction": "forward", "vehicle": None}
+    assert card in listed
     ghost = console.client.get("/api/ghosts/model:champion", params={"track": "oval"}).json()
+    assert ghost == {**card, "trace": ghost["trace"]}
     assert len(ghost["trace"]) == 136
     assert np.abs(track.project(np.array(ghost["trace"])[:, :2] / 1000)[1]).max() < 0.01
     params = {"track": "oval", "direction": "reverse"}
@@ -155,6 +145,30 @@ def test_a_models_best_lap_is_a_ghost(console: RunningConsole) -> None:
 
     (evaluation / "evaluation-simtrace" / "0-iteration.csv").write_text("episode,X\n1,nonsense\n")
     refused(console.client.get("/api/ghosts/model:champion", params={"track": "oval"}), 404)
+    listed = console.client.get("/api/ghosts", params={"track": "oval"}).json()
+    assert all(one["name"] != "champion" for one in listed)
+
+
+def test_a_ghost_says_which_way_round_and_in_what_it_was_driven(console: RunningConsole) -> None:
+    """Also of models that learned in reverse, or in another car; and an evaluation's car is not always the model's."""
+
+    def models(direction: str) -> list[Any]:
+        listed = console.client.get("/api/ghosts", params={"track": "bowtie", "direction": direction}).json()
+        return [(one["name"], one["direction"], one["vehicle"]) for one in listed]
+
+    console.create(name="crab", train=False, track="bowtie", vehicle="v6", direction="reverse")
+    write_raced(console.runs / "crab", 8.0, track="bowtie", direction="reverse")
+    console.create(name="dove", train=False, track="bowtie", vehicle="v6")
+    write_raced(console.runs / "dove", 11.0, track="bowtie", vehicle="v4")
+    assert models("forward") == [("dove", "forward", "v4"), ("crab", "reverse", "v6")]
+    assert models("reverse") == [("crab", "reverse", "v6"), ("dove", "forward", "v4")]
+
+    params = {"track": "bowtie", "direction": "reverse", "vehicle": "v6"}
+    ghost = console.client.get("/api/ghosts/model:crab", params=params).json()
+    assert (ghost["direction"], ghost["vehicle"]) == ("reverse", "v6")
+    start = begin(console, **params)["start"]
+    assert math.dist(start[:2], ghost["trace"][0][:2]) < 10
+    assert math.cos((start[2] - ghost["trace"][0][2]) / 1000) > 0.99
 
 
 @pytest.mark.parametrize(

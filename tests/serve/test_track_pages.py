@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
+from raced_models import write_raced
 from running_consoles import running_console
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
@@ -180,6 +182,22 @@ def test_the_medal_of_ones_best_lap_and_what_the_next_asks_for(visit: Visit) -> 
     times.get_by_text("6.00 s").wait_for()
     assert page.locator(".medal").count() == page.locator(".coin").count() == 0
     page.unroute("**/api/drives")
+
+
+def test_ones_own_car_is_driven_against_its_way_round_and_in_its_car(visit: Visit) -> None:
+    visit.console.create(name="crab", train=False, track="bowtie", vehicle="v6", direction="reverse")
+    write_raced(visit.console.runs / "crab", 9.0, track="bowtie", direction="reverse")
+    page = visit.open("/models/crab/race")
+    page.get_by_role("link", name="Beat your own car").click()
+    page.get_by_text("crab drove this lap. Direction: The other way; car: v6.").wait_for()
+    assert page.get_by_label("Ghost").input_value() == "model:crab"
+    assert page.get_by_label("Direction").input_value() == "reverse"
+    assert page.locator("label", has_text=re.compile("^Car")).locator("select").input_value() == "v6"
+    page.get_by_label("Direction").select_option("forward")  # where nobody drove
+    page.locator("option:checked", has_text="Drive alone").wait_for(state="attached")
+    page.get_by_label("Ghost").select_option("model:crab")
+    page.get_by_text("crab drove this lap").wait_for()
+    assert page.get_by_label("Direction").input_value() == "reverse"
 
 
 @needs_axe

@@ -29,7 +29,7 @@ from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.evaluation import evaluate
 from racecraft.race.placement import driven_track
 from racecraft.race.policy import NetworkPolicy, load_policy
-from racecraft.race.provenance import Provenance, provenance
+from racecraft.race.provenance import Provenance, provenance, vehicle_note
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RaceRules, rules_by_name
 from racecraft.race.yardstick import Placing, placings
@@ -281,6 +281,8 @@ def _write(
         )
     video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
     driven = provenance(evaluation.conditions).to_dict()
-    summary = {**evaluation.summary(), "driven": driven, "step": step, "video": video, **about}
+    vehicle = vehicle_note(evaluation.conditions.vehicle)
+    told = {"vehicle": vehicle, "driven": driven, "step": step, "video": video}
+    summary = {**evaluation.summary(), **told, **about}
     write_json(inside / "evaluation.json", summary)
     return files

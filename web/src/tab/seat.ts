@@ -8,6 +8,7 @@ import { drivenLap, keepLap } from "./shelf";
 import type { DriveOn, Load, Report, SitDown } from "./worker";
 
 const YOU = "you";
+const LEARNED: Settings = { direction: "forward", vehicle: "v5" }; // all that learned in a page
 
 export class TabSeat implements Seat {
   readonly hasGhosts = true;
@@ -50,7 +51,7 @@ export class TabSeat implements Seat {
     const best = await drivenLap(this.key);
     const { drive } = report as Extract<Report, { kind: "seated" }>;
     // the plan knows the medals of the car and the direction of the page's own trainings
-    const isUsual = settings.vehicle === "v5" && settings.direction === "forward";
+    const isUsual = settings.vehicle === LEARNED.vehicle && settings.direction === LEARNED.direction;
     const medals = (isUsual && plan.medals[track.geometry.name]) || null;
     return { ...drive, best: best?.seconds ?? null, medals };
   }
@@ -76,23 +77,27 @@ export class TabSeat implements Seat {
 
   async ghosts(): Promise<GhostCard[]> {
     const own = await drivenLap(this.key);
-    const cards = this.raced.map(({ name, bestLap }) => ({ key: `model:${name}`, name, seconds: bestLap! }));
+    const cards = this.raced.map(({ name, bestLap }) => ({
+      key: `model:${name}`,
+      name,
+      seconds: bestLap!,
+      ...LEARNED,
+    }));
     cards.sort((a, b) => a.seconds - b.seconds);
-    return [...(own ? [{ key: YOU, name: "", seconds: own.seconds }] : []), ...cards];
+    return [...(own ? [{ key: YOU, name: "", seconds: own.seconds, ...this.settings }] : []), ...cards];
   }
 
   async ghost(key: string): Promise<Ghost> {
     if (key === YOU) {
       const { seconds, trace } = (await drivenLap(this.key))!;
-      return { key, name: "", seconds, trace };
+      return { key, name: "", seconds, trace, ...this.settings };
     }
     const { name, bestLap, trace } = this.raced.find((one) => `model:${one.name}` === key)!;
-    return { key, name, seconds: bestLap!, trace: trace as Trace };
+    return { key, name, seconds: bestLap!, trace: trace as Trace, ...LEARNED };
   }
 
-  /** Models that lapped this track, all of which drive forward. */
+  /** Models that lapped this track. */
   private get raced(): Model[] {
-    if (this.settings.direction !== "forward") return [];
     return this.models.filter(({ track, trace }) => track === this.track.geometry.name && trace?.length);
   }
 

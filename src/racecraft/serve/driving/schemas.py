@@ -81,12 +81,13 @@ class GhostCard(Message):
     """``you``, or ``model:NAME``."""
     name: str
     seconds: float
+    direction: Directions
+    """Which way round it was driven."""
+    vehicle: Vehicles | None
+    """What it was driven in; none of a car of its own."""
 
 
-class Ghost(Message):
-    """Where it was at every step of 1/15 s: x, y, heading."""
+class Ghost(GhostCard):
+    """The same, with where it was at every step of 1/15 s: x, y, heading."""
 
-    key: str
-    name: str
-    seconds: float
     trace: list[list[int]]

@@ -36,12 +36,26 @@ def read_laps(path: Path) -> list[Lap]:
                 if row["episode"] != episode:
                     episode, began = row["episode"], now
                     laps.append(Lap())
-                heading = math.radians(float(row["yaw"]))
-                x = float(row["X"]) - REFERENCE_AHEAD * math.cos(heading)
-                y = float(row["Y"]) - REFERENCE_AHEAD * math.sin(heading)
-                laps[-1].trace.append([round(1000 * value) for value in (x, y, heading)])
+                laps[-1].trace.append(_pose(row))
                 laps[-1].seconds = now - began
                 laps[-1].is_complete |= row["episode_status"] == "lap_complete"
     except (OSError, KeyError, TypeError, ValueError, OverflowError, csv.Error):
         return [lap for lap in laps if lap.is_complete]
     return laps
+
+
+def read_start(path: Path) -> list[int]:
+    """Where the first lap in a file of steps began: x, y, heading in mm and mrad; empty where it cannot be read."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return _pose(next(csv.DictReader(file)))
+    except (OSError, StopIteration, KeyError, TypeError, ValueError, OverflowError, csv.Error):
+        return []
+
+
+def _pose(row: dict[str, str]) -> list[int]:
+    """Of the car's origin."""
+    heading = math.radians(float(row["yaw"]))
+    x = float(row["X"]) - REFERENCE_AHEAD * math.cos(heading)
+    y = float(row["Y"]) - REFERENCE_AHEAD * math.sin(heading)
+    return [round(1000 * value) for value in (x, y, heading)]

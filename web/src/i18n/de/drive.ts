@@ -14,6 +14,8 @@ export const drive: Record<keyof typeof english, string> = {
   drive_your_best: "Deine beste",
   drive_ghost: "Geist",
   drive_no_ghost: "Allein fahren",
+  drive_ghost_drove: "{name} fuhr diese Runde. Richtung: {direction}; Auto: {car}.",
+  drive_own_car: "ein eigenes",
   drive_you: "Deine beste Runde",
   drive_delta: "Zum Geist",
   drive_top_speed: "Höchsttempo",

@@ -12,6 +12,8 @@ export const drive = {
   drive_your_best: "Your best",
   drive_ghost: "Ghost",
   drive_no_ghost: "Drive alone",
+  drive_ghost_drove: "{name} drove this lap. Direction: {direction}; car: {car}.",
+  drive_own_car: "one of its own",
   drive_you: "Your best lap",
   drive_delta: "To the ghost",
   drive_top_speed: "Top speed",
