@@ -6,15 +6,19 @@ import json
 from pathlib import Path
 
 import models
+import numpy as np
 import pytest
 
 from racecraft import resume, train
-from racecraft.errors import RewardError, RunError
+from racecraft.errors import RewardError, RunError, TrackNotFound
 from racecraft.importing import import_run
+from racecraft.importing.own import read_own
+from racecraft.importing.source import open_source
 from racecraft.learn import PPOConfig
 from racecraft.reward.sandbox import Confinement, find_confinement
 from racecraft.run import RunFolder
 from racecraft.run.archive import archive_chunks
+from racecraft.track import load_track
 from racecraft.training.plan import make_plan
 from racecraft.tuning import Tuning, make_tuning, plan_of
 
@@ -63,6 +67,22 @@ def test_an_archive_of_racecrafts_own_is_foreign_too(tmp_path: Path) -> None:
     archive = tmp_path / "mine.tar.gz"
     archive.write_bytes(b"".join(archive_chunks(RunFolder.open(mine))))
     assert is_foreign(import_run(archive, root=tmp_path / "theirs", name="mine").run)
+
+
+def test_a_run_on_a_drawn_road_goes_on_where_that_road_comes_with_it(tmp_path: Path) -> None:
+    oval = load_track("oval")
+    road = tmp_path / "mine.npy"
+    np.save(road, np.concatenate((oval.centerline * 1.1, oval.inner * 1.1, oval.outer * 1.1), axis=1))
+    settings = {"ppo": TINY, "evaluate_every": 64, "evaluation_trials": 1, "num_threads": 1}
+    mine = train(str(road), until="64 steps", root=tmp_path, name="mine", **settings).run
+    archive = tmp_path / "mine.tar.gz"
+    archive.write_bytes(b"".join(archive_chunks(RunFolder.open(mine))))
+    with pytest.raises(TrackNotFound, match="not among Racecraft's tracks"):
+        import_run(archive, root=tmp_path / "theirs", name="alone")
+    with_road = import_run(archive, root=tmp_path / "theirs", name="with-road", track=str(road)).run
+    assert RunFolder.open(with_road).checkpoints.load("last").step == RunFolder.open(mine).checkpoints.load("last").step
+    with open_source(archive) as source:
+        assert read_own(source, "mine/", track="oval") is None
 
 
 @pytest.mark.costly

@@ -105,7 +105,8 @@ def import_run(
         path: A deepracer-for-cloud folder, a model's folder or archive, or a ``reward_function.py``.
         root: Where runs lie.
         name: Name of the run; by default made from the model's.
-        track: Name or file of a track, instead of the world that the files name.
+        track: Name or file of a track, instead of the world that the files name; a run of ours goes on where it is the
+            very road that it was trained on, and else begins anew.
         reward: Preset or file, instead of the reward function among the files.
         network: Instead of the network that the files name; then it begins with fresh weights.
         checkpoint: Which weights it begins with, where there are several: ``best``, ``last``, an iteration or a file's
@@ -122,7 +123,7 @@ def import_run(
         model.weights = _find_weights(model, checkpoint, network)
         text = _read_reward(model, reward)
         metadata = _read_metadata(model)
-        own = None if track or reward or network else read_own(source, model.root)
+        own = None if reward or network else read_own(source, model.root, track=track)
         hyperparameters = None if own is not None and not own.has_hyperparameters else _read_hyperparameters(model)
         if hyperparameters is not None:
             hyperparameters.check_algorithm(metadata.training_algorithm)

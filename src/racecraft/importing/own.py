@@ -72,8 +72,13 @@ class OwnRun:
         return {"checkpoints": f"training goes on at step {step:,}"}
 
 
-def read_own(source: Source, root: str) -> OwnRun | None:
-    """The run of an archive of ours, or None where it is another's.
+def read_own(source: Source, root: str, *, track: str = "") -> OwnRun | None:
+    """The run of an archive of ours, or None where it is another's, or of another road than the given one.
+
+    Args:
+        source: The archive.
+        root: Where in it the run is.
+        track: Name or file of its track, where Racecraft has none by its name.
 
     Raises:
         RunError: ``run.json`` is damaged or of another version.
@@ -83,22 +88,24 @@ def read_own(source: Source, root: str) -> OwnRun | None:
         return None
     document = parse_json_object(source.text(root + RUN), name=RUN)
     try:
-        track, digest = str(document["track"]), str(document["track_digest"])
-        settings = TrainSettings.from_dict({**document["settings"], "seed": document["seed"], "track": track})
+        named, digest = str(document["track"]), str(document["track_digest"])
+        settings = TrainSettings.from_dict({**document["settings"], "seed": document["seed"], "track": track or named})
     except (KeyError, TypeError) as error:
         raise RunError(f"{RUN} of {source.title} is damaged: {error!r}.") from error
+    if track and joint_digest(load_tracks(track)) != digest:
+        return None
     try:
-        if not _TRACKS.fullmatch(track) or ".." in track:  # a name from a stranger must not become a path
+        if not track and (not _TRACKS.fullmatch(named) or ".." in named):  # a stranger's name must not become a path
             raise TrackNotFound("not a name")
-        tracks = load_tracks(track)
+        tracks = load_tracks(track or named)
     except RacecraftError as error:
         raise TrackNotFound(
-            f"The run drives on {track[:80]!r}, which is not among Racecraft's tracks.",
+            f"The run drives on {named[:80]!r}, which is not among Racecraft's tracks.",
             hint="Give another track with --track NAME; training then begins with fresh weights.",
         ) from error
     if joint_digest(tracks) != digest:
         raise TrackNotFound(
-            f"The run's track {track!r} is not the one that Racecraft has by this name.",
+            f"The run's track {named!r} is not the one that Racecraft has by this name.",
             hint="Give a track with --track NAME; training then begins with fresh weights.",
         )
     files = {
