@@ -267,6 +267,55 @@ async function arrival(core, { plan, track, file }) {
   };
 }
 
+/** Laps of an evaluation as the page shows them, what a reward pays for them, and what the car saw first. */
+async function watched(core, { weights, reward, ...asked }) {
+  const { Watched } = await load("src/tab/laps/watched.ts");
+  const { payLaps } = await load("src/tab/laps/paid.ts");
+  const { payWith } = await load("src/tab/trainer.ts");
+  const address = `data:text/javascript,${encodeURIComponent(reward)}`;
+  const { rewards } = await import(address);
+  const begin = { weights: read(weights) };
+  const found = await Watched.evaluation(core, { ...asked, begin });
+  const pay = payWith(rewards.own, asked.track, 1);
+  found.pay(payLaps(pay, found.toPay()), rewards.own.remembers);
+  const last = found.report.laps.at(-1);
+  const { frames, shape } = await found.eyes(last.number);
+  return {
+    report: found.report,
+    count: frames.length / shape[0] / shape[1],
+    first: digest(frames.slice(0, shape[0] * shape[1])),
+  };
+}
+
+/** The same of a replay. */
+async function rewatched(core, { plan, replay, track }) {
+  const { Watched } = await load("src/tab/laps/watched.ts");
+  const { verify } = await load("src/tab/verify/verify.ts");
+  const bytes = new Uint8Array(Buffer.from(replay, "base64"));
+  let found;
+  const keep = (file, road) => {
+    found = Watched.replay(core, plan, file, road);
+  };
+  await verify(core, plan, bytes, async () => track, keep);
+  const eyes = await found.eyes(found.report.laps[0].number);
+  return { report: found.report, shape: eyes?.shape };
+}
+
+/** What becomes of drawings: a verdict, and of a road that can be driven the file. */
+async function drawings(core, { sketches, statuses }) {
+  const { judge } = await load("src/tab/drawn/judge.ts");
+  const { roadOf } = await load("src/tab/drawn/road.ts");
+  const { fileOf } = await load("src/tab/drawn/file.ts");
+  const words = { columns: core.names("row"), statuses };
+  const found = {};
+  for (const [name, sketch] of Object.entries(sketches)) {
+    const verdict = judge(sketch);
+    const file = verdict.ok && (await fileOf("drawing", roadOf(sketch), words));
+    found[name] = { verdict, file };
+  }
+  return found;
+}
+
 /** What rewards pay along tracks: presets by name, and one in Python. */
 async function paintings(core, { tracks, statuses, rewards, presets, source }) {
   const { paint } = await load("src/tab/painting.ts");
@@ -303,6 +352,7 @@ const core = await Core.load(readFileSync(code));
 const run = {
   ...{ ask, check, drive, train, refuse },
   ...{ verify, policies, session, driven, arrival, paintings },
+  ...{ watched, rewatched, drawings },
 };
 const all = JSON.parse(readFileSync(cases, "utf8"));
 const files = all.find(({ files }) => files)?.files;

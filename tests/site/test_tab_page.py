@@ -149,10 +149,70 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
     page.get_by_text("This archive is damaged").wait_for()
 
 
+def test_a_models_laps_are_watched_again_corner_by_corner(page: Page) -> None:
+    about = page.get_by_label("Your models").locator(".model").get_by_text(re.compile("best")).inner_text()
+    best = re.search(r"best (\S+ s)", about)
+    assert best is not None
+    page.get_by_role("button", name="Watch its laps: oval-racing-1").click()
+    shown = page.get_by_role("dialog")
+    shown.get_by_text(re.compile(rf"^oval-racing-1, Lap \d · {best[1]}$")).wait_for(timeout=PATIENCE)
+    assert shown.get_by_role("region", name="Corners").locator("tbody tr").count() == 2
+    eye = shown.get_by_label("What the car sees")
+    pixels = "eye => eye.getContext('2d').getImageData(0, 0, eye.width, eye.height).data.join()"
+    page.wait_for_function(f"new Set(({pixels})(document.querySelector('dialog .eye canvas')).split(',')).size > 20")
+    first = eye.evaluate(pixels)
+    slider = shown.get_by_role("slider", name="Moment of the lap")
+    slider.fill("3")
+    page.wait_for_function(f"first => ({pixels})(document.querySelector('dialog .eye canvas')) !== first", arg=first)
+    shown.get_by_text("What this model's own reward function pays along the lap").wait_for()
+    shown.get_by_role("button", name="Back").click()
+
+
 def test_a_model_stays_when_the_page_is_closed_and_goes_when_it_is_deleted(page: Page) -> None:
     page.reload()
     page.get_by_role("button", name="Delete: oval-racing-1").click()
     page.get_by_text("Nothing yet.").wait_for()
+
+
+def test_a_drawn_track_is_trained_on_and_goes_with_its_model(page: Page, tmp_path: Path) -> None:
+    page.get_by_role("button", name="Draw a track").click()
+    desk = page.get_by_role("dialog", name="Draw a track")
+    desk.get_by_text("It can be driven.").wait_for()
+    desk.get_by_label("Name of the track").fill("oval")
+    desk.get_by_role("button", name="Save").click()
+    desk.get_by_text("There is a track called oval already.").wait_for()
+    desk.get_by_label("Name of the track").fill("mine")
+    desk.get_by_role("button", name="Save").click()
+    page.get_by_role("button", name="Change this track").wait_for()
+    page.reload()
+    page.get_by_role("combobox", name="Track").select_option("mine")
+    page.get_by_role("img", name=PAINTED).wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Train", exact=True).click()
+    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    shown = page.get_by_text(re.compile(r"mine, 5 of 5 laps, best \d+\.\d\d s")).inner_text()
+    files = {}
+    for button in ("Download this road", "Download: mine-racing-1"):
+        with page.expect_download() as download:
+            page.get_by_role("button", name=button).click()
+        files[button] = tmp_path / download.value.suggested_filename
+        download.value.save_as(files[button])
+    route, archive = files.values()
+    imported = import_run(archive, root=tmp_path / "runs", track=str(route))
+    rules, seed = "first_lap", (1 + SEED) % 2**32
+    driven = evaluate(imported.run, rules=rules, seed=seed, video=False).evaluation
+    laps = [lap for trial in driven.trials for lap in trial.lap_times]
+    assert len(laps) == 5
+    assert f"best {min(laps):.2f} s" in shown
+    page.get_by_role("button", name="Change this track").click()
+    desk.get_by_role("button", name="Delete this track").click()
+    desk.get_by_text("A model of yours drives on mine").wait_for()
+    desk.get_by_role("button", name="Back").click()
+    page.get_by_role("button", name="Delete: mine-racing-1").click()
+    page.get_by_text("Nothing yet.").wait_for()
+    page.get_by_role("button", name="Change this track").click()
+    desk.get_by_role("button", name="Delete this track").click()
+    page.get_by_role("button", name="Draw a track").wait_for()
+    assert "mine" not in page.get_by_role("combobox", name="Track").inner_text()
 
 
 def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
@@ -277,6 +337,11 @@ def test_a_replay_is_driven_again_in_the_tab_and_a_changed_number_is_named(page:
     chooser.set_input_files(path)
     page.get_by_text("Driven: by drfc rules, with the car v5, on oval.").wait_for(timeout=PATIENCE)
     page.get_by_text(re.compile(r"All \d+ steps of 2 cars come out the same, bit for bit")).wait_for()
+    page.get_by_role("button", name="Watch its laps", exact=True).click()
+    shown, best = page.get_by_role("dialog"), min(trial.laps[0].time for trial in evaluation.trials)
+    shown.get_by_text("A replay does not say what its driver was paid for.").wait_for(timeout=PATIENCE)
+    shown.get_by_text(re.compile(rf"^club.replay, Lap \d · {best:.2f} s$")).wait_for()
+    page.get_by_role("button", name="Back").click()
     replay = read_replay(path)
     replay.rewards[1][40] = 0.25
     chooser.set_input_files(write_replay(replay, path))
@@ -356,6 +421,12 @@ def test_the_page_is_accessible_in_both_themes_and_fits_a_phone(page: Page) -> N
         page.evaluate(FADED)
         found = page.evaluate("axe.run().then((found) => found.violations.map((one) => [one.id, one.nodes[0].html]))")
         assert found == []
+        page.get_by_role("button", name="Draw a track").click()
+        page.get_by_role("dialog").get_by_text("It can be driven.").wait_for(timeout=PATIENCE)
+        page.evaluate(FADED)
+        inside = "axe.run('dialog').then((found) => found.violations.map((one) => [one.id, one.nodes[0].html]))"
+        assert page.evaluate(inside) == []
+        page.get_by_role("dialog").get_by_role("button", name="Back").click()
     for width in (390, 768):
         page.set_viewport_size({"width": width, "height": 800})
         page.wait_for_timeout(300)  # until the chart has followed

@@ -21,7 +21,7 @@ from racecraft.serve.rewards.routes import list_actions
 from racecraft.serve.rewards.schemas import ActionPreset
 from racecraft.serve.tracks.courses import geometry
 from racecraft.sim.camera import CAMERAS, CameraSpec
-from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, STATUS_NAMES
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.objects import NO_OBJECTS, OBJECT_KINDS, RACE_TYPES, Objects, objects_for_race
 from racecraft.sim.randomization import PRESETS as RANDOM
 from racecraft.sim.simulation import CONTROL_DT, DIRECTIONS, START_MODES, Start, track_arrays
@@ -170,6 +170,7 @@ def plan() -> dict[str, Any]:
         "slowest": SLOWEST,
         "evaluationSeed": SEED,
         "seeds": list(SEEDS),
+        "columns": list(ROW_COLUMNS),
         "statuses": list(STATUS_NAMES),
         "objectKinds": list(OBJECT_KINDS),
         "traceWidth": STEP_WIDTH,

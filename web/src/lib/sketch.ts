@@ -42,7 +42,7 @@ function solve(matrix: number[][], rhs: [number, number][]): [number, number][] 
 }
 
 /** Second derivatives at the nodes. */
-function bends(points: [number, number][], steps: number[], isClosed: boolean): [number, number][] {
+export function bends(points: [number, number][], steps: number[], isClosed: boolean): [number, number][] {
   const slopes = steps.map((step, i) => [
     (points[i + 1]![0] - points[i]![0]) / step,
     (points[i + 1]![1] - points[i]![1]) / step,

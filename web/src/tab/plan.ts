@@ -45,6 +45,7 @@ export interface Plan {
   slowest: number; // m/s
   evaluationSeed: number; // added to a training's
   seeds: number[];
+  columns: string[]; // of a row
   statuses: string[]; // of a car, by the number in its row
   traceWidth: number; // numbers that the installed program logs of a step
   objectKinds: string[]; // by the number in a row
@@ -92,8 +93,10 @@ export const arraysOf = ({ told }: TrackFile): TrackArrays => ({
 });
 
 /** Of every piece of the centre line, the waypoint where it begins  (W - 1,). */
-export const indicesOf = ({ told }: TrackFile): Int32Array =>
-  new Int32Array(bytesOf(told.waypoints)).subarray(0, told.count - 1);
+export const indicesOf = ({ told }: TrackFile, isReversed = false): Int32Array => {
+  const pieces = told.count - 1;
+  return new Int32Array(bytesOf(told.waypoints)).subarray(isReversed ? pieces : 0, isReversed ? 2 * pieces : pieces);
+};
 
 export const readTrack = async (site: string, name: string): Promise<TrackFile> =>
   (await (await read(site, `data/tracks/${name.replace(":", "-")}.json`)).json()) as TrackFile;

@@ -9,6 +9,7 @@ export class Proof {
   name = $state(""); // of the file that is being driven
   verdict = $state.raw<Verdict | undefined>();
   problem = $state("");
+  file = $state.raw<File | undefined>(); // that was checked last
   private worker: Worker | undefined;
 
   constructor(
@@ -19,6 +20,7 @@ export class Proof {
   check(file: File): void {
     this.worker?.terminate();
     [this.name, this.verdict, this.problem] = [file.name, undefined, ""];
+    this.file = file;
     const worker = (this.worker = openWorker());
     worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data);
     worker.onerror = ({ message }) => this.end(l("replay_unable", { why: message || "worker" }));

@@ -22,8 +22,8 @@ export class Road {
   readonly isClosed: boolean;
   private readonly center: Line;
   private readonly borders: { left: Line; right: Line };
-  private readonly arc: Float64Array; // (W,) m along the centre line
-  private readonly headings: Float64Array; // (W - 1,) rad of each piece
+  readonly arc: Float64Array; // (W,) m along the centre line
+  readonly headings: Float64Array; // (W - 1,) rad of each piece
 
   constructor({ told, road }: TrackFile, isReversed: boolean) {
     const { count } = told;

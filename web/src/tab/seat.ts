@@ -102,6 +102,9 @@ export class TabSeat implements Seat {
   }
 
   private get key(): string {
-    return [this.track.geometry.name, this.settings.vehicle, this.settings.direction].join("/");
+    const { geometry, digest } = this.track;
+    // a drawn road may change under its name
+    const road = this.plan.tracks.includes(geometry.name) ? geometry.name : digest;
+    return [road, this.settings.vehicle, this.settings.direction].join("/");
   }
 }

@@ -1,10 +1,11 @@
-/** Models in this browser's storage, and the best laps of who drives: they stay when the page is closed; a model leaves it
+/** Models in this browser's storage, tracks that were drawn, and the best laps of who drives: they stay when the page is closed; a model leaves it
  * only as a download. */
 import type { Trace } from "./drivencar";
+import type { Sketch } from "../lib/sketch";
 import type { Model } from "./model";
 
-const [BASE, VERSION] = ["racecraft-tab", 2];
-const KEYS = { models: "name", laps: "key" } as const; // of what is kept
+const [BASE, VERSION] = ["racecraft-tab", 3];
+const KEYS = { models: "name", laps: "key", tracks: "name" } as const; // of what is kept
 
 /** A lap that somebody drove. */
 export interface DrivenLap {
@@ -12,6 +13,20 @@ export interface DrivenLap {
   seconds: number;
   trace: Trace;
 }
+
+/** A track that somebody drew. */
+export interface DrawnTrack {
+  name: string;
+  sketch: Sketch;
+}
+
+export const drawnTracks = (): Promise<DrawnTrack[]> =>
+  ask("tracks", "readonly", (store) => store.getAll() as IDBRequest<DrawnTrack[]>);
+
+export const keepTrack = (track: DrawnTrack): Promise<unknown> =>
+  ask("tracks", "readwrite", (store) => store.put(track));
+
+export const dropTrack = (name: string): Promise<unknown> => ask("tracks", "readwrite", (store) => store.delete(name));
 
 /** Every model, newest first. */
 export async function kept(): Promise<Model[]> {

@@ -6,6 +6,9 @@ import type { Look, Picture } from "../scene/poses";
 import { loadCore, type LoadedCore } from "./core";
 import type { Beginning } from "./begin";
 import { DrivenCar, type Trace } from "./drivencar";
+import type { EvaluationLaps } from "../lib/laps";
+import type { ToPay } from "./laps/paid";
+import type { Eyes, Watched } from "./laps/watched";
 import { objectsOf } from "./objects";
 import { read, readTrack, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
 import { type Pay, Python, RewardFailure } from "./python";
@@ -89,6 +92,32 @@ export interface Judge {
   begin: Beginning;
 }
 
+/** The laps of a model's evaluation are to be watched. */
+export interface LookAtLaps extends Omit<Judge, "kind"> {
+  kind: "laps";
+  reward: string | undefined; // the preset that it was trained with
+}
+
+/** The laps of the replay that was found genuine are to be watched. */
+export interface LookAtReplay {
+  kind: "watch";
+  plan: Plan;
+}
+
+/** What the car saw in a lap of those. */
+export interface LookThrough {
+  kind: "eyes";
+  lap: number;
+}
+
+/** What a reward in Python pays for laps. */
+export interface PayLaps {
+  kind: "pay";
+  source: string;
+  track: TrackFile;
+  laps: ToPay[];
+}
+
 /** Somebody takes the wheel, of the only car of this thread. */
 export interface SitDown {
   kind: "sit";
@@ -103,7 +132,8 @@ export interface DriveOn {
   controls: { steering: number; speed: number; steps: number }; // rad, m/s, of 1/15 s
 }
 
-type Asked = Load | Show | Hide | Check | Paint | Start | Verify | Judge | SitDown | DriveOn;
+type Asked = Load | Show | Hide | Check | Paint | Start | Verify | Judge | SitDown | DriveOn | Watching;
+type Watching = LookAtLaps | LookAtReplay | LookThrough | PayLaps;
 
 export type Report =
   | { kind: "ready" } // all that was asked for is loaded
@@ -128,6 +158,9 @@ export type Report =
   | { kind: "seated"; drive: Drive }
   | { kind: "steered"; state: DriveState; trace: Trace }
   | { kind: "verified"; verdict: Verdict }
+  | { kind: "laps"; found: EvaluationLaps; toPay: ToPay[] }
+  | { kind: "eyes"; lap: number; eyes: Eyes | undefined }
+  | { kind: "paid"; rewards: (number | null)[][] }
   | { kind: "unreadable"; key: ProblemKey; values: Record<string, string | number> }
   | { kind: "failed"; message: string; isReward: boolean };
 
@@ -173,6 +206,10 @@ async function handle(asked: Asked): Promise<void> {
       kind: "judged",
       evaluation: new Trainer(loaded.core.core, asked, () => () => new Float64Array()).evaluate(),
     });
+  else if (asked.kind === "laps") await lookAtLaps(asked, loaded);
+  else if (asked.kind === "watch") lookAtReplay(await toWatch!());
+  else if (asked.kind === "eyes") tell({ kind: "eyes", lap: asked.lap, eyes: await watched!.eyes(asked.lap) });
+  else if (asked.kind === "pay") await payFor(asked, loaded);
   else if (asked.kind === "sit") sit(asked, loaded);
   else if (asked.kind === "steer") {
     const { steering, speed, steps } = asked.controls;
@@ -239,11 +276,38 @@ async function prove({ plan, file }: Verify, { core: { core }, site }: Loaded): 
   const { ReplayProblem, verifyFile } = await import("./verify/verify");
   const track = (name: string) => readTrack(site, name);
   try {
-    tell({ kind: "verified", verdict: await verifyFile(core, plan, file, track) });
+    const verdict = await verifyFile(core, plan, file, track, (replay, road) => {
+      toWatch = async () => (await import("./laps/watched")).Watched.replay(core, plan, replay, road);
+    });
+    tell({ kind: "verified", verdict });
   } catch (error) {
     if (!(error instanceof ReplayProblem)) throw error;
     tell({ kind: "unreadable", key: error.key, values: error.values });
   }
+}
+
+let watched: Watched | undefined;
+let toWatch: (() => Promise<Watched>) | undefined;
+async function lookAtLaps(asked: LookAtLaps, { core: { core }, presets }: Loaded): Promise<void> {
+  const [{ Watched }, { payLaps }] = await Promise.all([import("./laps/watched"), import("./laps/paid")]);
+  watched = await Watched.evaluation(core, { ...asked, kind: "judge" });
+  const { reward, track } = asked;
+  const preset = reward === undefined ? undefined : presets[reward]!;
+  const toPay = watched.toPay();
+  if (preset) watched.pay(payLaps(payWith(preset, track, 1), toPay), preset.remembers);
+  tell({ kind: "laps", found: watched.report, toPay: preset ? [] : toPay });
+}
+
+function lookAtReplay(replay: Watched): void {
+  watched = replay;
+  tell({ kind: "laps", found: watched.report, toPay: [] });
+}
+
+async function payFor({ source, track, laps }: PayLaps, { python }: Loaded): Promise<void> {
+  const { payLaps } = await import("./laps/paid");
+  const width = laps.flatMap(({ rows }) => rows)[0]?.length ?? 0;
+  const paid = width ? payLaps(python!.open(source, track, 1, width, 0).pay, laps) : [];
+  tell({ kind: "paid", rewards: paid });
 }
 
 async function load({ site, hasPython }: Load): Promise<Loaded> {

@@ -5,14 +5,13 @@
  *                                   v
  *                   rows, laps, rewards == those of the file ?   the first that differs ends it
  */
-import type { Core, Settings } from "../core";
-import { countOf, toldObjects } from "../objects";
-import { arraysOf, doublesOf, type Plan, type TrackFile } from "../plan";
+import type { Core } from "../core";
+import { doublesOf, type Plan, type TrackFile } from "../plan";
+import { driveAgain } from "./again";
 import { MOST_FILE, readReplay, type ReplayFile, type StoredCar } from "./file";
-import { Marshal, type Course, type Driven } from "./marshal";
+import type { Driven } from "./marshal";
 import { ReplayProblem } from "./problem";
 import { provenanceOf, type Provenance } from "./provenance";
-import { Road } from "../road";
 
 /** The first thing that comes out otherwise. */
 export interface Difference {
@@ -34,11 +33,7 @@ export interface Verdict {
   driven: Provenance;
 }
 
-const SMALLEST_CAMERA = 8; // pixels: only where the camera looks is part of the rules
 const START_TOLERANCE = 1e-9; // m and rad, of a row that prepares a start
-const MOST_STEPS_TO_A_LAP = 100_000;
-const PALETTES = ["2018", "2020", "2026"];
-const [FIXED, RANDOM] = [0, 2]; // starts of the simulation
 
 export { ReplayProblem };
 
@@ -48,16 +43,19 @@ export async function verifyFile(
   plan: Plan,
   file: Blob,
   track: (name: string) => Promise<TrackFile>,
+  keep?: (replay: ReplayFile, road: TrackFile) => void,
 ): Promise<Verdict> {
   if (file.size > MOST_FILE) throw new ReplayProblem("replay_large", { size: MOST_FILE >> 20 });
-  return verify(core, plan, new Uint8Array(await file.arrayBuffer()), track);
+  return verify(core, plan, new Uint8Array(await file.arrayBuffer()), track, keep);
 }
 
+/** `keep` is told what a genuine file holds. */
 export async function verify(
   core: Core,
   plan: Plan,
   bytes: Uint8Array<ArrayBuffer>,
   track: (name: string) => Promise<TrackFile>,
+  keep: (replay: ReplayFile, road: TrackFile) => void = () => undefined,
 ): Promise<Verdict> {
   const columns = core.names("row");
   const replay = await readReplay(bytes, columns);
@@ -75,7 +73,9 @@ export async function verify(
     }),
     driven: provenanceOf(replay, plan.known),
   };
-  return { ...about, difference: await differenceOf(core, plan, replay, road, columns) };
+  const difference = await differenceOf(core, plan, replay, road, columns);
+  if (!difference) keep(replay, road);
+  return { ...about, difference };
 }
 
 /** Somebody else's words, without what is no letter. */
@@ -104,45 +104,6 @@ async function roadOf(
   return file;
 }
 
-function settingsOf(plan: Plan, { rules, seed, camera, cars, cars_per_race }: ReplayFile, isClosed: boolean): Settings {
-  const isAlone = cars_per_race === 1;
-  const fromLine = rules.starts === "line";
-  const laps = rules.is_continuous && isClosed ? rules.laps : 1; // of one simulated episode
-  const told: Settings = {
-    ...plan.races["time-trial"].trials,
-    num_envs: cars.length,
-    cars_per_race,
-    seed: Number(seed & 0xffff_ffffn),
-    seed_high: Number(seed >> 32n),
-    laps,
-    max_steps: laps * MOST_STEPS_TO_A_LAP,
-    start_mode: fromLine ? FIXED : RANDOM,
-    start_offset: fromLine ? rules.start_offset : 0,
-    start_spread: 0,
-    lateral_jitter: !fromLine && isAlone ? rules.lateral_jitter : 0,
-    heading_jitter: !fromLine && isAlone ? rules.heading_jitter : 0,
-    direction: rules.direction === "reverse" ? 1 : 0,
-    has_camera: Number(camera !== null),
-    palette: 0,
-    picture_age: 0,
-    baseline: 0,
-  };
-  if (!camera) return told;
-  return {
-    ...told,
-    width: SMALLEST_CAMERA,
-    height: SMALLEST_CAMERA,
-    hfov: camera.horizontal_fov,
-    forward: camera.forward,
-    left: camera.left,
-    above: camera.above_ground,
-    pitch: camera.pitch,
-    baseline: camera.baseline,
-    palette: PALETTES.indexOf(camera.palette),
-    picture_age: Math.round((camera.age / (1 / 15)) * plan.races["time-trial"].trials["substeps"]!),
-  };
-}
-
 async function differenceOf(
   core: Core,
   plan: Plan,
@@ -150,40 +111,18 @@ async function differenceOf(
   file: TrackFile,
   columns: string[],
 ): Promise<Difference | null> {
-  const { rules, vehicle, objects, randomize, seed, cars: stored } = replay;
-  const none = plan.known.randomize["none"]!;
-  const isRandom = Object.entries(randomize).some(([name, [low, high]]) => {
-    const range = none[name];
-    if (!range) throw new ReplayProblem("replay_header", { at: "header.randomize" });
-    return low !== range[0] || high !== range[1];
-  });
-  const ranges = isRandom ? Object.keys(none).flatMap((name) => randomize[name] ?? none[name]!) : undefined;
-  const around = { objects: toldObjects(objects), ranges };
-  const cars = core.track(arraysOf(file)).cars(settingsOf(plan, replay, file.told.isClosed), vehicle, around);
-  const course: Course = {
-    ...{ core, cars, rules, seed, columns, statuses: plan.statuses, numObjects: countOf(objects) },
-    ...{ road: new Road(file, rules.direction === "reverse"), carsPerRace: replay.cars_per_race },
-  };
+  const stored = replay.cars;
   let found: Difference | undefined;
+  let names: string[] | undefined;
   const steps = stored.map(() => 0);
-  const names = namesOf(columns, cars.rowWidth);
   const compare = (car: number, driven: Float64Array) => {
     const step = steps[car]!++;
     if (found && found.car <= car) return; // of cars that differ in one step, the first is named
+    names ??= namesOf(columns, driven.length);
     found = rowDifference(stored[car]!, driven, { car, step, names, columns, statuses: plan.statuses }) ?? found;
   };
-  const marshal = await Marshal.begin(course, isRandom, compare);
-  const actions = new Float32Array(2 * stored.length);
-  while (!found && marshal.isRacing) {
-    actions.fill(0);
-    stored.forEach((car, index) => {
-      const step = steps[index]!;
-      if (step < car.steps) actions.set(car.actions.subarray(2 * step, 2 * step + 2), 2 * index);
-    });
-    marshal.step(actions);
-  }
+  const results = await driveAgain(core, plan, replay, file, { log: compare, isOver: () => found !== undefined });
   if (found) return found;
-  const results = marshal.results();
   for (const [car, driven] of results.entries()) {
     const other = resultDifference(stored[car]!, driven, { car, steps: steps[car]!, columns, statuses: plan.statuses });
     if (other) return other;
