@@ -78,6 +78,7 @@ CONSOLE = (
     "quotas",
     "desks",
     "submissions",
+    "workers",
     "context",
     "app",
     "server",

@@ -23,6 +23,10 @@ class RunningWorker:
     machine: str
     runs: Path
 
+    def children(self) -> list[int]:
+        """The processes that do its jobs."""
+        return processes_on(self.runs)
+
     def kill(self) -> None:
         """As a machine that is switched off: the worker and what it started, at once."""
         for process in (self.process.pid, *processes_on(self.runs)):
@@ -32,15 +36,17 @@ class RunningWorker:
 
 
 @contextmanager
-def running_worker(runs: Path, *, database: str, artifacts: str) -> Iterator[RunningWorker]:
+def running_worker(runs: Path, *options: str, database: str = "", artifacts: str = "") -> Iterator[RunningWorker]:
     command = [sys.executable, "-m", "racecraft", "worker", "--json", "--runs", str(runs), "--machine", runs.name]
-    environment = {**os.environ, "RACECRAFT_DATABASE": database, "RACECRAFT_ARTIFACTS": artifacts}
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None
-        yield RunningWorker(process, json.loads(process.stdout.readline())["machine"], runs)
-    finally:
-        end(process)
+    shared = {"RACECRAFT_DATABASE": database, "RACECRAFT_ARTIFACTS": artifacts} if database else {}
+    with subprocess.Popen(
+        [*command, *options], env={**os.environ, **shared}, stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            yield RunningWorker(process, json.loads(process.stdout.readline())["machine"], runs)
+        finally:
+            end(process)
 
 
 def processes_on(runs: Path) -> list[int]:

@@ -42,6 +42,7 @@ class School:
             "starter": "quick",
             "drive_id": ok(ada.post("/api/drives", json={"track": "adas-track"}), 201)["id"],
             "key": "model:adas-model",
+            "worker": "0" * 16,
             "path": "metrics/x.json",
             "stamp": "20260101000000",
             "target": "car",

@@ -24,6 +24,7 @@ from racecraft.errors import ConfigError, RunError
 from racecraft.run import RunFolder
 
 pytest.importorskip("obstore")
+from racecraft.serve.jobs.access import Access
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.models import mirror
@@ -261,7 +262,7 @@ def test_a_store_that_did_not_answer_at_first_is_asked_again(
     database = Database(f"sqlite:///{tmp_path / 'console.db'}")
     queue = JobQueue(database)
     settings = ServeSettings(runs=there)
-    supervisor = Supervisor(settings, database, queue)
+    supervisor = Supervisor(settings, queue, Access.of(settings))
     keeper = mirror.Mirror(store, settings=settings, queue=queue, supervisor=supervisor)
     thread = threading.Thread(target=keeper.start)
     thread.start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ from typer.main import get_command
 
 from racecraft.cli import every_verb
 from racecraft.serve.jobs.supervisor import GRACE
-from racecraft.serve.settings import ARTIFACTS, DATABASE
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 
@@ -33,8 +33,15 @@ def test_what_it_starts_is_a_worker_of_the_image(deployment: dict[str, Any]) -> 
     assert (options["trainings"], options["others"], options["machine"]) == (1, 1, "$(POD)")
     assert container["env"][0]["name"] == "POD"
     assert str(options["runs"]).startswith(container["volumeMounts"][0]["mountPath"])
+    assert options["server"] == "https://racing.example.org"
+    assert not options["database"]
     text = (DEPLOY / "workers.yaml").read_text()
-    assert all(f"--from-literal={name}=" in text for name in (DATABASE, ARTIFACTS))
+    made = re.search(r"#   racecraft (.+?) > (\w+) .* --from-file=(\w+)\n", text)
+    assert made is not None
+    assert made[2] == made[3] == Path(options["token_file"]).name
+    league, name, *rest = made[1].split()
+    maker = get_command(every_verb()).commands[league].commands[name]  # type: ignore[attr-defined]
+    assert maker.make_context(name, rest).params["title"] == "kubernetes"
 
 
 def test_its_parts_belong_together(deployment: dict[str, Any]) -> None:
@@ -44,5 +51,10 @@ def test_its_parts_belong_together(deployment: dict[str, Any]) -> None:
     (container,) = pod["containers"]
     assert {one["name"] for one in container["volumeMounts"]} == {one["name"] for one in pod["volumes"]}
     assert container["securityContext"]["readOnlyRootFilesystem"]  # all that is written lies on a volume
-    assert container["envFrom"] == [{"secretRef": {"name": "racecraft"}}]
-    assert not any("value" in one and "://" in one["value"] for one in container["env"])  # no secret in the file
+    (secret,) = (one for one in pod["volumes"] if "secret" in one)
+    text = (DEPLOY / "workers.yaml").read_text()
+    assert f"create secret generic {secret['secret']['secretName']} " in text
+    (place,) = (one["mountPath"] for one in container["volumeMounts"] if one["name"] == secret["name"])
+    assert f"--token-file={place}/token" in container["args"]
+    assert pod["securityContext"]["fsGroup"]  # who may read it
+    assert "rc_" not in text  # no secret in the file

@@ -35,7 +35,7 @@ OPERATORS = (
         "serve/station.py",
     ),
     "serve/server.py",
-    *("importing/history.py", "importing/own.py", "serve/jobs/bench.py"),
+    *("importing/history.py", "importing/own.py", "serve/jobs/bench.py", "serve/jobs/line.py"),
 )
 """Where they come from that only terminals and logs show, or that quote others."""
 PLAIN = re.compile(

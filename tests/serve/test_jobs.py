@@ -155,7 +155,7 @@ def test_a_job_that_is_lost_with_its_machine_is_given_up_later(queue: JobQueue, 
     for attempt in range(MAX_DEATHS):
         assert queue.claim(("train",), owner=str(attempt)) is not None
         if attempt % 2:
-            queue.release(str(attempt), limit=MAX_DEATHS)  # as found by the next server
+            queue.release(str(attempt), has_company=True)  # as found by the next server
         else:
             expire(database)
             queue.take_back_expired()

@@ -182,6 +182,21 @@ def test_what_may_be_used_is_said_by_the_teacher_and_seen_by_everybody(lesson: L
     page.get_by_text("1 of 200").wait_for()
 
 
+def test_whoever_holds_the_league_makes_tokens_for_workers(lesson: Lesson, race: int) -> None:
+    page = lesson.visits["teacher"].open("/me")
+    page.get_by_label("What for").fill("lab")
+    page.get_by_label("For a worker").check()
+    page.get_by_role("button", name="Make a token").click()
+    bearer = {"authorization": f"Bearer {page.locator('code').inner_text()}"}
+    page.get_by_text("lab (worker)").wait_for()
+    stranger = lesson.league.stranger()
+    assert stranger.get("/api/workers", headers=bearer).status_code == 200
+    assert stranger.get("/api/models", headers=bearer).status_code == 403
+    page = lesson.visits["Comet"].open("/me")
+    page.get_by_role("button", name="Make a token").wait_for()
+    assert page.get_by_label("For a worker").count() == 0
+
+
 def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
     page = lesson.visits["Turbo"].open("/me")
     page.get_by_label("New password, at least 10 characters").fill("correct horse")

@@ -13,6 +13,7 @@ import pytest
 
 from racecraft.errors import RunError
 from racecraft.run.lock import exclusive_lock
+from racecraft.serve.jobs.access import Access
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Standby
 from racecraft.serve.settings import ServeSettings
@@ -31,7 +32,7 @@ def settings(tmp_path: Path) -> ServeSettings:
 @pytest.fixture
 def standby(settings: ServeSettings) -> Iterator[Standby]:
     folder, log = settings.state / "workers", settings.state / "jobs.log"
-    standby = Standby(settings.runs, workers=folder, database=settings.database_url, artifacts="", log=log)
+    standby = Standby(settings.runs, workers=folder, access=Access.of(settings), log=log)
     yield standby
     standby.close()
 
@@ -71,7 +72,7 @@ def test_after_a_short_job_it_waits_for_another(settings: ServeSettings, standby
         workers.append(standby.start(job.id))
         assert select.select([standby.bell], [], [], PATIENCE)[0], "it rings when a job has ended"
         os.read(standby.bell, 10)
-        assert not queue.is_held(name)
+        assert queue.held(name) is None
         assert (ended := queue.get(job.id)) is not None
         assert ended.state == "failed"
         assert workers[-1].poll() is None

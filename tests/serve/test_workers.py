@@ -26,6 +26,7 @@ from racecraft.errors import ConfigError, RunError
 from racecraft.moved import move
 from racecraft.reward import load_preset
 from racecraft.run import RunFolder
+from racecraft.serve.jobs.access import Access
 from racecraft.serve.jobs.cargo import Cargo, files_of, rivals_of
 from racecraft.serve.jobs.courier import Courier
 from racecraft.serve.jobs.follower import Follower
@@ -176,7 +177,7 @@ def test_a_guests_training_on_an_own_track_against_another_run_travels(
     queue, store = JobQueue(database).of(guest), Artifacts(f"file://{tmp_path}/store")
     owner = ServeSettings(runs=tmp_path / "home")
     settings = owner.of(guest)
-    keeper = Mirror(store, settings=owner, queue=queue, supervisor=Supervisor(owner, database, queue))
+    keeper = Mirror(store, settings=owner, queue=queue, supervisor=Supervisor(owner, queue, Access.of(owner)))
     keeper = keeper.of(settings, queue)
     own = settings.tracks / "own.npy"
     own.parent.mkdir(parents=True)
@@ -323,8 +324,8 @@ def test_two_machines_never_work_on_one_run(postgres: PostgresServer) -> None:
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        ({"database": "", "artifacts": "file:///tmp/x"}, "needs the console's database"),
-        ({"database": "sqlite:///x.db", "artifacts": ""}, "needs the console's database"),
+        ({"database": "", "artifacts": "file:///tmp/x"}, "needs a console's server and a token, or its database"),
+        ({"database": "sqlite:///x.db", "artifacts": ""}, "needs a console's server and a token, or its database"),
         ({"database": "sqlite:////nowhere/x.db", "artifacts": "file:///tmp/x"}, "cannot be opened"),
     ],
 )
@@ -351,7 +352,7 @@ def test_a_run_whose_copy_waits_behind_others_is_shared_all_the_same(tmp_path: P
     database.migrate()
     store, queue = Artifacts(f"file://{tmp_path}/store"), JobQueue(database)
     settings = ServeSettings(runs=tmp_path / "runs")
-    mirror = Mirror(store, settings=settings, queue=queue, supervisor=Supervisor(settings, database, queue))
+    mirror = Mirror(store, settings=settings, queue=queue, supervisor=Supervisor(settings, queue, Access.of(settings)))
     metadata = ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
     oval = make_settings(metadata=metadata, hyperparameters=None, track="oval")
     folder = start_run(oval, reward=load_preset("racing"), metadata=metadata, root=settings.runs, name="fresh")

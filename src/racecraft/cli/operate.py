@@ -87,6 +87,32 @@ def audit(
 
 
 @league_app.command()
+def token(
+    title: Annotated[str, typer.Argument(help="What for, as the list of tokens shows it.")] = "worker",
+    runs: Runs = Path("runs"),
+    database: Database = "",
+    days: Annotated[int, typer.Option("--days", min=1, max=365, help="How long it is good.")] = 90,
+    as_json: Json = False,
+) -> None:
+    """Make a token for machines that work for this league, and print it; the server may be running."""
+    with needed_for("A league"):
+        from racecraft.serve.audit.audit import Audit
+        from racecraft.serve.people.keys import WORKER, Keys
+        from racecraft.serve.settings import OWNER, ServeSettings
+        from racecraft.serve.store.database import Database as Tables
+
+    tables = Tables(ServeSettings(runs=runs, database=database).database_url)
+    tables.require_current()
+    number, secret = Keys(tables).make_token(OWNER, title=title[:64], scopes=[WORKER], days=days)
+    Audit(tables).note(OWNER, "make_token", "racecraft league token", title=title[:64])
+    tables.close()
+    if as_json:
+        print_json({"id": number, "token": secret})
+    else:
+        typer.echo(secret)
+
+
+@league_app.command()
 def reset(
     name: Annotated[str, typer.Argument(help="Nickname of whose password is forgotten.")],
     runs: Runs = Path("runs"),

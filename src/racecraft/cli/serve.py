@@ -163,6 +163,16 @@ def worker(
     runs: Annotated[
         Path, typer.Option("--runs", help="Folder for the runs that are worked on; not the console's own.")
     ] = Path("worker-runs"),
+    server: Annotated[
+        str, typer.Option("--server", envvar="RACECRAFT_SERVER", help="Address of the console: https://NAME.")
+    ] = "",
+    token_file: Annotated[
+        Path | None,
+        typer.Option("--token-file", envvar="RACECRAFT_TOKEN_FILE", help="File with a worker's token from there."),
+    ] = None,
+    plain_http: Annotated[
+        bool, typer.Option("--plain-http", help="Let the token cross the network unencrypted.")
+    ] = False,
     database: Database = "",
     artifacts: Artifacts = "",
     trainings: Trainings = 1,
@@ -172,13 +182,15 @@ def worker(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Work for a console on another machine, until Ctrl-C."""
+    """Work for a console on another machine, until Ctrl-C: by its address and a token, or by its database and store."""
     from racecraft.serve.quick import loading
 
     with needed_for("A worker"), loading():
         from racecraft.serve.settings import ServeSettings
-        from racecraft.serve.station import work_for
+        from racecraft.serve.station import work_for, work_through
 
+    if (server == "") != (token_file is None) or (server and (database or artifacts)):
+        raise ConfigError("Give --server with --token-file, or --database with --artifacts.")
     settings = ServeSettings(
         runs=runs,
         database=database,
@@ -194,4 +206,7 @@ def worker(
         else:
             typer.echo(f"{settings.machine} works for the console. Ctrl-C saves what is under way and stops.")
 
-    work_for(settings, on_ready=ready)
+    if token_file is not None:
+        work_through(server, token_file, settings, on_ready=ready, plain_http=plain_http)
+    else:
+        work_for(settings, on_ready=ready)

@@ -7,10 +7,11 @@ import logging
 import secrets
 import shutil
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from fastapi import FastAPI, Request
 from fastapi.responses import FileResponse, HTMLResponse, Response
@@ -31,6 +32,7 @@ from racecraft.serve.evaluations import analysis, beliefs
 from racecraft.serve.evaluations import routes as evaluations
 from racecraft.serve.groups import routes as groups
 from racecraft.serve.jobs import routes as jobs
+from racecraft.serve.jobs.access import Access
 from racecraft.serve.jobs.follower import Follower
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Supervisor
@@ -60,6 +62,9 @@ from racecraft.serve.tracks import routes as tracks
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning import routes as tunings
 from racecraft.serve.tuning.tunings import Tunings
+from racecraft.serve.workers import routes as workers
+from racecraft.serve.workers.leases import Leases
+from racecraft.serve.workers.parcels import Parcels
 from racecraft.version import VERSION
 
 PAGES: Final = Path(__file__).parent / "pages"
@@ -68,15 +73,27 @@ KINDS: Final = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg
 
 
 COUNT: Final = 5.0  # s between two looks at who has trained enough for a day
+CHECK: Final = 0.5  # s between two looks whether who has jobs by a token still may
 
 
-async def _count(consoles: Consoles) -> None:
+async def _again(action: Callable[[], None], *, every: float, what: str) -> None:
     while True:
-        await asyncio.sleep(COUNT)
+        await asyncio.sleep(every)
         try:
-            await asyncio.to_thread(consoles.quotas.end_what_is_over)
+            await asyncio.to_thread(action)
         except SQLAlchemyError as error:  # the database is being restarted
-            logging.getLogger("racecraft.serve").error("Quotas cannot be read: %s", str(error).splitlines()[0])
+            logging.getLogger("racecraft.serve").error("%s cannot be read: %s", what, str(error).splitlines()[0])
+
+
+def _looks(consoles: Consoles) -> list[Coroutine[Any, Any, None]]:
+    """What a league looks at now and then."""
+    if not consoles.owner.settings.league:
+        return []
+    leases, keys = consoles.owner.leases, consoles.keys
+    return [
+        _again(consoles.quotas.end_what_is_over, every=COUNT, what="Quotas"),
+        _again(partial(leases.end_without_token, keys), every=CHECK, what="Tokens"),
+    ]
 
 
 def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
@@ -96,7 +113,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     database.migrate()
     queue = JobQueue(database)
     garage, courses = Garage(settings.runs, settings.state, database), Courses(settings.tracks)
-    supervisor = Supervisor(settings, database, queue)
+    supervisor = Supervisor(settings, queue, Access.of(settings))
     artifacts = Artifacts(settings.artifacts) if settings.artifacts else None
     follower = Follower(artifacts, settings=settings, queue=queue)
     mirror = Mirror(artifacts, settings=settings, queue=queue, supervisor=supervisor)
@@ -116,19 +133,21 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         sweeps=Sweeps(queue, garage, courses, mirror=mirror, see=follower.see),
         mirror=mirror,
         hub=Hub(settings.runs, queue, see=follower.see),
+        leases=Leases(database, queue),
+        parcels=Parcels(artifacts),
     )
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         tending = asyncio.create_task(context.supervisor.run())
-        counting = asyncio.create_task(_count(app.state.consoles)) if settings.league else None
+        looking = [asyncio.create_task(look) for look in _looks(app.state.consoles)]
         for name, work in (("mirror", context.mirror.start), ("follower", follower.run)):
             threading.Thread(target=work, name=name, daemon=True).start()
         yield
         context.mirror.end()
         follower.end()
-        if counting is not None:
-            counting.cancel()
+        for look in looking:
+            look.cancel()
         tending.cancel()
         with suppress(asyncio.CancelledError):
             await tending
@@ -154,7 +173,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     replies.install(app)
     parts = [console, tracks, drives, rewards, choices, archives, exports, models]
     parts += [evaluations, analysis, beliefs, tunings, sweeps, races]
-    parts += [contests, jobs, events, door, provider, audit, lessons]
+    parts += [contests, jobs, events, door, provider, audit, lessons, workers]
     for part in parts:
         app.include_router(part.router)
     for part in (account, groups, league, quotas):

@@ -37,6 +37,8 @@ from racecraft.serve.submissions.league import League
 from racecraft.serve.sweeps.sweeps import Sweeps
 from racecraft.serve.tracks.courses import Courses
 from racecraft.serve.tuning.tunings import Tunings
+from racecraft.serve.workers.leases import Leases
+from racecraft.serve.workers.parcels import Parcels
 
 if TYPE_CHECKING:
     from racecraft.serve.provider.provider import Provider
@@ -63,6 +65,8 @@ class Context:
     sweeps: Sweeps
     mirror: Mirror
     hub: Hub
+    leases: Leases
+    parcels: Parcels
 
 
 class Consoles:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
+from urllib.parse import urlsplit
 
-from racecraft.errors import ConfigError
-from racecraft.serve.jobs.queue import JobQueue
+from racecraft.errors import ConfigError, RunError
+from racecraft.serve.jobs.access import Access
+from racecraft.serve.jobs.office import Office
+from racecraft.serve.jobs.remote import ROOM, RemoteOffice
 from racecraft.serve.jobs.supervisor import Supervisor
-from racecraft.serve.settings import ServeSettings
+from racecraft.serve.settings import LOOPBACK, ServeSettings
 from racecraft.serve.store.artifacts import Artifacts
-from racecraft.serve.store.database import Database
 from racecraft.system import STOPS
+from racecraft.version import VERSION
 
 
 def work_for(settings: ServeSettings, *, on_ready: Callable[[], None]) -> None:
@@ -30,16 +34,54 @@ def work_for(settings: ServeSettings, *, on_ready: Callable[[], None]) -> None:
     """
     if not settings.database or not settings.artifacts:
         raise ConfigError(
-            "A worker needs the console's database and its object store.",
-            hint="Give both with --database and --artifacts, as to 'racecraft serve'.",
+            "A worker needs a console's server and a token, or its database and its object store.",
+            hint="Give --server and --token-file, or --database and --artifacts as to 'racecraft serve'.",
         )
+    access = Access.of(settings)
+    with access.opened() as (office, database):
+        assert database is not None
+        database.require_current()
+        Artifacts(settings.artifacts).names()
+        _work(settings, office, access, on_ready)
+
+
+def work_through(
+    server: str, token_file: Path, settings: ServeSettings, *, on_ready: Callable[[], None], plain_http: bool = False
+) -> None:
+    """The same by nothing but a console's server and a token that its admin made for workers.
+
+    Args:
+        server: ``https://NAME`` or ``http://NAME:PORT``.
+        token_file: Holds the token, and is read again when that has been replaced.
+        settings: Where runs lie while they are worked on, and how many at once.
+        on_ready: Called when the server has answered.
+        plain_http: Whether the token may cross a network unencrypted.
+
+    Raises:
+        ConfigError: The address is none, the token would be seen, or there is none.
+        RunError: The server cannot be reached, does not know the token, or is of another version.
+    """
+    access = Access(server=server, token_file=str(token_file.absolute()))
+    line = access.line
+    parts = urlsplit(server)
+    if parts.scheme != "https" and parts.hostname not in LOOPBACK and not plain_http:
+        raise ConfigError(
+            "The token would cross the network unencrypted.",
+            hint="Give https://NAME, or say --plain-http in a network that you trust.",
+        )
+    found = line.ask("GET", ROOM)
+    if not isinstance(found, dict) or found.get("version") != VERSION:
+        said = str(found.get("version"))[:40] if isinstance(found, dict) else "of no version"
+        raise RunError(
+            f"The console is Racecraft {said}, this worker is {VERSION}.",
+            hint="Install the same version of Racecraft on both machines.",
+        )
+    _work(settings, RemoteOffice(line), access, on_ready)
+
+
+def _work(settings: ServeSettings, office: Office, access: Access, on_ready: Callable[[], None]) -> None:
     settings.state.mkdir(parents=True, exist_ok=True)
-    database = Database(settings.database)
-    database.require_current()
-    Artifacts(settings.artifacts).names()
-    supervisor = Supervisor(settings, database, JobQueue(database), is_home=False)
-    asyncio.run(_until_signalled(supervisor, on_ready))
-    database.close()
+    asyncio.run(_until_signalled(Supervisor(settings, office, access, is_home=False), on_ready))
 
 
 async def _until_signalled(supervisor: Supervisor, on_ready: Callable[[], None]) -> None:
@@ -48,8 +90,12 @@ async def _until_signalled(supervisor: Supervisor, on_ready: Callable[[], None])
         asyncio.get_running_loop().add_signal_handler(number, told.set)
     tending = asyncio.create_task(supervisor.run())
     on_ready()
-    await told.wait()
-    tending.cancel()
-    with suppress(asyncio.CancelledError):
-        await tending
-    await supervisor.stop()
+    telling = asyncio.create_task(told.wait())
+    await asyncio.wait((tending, telling), return_when=asyncio.FIRST_COMPLETED)
+    for task in (tending, telling):
+        task.cancel()
+    try:
+        with suppress(asyncio.CancelledError):
+            await tending  # which ends by itself only where the console refuses this worker
+    finally:
+        await supervisor.stop()

@@ -99,8 +99,12 @@ export const leagueApi = {
   endSession: (id: string) => ask<void>("DELETE", `/account/sessions/${id}`),
   endSessions: () => ask<void>("DELETE", "/account/sessions"),
   tokens: () => ask<TokenInfo[]>("GET", "/account/tokens"),
-  makeToken: (title: string, days: number) =>
-    ask<Schemas["MadeToken"]>("POST", "/account/tokens", { title, days, scopes: ["read", "submit"] }),
+  makeToken: (title: string, days: number, isWorker: boolean) =>
+    ask<Schemas["MadeToken"]>("POST", "/account/tokens", {
+      title,
+      days,
+      scopes: isWorker ? ["worker"] : ["read", "submit"],
+    }),
   removeToken: (id: number) => ask<void>("DELETE", `/account/tokens/${id}`),
   removeAccount: () => ask<void>("DELETE", "/account"),
 };

@@ -251,6 +251,10 @@ export const de: Record<LeagueKey, string> = {
   me_device_in: "Es ist drin.",
   me_token_title: "Wofür",
   me_token_make: "Token erzeugen",
+  me_token_worker: "Für einen Helfer",
+  me_token_worker_lead:
+    "Ein Rechner, der für diese Konsole trainiert und bewertet (racecraft worker) und sonst nichts darf.",
+  me_token_is_worker: "Helfer",
   me_token_until: "bis {when}",
   me_token_once: "Jetzt kopieren; es ist nur dieses eine Mal zu sehen:",
   me_data: "Meine Daten",

@@ -243,6 +243,10 @@ export const en = {
   me_device_in: "It is let in.",
   me_token_title: "What for",
   me_token_make: "Make a token",
+  me_token_worker: "For a worker",
+  me_token_worker_lead:
+    "A machine that trains and evaluates for this console (racecraft worker), and may do nothing else.",
+  me_token_is_worker: "worker",
   me_token_until: "until {when}",
   me_token_once: "Copy it now; it is shown this once:",
   me_data: "My data",

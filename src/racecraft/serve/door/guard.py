@@ -23,12 +23,16 @@ from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from racecraft.serve.people.keys import Keys
+from racecraft.serve.jobs.line import MAX_OBJECT
+from racecraft.serve.jobs.remote import ROOM
+from racecraft.serve.people.keys import WORKER, Keys
 from racecraft.serve.replies import problem
 from racecraft.serve.settings import COOKIE, LOOPBACK, OWNER, PROVIDER_COOKIE, ServeSettings
 
 MAX_BODY: Final = 8 << 20  # bytes
 MAX_SUBMISSION: Final = 32 << 20
+MAX_TOLD: Final = 1 << 20
+"""What a worker says in words."""
 LARGE: Final = {"/api/models/import": 1 << 30}
 """Addresses that take more, as much as an archive may have; they write to disk what comes, as it comes."""
 SAFE: Final = ("GET", "HEAD", "OPTIONS")
@@ -46,6 +50,8 @@ BOARDS: Final = "/api/boards/"
 STREAMS: Final = "/api/events/"
 SUBMIT: Final = re.compile(r"/api/league/races/[0-9]{1,10}/submissions")
 """Where programs send what they submit."""
+PARCEL: Final = re.compile(rf"{ROOM}/[0-9a-f]{{16}}/objects/")
+"""Where workers send files."""
 LOOK: Final = 0.5  # s between two looks whether who follows a stream still may
 COOKIE_S: Final = 30 * 86400
 HEADERS: Final = {
@@ -68,6 +74,8 @@ def content_policy(nonce: str) -> str:
 
 def most_bytes(path: str) -> int:
     """How much a request to an address may hold."""
+    if path.startswith(f"{ROOM}/"):
+        return MAX_OBJECT if PARCEL.match(path) else MAX_TOLD
     return MAX_SUBMISSION if SUBMIT.fullmatch(path) else LARGE.get(path, MAX_BODY)
 
 
@@ -168,15 +176,19 @@ class Guard:
             if self._is_league and (path in OPEN or (path.startswith(BOARDS) and request.method in SAFE)):
                 request.state.user_id = None
                 return None
+            if self._is_league and "authorization" in request.headers:
+                return problem(401, "NotSignedIn", "This token is no longer good.", "Make a new one.")
             if self._is_league:
                 return problem(401, "NotSignedIn", "You are not signed in.", "Sign in, or show your card.")
             return problem(
                 401, "NotSignedIn", "This browser is not known.", "Open the link that racecraft serve prints."
             )
-        if request.state.scopes is not None:
-            may_read = "read" in request.state.scopes and request.method in SAFE and not path.startswith("/api/account")
-            may_submit = "submit" in request.state.scopes and request.method == "POST" and SUBMIT.fullmatch(path)
-            if not may_read and not may_submit:
+        if (scopes := request.state.scopes) is not None:
+            is_own = path.startswith(("/api/account", f"{ROOM}/")) or path == ROOM
+            may_read = "read" in scopes and request.method in SAFE and not is_own
+            may_submit = "submit" in scopes and request.method == "POST" and SUBMIT.fullmatch(path)
+            may_work = WORKER in scopes and (path == ROOM or path.startswith(f"{ROOM}/"))
+            if not may_read and not may_submit and not may_work:
                 return problem(403, "Refused", "This token is not for that.", "Make one with the scope that it needs.")
         return None
 
@@ -222,11 +234,11 @@ class Guard:
         """Who asks; of a league's people it is looked up every time, so that they are out as soon as they are."""
         request.state.scopes = None
         if self._is_league and (bearer := request.headers.get("authorization", "")).startswith("Bearer "):
-            found = self._keys.token_user(bearer.removeprefix("Bearer "))
-            if found is not None:
-                request.state.user_id, request.state.scopes = found
-                return found[0]
-            return None
+            found = self._keys.bearer(bearer.removeprefix("Bearer "))
+            if found is None:
+                return None
+            request.state.user_id, request.state.scopes, request.state.token = found.user_id, found.scopes, found.token
+            return found.user_id
         secret = request.cookies.get(COOKIE)
         if not secret:
             return None

@@ -1,4 +1,4 @@
-"""The process of a job: ``python -m racecraft.serve.jobs RUNS LOCK BELL``, with two URLs in the environment.
+"""The process of a job: ``python -m racecraft.serve.jobs RUNS LOCK BELL``, with the way to its jobs in the environment.
 
 It loads what jobs need, and waits for a line on its standard input: a job and the name that it was claimed under. After
 some kinds of jobs it waits for another line. Without one the server has ended, and so does this. LOCK is an open file,
@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Final
 
 from racecraft.serve.quick import loading
-from racecraft.serve.settings import ARTIFACTS, DATABASE
 from racecraft.system import lower_priority
 
 NICENESS: Final = 15
@@ -27,15 +26,16 @@ def main(runs: str, lock: str, bell: str) -> int:
         os.set_inheritable(file, False)  # they are to end with this process, not with what that starts
     lower_priority(NICENESS)
     with loading():
+        from racecraft.serve.jobs.access import Access
         from racecraft.serve.jobs.worker import do_job, load
 
         load()
 
-    database_url, artifacts_url = os.environ.pop(DATABASE), os.environ.pop(ARTIFACTS, "")
+    access = Access.from_environment()
     while len(told := sys.stdin.readline().split()) == 2:
         job_id, owner = told
         try:
-            stays = do_job(job_id, owner=owner, runs=Path(runs), database_url=database_url, artifacts_url=artifacts_url)
+            stays = do_job(job_id, owner=owner, runs=Path(runs), access=access)
         finally:
             with suppress(OSError):  # there is no server any more, or it has been told often enough
                 os.write(int(bell), b".")

@@ -16,6 +16,7 @@ from racecraft.errors import RunError
 from racecraft.run import RunFolder
 from racecraft.run.lock import exclusive_lock
 from racecraft.serve.jobs.cargo import Cargo
+from racecraft.serve.jobs.line import Refused
 from racecraft.serve.jobs.queue import KINDS, folder_of
 from racecraft.serve.live.cars import LiveReader
 from racecraft.serve.settings import INCOMING, STATE_FOLDER
@@ -128,6 +129,8 @@ def _patiently(action: Callable[[], Any]) -> None:
         try:
             action()
             return
+        except Refused:
+            raise
         except RunError:
             if time.monotonic() > deadline:
                 raise

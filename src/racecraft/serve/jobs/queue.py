@@ -10,7 +10,8 @@ Every step is one UPDATE whose WHERE says what it relies on, so two servers or w
 from __future__ import annotations
 
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Final, Literal
@@ -19,12 +20,11 @@ import sqlalchemy as sa
 from sqlalchemy.orm import aliased
 
 from racecraft.serve.jobs.cargo import Cargo
+from racecraft.serve.jobs.office import Answer, Slot
 from racecraft.serve.jobs.turns import choose_to_rest, is_full, running_on, turn_of, turn_order, waiting_line
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
-
-Slot = Literal["training", "other"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,16 +93,6 @@ ENDED: Final = ("done", "failed", "cancelled")
 RESTING: Final = tuple(name for name, kind in KINDS.items() if kind.rests)
 WATCHED: Final = timedelta(seconds=5)
 """How long a look at a training on another machine makes that show its cars."""
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What the owner of a job is told."""
-
-    word: Literal["go on", "rest", "stop", "lost"]
-    """``rest`` when others wait for its place; ``stop`` when somebody cancelled it; ``lost`` when another has it."""
-    is_watched: bool = False
-    """Whether somebody elsewhere wants to see it."""
 
 
 def folder_of(job: Job) -> tuple[str, str] | None:
@@ -208,11 +198,18 @@ class JobQueue:
         earlier = line[: next((place for place, one in enumerate(line) if one.id == job.id), 0)]
         return [one.run if one.user_id == self._user_id else "…" for one in earlier]
 
-    def is_held(self, owner: str) -> bool:
-        """Whether a worker has a job."""
-        query = sa.select(Job.id).where(Job.owner == owner, Job.state == "running").limit(1)
+    def held(self, owner: str) -> Job | None:
+        """The job that a worker has."""
         with self._database.transaction() as session:
-            return session.scalar(query) is not None
+            return session.scalars(sa.select(Job).where(Job.owner == owner, Job.state == "running")).first()
+
+    @contextmanager
+    def holding(self, job_id: str, *, owner: str) -> Iterator[bool]:
+        """Whether an owner has a job, which nobody takes from it before the block ends."""
+        kept = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
+        with self._database.transaction() as session:
+            kept = kept.values(lease_until=self._database.moment(session) + LEASE)
+            yield session.execute(kept).rowcount == 1  # type: ignore[attr-defined]
 
     def elsewhere(self, machine: str) -> Sequence[Job]:
         """What other machines are doing."""
@@ -251,6 +248,17 @@ class JobQueue:
             chosen = choose_to_rest(running, waiting, places, moment, resting=RESTING)
             if chosen is not None:
                 session.execute(sa.update(Job).where(Job.id == chosen.id, Job.state == "running").values(asked=moment))
+
+    def take(
+        self, slot: Slot, kinds: tuple[str, ...], *, owner: str, machine: str, places: int, is_home: bool
+    ) -> Job | None:
+        """The next job for a place of a machine; where all are taken, have somebody rest for who waits."""
+        job = None
+        if self.has_room(kinds_of(slot), machine=machine, places=places):
+            job = self.claim(kinds, owner=owner, machine=machine, is_home=is_home)
+        if job is None:
+            self.make_room(kinds, machine=machine, places=places, is_home=is_home)
+        return job
 
     def claim(self, kinds: tuple[str, ...], *, owner: str, machine: str = "", is_home: bool = True) -> Job | None:
         """Take the next queued job of these kinds, or None; away from home one that travels.
@@ -343,9 +351,9 @@ class JobQueue:
         """Put back what an owner was asked to let go of; that is no fault of the job's."""
         self._take_back(Job.owner == owner)
 
-    def release(self, owner: str, *, limit: int = MAX_LOSSES) -> None:
+    def release(self, owner: str, *, has_company: bool = False) -> None:
         """Put back what an owner holds that has ended without a word; given up after so many losses."""
-        self._take_back(Job.owner == owner, limit=limit)
+        self._take_back(Job.owner == owner, limit=MAX_DEATHS if has_company else MAX_LOSSES)
 
     def take_back_expired(self) -> None:
         """Put back what nobody keeps alive."""

@@ -21,14 +21,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Final
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from racecraft import system
 from racecraft.errors import RunError
 from racecraft.run.lock import exclusive_lock
-from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, JobQueue, Slot, kinds_of
-from racecraft.serve.settings import ARTIFACTS, DATABASE, WORKERS, ServeSettings
-from racecraft.serve.store.database import Database
+from racecraft.serve.jobs.access import Access
+from racecraft.serve.jobs.office import AWAY, Office, Slot
+from racecraft.serve.jobs.queue import KINDS, kinds_of
+from racecraft.serve.settings import WORKERS, ServeSettings
 
 POLL: Final = 0.5  # s between two looks at the queue; `wake` makes one at once
 GRACE: Final = 20.0  # s for a training to save itself when the server is stopped
@@ -39,15 +38,15 @@ class Supervisor:
     """One per machine.
 
     Args:
-        settings: Of the console.
-        database: Handed to the children by its URL.
-        queue: Of jobs.
+        settings: Of the console, or of a machine that works for one.
+        office: Where jobs are handed out.
+        access: The way to that, for the children.
         is_home: Whether this is the console's own machine, where all runs, tracks and files are; others take jobs that
             travel.
     """
 
-    def __init__(self, settings: ServeSettings, database: Database, queue: JobQueue, *, is_home: bool = True) -> None:
-        self._settings, self._database, self._queue, self._is_home = settings, database, queue, is_home
+    def __init__(self, settings: ServeSettings, office: Office, access: Access, *, is_home: bool = True) -> None:
+        self._settings, self._office, self._is_home = settings, office, is_home
         self._children: dict[str, subprocess.Popen[bytes]] = {}  # by owner
         self._staying: set[str] = set()  # those of them that wait for another job after theirs
         self._awake = asyncio.Event()
@@ -57,9 +56,7 @@ class Supervisor:
         self._started = float("-inf")  # the newest job, in `time.monotonic()` seconds
         self._workers = settings.state / WORKERS
         self._workers.mkdir(parents=True, exist_ok=True)
-        self._standby = Standby(
-            settings.runs, workers=self._workers, database=database.url, artifacts=settings.artifacts, log=log
-        )
+        self._standby = Standby(settings.runs, workers=self._workers, access=access, log=log)
 
     def wake(self) -> None:
         """There is something new in the queue; safe from any thread."""
@@ -74,7 +71,7 @@ class Supervisor:
             while True:
                 try:
                     await asyncio.to_thread(self._tend)
-                except (SQLAlchemyError, OSError) as error:  # the database is being restarted, the disk is full
+                except (*AWAY, OSError) as error:  # the database is being restarted, the disk is full
                     logging.getLogger("racecraft.serve").error("Jobs cannot be tended: %s", str(error).splitlines()[0])
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._awake.wait(), POLL)
@@ -100,34 +97,31 @@ class Supervisor:
                     child.kill()
             await asyncio.sleep(0.05)
         for owner, child in self._children.items():
-            self._queue.hand_back(owner)
+            self._office.hand_back(owner)
             _pipe(child).close()
         self._children.clear()
 
     def _tend(self) -> None:
         self._reap()
         self._bury()
-        self._queue.take_back_expired()
+        self._office.take_back_expired()
         places: dict[Slot, int] = {"training": self._settings.training_slots, "other": self._settings.other_slots}
         for slot, count in places.items():
-            kinds, doable = kinds_of(slot), self._doable(kinds_of(slot))
-            while not self._is_stopping and self._has_room(kinds, count) and self._start(doable):
+            while not self._is_stopping and self._start(slot, count):
                 pass
-            self._queue.make_room(doable, machine=self._settings.machine, places=count, is_home=self._is_home)
         if not self._is_stopping and time.monotonic() - self._started > CALM:
             self._standby.prepare()
-
-    def _has_room(self, kinds: tuple[str, ...], places: int) -> bool:
-        return self._queue.has_room(kinds, machine=self._settings.machine, places=places)
 
     def _doable(self, kinds: tuple[str, ...]) -> tuple[str, ...]:
         """Those for which everything is installed; at home all, so that somebody says what is missing."""
         return kinds if self._is_home else tuple(kind for kind in kinds if _is_installed(KINDS[kind].needs))
 
-    def _start(self, kinds: tuple[str, ...]) -> bool:
-        """Start the next job of these kinds; False when there is none."""
-        owner = self._standby.name()
-        job = self._queue.claim(kinds, owner=owner, machine=self._settings.machine, is_home=self._is_home)
+    def _start(self, slot: Slot, places: int) -> bool:
+        """Start the next job for such a place; False when there is none, or no place is free."""
+        owner, kinds = self._standby.name(), self._doable(kinds_of(slot))
+        job = self._office.take(
+            slot, kinds, owner=owner, machine=self._settings.machine, places=places, is_home=self._is_home
+        )
         if job is None:
             return False
         self._children[owner] = self._standby.start(job.id)
@@ -140,12 +134,12 @@ class Supervisor:
         """Take note of children that ended, and of those whose job has ended and that wait for another."""
         for owner, child in list(self._children.items()):
             if child.poll() is not None:
-                self._queue.release(owner)
+                self._office.release(owner)
                 (self._workers / owner).unlink(missing_ok=True)
                 _pipe(child).close()
                 del self._children[owner]
                 self._staying.discard(owner)
-            elif owner in self._staying and not self._queue.is_held(owner):
+            elif owner in self._staying and self._office.held(owner) is None:
                 self._staying.discard(owner)
                 if not self._is_stopping and self._standby.take(owner, child):
                     del self._children[owner]
@@ -157,7 +151,7 @@ class Supervisor:
         for path in self._workers.iterdir():
             if path.name not in self._children:
                 with suppress(RunError), exclusive_lock(path):  # a living one holds it
-                    self._queue.release(path.name, limit=MAX_DEATHS)
+                    self._office.release(path.name, has_company=True)
                     path.unlink(missing_ok=True)
 
 
@@ -171,15 +165,14 @@ class Standby:
     Args:
         runs: Folder of the runs.
         workers: Folder of the locks: a file for each worker by its name, held as long as it lives.
-        database: The database's URL.
-        artifacts: Where runs are copied to, or empty.
+        access: The way to their jobs.
         log: File for what workers print.
     """
 
-    def __init__(self, runs: Path, *, workers: Path, database: str, artifacts: str, log: Path) -> None:
+    def __init__(self, runs: Path, *, workers: Path, access: Access, log: Path) -> None:
         # -P: a random.py in the user's folder is not to be taken for Python's
         self._command = [sys.executable, "-P", "-m", "racecraft.serve.jobs", str(runs)]
-        self._environment = {**os.environ, DATABASE: database, ARTIFACTS: artifacts}
+        self._environment = {**os.environ, **access.environment()}
         self._workers, self._log = workers, log
         self._name = ""  # of the one that waits
         self._waiting: subprocess.Popen[bytes] | None = None

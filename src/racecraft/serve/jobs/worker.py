@@ -16,12 +16,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from racecraft.errors import RacecraftError, RunError
 from racecraft.moved import move
+from racecraft.serve.jobs.access import Access
 from racecraft.serve.jobs.courier import Courier
-from racecraft.serve.jobs.queue import KINDS, LEASE, Answer, JobKind, JobQueue
+from racecraft.serve.jobs.office import AWAY, Answer, Office
+from racecraft.serve.jobs.queue import KINDS, LEASE, JobKind
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.settings import OWNER, runs_of
 from racecraft.serve.store.artifacts import Artifacts
@@ -67,17 +67,25 @@ class Worker:
     """One job from beginning to end.
 
     Args:
-        database: Where the job is.
+        office: Where the job is from.
         job: Claimed by `owner`.
         owner: This process, by the name that it was started under.
         runs: Folder of the owner's runs; those of others lie within.
         artifacts: Where runs are copied to.
+        database: That of the console, where it can be reached from here.
     """
 
     def __init__(
-        self, database: Database, job: Job, *, owner: str, runs: Path, artifacts: Artifacts | None = None
+        self,
+        office: Office,
+        job: Job,
+        *,
+        owner: str,
+        runs: Path,
+        artifacts: Artifacts | None = None,
+        database: Database | None = None,
     ) -> None:
-        self._queue = JobQueue(database)
+        self._office = office
         self._job, self._owner = job, owner
         self._stops: list[Callable[[], None]] = []
         self._is_cancelled = False  # by the user
@@ -116,7 +124,7 @@ class Worker:
             self._report(lambda: self._finish("failed", error=described))
             return
         if result.get("reason") == "interrupted" and not self._is_cancelled:
-            self._report(lambda: self._queue.hand_back(self._owner))  # it continues later
+            self._report(lambda: self._office.hand_back(self._owner))  # it continues later
         else:
             self._report(lambda: self._finish("done", result=result))
 
@@ -128,11 +136,11 @@ class Worker:
                 if self._is_told:
                     return
                 try:
-                    answer = self._queue.heartbeat(
+                    answer = self._office.heartbeat(
                         self._job.id, owner=self._owner, has_progressed=self._progress() != begun
                     )
                     kept = time.monotonic()
-                except SQLAlchemyError:  # the database is being restarted, say
+                except AWAY:  # the database is being restarted, say
                     answer = Answer("go on")
             if self._courier is not None:
                 self._courier.is_watched = answer.is_watched
@@ -157,11 +165,11 @@ class Worker:
             if self._is_cancelled:
                 self._finish("cancelled")
             else:
-                self._queue.hand_back(self._owner)
+                self._office.hand_back(self._owner)
             os._exit(0)
 
     def _finish(self, state: str, **outcome: Any) -> None:
-        self._queue.finish(self._job.id, owner=self._owner, state=state, **outcome)
+        self._office.finish(self._job.id, owner=self._owner, state=state, **outcome)
 
     def _report(self, tell: Callable[[], None]) -> None:
         """Say how it ended; while the database is away, try again until the lease has run out."""
@@ -171,7 +179,7 @@ class Worker:
                     tell()
                     self._is_told = True
                 return
-            except SQLAlchemyError:
+            except AWAY:
                 time.sleep(HEARTBEAT)
 
     def _progress(self) -> float:
@@ -194,14 +202,11 @@ def _described(error: Exception) -> dict[str, Any]:
     }
 
 
-def do_job(job_id: str, *, owner: str, runs: Path, database_url: str, artifacts_url: str) -> bool:
+def do_job(job_id: str, *, owner: str, runs: Path, access: Access) -> bool:
     """Do a job that was claimed by `owner`, if it still is; whether this process may do another one."""
-    database = Database(database_url)
-    with database.transaction() as session:
-        job = session.get(Job, job_id)
-    if job is None or job.owner != owner:  # it was taken for dead before it was there
-        return False
-    artifacts = Artifacts(artifacts_url).of(job.user_id) if artifacts_url else None
-    stays = Worker(database, job, owner=owner, runs=runs, artifacts=artifacts).run()
-    database.close()
-    return stays
+    with access.opened() as (office, database):
+        job = office.held(owner)
+        if job is None or job.id != job_id:  # it was taken for dead before it was there
+            return False
+        artifacts = access.artifacts_of(job, owner)
+        return Worker(office, job, owner=owner, runs=runs, artifacts=artifacts, database=database).run()

@@ -15,11 +15,13 @@ from typing import Any, Final, Literal
 import sqlalchemy as sa
 from sqlalchemy.orm import Session as Transaction
 
+from racecraft.errors import RunError
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Card, Identity, Reset, Session, Token, User, now
 
-Scope = Literal["read", "submit"]
+Scope = Literal["read", "submit", "worker"]
+WORKER: Final = "worker"
 SESSION_DAYS: Final = 30
 MAX_SESSIONS: Final = 20  # of a person; the oldest makes room
 SESSION_ID: Final = 16
@@ -45,6 +47,17 @@ class TokenCard:
     scopes: list[str]
     created: datetime
     expires: datetime
+
+
+@dataclass(frozen=True)
+class Bearer:
+    """Who shows a token."""
+
+    user_id: int
+    scopes: list[str]
+    """What it may be used for."""
+    token: int
+    """Its number."""
 
 
 @dataclass(frozen=True)
@@ -174,9 +187,14 @@ class Keys:
 
         Raises:
             Conflict: There are too many.
+            RunError: It is for a worker, and for something else, too, or not an admin's.
         """
+        if WORKER in scopes and len(set(scopes)) > 1:
+            raise RunError("A worker's token is for nothing else.", hint="Make another one for that.")
         secret = TOKEN_MARK + secrets.token_urlsafe(32)
         with self._database.transaction() as session:
+            if WORKER in scopes and session.get_one(User, user_id).role != "admin":
+                raise RunError("Only whoever holds the league makes tokens for workers.")
             session.execute(sa.delete(Token).where(Token.expires < now()))
             count = session.scalar(sa.select(sa.func.count(Token.id)).where(Token.user_id == user_id)) or 0
             if count >= MAX_TOKENS:
@@ -209,13 +227,23 @@ class Keys:
             if session.execute(gone).rowcount != 1:  # type: ignore[attr-defined]
                 raise NotFound(f"There is no token {token_id}.")
 
-    def token_user(self, secret: str) -> tuple[int, list[str]] | None:
-        """Whose token it is, and what it may be used for."""
-        query = sa.select(Token.user_id, Token.scopes).join(User, User.id == Token.user_id)
+    def bearer(self, secret: str) -> Bearer | None:
+        """Whose token it is, and what it may be used for now: workers are those of an admin."""
+        query = sa.select(Token.user_id, Token.scopes, Token.id, User.role).join(User, User.id == Token.user_id)
         query = query.where(Token.digest == digest_of(secret), Token.expires > now(), User.deleted.is_(None))
         with self._database.transaction() as session:
             found = session.execute(query).first()
-        return None if found is None else (found[0], found[1])
+        if found is None:
+            return None
+        user_id, scopes, number, role = found
+        return Bearer(user_id, [scope for scope in scopes if scope != WORKER or role == "admin"], number)
+
+    def worker_tokens(self) -> set[int]:
+        """The numbers of the tokens that workers may show."""
+        query = sa.select(Token.id, Token.scopes).join(User, User.id == Token.user_id)
+        query = query.where(Token.expires > now(), User.deleted.is_(None), User.role == "admin")
+        with self._database.transaction() as session:
+            return {number for number, scopes in session.execute(query) if WORKER in scopes}
 
     def _user(self, query: sa.Select[Any]) -> int | None:
         with self._database.transaction() as session:

@@ -31,11 +31,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from racecraft.errors import ConfigError, RunError
-from racecraft.extras import needed_for
+from racecraft.errors import RunError
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file
 from racecraft.serve.settings import OWNER
+from racecraft.serve.store.objects import NoAnswer, NoObject, Objects, ObjectStore, first_line
 
 T = TypeVar("T")
 FORMAT: Final = 1
@@ -44,7 +44,6 @@ MAX_FILE_BYTES: Final = 1 << 33
 MAX_FILES: Final = 200_000
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}(/[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}){0,20}")
 """Paths of runs: no odd characters, nothing hidden, nothing that leads elsewhere."""
-SCHEMES: Final = ("s3://", "file:///")
 MARK: Final = ".copy"
 """In a run folder: the number of the copy that it was last alike to."""
 RUNS: Final = "runs"
@@ -72,37 +71,16 @@ class Artifacts:
     """The runs in an object store.
 
     Args:
-        url: ``s3://bucket/prefix`` or ``file:///folder``.
+        store: ``s3://bucket/prefix`` or ``file:///folder``, or what stands for it.
 
     Raises:
         ConfigError: No such kind of store, or it cannot be opened.
     """
 
-    def __init__(self, url: str) -> None:
-        if not url.startswith(SCHEMES):
-            raise ConfigError(
-                f"artifacts is {url.split('://')[0]!r}; allowed are s3://BUCKET/PREFIX and file:///FOLDER."
-            )
-        with needed_for("An object store"):
-            import obstore
-            from obstore import exceptions, store
-        self.url = url
+    def __init__(self, store: str | Objects) -> None:
+        self.objects = ObjectStore(store) if isinstance(store, str) else store
+        self.url = self.objects.url
         self._prefix, self._shelf = "", RUNS
-        self._api, self._missing = obstore, (exceptions.NotFoundError, FileNotFoundError)
-        self._broken = (exceptions.BaseError, OSError)
-        endpoint = os.environ.get("AWS_ENDPOINT_URL", os.environ.get("AWS_ENDPOINT", ""))
-        try:
-            if url.startswith("file:"):
-                Path(url.removeprefix("file://")).mkdir(parents=True, exist_ok=True)
-                self._store: Any = store.from_url(url)
-            else:
-                # obstore's own 5 s to connect and 30 s to answer are too short where a machine or a line is busy
-                times = {"connect_timeout": "30 seconds", "timeout": "300 seconds"}
-                options: Any = {"allow_http": endpoint.startswith("http://"), **times}
-                retries: Any = {"max_retries": 3}
-                self._store = store.from_url(url, client_options=options, retry_config=retries)
-        except (*self._broken, ValueError) as error:
-            raise ConfigError(f"The object store {url} cannot be opened: {_first_line(error)}.") from error
 
     def of(self, user_id: int) -> Artifacts:
         """The same for another person."""
@@ -125,8 +103,8 @@ class Artifacts:
         """
 
         def listed() -> list[str]:
-            found = self._api.list_with_delimiter(self._store, self._key())["objects"]
-            names = [entry["path"].removeprefix(f"{self._key()}/").removesuffix(".json") for entry in found]
+            found = self.objects.beside(self.key())
+            names = [path.removeprefix(f"{self.key()}/").removesuffix(".json") for path in found]
             return sorted(name for name in names if _PLAIN.fullmatch(name) and "/" not in name)
 
         return self._tried(listed)
@@ -142,7 +120,7 @@ class Artifacts:
         """
 
         def copied() -> int:
-            before = self._copy(folder.name) or Copy()
+            before = self.copy(folder.name) or Copy()
             if before.number > _mark(folder.path, before.number):
                 raise RunError(
                     f"Run {folder.name!r} was changed by another machine, so its copy is newer than {folder.path}."
@@ -160,7 +138,7 @@ class Artifacts:
                     data = _content(file)
                     digest, size = hashlib.sha256(data).hexdigest(), len(data)
                     if digest not in there:
-                        self._api.put(self._store, self._key(folder.name, digest), data)
+                        self.objects.put(self.key(folder.name, digest), data)
                         there.add(digest)
                         count += 1
                 return {"size": size, "time": status.st_mtime_ns, "sha256": digest}
@@ -170,10 +148,10 @@ class Artifacts:
             if files != before.files:
                 number += 1
                 document = {"format": FORMAT, "number": number, "files": files}
-                self._api.put(self._store, self._key(f"{folder.name}.json"), json.dumps(document).encode())
+                self.objects.put(self.key(f"{folder.name}.json"), json.dumps(document).encode())
             _remember(folder.path, number)
             gone = {line["sha256"] for line in before.files.values()} - {line["sha256"] for line in files.values()}
-            self._delete(self._key(folder.name, digest) for digest in gone)
+            self.objects.delete(self.key(folder.name, digest) for digest in gone)
             return count
 
         return self._tried(copied)
@@ -184,7 +162,7 @@ class Artifacts:
         Raises:
             RunError: The store cannot be reached.
         """
-        copy = self._tried(lambda: self._copy(folder.name)) or Copy()
+        copy = self._tried(lambda: self.copy(folder.name)) or Copy()
         found = {path: (file.stat().st_size, file.stat().st_mtime_ns) for path, file in _files(folder.path)}
         return found == {path: (line["size"], line["time"]) for path, line in copy.files.items()}
 
@@ -206,7 +184,7 @@ class Artifacts:
         folder = runs / name
         incoming.mkdir(parents=True, exist_ok=True)
         for attempt in range(1, FETCHES + 1):
-            copy = self._tried(lambda: self._copy(name))
+            copy = self._tried(lambda: self.copy(name))
             if copy is None and missing_ok:
                 return False
             if copy is None:
@@ -229,7 +207,7 @@ class Artifacts:
                     _replace(folder, target, wanted, copy)
                 return True
             except RunError:
-                latest = self._tried(lambda: self._copy(name))
+                latest = self._tried(lambda: self.copy(name))
                 if attempt == FETCHES or latest is None or latest.number == copy.number:
                     raise
             finally:
@@ -242,7 +220,7 @@ class Artifacts:
             file.parent.mkdir(parents=True, exist_ok=True)
             digest, size = hashlib.sha256(), 0
             with file.open("xb") as out:
-                for chunk in self._api.get(self._store, self._key(name, line["sha256"])).stream():
+                for chunk in self.objects.get(self.key(name, line["sha256"])).chunks:
                     size += len(chunk)
                     if size > line["size"]:
                         break
@@ -258,7 +236,7 @@ class Artifacts:
         Raises:
             RunError: The store cannot be reached.
         """
-        self._tried(lambda: self._api.put(self._store, f"{self._prefix}live/{name}", live))
+        self._tried(lambda: self.objects.put(f"{self._prefix}live/{name}", live))
 
     def shown(self, name: str) -> bytes:
         """What was shown last of a run's cars; nothing where nothing was, or too much.
@@ -269,10 +247,10 @@ class Artifacts:
 
         def read() -> bytes:
             try:
-                reply = self._api.get(self._store, f"{self._prefix}live/{name}")
-            except self._missing:
+                content = self.objects.get(f"{self._prefix}live/{name}")
+            except NoObject:
                 return b""
-            return b"" if reply.meta["size"] > MAX_LIVE_BYTES else bytes(reply.bytes())
+            return b"" if content.size > MAX_LIVE_BYTES else content.read()
 
         return self._tried(read)
 
@@ -284,9 +262,8 @@ class Artifacts:
         """
 
         def forgotten() -> None:
-            self._delete([self._key(f"{name}.json"), f"{self._prefix}live/{name}"])
-            for page in self._api.list(self._store, self._key(name)):
-                self._delete(entry["path"] for entry in page)
+            self.objects.delete([self.key(f"{name}.json"), f"{self._prefix}live/{name}"])
+            self.objects.delete(self.objects.below(self.key(name)))
 
         self._tried(forgotten)
 
@@ -299,11 +276,7 @@ class Artifacts:
         if not self._prefix:
             raise RunError("The owner's copies are not removed.")
 
-        def forgotten() -> None:
-            for page in self._api.list(self._store, self._prefix.rstrip("/")):
-                self._delete(entry["path"] for entry in page)
-
-        self._tried(forgotten)
+        self._tried(lambda: self.objects.delete(self.objects.below(self._prefix.rstrip("/"))))
 
     def keep_track(self, file: Path) -> str:
         """Have a track's file here; its SHA-256.
@@ -315,7 +288,7 @@ class Artifacts:
         def kept() -> str:
             data = file.read_bytes()
             digest = hashlib.sha256(data).hexdigest()
-            self._api.put(self._store, f"{self._prefix}tracks/{digest}", data)
+            self.objects.put(self.track_key(digest), data)
             return digest
 
         return self._tried(kept)
@@ -328,8 +301,8 @@ class Artifacts:
         """
 
         def read() -> bytes:
-            reply = self._api.get(self._store, f"{self._prefix}tracks/{digest}")
-            return b"" if reply.meta["size"] > MAX_TRACK_BYTES else bytes(reply.bytes())
+            content = self.objects.get(self.track_key(digest))
+            return b"" if content.size > MAX_TRACK_BYTES else content.read()
 
         if not file.is_file():
             data = self._tried(read)
@@ -338,57 +311,65 @@ class Artifacts:
             file.parent.mkdir(parents=True, exist_ok=True)
             write_file(file, data)
 
-    def _key(self, *parts: str) -> str:
+    def key(self, *parts: str) -> str:
+        """Where something of this shelf is in the store."""
         return "/".join((f"{self._prefix}{self._shelf}", *parts))
 
-    def _copy(self, name: str) -> Copy | None:
+    def track_key(self, digest: str) -> str:
+        """The same for a track."""
+        return f"{self._prefix}tracks/{digest}"
+
+    def copy(self, name: str) -> Copy | None:
         """What the store has of a run, checked; None when there is nothing."""
         try:
-            reply = self._api.get(self._store, self._key(f"{name}.json"))
-            if reply.meta["size"] > MAX_INDEX_BYTES:
+            content = self.objects.get(self.key(f"{name}.json"))
+            if content.size > MAX_INDEX_BYTES:
                 raise RunError(f"The list of files of run {name!r} is too large.")
-            document = json.loads(bytes(reply.bytes()))
-        except self._missing:
+            return read_copy(content.read(), name)
+        except NoObject:
             return None
-        except ValueError as error:
-            raise RunError(f"The list of files of run {name!r} is damaged.") from error
-        try:
-            if document["format"] != FORMAT or len(document["files"]) > MAX_FILES:
-                raise ValueError("format")
-            files = {}
-            for path, line in document["files"].items():
-                size, moment, digest = int(line["size"]), int(line["time"]), str(line["sha256"])
-                is_digest = len(digest) == 64 and set(digest) <= set("0123456789abcdef")
-                if (
-                    not _PLAIN.fullmatch(path)
-                    or not 0 <= size <= MAX_FILE_BYTES
-                    or not 0 <= moment < 2**63
-                    or not is_digest
-                ):
-                    raise ValueError("name or size")
-                files[path] = {"size": size, "time": moment, "sha256": digest}
-            number = int(document.get("number", 0))  # copies of earlier versions are not counted
-            if not 0 <= number < 2**62:
-                raise ValueError("number")
-            return Copy(number, files)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise RunError(f"The list of files of run {name!r} is not one of Racecraft's.") from error
-
-    def _delete(self, paths: Any) -> None:
-        for path in paths:
-            try:
-                self._api.delete(self._store, path)
-            except self._missing:
-                continue
 
     def _tried(self, action: Callable[[], T]) -> T:
         try:
             return action()
-        except self._broken as error:
+        except (NoAnswer, OSError) as error:
             raise RunError(
-                f"The object store {self.url} does not answer as it should: {_first_line(error)}.",
+                f"The object store {self.url} does not answer as it should: {first_line(error)}.",
                 hint="Runs are safe on this machine and are copied later.",
             ) from error
+
+
+def read_copy(data: bytes, name: str) -> Copy:
+    """What a list of a run's files says, checked.
+
+    Raises:
+        RunError: It is none of ours.
+    """
+    try:
+        document = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise RunError(f"The list of files of run {name!r} is damaged.") from error
+    try:
+        if document["format"] != FORMAT or len(document["files"]) > MAX_FILES:
+            raise ValueError("format")
+        files = {}
+        for path, line in document["files"].items():
+            size, moment, digest = int(line["size"]), int(line["time"]), str(line["sha256"])
+            is_digest = len(digest) == 64 and set(digest) <= set("0123456789abcdef")
+            if (
+                not _PLAIN.fullmatch(path)
+                or not 0 <= size <= MAX_FILE_BYTES
+                or not 0 <= moment < 2**63
+                or not is_digest
+            ):
+                raise ValueError("name or size")
+            files[path] = {"size": size, "time": moment, "sha256": digest}
+        number = int(document.get("number", 0))  # copies of earlier versions are not counted
+        if not 0 <= number < 2**62:
+            raise ValueError("number")
+        return Copy(number, files)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise RunError(f"The list of files of run {name!r} is not one of Racecraft's.") from error
 
 
 def _files(root: Path) -> Iterator[tuple[str, Path]]:
@@ -473,7 +454,3 @@ def _moment(path: Path) -> tuple[int, int]:
     except OSError:
         return 0, 0
     return status.st_mtime_ns, status.st_ino
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:300].rstrip(".")

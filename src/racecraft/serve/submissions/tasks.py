@@ -68,9 +68,9 @@ def judge(task: Task) -> dict[str, Any]:
     terms = announcement.document
     (standing,) = classify([replay.cars], ranking=terms["ranking"], minimum_laps=terms["minimum_laps"])
     values = {**standing.in_whole_ms(), "judged": now()}
-    with task.database.transaction() as session:
+    with task.own_database.transaction() as session:
         keep_choices(session, task.job.id, choices)
-    with task.database.transaction() as session:
+    with task.own_database.transaction() as session:
         mark_copies(session, task.job.id)
         session.execute(sa.update(Submission).where(Submission.job_id == task.job.id).values(values))
     return {**replay.evaluation.report(), "step": int(result["step"])}
@@ -79,5 +79,5 @@ def judge(task: Task) -> dict[str, Any]:
 def _announcement(task: Task) -> Announcement:
     """The race as it was made, with its secret, which is in no job: whoever entered can read what their jobs hold."""
     race = sa.select(Race).join(Submission, Submission.race_id == Race.id).where(Submission.job_id == task.job.id)
-    with task.database.transaction() as session:
+    with task.own_database.transaction() as session:
         return announcement_of(session.scalars(race).one())
