@@ -20,7 +20,10 @@ class School:
         group = league.group("adas-class", teacher)
         code = league.code(group, teacher)
         ada, bob = league.join(code, "Ada"), league.join(code, "Bob")
-        eve = league.join(league.code(league.group("Elsewhere", other), other), "Eve")
+        elsewhere = league.group("Elsewhere", other)
+        code = league.code(elsewhere, other)
+        eve = league.join(code, "Eve")
+        ok(ada.post("/api/groups/join", json={"code": code}))  # she races there, too
         self.people = {"owner": league.owner, "teacher": teacher, "other": other, "ada": ada, "bob": bob, "eve": eve}
         number = league.number(ada)
         home = league.console.runs / ".racecraft" / "people" / str(number)
@@ -54,6 +57,7 @@ class School:
             "token_id": token,
             "session_id": ok(ada.get("/api/account/sessions"))[0]["id"],
             "group_id": group,
+            "elsewhere": elsewhere,
             "member": number,
             "cup": cup,
             "submission_id": submission,

@@ -218,16 +218,28 @@ SLIPPERY = (
 """To get out of a car that is not there is no error; what was driven in a race that is on nobody sees."""
 
 
-def request(school: School, client: httpx.Client, label: str) -> httpx.Response:
+POWER: dict[str, Any] = {  # over a racer, of the group by which she came in alone; how, and a body that would do
+    "POST /api/groups/{group_id}/cards": {"members": [0]},
+    "PATCH /api/groups/{group_id}/members/{member}": {"name": "Rude"},
+    "PUT /api/groups/{group_id}/members/{member}/quota": {"models": 100},
+    "POST /api/groups/{group_id}/members/{member}/admit": None,
+    "POST /api/groups/{group_id}/members/{member}/revoke": None,
+    "POST /api/groups/{group_id}/models/copy": {"member": 0, "model": "adas-model"},
+}
+
+
+def request(school: School, client: httpx.Client, label: str, **other: Any) -> httpx.Response:
+    """Ask for what Ada has, but for what is told to be another thing."""
     method, path = label.split()
-    body = ROWS[label][1]
+    body = other.pop("body", ROWS[label][1])
+    objects = {**school.objects, **other}
     if isinstance(body, dict):
         body = {**body}
         body |= {"members": [school.objects["member"]]} if "members" in body else {}
         body |= {"member": school.objects["member"]} if "member" in body else {}
     query = body if isinstance(body, str) else ""
     json = body if isinstance(body, dict) else None
-    with client.stream(method, path.format(**school.objects) + query, json=json) as reply:
+    with client.stream(method, path.format(**objects) + query, json=json) as reply:
         if not reply.headers.get("content-type", "").startswith("text/event-stream"):
             reply.read()
         return reply
@@ -307,3 +319,23 @@ def test_a_group_cannot_be_looked_into_by_who_organises_another(school: School) 
                 assert school.people[role].get(path).status_code == 404, (role, label)
     looked = school.people["teacher"].get(f"/api/models/adas-model?of={school.objects['member']}")
     assert looked.status_code == 200
+
+
+def test_who_organises_another_group_of_hers_has_no_power_over_her(school: School) -> None:
+    """Ada came in by the teacher's group, and joined the other's with the account that she has."""
+    other, elsewhere = school.people["other"], school.objects["elsewhere"]
+    for label, body in POWER.items():
+        reply = request(school, other, label, group_id=elsewhere, body=body)
+        assert (reply.status_code, "by another group" in reply.text) == (404, True), (label, reply.text)
+    found = ok(other.get(f"/api/groups/{elsewhere}"))["members"]
+    assert {member["name"]: member["is_home"] for member in found} == {"Other": False, "Ada": False, "Eve": True}
+    assert [one["name"] for one in ok(other.get(f"/api/groups/{elsewhere}/models"))] == ["Eve"]
+    both = {"members": [member["id"] for member in found if member["role"] == "racer"]}
+    printed = ok(other.post(f"/api/groups/{elsewhere}/cards", json=both), 201)
+    assert ([card["name"] for card in printed["cards"]], printed["left_out"]) == (["Eve"], ["Ada"])
+    real_name = {"real_name": "Augusta"}
+    label = "PATCH /api/groups/{group_id}/members/{member}"
+    assert request(school, other, label, group_id=elsewhere, body=real_name).status_code == 204
+    assert "Augusta" not in school.people["teacher"].get(f"/api/groups/{school.objects['group_id']}").text
+    card = {"members": [school.objects["member"]]}
+    ok(school.people["teacher"].post(f"/api/groups/{school.objects['group_id']}/cards", json=card), 201)

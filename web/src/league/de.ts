@@ -95,6 +95,7 @@ export const de: Record<LeagueKey, string> = {
   card_revoke: "Aussperren",
   card_revoked: "{name} ist ausgesperrt: Karte, Browser und Tokens sind wertlos. Eine neue Karte lässt wieder herein.",
   provider_yes: "über {provider}",
+  not_home: "aus einer anderen Gruppe",
   provider_locked: "ausgesperrt",
   provider_revoked: "{name} ist ausgesperrt: Browser und Tokens sind wertlos. Wieder zulassen lässt es sich hier.",
   provider_admitted: "{name} kommt wieder über {provider} herein.",

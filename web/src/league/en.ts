@@ -91,6 +91,7 @@ export const en = {
   card_revoke: "Lock out",
   card_revoked: "{name} is locked out: card, browsers and tokens are worth nothing. A new card lets them in again.",
   provider_yes: "through {provider}",
+  not_home: "of another group",
   provider_locked: "locked out",
   provider_revoked: "{name} is locked out: browsers and tokens are worth nothing. You can let them in again here.",
   provider_admitted: "{name} comes in through {provider} again.",

@@ -44,6 +44,8 @@ class GroupMember:
     comes_by_provider: bool
     is_locked: bool
     """Whether they did, and were locked out."""
+    is_home: bool
+    """Whether they came in here."""
 
 
 @dataclass(frozen=True)
@@ -128,25 +130,27 @@ class Groups:
         return part
 
     def may_look(self, user_id: int, other: int) -> bool:
-        """Whether somebody organises a group in which the other one races."""
+        """Whether somebody organises the group by which the other one came in."""
         mine, theirs = aliased(Member), aliased(Member)
         query = sa.select(mine.group_id).join(theirs, mine.group_id == theirs.group_id)
         query = query.where(mine.user_id == user_id, mine.role == "organiser")
-        query = query.where(theirs.user_id == other, theirs.role == "racer").limit(1)
+        query = query.where(theirs.user_id == other, theirs.role == "racer", theirs.is_home).limit(1)
         with self._database.transaction() as session:
             return session.scalar(query) is not None
 
     def members(self, group_id: int) -> list[GroupMember]:
         """Everybody in a group, organisers first, by name."""
         has_card = sa.exists().where(Card.user_id == User.id)
-        query = sa.select(User.id, User.name, Member.role, Member.real_name, has_card, Identity.is_locked)
+        query = sa.select(
+            User.id, User.name, Member.role, Member.real_name, has_card, Identity.is_locked, Member.is_home
+        )
         query = query.join(Member, Member.user_id == User.id).where(Member.group_id == group_id)
         mine = sa.and_(Identity.user_id == User.id, Identity.issuer == self._issuer)
         query = query.outerjoin(Identity, mine)
         with self._database.transaction() as session:
             rows = session.execute(query.order_by(Member.role, User.name)).all()
         return [
-            GroupMember(row[0], row[1], _part(row[2]), row[3], bool(row[4]), row[5] is not None, bool(row[5]))
+            GroupMember(row[0], row[1], _part(row[2]), row[3], bool(row[4]), row[5] is not None, bool(row[5]), row[6])
             for row in rows
         ]
 
@@ -161,7 +165,7 @@ class Groups:
             numbers = []
             for name, real_name in people:
                 user_id = add_person(session, name)
-                session.add(Member(group_id=group_id, user_id=user_id, role="racer", real_name=real_name.strip()))
+                session.add(_newcomer(group_id, user_id, real_name.strip()))
                 numbers.append(user_id)
             return numbers
 
@@ -173,6 +177,19 @@ class Groups:
         """
         if self.part(group_id, user_id) != "racer":
             raise NotFound(f"There is no racer {user_id} in this group.")
+
+    def ward(self, group_id: int, user_id: int) -> None:
+        """Make sure that somebody races in a group and came in by it.
+
+        Raises:
+            NotFound: They do not, or by another one.
+        """
+        with self._database.transaction() as session:
+            member = session.get(Member, (group_id, user_id))
+            if member is None or _part(member.role) != "racer":
+                raise NotFound(f"There is no racer {user_id} in this group.")
+            if not member.is_home:
+                raise NotFound("They came in by another group, whose organisers do that.")
 
     def set_real_name(self, group_id: int, user_id: int, real_name: str) -> None:
         """What only the organisers see."""
@@ -223,7 +240,7 @@ class Groups:
             user_id = add_person(session, name, role=role)
             if invitation.group_id is not None:
                 _require_room(session, invitation.group_id, 1)
-                session.add(Member(group_id=invitation.group_id, user_id=user_id, role="racer"))
+                session.add(_newcomer(invitation.group_id, user_id))
             return user_id
 
     def welcome(self, name: str, whom: tuple[str, str], *, group_id: int | None, real_name: str) -> int:
@@ -248,21 +265,41 @@ class Groups:
                         hint="Whoever holds the league looks at --provider-group.",
                     )
                 _require_room(session, group_id, 1)
-                session.add(Member(group_id=group_id, user_id=user_id, role="racer", real_name=real_name))
+                session.add(_newcomer(group_id, user_id, real_name))
             return user_id
 
     def join_on(self, code: str, user_id: int) -> int | None:
-        """Into a group by its code, with an account that there is; the group's number, or None for a wrong code."""
+        """Into a group by its code, with an account that there is; the group's number, or None for a wrong code.
+
+        A racer whom no group took in, or who left the one that did, has come in by this one from now on; who has a
+        password or makes groups belongs to nobody.
+        """
         with self._database.transaction() as session:
             invitation = use_invitation(session, plain_code(code))
             if invitation is None:
                 return None
             if invitation.group_id is None:
                 raise Conflict("This code makes an account; you have one.")  # and it keeps its use
-            if session.get(Member, (invitation.group_id, user_id)) is None:
+            member = session.get(Member, (invitation.group_id, user_id))
+            if member is None:
                 _require_room(session, invitation.group_id, 1)
-                session.add(Member(group_id=invitation.group_id, user_id=user_id, role="racer"))
+                member = Member(group_id=invitation.group_id, user_id=user_id, role="racer")
+                session.add(member)
+            if member.role == "racer" and _needs_home(session, user_id):
+                member.is_home = True
             return invitation.group_id
+
+
+def _newcomer(group_id: int, user_id: int, real_name: str = "") -> Member:
+    """Somebody who comes in by a group."""
+    return Member(group_id=group_id, user_id=user_id, role="racer", real_name=real_name, is_home=True)
+
+
+def _needs_home(session: Session, user_id: int) -> bool:
+    """Whether somebody belongs to no group and may belong to one."""
+    user = session.get_one(User, user_id)
+    has_home = sa.select(sa.exists().where(Member.user_id == user_id, Member.is_home))
+    return user.role == "racer" and not user.password and not session.scalar(has_home)
 
 
 def _require_room(session: Session, group_id: int, more: int) -> None:

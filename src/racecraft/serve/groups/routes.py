@@ -34,7 +34,7 @@ from racecraft.serve.problems import NotFound, NotLetIn
 
 router = APIRouter(prefix="/api", tags=["groups"])
 
-HIDDEN: Final = {"real_name": "", "has_card": False, "comes_by_provider": False, "is_locked": False}
+HIDDEN: Final = {"real_name": "", "has_card": False, "comes_by_provider": False, "is_locked": False, "is_home": False}
 """What racers see of a member that only organisers know."""
 Id = Annotated[int, Path(ge=0, lt=2**31)]
 
@@ -109,9 +109,11 @@ def add_members(
 
 @router.patch("/groups/{group_id}/members/{member}", status_code=204)
 def change_member(group_id: Id, member: Id, body: MemberChange, consoles: InConsoles, person: InPerson) -> Response:
-    """Another name for somebody, if the one they chose will not do, or a real name."""
-    _require_ward(consoles, group_id, member, person.id)
+    """Another name for somebody, if the one they chose will not do, or a real name, which is each group's own."""
+    consoles.groups.require(group_id, person.id, organiser=True)
+    consoles.groups.racer(group_id, member)
     if body.name is not None:
+        _require_ward(consoles, group_id, member, person.id)
         consoles.people.rename(member, body.name)
     if body.real_name is not None:
         consoles.groups.set_real_name(group_id, member, body.real_name)
@@ -150,31 +152,33 @@ def admit_member(group_id: Id, member: Id, consoles: InConsoles, person: InPerso
 def print_cards(
     group_id: Id, body: PrintCards, request: Request, consoles: InConsoles, person: InPerson
 ) -> PrintedCards:
-    """New cards for members but those who have accounts of their own; earlier cards are worth nothing from now on."""
+    """New cards for members who came in by a group and have no accounts of their own; earlier cards are worthless."""
     consoles.groups.require(group_id, person.id, organiser=True)
-    by_provider = {member.id for member in consoles.groups.members(group_id) if member.comes_by_provider}
+    members = consoles.groups.members(group_id)
+    by_provider = {member.id for member in members if member.comes_by_provider}
+    guests = {member.id for member in members if not member.is_home}
     wards: list[Person] = []
     others: list[Person] = []
     for member in dict.fromkeys(body.members):
         consoles.groups.racer(group_id, member)
         one = consoles.people.get(member)
-        (others if member in by_provider or _is_independent(one) else wards).append(one)
+        (others if member in by_provider | guests or _is_independent(one) else wards).append(one)
     if not wards:
         if others[0].id in by_provider:
             raise NotFound(f"{others[0].name} has an account of their own, through a provider.")
-        raise NotFound(f"{others[0].name} has an account of their own, with a password.")
+        _require_ward(consoles, group_id, others[0].id, person.id)
     cards = _cards(request, consoles, [ward.id for ward in wards])
     return PrintedCards(cards=cards, left_out=[one.name for one in others])
 
 
 @router.get("/groups/{group_id}/models")
 def list_group_models(group_id: Id, consoles: InConsoles, person: InPerson) -> list[MemberModels]:
-    """What the racers of a group have made, for its organisers."""
+    """What the racers have made who came in by a group, for its organisers."""
     consoles.groups.require(group_id, person.id, organiser=True)
     return [
         MemberModels(id=member.id, name=member.name, models=consoles.of(member.id).garage.cards())
         for member in consoles.groups.members(group_id)
-        if member.role == "racer"
+        if member.role == "racer" and member.is_home
     ]
 
 
@@ -182,7 +186,7 @@ def list_group_models(group_id: Id, consoles: InConsoles, person: InPerson) -> l
 def copy_model(group_id: Id, body: CopyModel, consoles: InConsoles, person: InPerson) -> ModelCard:
     """A racer's model, as it is, into an organiser's own garage, where nothing that is done to it is the racer's."""
     consoles.groups.require(group_id, person.id, organiser=True)
-    consoles.groups.racer(group_id, body.member)
+    consoles.groups.ward(group_id, body.member)
     theirs, ours = consoles.of(body.member).garage, consoles.of(person.id).garage
     source = theirs.folder(body.model)
     name = body.name or ours.name_beside(body.model)
@@ -232,7 +236,8 @@ def _cards(request: Request, consoles: Consoles, members: list[int]) -> list[Log
 def _require_ward(consoles: Consoles, group_id: int, member: int, user_id: int) -> None:
     """Make sure that somebody organises a group and a member is theirs to name and to let in.
 
-    Who has a password or makes groups is not, wherever they race: a card would be a way to be them.
+    Who has a password or makes groups is not, wherever they race, nor who came in by another group: a card would be a
+    way to be them.
 
     Raises:
         NotFound: They are not.
@@ -242,6 +247,7 @@ def _require_ward(consoles: Consoles, group_id: int, member: int, user_id: int) 
     ward = consoles.people.get(member)
     if _is_independent(ward):
         raise NotFound(f"{ward.name} has an account of their own, with a password.")
+    consoles.groups.ward(group_id, member)
 
 
 def _is_independent(person: Person) -> bool:

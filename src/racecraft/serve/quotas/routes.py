@@ -67,9 +67,9 @@ def set_group_quota(group_id: Id, body: QuotaInfo, consoles: InConsoles, person:
 
 @router.put("/groups/{group_id}/members/{member}/quota", status_code=204)
 def set_member_quota(group_id: Id, member: Id, body: QuotaInfo, consoles: InConsoles, person: InPerson) -> Response:
-    """What one racer may use, whatever is said of the others."""
+    """What one racer may use who came in by a group, whatever is said of the others."""
     consoles.groups.require(group_id, person.id, organiser=True)
-    consoles.groups.racer(group_id, member)
+    consoles.groups.ward(group_id, member)
     consoles.quotas.say("person", _limits(body), member)
     return Response(status_code=204)
 

@@ -107,7 +107,7 @@ class Database:
                 return ""
             return str(connection.scalar(sa.text("SELECT version_num FROM alembic_version")))
 
-    def _upgrade(self) -> None:
+    def _upgrade(self, to: str = "head") -> None:
         from alembic import command  # takes its time to load, and most starts do without
         from alembic.config import Config
 
@@ -120,7 +120,7 @@ class Database:
                 connection.commit()
             with connection.begin():
                 config.attributes["connection"] = connection
-                command.upgrade(config, "head")
+                command.upgrade(config, to)
             if is_sqlite:
                 connection.exec_driver_sql("PRAGMA foreign_keys=ON")
                 connection.commit()

@@ -145,6 +145,8 @@ class Member(Table):
     """``organiser`` or ``racer``."""
     real_name: Mapped[str] = mapped_column(String(100), default="")
     """For the organisers only."""
+    is_home: Mapped[bool] = mapped_column(default=False)
+    """Whether they came in here: its organisers print their cards, name them, and look at what they made."""
     created: Mapped[datetime] = mapped_column(default=now)
 
 
