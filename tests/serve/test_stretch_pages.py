@@ -180,6 +180,23 @@ def test_compare_credits_the_lap_to_the_reward_that_drove_it(changed: Visit) -> 
     code.get_by_text("-params['speed']").wait_for()
 
 
+def test_compare_has_bands_of_stretches_and_lap_times_like_watch(changed: Visit) -> None:
+    page = changed.open("/compare/other/heron")
+    bands = page.get_by_role("list", name="Stretches of the training")
+    bands.wait_for()
+    expected = ["Stretch 1 · the beginning", "Stretch 2 · reward"]
+    assert [text.strip() for text in bands.locator("li").all_inner_texts()] == expected
+    page.get_by_text("Stretches shown: heron").wait_for()
+    bands.get_by_role("button", name="Stretch 2 · reward").click()
+    change = page.get_by_role("region", name="Stretch 2", exact=True)
+    change.locator("tr.added", has_text="-params['speed']").wait_for()
+    bands.get_by_role("button", name="Stretch 2 · reward").click()
+    change.wait_for(state="detached")
+    page.get_by_role("button", name="Lap time, s").click()
+    page.get_by_role("img", name="Lap time, s").wait_for()
+    assert bands.locator("li").count() == 2
+
+
 @pytest.mark.parametrize("language", ["en", "de"])
 @pytest.mark.parametrize("width", [390, 1440])
 def test_nothing_is_wider_than_the_window(changed: Visit, width: int, language: str, tmp_path: Path) -> None:

@@ -51,6 +51,7 @@ export const analysis: Record<keyof typeof english, string> = {
   compare_lead: "Kurven, Ergebnisse, Einstellungen und Belohnungscode von zwei bis sechs Modellen.",
   compare_models: "Modelle",
   compare_two: "Wähle zwei Modelle oder mehr.",
+  compare_bands: "Gezeigte Abschnitte:",
   compare_axis: "Achse",
   compare_settings: "Einstellungen, die sich unterscheiden",
   compare_same: "Alle Einstellungen sind gleich.",

@@ -48,6 +48,7 @@ export const analysis = {
   compare_lead: "Curves, results, settings and reward code of two to six models.",
   compare_models: "Models",
   compare_two: "Choose two models or more.",
+  compare_bands: "Stretches shown:",
   compare_axis: "Axis",
   compare_settings: "Settings that differ",
   compare_same: "All settings are the same.",
