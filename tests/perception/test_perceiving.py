@@ -23,6 +23,7 @@ pytestmark = pytest.mark.costly
 
 FLOOR = Path(__file__).parents[3] / "shared" / "frames" / "car"
 TOLD = (60, 75, 90, 105)
+AHEAD = list(NUMBERS).index("heading_ahead")
 
 
 @pytest.fixture(scope="module")
@@ -91,10 +92,14 @@ def test_offset_and_heading_on_roads_never_seen(unseen: tuple[Belief, NDArray[np
     belief, truth = unseen
     offset = np.abs(belief.offset - truth[:, 0] * NUMBERS["offset"])
     heading = np.abs(belief.heading - truth[:, 1] * NUMBERS["heading"])
+    ahead = np.abs(belief.heading_ahead - truth[:, AHEAD] * NUMBERS["heading_ahead"])
     assert np.percentile(offset, 90) <= 0.02
-    # 2 degrees were hoped for: what of a road lies under the lens and behind it no single picture shows
-    assert np.degrees(np.median(heading)) <= 2.0
-    assert np.degrees(np.percentile(heading, 90)) <= 5.5
+    # 2 degrees were hoped for: what of a road lies under the lens and behind it no single picture shows, and the best
+    # of eyes err by 3.5 (benchmarks/perception_limit.py); where it leads to from there, more of it does
+    assert np.degrees(np.median(heading)) <= 1.8
+    assert np.degrees(np.percentile(heading, 90)) <= 5.3
+    assert np.degrees(np.median(ahead)) <= 1.0
+    assert np.degrees(np.percentile(ahead, 90)) <= 2.7
 
 
 def test_it_knows_how_far_off_it_may_be(unseen: tuple[Belief, NDArray[np.float32]]) -> None:
@@ -102,6 +107,7 @@ def test_it_knows_how_far_off_it_may_be(unseen: tuple[Belief, NDArray[np.float32
     for name, told, expected in (
         ("offset", belief.offset, belief.offset_error),
         ("heading", belief.heading, belief.heading_error),
+        ("heading_ahead", belief.heading_ahead, belief.heading_ahead_error),
     ):
         error = np.abs(told - truth[:, list(NUMBERS).index(name)] * NUMBERS[name])
         assert 0.6 < expected.mean() / error.mean() < 1.7, name

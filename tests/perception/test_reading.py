@@ -107,9 +107,10 @@ def test_every_truncation_of_a_picture_is_refused_or_read(tmp_path: Path, percei
 
 
 def test_what_is_told() -> None:
-    told = tell("a", belief_of(offset=0.1, heading=-0.2, closeness=0.5), 0)
+    told = tell("a", belief_of(offset=0.1, heading=-0.2, heading_ahead=0.3, closeness=0.5), 0)
     assert told["offset_m"] == pytest.approx(0.1)
     assert told["heading_rad"] == pytest.approx(-0.2)
+    assert told["heading_ahead_rad"] == pytest.approx(0.3)
     assert told["distance_m"] == pytest.approx(1.0)
     assert told["middle"] == [None] * 4  # as likely there as not
     assert tell("a", belief_of(), 0)["distance_m"] is None

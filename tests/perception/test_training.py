@@ -9,7 +9,7 @@ import pytest
 
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.perception import Lessons, Perceiver, train
-from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS
+from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, NUMBERS
 from racecraft.perception.network import MAX_WEIGHTS, WEIGHTS
 from racecraft.perception.training import slopes_of
 
@@ -68,14 +68,14 @@ def test_a_column_that_is_not_there_teaches_nothing() -> None:
     targets = np.zeros((1, NUM_TARGETS), np.float32)
     outputs = np.full((1, NUM_OUTPUTS), 0.7, np.float32)
     slopes, _ = slopes_of(outputs, targets)
-    assert not slopes[0, 7:NUM_CONTINUOUS].any()
-    assert slopes[0, :7].all()
+    assert not slopes[0, len(NUMBERS) : NUM_CONTINUOUS].any()
+    assert slopes[0, : len(NUMBERS)].all()
 
 
 def test_the_weights_brought_along_are_small_and_of_16_bits() -> None:
     from safetensors.numpy import load_file
 
-    assert WEIGHTS.stat().st_size < 1_000_000
+    assert WEIGHTS.stat().st_size < 2_000_000
     arrays = load_file(WEIGHTS)
     assert {array.dtype for array in arrays.values()} == {np.dtype(np.float16)}
     assert all(np.isfinite(array).all() for array in arrays.values())

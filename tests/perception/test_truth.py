@@ -12,6 +12,8 @@ from racecraft.perception.truth import Truth
 from racecraft.sim import STATE_COLUMNS, Simulation, Start
 from racecraft.track import load_track
 
+AHEAD = list(NUMBERS).index("heading_ahead")
+
 
 def columns_of(targets: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Columns of the road's middle, and whether they are in the picture  (N, R)."""
@@ -74,6 +76,7 @@ def test_a_straight_road_is_projected_as_a_pinhole_does(straight: Simulation) ->
     assert np.abs(offset).max() > 0.15
     assert targets[:, 0] * NUMBERS["offset"] == pytest.approx(offset, abs=2e-4)
     assert targets[:, 1] * NUMBERS["heading"] == pytest.approx(turned, abs=2e-4)
+    assert targets[:, AHEAD] * NUMBERS["heading_ahead"] == pytest.approx(turned, abs=2e-4)
 
     columns, is_there = columns_of(targets)
     ahead = np.linspace(0.0, 1.5, 3001)
@@ -142,3 +145,20 @@ def test_a_lens_in_its_place_is_the_point_that_the_state_speaks_of() -> None:
     assert targets[:, 1] * NUMBERS["heading"] == pytest.approx(heading, abs=0.12)
     assert np.median(np.abs(targets[:, 1] * NUMBERS["heading"] - heading)) < 0.02
     assert targets[:, 3] == pytest.approx(state["curvature_2"], abs=1e-3)
+
+
+def test_where_a_road_leads_is_half_of_its_bend_over_40_cm_further_on() -> None:
+    track = load_track("oval")
+    simulation = Simulation(
+        [track], num_envs=128, seed=4, start=Start(mode="random", heading_jitter=0.3), num_threads=1
+    )
+    targets, state = Truth(simulation).targets(), dict(zip(STATE_COLUMNS, simulation.state.T, strict=True))
+    # where it bends alike from 0.2 m behind the lens, whose direction the first one is told over, to 0.5 m ahead
+    bends = np.stack([state[f"curvature_{i}"] for i in range(3)])
+    is_even = (np.ptp(bends, axis=0) < 0.02) & (np.abs(bends[0]) > 0.2)
+    assert is_even.sum() > 15
+    turned = targets[:, 1] * NUMBERS["heading"] - targets[:, AHEAD] * NUMBERS["heading_ahead"]
+    ahead = 0.2 * state["curvature_1"]
+    close = np.abs(turned - ahead)[is_even] < 0.03
+    assert close.mean() > 0.8
+    assert np.abs(ahead[is_even]).min() > 0.04

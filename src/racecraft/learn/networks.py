@@ -93,7 +93,7 @@ TEACHER_LOG_STD = -1.0
 
 PERCEIVER = "PERCEIVER"
 """The network behind `racecraft.perception`, which tells what a frame shows and drives nothing."""
-_PERCEIVER = Architecture((Conv(16, 4, 2), Conv(32, 3, 2), Conv(40, 3, 2)), (192,), pool=2, sky=0.2)
+_PERCEIVER = Architecture((Conv(16, 4, 2), Conv(32, 3, 2), Conv(64, 3, 2)), (256,), pool=2, sky=0.2)
 
 
 def network_names() -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """What perception is asked of every picture, in the order of its network's outputs, and in which units.
 
-    numbers    how much, and how far off that may be           offset, heading, width, curvature, what is in the way
+    numbers    how much, and how far off that may be           offset, headings, width, curvature, what is in the way
     middles    which column, how far off, whether it is there  of the road's middle in some rows
     regions    whether there is road                           in a grid over the lower part of the picture
     on_road    whether there is road below the lens
@@ -21,9 +21,13 @@ NUMBERS: Final = {
     "curvature": 1.0,
     "curvature_far": 1.0,
     "closeness": 0.5,
+    "heading_ahead": 0.25,
 }
 """Names, and what 1 of the network is: m left of the road's middle, rad turned left against it, m, 1/m to the left
-where `CURVATURE_AT` says, and 1 / (1 + m to the next object ahead), 0 where there is none."""
+where `CURVATURE_AT` says, 1 / (1 + m to the next object ahead), 0 where there is none, and rad turned left against
+where the road leads over the next `HEADING_OVER`."""
+HEADING_OVER: Final = 0.4
+"""m of road. A lens sees the road from 16 cm ahead on: what lies beside it, it can only guess in a bend."""
 CURVATURE_AT: Final = (0.5, 1.0, 2.0)
 """m ahead where curvature is told."""
 ROWS: Final = (45, 52, 60, 67, 75, 82, 90, 97, 105, 112)

@@ -11,16 +11,16 @@ from racecraft.checks import check_number, check_whole
 class Lessons:
     """How much is learned, and how."""
 
-    updates: int = 32_000
+    updates: int = 20_000
     """Gradient steps."""
     minibatch_size: int = 128
     """Pictures to each of them."""
-    learning_rate: float = 3e-3
+    learning_rate: float = 6e-3
     """Adam's step size after its first steps; it falls to nothing along a cosine."""
     store: int = 24_576
     """Pictures that are remembered, so that those of a minibatch have nothing to do with each other."""
-    fresh: float = 0.5
-    """New pictures to one of a minibatch."""
+    fresh: float = 0.25
+    """New pictures to one of a minibatch; half of a minibatch is looked at in a mirror."""
     roads: int = 60
     """Generated roads to learn on, beside three of the library; a quarter of them with tight bends."""
     seed: int = 1

@@ -29,6 +29,7 @@ from racecraft.perception.answers import (
     REGION_ROWS,
     ROWS,
 )
+from racecraft.perception.mirror import mirrored_answers, mirrored_observations
 
 WEIGHTS: Final = Path(__file__).with_name("weights.safetensors")
 """What `racecraft perceive --train` made and the package brings along: float16."""
@@ -37,7 +38,7 @@ MEAN, SPREAD = 112.0, 48.0
 LEAST_SPREAD: Final = 4.0
 """Standard deviation, in levels, that the picture of a wall has: less is noise, and is not made more of."""
 MAX_WEIGHTS: Final = 16_000_000
-"""Bytes of a file of weights; ours has 0.8 million."""
+"""Bytes of a file of weights; ours has 1.6 million."""
 LOG_LIMITS: Final = (-6.0, 2.0)
 """Of the logarithm of an error, in units of the network."""
 
@@ -55,6 +56,10 @@ class Belief:
     heading: NDArray[np.float32]
     """rad, of the lens against the road beside it, turned left positive  (N,)."""
     heading_error: NDArray[np.float32]
+    """rad  (N,)."""
+    heading_ahead: NDArray[np.float32]
+    """rad, of the lens against where the road beside it leads over the next 40 cm, turned left positive  (N,)."""
+    heading_ahead_error: NDArray[np.float32]
     """rad  (N,)."""
     half_width: NDArray[np.float32]
     """m, half the road's width  (N,)."""
@@ -99,12 +104,15 @@ class Perceiver:
             self._load(weights)
 
     def __call__(self, frames: NDArray[np.uint8]) -> Belief:
-        """What is believed of some pictures, grey uint8 (N, 120, 160).
+        """What is believed of some pictures, grey uint8 (N, 120, 160): the mean of them and of them in a mirror.
 
         Raises:
             ShapeError: They are not of this type and shape.
         """
-        return believe(self.network.policy(self.observe(frames)))
+        observations = self.observe(frames)
+        straight = self.network.policy(observations)
+        turned = self.network.policy(mirrored_observations(observations))
+        return believe(np.float32(0.5) * (straight + mirrored_answers(turned)))
 
     def observe(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """What the network sees of pictures: without their sky, pooled, and of one brightness and contrast.
@@ -170,6 +178,8 @@ def believe(outputs: NDArray[np.float32]) -> Belief:
         offset_error=errors[:, 0],
         heading=told[:, 1],
         heading_error=errors[:, 1],
+        heading_ahead=told[:, 7],
+        heading_ahead_error=errors[:, 7],
         half_width=told[:, 2],
         curvature=told[:, 3:6],
         curvature_error=errors[:, 3:6],

@@ -28,8 +28,9 @@ def tell(file: str, belief: Belief, index: int) -> dict[str, Any]:
     """One picture's belief.
 
     Returns:
-        ``file``; ``on_road``; ``offset_m``, left of the middle positive, and ``heading_rad``, turned left positive,
-        both of the lens, with ``…_error``, the mean distance to the truth that is expected; ``middle``: columns of a
+        ``file``; ``on_road``; ``offset_m``, left of the middle positive, and ``heading_rad``, turned left positive
+        against the road beside the lens, and ``heading_ahead_rad``, against where that road leads over the next 40 cm,
+        all of the lens, with ``…_error``, the mean distance to the truth that is expected; ``middle``: columns of a
         picture of 160 x 120 in `TOLD_ROWS`, None where it is not in sight, with ``middle_error``; ``half_width_m``;
         ``curvature_per_m`` 0.5, 1 and 2 m ahead, to the left positive; ``distance_m`` to what is in the way, None where
         nothing is, with the two ends of where it is likely to be.
@@ -47,6 +48,8 @@ def tell(file: str, belief: Belief, index: int) -> dict[str, Any]:
         "offset_error_m": _rounded(belief.offset_error[index]),
         "heading_rad": _rounded(belief.heading[index]),
         "heading_error_rad": _rounded(belief.heading_error[index]),
+        "heading_ahead_rad": _rounded(belief.heading_ahead[index]),
+        "heading_ahead_error_rad": _rounded(belief.heading_ahead_error[index]),
         "middle": [
             _rounded(belief.middle[index, place], 2) if there else None
             for place, there in zip(places, seen, strict=True)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from racecraft.perception.answers import NUM_CONTINUOUS, NUM_TARGETS, NUMBERS, ROWS
 from racecraft.perception.lessons import Lessons
+from racecraft.perception.mirror import mirrored_answers, mirrored_observations
 from racecraft.perception.network import LOG_LIMITS, Perceiver
 from racecraft.perception.truth import Truth
 from racecraft.sim import STATE_COLUMNS, Objects, Obstacles, Simulation, Start
@@ -27,9 +28,8 @@ ERROR_RATE: Final = 0.1
 """Weight of learning how far off answers are, beside the answers themselves."""
 YES_OR_NO: Final = 0.15
 """Weight of each answer that is yes or no."""
-WEIGHTS: Final = np.array([3.0, 3.0, 1.0, 1.0, 1.0, 1.0, 2.0, *[1.0] * len(ROWS)], np.float32)
-"""Of the continuous answers: offset and heading matter most."""
-
+WEIGHTS: Final = np.array([3.0, 3.0, 1.0, 1.0, 1.0, 1.0, 2.0, 3.0, *[1.0] * len(ROWS)], np.float32)
+"""Of the continuous answers: offset and headings matter most."""
 USUAL: Final = Lessons()
 
 
@@ -167,10 +167,14 @@ def train(lessons: Lessons = USUAL, *, tell: Callable[[int, float], None] = lamb
                 known += len(free)
                 seen += len(frames)
         rows = rng.integers(0, known, lessons.minibatch_size)
-        slopes, loss = slopes_of(network.policy(observations[rows]), targets[rows])
+        seen_now, wanted_now = observations[rows], targets[rows]
+        turned = lessons.minibatch_size // 2  # so many are looked at in a mirror
+        seen_now[:turned] = mirrored_observations(seen_now[:turned])
+        wanted_now[:turned] = mirrored_answers(wanted_now[:turned])
+        slopes, loss = slopes_of(network.policy(seen_now), wanted_now)
         share = update / lessons.updates
         rate = lessons.learning_rate * min(1.0, (update + 1) / 300) * (0.5 + 0.5 * np.cos(np.pi * share))
-        network.descend(observations[rows], slopes, learning_rate=float(rate), max_grad_norm=5.0)
+        network.descend(seen_now, slopes, learning_rate=float(rate), max_grad_norm=5.0)
         losses.append(loss)
         if time.monotonic() - said > 5.0 or update == lessons.updates - 1:
             tell(update + 1, float(np.mean(losses)))

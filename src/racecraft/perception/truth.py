@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from racecraft.perception.answers import (
     CURVATURE_AT,
     HALF,
+    HEADING_OVER,
     NUM_TARGETS,
     NUMBERS,
     REGION_COLUMNS,
@@ -33,6 +34,8 @@ COARSE: Final = 8
 BEHIND, AHEAD = 8, 80
 """Points behind and ahead of the nearest one that are looked at: 2 m of road. Between as many to both sides, 0.4 m, the
 direction of the road is told."""
+HEADINGS: Final = [0, 1, list(NUMBERS).index("heading_ahead")]
+"""Targets that a centre line tells: offset, heading, and heading against where it leads."""
 CELL: Final = 0.02
 """m, side of a cell of the map of a road."""
 MARGIN: Final = 0.5
@@ -82,7 +85,7 @@ class Truth:
             found[:, 6] = state[:, len(STATE_COLUMNS)]
         roads = simulation.column("track_index").astype(int)
         lenses = self._lenses()
-        found[:, :2], columns, is_there = self._along(roads, lenses)
+        found[:, HEADINGS], columns, is_there = self._along(roads, lenses)
         found[:, : len(NUMBERS)] /= np.array(list(NUMBERS.values()))
         begin, num_rows = len(NUMBERS), len(ROWS)
         found[:, begin : begin + num_rows] = np.where(is_there, columns / HALF, 0.0)
@@ -120,7 +123,7 @@ class Truth:
         return np.where(self._is_closed[roads][:, None], index % count, index.clip(0, count - 1))
 
     def _along(self, roads: NDArray[np.intp], lenses: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """Offset and heading (N, 2); pixels from the picture's middle to the road's (N, R), and where it is in view."""
+        """`HEADINGS` (N, 3); pixels from the picture's middle to the road's (N, R), and where it is in view."""
         x, y, cosine, sine, above, pitch, focal = lenses.T[:, :, None]
         nearest = self._nearest(roads, x[:, 0], y[:, 0])
         ahead_of = self._index(roads, nearest[:, None] + np.arange(-BEHIND, AHEAD))
@@ -128,10 +131,16 @@ class Truth:
         # a track's lines are chords of a curve: the direction of one of them tells less of the road than their mean
         tangent = line[:, 2 * BEHIND] - line[:, 0]
         tangent /= np.sqrt((tangent**2).sum(axis=1, keepdims=True))
+        leads = line[:, BEHIND + round(HEADING_OVER / SPACING)] - line[:, BEHIND]
+        leads = np.where((leads**2).sum(axis=1, keepdims=True) > 0.0, leads, tangent)  # no road ahead of its end
         off_x, off_y = x[:, 0] - line[:, BEHIND, 0], y[:, 0] - line[:, BEHIND, 1]
         offset = tangent[:, 0] * off_y - tangent[:, 1] * off_x
-        across = tangent[:, 0] * sine[:, 0] - tangent[:, 1] * cosine[:, 0]
-        along = tangent[:, 0] * cosine[:, 0] + tangent[:, 1] * sine[:, 0]
+        headings = [
+            np.arctan2(
+                way[:, 0] * sine[:, 0] - way[:, 1] * cosine[:, 0], way[:, 0] * cosine[:, 0] + way[:, 1] * sine[:, 0]
+            )
+            for way in (tangent, leads)
+        ]
 
         dx, dy = line[..., 0] - x, line[..., 1] - y
         ahead, right = dx * cosine + dy * sine, dx * sine - dy * cosine
@@ -147,7 +156,7 @@ class Truth:
             aside = right[cars, before] + share * (right[cars, later] - right[cars, before])
             columns[:, place] = focal[:, 0] * aside / depth[:, 0]
             is_there[:, place] = (later > 0) & (np.abs(columns[:, place]) < HALF)
-        return np.stack([offset, np.arctan2(across, along)], axis=1), columns, is_there
+        return np.stack([offset, *headings], axis=1), columns, is_there
 
     def _regions(self, roads: NDArray[np.intp], lenses: Floats) -> NDArray[np.bool_]:
         """Whether there is road in the middle of each region  (N, NUM_REGIONS)."""

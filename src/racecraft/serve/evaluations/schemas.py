@@ -179,6 +179,9 @@ class RoadBelief(Message):
     """As all errors the mean distance to the truth that is expected."""
     heading_rad: float
     heading_error_rad: float
+    heading_ahead_rad: float
+    """Against where the road leads over the next 40 cm."""
+    heading_ahead_error_rad: float
     middle: list[float | None]
     middle_error: list[float | None]
     half_width_m: float
