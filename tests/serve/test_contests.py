@@ -41,7 +41,8 @@ def started(console: RunningConsole, room: str, **settings: Any) -> dict[str, An
 def test_a_heat_is_driven_on_one_road_and_can_be_verified(
     console: RunningConsole, cars: list[dict[str, str]], tmp_path: Path
 ) -> None:
-    heat = started(console, "heats", models=[*cars, cars[0]], track="oval", max_resets=1, seed=7, title="Sunday")
+    road = {"track": "oval", "objects": "bots", "count": 2, "max_resets": 1, "seed": 7}
+    heat = started(console, "heats", models=[*cars, cars[0]], title="Sunday", **road)
     assert (heat["kind"], heat["is_ladder"], heat["title"], heat["has_video"]) == ("grid", False, "Sunday", True)
     assert [row["place"] for row in heat["heat"]] == sorted(row["place"] for row in heat["heat"])
     assert {row["car"] for row in heat["heat"]} == {0, 1, 2}
@@ -54,15 +55,26 @@ def test_a_heat_is_driven_on_one_road_and_can_be_verified(
     assert len(starts) == 3  # a grid, and no car is in another
     path = tmp_path / "heat.replay"
     path.write_bytes(console.client.get(f"{address}/replay.file").content)
-    assert verify(read_replay(path)).is_genuine
+    replay = read_replay(path)
+    assert verify(replay).is_genuine
+    longest = max((car.recording for car in replay.cars), key=len)
+    assert [thing["kind"] for thing in film["objects"]] == [
+        "bot_car",
+        "bot_car",
+    ]  # and no racer
+    assert [car["objects"] for car in film["cars"]] == [[], [], []]
+    for step in range(len(longest)):
+        there = [(thing["x"][step], thing["y"][step], thing["heading"][step]) for thing in film["objects"]]
+        assert there == [pytest.approx(view[:3], abs=6e-4) for view in longest.objects(step)[:2]]
+    assert film["objects"][0]["x"][0] != film["objects"][0]["x"][-1]
     assert console.client.get(f"{address}/video").headers["content-type"] == "video/mp4"
 
-    again = started(console, "heats", models=[*cars, cars[0]], track="oval", max_resets=1, seed=7)
+    again = started(console, "heats", models=[*cars, cars[0]], **road)
     assert again["heat"] == heat["heat"]
     assert [card["id"] for card in console.client.get("/api/contests").json()] == [again["id"], heat["id"]]
 
 
-@pytest.mark.parametrize("kind", ["head-to-model", "time-trial"])
+@pytest.mark.parametrize("kind", ["head-to-model", "time-trial", "head-to-bot"])
 def test_a_ladder_rates_and_shows_every_race(console: RunningConsole, cars: list[dict[str, str]], kind: str) -> None:
     ladder = started(console, "ladders", models=cars, tracks=["oval"], kind=kind, starts=2, seed=3)
     assert (ladder["is_ladder"], ladder["driven"], len(ladder["matches"])) == (True, 2, 2)
@@ -75,6 +87,11 @@ def test_a_ladder_rates_and_shows_every_race(console: RunningConsole, cars: list
         assert film["cars"][0]["model"] == first
         assert {car["model"] for car in film["cars"]} == set(match["models"])
         assert all(len(car["trace"]) > 10 for car in film["cars"])
+        assert film["objects"] == []  # each met its own, which began where the other's did
+        bots = [[(one["kind"], len(one["x"])) for one in car["objects"]] for car in film["cars"]]
+        assert bots == [[("bot_car", len(car["trace"]))] * (3 if kind == "head-to-bot" else 0) for car in film["cars"]]
+        begin = [[(one["x"][0], one["y"][0]) for one in car["objects"]] for car in film["cars"]]
+        assert begin[0] == begin[1]
     assert console.client.get(f"/api/contests/{ladder['id']}/replay?match=2").status_code == 404
 
 
@@ -102,6 +119,7 @@ def test_what_cannot_be_driven_is_refused(console: RunningConsole, cars: list[di
 def test_a_removed_contest_leaves_nothing(console: RunningConsole, cars: list[dict[str, str]]) -> None:
     heat = started(console, "heats", models=cars, track="oval", max_resets=0)
     assert heat["kind"] == "head-to-model"
+    assert console.client.get(f"/api/contests/{heat['id']}/replay").json()["objects"] == []  # the other car is none
     folder = console.runs / ".racecraft" / "contests" / heat["id"]
     assert (folder / "race.replay").is_file()
     assert console.client.delete(f"/api/contests/{heat['id']}").status_code == 204

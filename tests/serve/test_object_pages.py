@@ -57,3 +57,34 @@ def test_what_is_on_the_road_is_seen_live_and_again_in_the_replay(
             assert (len(where) == 1) == (race == "object-avoidance")
             expected = table[:, index, 1:3] if len(where) > 1 else table[:1, index, 1:3]
             np.testing.assert_allclose(where, expected, atol=1e-3)
+
+
+def test_what_is_on_the_road_is_seen_in_the_film_of_a_race(visit: Visit) -> None:
+    console = visit.console
+    console.create(name="ada", track="oval", until="1000 steps", seed=1)
+    (job,) = console.client.get("/api/jobs", params={"run": "ada"}).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    models = [{"model": "ada"}, {"model": "ada", "checkpoint": "last"}]
+    heat = {"models": models, "track": "oval", "objects": "bots", "count": 2, "max_resets": 0}
+    ladder = {"models": models, "tracks": ["oval"], "kind": "object-avoidance", "starts": 1}
+    driven = {}
+    for room, request in (("heats", heat), ("ladders", ladder)):
+        reply = console.client.post(f"/api/contests/{room}", json=request)
+        assert reply.status_code == 202, reply.text
+        driven[room] = reply.json()["id"]
+    for contest in driven.values():
+        assert console.wait_for(console.job_ended(contest))["state"] == "done"
+
+    page = visit.open(f"/contests/{driven['heats']}")
+    page.locator("canvas[data-boxes='0'][data-bots='2']").wait_for()
+    assert page.get_by_text("Each car drove alone.").count() == 0  # all share the road
+
+    page = visit.open(f"/contests/{driven['ladders']}")
+    page.get_by_role("button", name="Watch: ").click()
+    page.locator("canvas[data-boxes='6'][data-bots='0']").wait_for()
+    cars = page.locator(".stage li button")
+    names = [cars.nth(index).locator("span").first.inner_text() for index in (0, 1)]
+    for index in (1, 0):
+        cars.nth(index).click()
+        page.get_by_text(f"Boxes and bot cars are where {names[index]} met them").wait_for()
+    page.locator("canvas[data-boxes='6'][data-bots='0']").wait_for()

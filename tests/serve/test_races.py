@@ -396,7 +396,7 @@ def test_a_film_knows_the_corners_as_they_are_driven(is_reversed: bool) -> None:
     driven = track.reversed() if is_reversed else track
     points = driven.point_at(np.arange(5.0, 12.0, 0.1))
     trace = [[round(1000 * float(x)), round(1000 * float(y)), 0] for x, y in points]
-    cars = [ReplayCar(entry=1, model="ada", trace=trace, laps=[])]
+    cars = [ReplayCar(entry=1, model="ada", trace=trace, laps=[], objects=[])]
     film = replay_of("delta", track, cars, trial=0)
     assert film.is_reversed is is_reversed
     assert [sector.apex for sector in film.sectors] == [sector.apex for sector in sectors_of(driven)]

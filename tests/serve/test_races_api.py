@@ -36,7 +36,8 @@ def test_a_race_from_beginning_to_end(console: RunningConsole, tmp_path: Path) -
         console.create(name=name, track="oval", until="3000 steps", seed=len(name) + ord(name[0]))
     for job in client.get("/api/jobs").json():
         assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
-    race = make(console, laps=1, offtrack_penalty=1.0, max_resets=3, trials=3)
+    road = {"kind": "object-avoidance", "objects": 2}
+    race = make(console, laps=1, offtrack_penalty=1.0, max_resets=3, trials=3, **road)
     assert (race["state"], race["is_withheld"], race["secret"], race["seed"]) == ("open", True, "", None)
     entered = client.post(f"/api/races/{race['id']}/entries", json={"models": ["ada", "bob", "ada"]})
     assert entered.status_code == 202, entered.text
@@ -82,6 +83,7 @@ def test_a_race_from_beginning_to_end(console: RunningConsole, tmp_path: Path) -
         assert str(seed_of(bytes.fromhex(secret))) not in text
     told = client.get(f"/api/races/{race['id']}/race.json")
     (tmp_path / "race.json").write_bytes(told.content)
+    driven = []
     for row in closed["standings"]:
         assert row["has_replay"]
         assert client.get(row["video"]).headers["content-type"] == "video/mp4"
@@ -93,10 +95,16 @@ def test_a_race_from_beginning_to_end(console: RunningConsole, tmp_path: Path) -
         assert len(replay.cars) == 3
         assert [list(car.lap_times) for car in replay.cars] == row["lap_times"]
         assert replay.conditions.vehicle == PRESETS["v5"]
+        driven.append(replay.cars[1].recording)
     film = client.get(f"/api/races/{race['id']}/replay", params={"entries": entries, "trial": 1}).json()
     assert film["trial"] == 1
     assert (film["is_reversed"], [sector["number"] for sector in film["sectors"]]) == (False, [1, 2])
     assert [car["model"] for car in film["cars"]] == [row["model"] for row in closed["standings"]]
+    assert film["objects"] == []  # everybody met their own
+    for car, recording in zip(film["cars"], driven, strict=True):
+        there = [(one["x"], one["y"], one["heading"]) for one in car["objects"]]
+        assert [one["kind"] for one in car["objects"]] == ["box", "box"]
+        assert there == [tuple([pytest.approx(value, abs=6e-4)] for value in box[:3]) for box in recording.objects(0)]
     begin = [car["trace"][0] for car in film["cars"]]
     assert begin[0] == begin[1]  # everybody from the same place
     other = client.get(f"/api/races/{race['id']}/replay", params={"entries": entries, "trial": 2}).json()

@@ -2,6 +2,7 @@
 import type { components } from "../api/schema";
 
 export type LapTrace = components["schemas"]["LapTrace"];
+export type RoadObject = components["schemas"]["RoadObject"];
 export type EvaluationLaps = components["schemas"]["EvaluationLaps"];
 
 export const PLACES = 241;
@@ -59,13 +60,14 @@ export function poseAt(lap: LapTrace, seconds: number): { x: number; y: number; 
 }
 
 /** Boxes and other cars as they were so many seconds after a lap's start. */
-export function objectsAt(lap: LapTrace, seconds: number): { kind: string; x: number; y: number; heading: number }[] {
-  const row = before(lap.time, seconds);
-  return lap.objects.map(({ kind, x, y, heading }) => {
-    const at = Math.min(row, x.length - 1);
+export const objectsAt = (lap: LapTrace, seconds: number) => roadAt(lap.objects, before(lap.time, seconds));
+
+/** What is on a road as it is in a step; it stays where it is when nobody drives any more. */
+export const roadAt = (objects: RoadObject[], step: number) =>
+  objects.map(({ kind, x, y, heading }) => {
+    const at = Math.min(step, x.length - 1);
     return { kind, x: x[at]!, y: y[at]!, heading: heading[at]! };
   });
-}
 
 /** Values of a column at equal shares of the lap, null beyond where it ended. */
 export function alongLap(lap: LapTrace, values: (number | null)[]): (number | null)[] {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import FileResponse
@@ -11,7 +11,7 @@ from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
 from racecraft.serve.contests.schemas import ContestCard, ContestDetail, NewHeat, NewLadder
 from racecraft.serve.context import InContext, TakesPlace
 from racecraft.serve.problems import NotFound
-from racecraft.serve.races.replays import poses_of, replay_of
+from racecraft.serve.races.replays import car_of, replay_of, road_of
 from racecraft.serve.races.schemas import RaceReplay, ReplayCar
 
 router = APIRouter(prefix="/api/contests", tags=["contests"])
@@ -78,9 +78,9 @@ def get_contest_replay(
 
     found = context.contests.get(contest)
     if not found.is_ladder:
-        cars = read_replay(context.contests.file(contest, REPLAY)).cars
-        driven = [(row.car, row.name, *poses_of(cars[row.car].recording)) for row in found.heat]
-        track = found.tracks[0]
+        driven = [car.recording for car in read_replay(context.contests.file(contest, REPLAY)).cars]
+        cars = [car_of(row.car, row.name, driven[row.car], is_alone=False) for row in found.heat]
+        track, road = found.tracks[0], road_of(*driven)
     else:
         document = read_match(context.contests.file(contest, MATCHES), match or 0)
         row = next((one for one in found.matches if one.number == (match or 0)), None)
@@ -88,7 +88,7 @@ def get_contest_replay(
             raise NotFound(f"The ladder has no race {match}.")
         order = sorted(range(len(row.models)), key=lambda car: row.places[car])
         two = document["cars"]
-        driven = [(car, row.models[car], two[car]["trace"], two[car]["laps"]) for car in order]
-        track = document["track"]
-    shown = [ReplayCar(entry=car, model=name, trace=trace, laps=laps) for car, name, trace, laps in driven]
-    return replay_of(track, context.courses.load(track), shown, trial=0)
+        before: dict[str, Any] = {"objects": []}  # in files from before they were kept
+        cars = [ReplayCar(entry=car, model=row.models[car], **(before | two[car])) for car in order]
+        track, road = document["track"], []
+    return replay_of(track, context.courses.load(track), cars, trial=0, objects=road)

@@ -114,11 +114,10 @@ def ladder(task: Task) -> dict[str, Any]:
 
 
 def _driven(trial: Trial) -> dict[str, Any]:
-    """Poses in whole mm and mrad, and the steps after which laps ended."""
-    from racecraft.serve.races.replays import poses_of
+    """What `ReplayCar` tells of a car besides its number and name."""
+    from racecraft.serve.races.replays import car_of
 
-    trace, laps = poses_of(trial.recording)
-    return {"trace": trace, "laps": laps}
+    return car_of(0, "", trial.recording).model_dump(exclude={"entry", "model"})
 
 
 def _models(task: Task) -> list[str]:

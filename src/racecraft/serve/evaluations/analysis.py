@@ -36,9 +36,9 @@ from racecraft.serve.evaluations.objects import objects_of
 from racecraft.serve.evaluations.paid import rewards_of
 from racecraft.serve.evaluations.schemas import (
     EvaluationLaps,
-    LapObject,
     LapPassage,
     LapTrace,
+    RoadObject,
     SaliencyPicture,
     TrainingMaps,
 )
@@ -250,7 +250,7 @@ def _network(folder: RunFolder, step: Any) -> tuple[int, NetworkSpec, Weights]:
 
 
 def _lap(
-    track: Track, lap: TracedLap, through: list[LapPassage | None], paid: list[float | None], objects: list[LapObject]
+    track: Track, lap: TracedLap, through: list[LapPassage | None], paid: list[float | None], objects: list[RoadObject]
 ) -> LapTrace:
     return LapTrace(
         number=lap.number,

@@ -16,7 +16,7 @@ from racecraft.judging.trained import trained_camera
 from racecraft.serve.context import Computes, InContext
 from racecraft.serve.evaluations.analysis import AHEAD, evaluation_track, trace_of
 from racecraft.serve.evaluations.objects import objects_of
-from racecraft.serve.evaluations.schemas import LapObject, RoadBelief
+from racecraft.serve.evaluations.schemas import RoadBelief, RoadObject
 from racecraft.serve.problems import NotFound
 from racecraft.sim.camera import LUMA
 from racecraft.sim.views import BoxView, CarView, ObjectView, Scene
@@ -81,7 +81,7 @@ def _perceiver() -> Perceiver:
     return Perceiver(num_threads=1)
 
 
-def _view(thing: LapObject, row: int) -> ObjectView:
+def _view(thing: RoadObject, row: int) -> ObjectView:
     place = min(row, len(thing.x) - 1)  # what stands has one pose for the whole lap
     pose = (thing.x[place], thing.y[place], thing.heading[place])
     return BoxView(*pose) if thing.kind == "box" else CarView(*pose)

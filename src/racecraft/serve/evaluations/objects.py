@@ -1,4 +1,4 @@
-"""Where boxes and other cars were while a lap was driven: the replay says it, AWS's file of steps does not."""
+"""Where boxes and other cars were while somebody drove: the replay says it, AWS's file of steps does not."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from racecraft.errors import ReplayError
 from racecraft.race.recording import Recording
 from racecraft.replay.replay import read_replay
 from racecraft.run import RunFolder
-from racecraft.serve.evaluations.schemas import LapObject
+from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.sim.objects import OBJECT_KINDS
 
 STILL: Final = 1e-6  # m and rad; what moves less stands
+RACERS: Final = ("racer", "frozen_racer", "gone_racer")
 
 
-def objects_of(folder: RunFolder, stamp: str, laps: Sequence[TracedLap]) -> dict[int, list[LapObject]]:
+def objects_of(folder: RunFolder, stamp: str, laps: Sequence[TracedLap]) -> dict[int, list[RoadObject]]:
     """What was on the road in each lap, by the lap's number; nothing where no replay says it."""
     path = folder.evaluation(stamp) / "evaluation.replay"
     if not path.is_file():
@@ -33,7 +34,7 @@ def objects_of(folder: RunFolder, stamp: str, laps: Sequence[TracedLap]) -> dict
         return {}
     driven = [car.recording.lap(number) for car in replay.cars for number in _laps(car.recording)]
     return {
-        lap.number: _objects(driven[lap.number - 1].rows)
+        lap.number: objects_in(driven[lap.number - 1].rows)
         for lap in laps
         if lap.number <= len(driven) and len(driven[lap.number - 1]) == len(lap.time)
     }
@@ -43,8 +44,13 @@ def _laps(recording: Recording) -> list[int]:
     return [int(number) for number in np.unique(recording.lap_numbers)]
 
 
-def _objects(rows: NDArray[np.float64]) -> list[LapObject]:
-    """Of a lap's rows, objects included  (T, row_width)."""
+def objects_in(rows: NDArray[np.float64], *, has_racers: bool = True) -> list[RoadObject]:
+    """What was on the road besides the car that was driven.
+
+    Args:
+        rows: Of a recording, objects included  (T, row_width).
+        has_racers: Whether other cars of the same race are among it.
+    """
     table = rows[:, len(ROW_COLUMNS) + len(OBJECT_HEADER) :].reshape(len(rows), -1, len(OBJECT_COLUMNS))
     found = []
     for index in range(table.shape[1]):
@@ -53,6 +59,6 @@ def _objects(rows: NDArray[np.float64]) -> list[LapObject]:
         if np.ptp(poses, axis=0).max(initial=0.0) < STILL:
             poses = poses[:1]
         x, y, heading = (column.round(3).tolist() for column in poses.T)
-        if kind != "gone_racer":
-            found.append(LapObject(kind=kind, x=x, y=y, heading=heading))
+        if kind != "gone_racer" and (has_racers or kind not in RACERS):
+            found.append(RoadObject(kind=kind, x=x, y=y, heading=heading))
     return found

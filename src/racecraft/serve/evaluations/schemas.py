@@ -76,13 +76,13 @@ class LapTrace(Message):
     """Steps in which it stands where it was put after a mistake."""
     reward: list[float | None]
     """What the reward function of its training pays for every step; null where it is not asked, see `RewardOfLaps`."""
-    objects: list[LapObject]
+    objects: list[RoadObject]
     """Boxes and other cars, as far as the replay beside the trace says."""
     passages: list[LapPassage | None]
     """Through every sector; null where it did not get through."""
 
 
-class LapObject(Message):
+class RoadObject(Message):
     """Something on the road: lists have one entry where it stands, else one a control step."""
 
     kind: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,30 +10,52 @@ import numpy as np
 from racecraft.analysis import driven_direction, sectors_of
 from racecraft.race.recording import Recording
 from racecraft.replay.replay import read_replay
+from racecraft.serve.evaluations.objects import objects_in
+from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.races.schemas import RaceReplay, ReplayCar
 from racecraft.serve.tracks.courses import geometry
 from racecraft.serve.tracks.schemas import TrackSector
 from racecraft.track import Track
 
 
-def trial_poses(path: Path, trial: int, *, grain: int = 1) -> tuple[list[list[int]], list[int]]:
-    """Poses of one trial of a replay file in whole mm and mrad, and the steps after which its laps ended.
+def car_of(entry: int, model: str, recording: Recording, *, grain: int = 1, is_alone: bool = True) -> ReplayCar:
+    """One drive.
 
     Args:
-        path: The file.
-        trial: From 0.
-        grain: mm and mrad that poses are rounded to.
+        entry: Its number.
+        model: Its name.
+        recording: What it did.
+        grain: mm and mrad that its poses are rounded to.
+        is_alone: Whether it had the road and what stood there for itself.
     """
-    return poses_of(read_replay(path).cars[trial].recording, grain=grain)
+    return ReplayCar(
+        entry=entry,
+        model=model,
+        trace=((1000 / grain * recording.poses).round().astype(int) * grain).tolist(),
+        laps=[step + 1 for step, event in recording.events if event == "lap_complete"],
+        objects=road_of(recording) if is_alone else [],
+    )
 
 
-def poses_of(recording: Recording, *, grain: int = 1) -> tuple[list[list[int]], list[int]]:
-    """Poses of one drive in whole mm and mrad, and the steps after which its laps ended."""
-    ends = [step + 1 for step, event in recording.events if event == "lap_complete"]
-    return ((1000 / grain * recording.poses).round().astype(int) * grain).tolist(), ends
+def trial_of(path: Path, trial: int, *, entry: int, model: str, grain: int = 1) -> ReplayCar:
+    """One trial of a replay file, see `car_of`; trials count from 0."""
+    return car_of(entry, model, read_replay(path).cars[trial].recording, grain=grain)
 
 
-def replay_of(name: str, track: Track, cars: list[ReplayCar], *, trial: int, is_coarse: bool = False) -> RaceReplay:
+def road_of(*recordings: Recording) -> list[RoadObject]:
+    """Boxes and bot cars of one road, as whoever drove longest saw them."""
+    return objects_in(max(recordings, key=len).rows, has_racers=False)
+
+
+def replay_of(
+    name: str,
+    track: Track,
+    cars: list[ReplayCar],
+    *,
+    trial: int,
+    is_coarse: bool = False,
+    objects: Sequence[RoadObject] = (),
+) -> RaceReplay:
     """The same trial of some cars.
 
     Args:
@@ -41,6 +64,7 @@ def replay_of(name: str, track: Track, cars: list[ReplayCar], *, trial: int, is_
         cars: At least one.
         trial: From 0.
         is_coarse: Whether the poses are rounded so that nobody reads a driver's choices off them.
+        objects: Boxes and bot cars of a road that all share.
     """
     driven = driven_direction(track, [np.array(car.trace, float).reshape(-1, 3)[:, :2] / 1000 for car in cars])
     return RaceReplay(
@@ -48,5 +72,6 @@ def replay_of(name: str, track: Track, cars: list[ReplayCar], *, trial: int, is_
         geometry=geometry(name, track),
         is_reversed=driven is not track,
         sectors=[] if is_coarse else [TrackSector.of(sector) for sector in sectors_of(driven)],
+        objects=list(objects),
         cars=cars,
     )

@@ -15,7 +15,7 @@ from racecraft.judging.race import FORMAT
 from racecraft.serve.context import InConsoles, InContext, InUser, TakesPlace
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
-from racecraft.serve.races.replays import replay_of, trial_poses
+from racecraft.serve.races.replays import replay_of, trial_of
 from racecraft.serve.races.schemas import (
     MAX_CARS,
     Enter,
@@ -127,11 +127,7 @@ def get_replay(
     race, runs = context.races.get(race_id), context.settings.runs
     driven = context.races.driven(race_id, wanted)
     chosen = _median_trial(race, wanted[0]) if trial is None else min(trial, race.trials - 1)
-    cars = [
-        ReplayCar(entry=entry, model=job.run, trace=trace, laps=ends)
-        for entry, job in driven
-        for trace, ends in [_old_steps(job, runs) if race.is_old else _steps(job, runs, chosen)]
-    ]
+    cars = [_old_car(entry, job, runs) if race.is_old else _car(entry, job, runs, chosen) for entry, job in driven]
     return replay_of(race.track, context.courses.load(race.track), cars, trial=chosen)
 
 
@@ -152,16 +148,16 @@ def _median_trial(race: RaceDetail, entry: int) -> int:
     return away.index(min(away))
 
 
-def _steps(job: Job, runs: FilePath, trial: int) -> tuple[list[list[int]], list[int]]:
-    """Poses of one trial in whole mm and mrad, and the steps after which its laps ended."""
+def _car(entry: int, job: Job, runs: FilePath, trial: int) -> ReplayCar:
+    """One trial of an entry."""
     path = entry_folder(runs, job.id) / REPLAY
     if not path.is_file():
         raise NotFound(f"{job.run!r} has no replay in this race.")
-    return trial_poses(path, trial)
+    return trial_of(path, trial, entry=entry, model=job.run)
 
 
-def _old_steps(job: Job, runs: FilePath) -> tuple[list[list[int]], list[int]]:
-    """The same of an entry under the old rules."""
+def _old_car(entry: int, job: Job, runs: FilePath) -> ReplayCar:
+    """The same of an entry under the old rules, whose file does not say what stood on the road."""
     path = replay_trace(job, runs=runs)
     if path is None:
         raise NotFound(f"{job.run!r} has no replay in this race.")
@@ -170,4 +166,4 @@ def _old_steps(job: Job, runs: FilePath) -> tuple[list[list[int]], list[int]]:
     for lap in read_laps(path):
         trace += lap.trace
         ends.append(len(trace))
-    return trace, ends
+    return ReplayCar(entry=entry, model=job.run, trace=trace, laps=ends, objects=[])

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AwareDatetime, Field
 
+from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.schemas import Message, RunName
 from racecraft.serve.tracks.schemas import TrackGeometry, TrackSector
 
@@ -164,6 +165,8 @@ class ReplayCar(Message):
     model: str
     trace: list[list[int]]
     laps: list[int]
+    objects: list[RoadObject]
+    """Boxes and bot cars of its own road, step by step; none where all share one."""
 
 
 class RaceReplay(Message):
@@ -176,4 +179,6 @@ class RaceReplay(Message):
     """Whether they drive against the geometry's direction."""
     sectors: list[TrackSector]
     """In driving direction; none where the steps are too coarse to say why one is faster."""
+    objects: list[RoadObject]
+    """Boxes and bot cars of the road that all share, step by step; none where each drove on its own."""
     cars: list[ReplayCar]

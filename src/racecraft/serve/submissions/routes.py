@@ -14,8 +14,8 @@ from racecraft.judging.race import FORMAT
 from racecraft.limits import Medals
 from racecraft.race.entry_file import pack_entry
 from racecraft.serve.context import Computes, Consoles, InConsoles, InLeague, InPerson
-from racecraft.serve.races.replays import replay_of, trial_poses
-from racecraft.serve.races.schemas import MAX_CARS, NewRace, RaceReplay, ReplayCar
+from racecraft.serve.races.replays import replay_of, trial_of
+from racecraft.serve.races.schemas import MAX_CARS, NewRace, RaceReplay
 from racecraft.serve.schemas import RunName
 from racecraft.serve.submissions.board import Row
 from racecraft.serve.submissions.data import data_of
@@ -153,10 +153,10 @@ def get_film(
         raise ConfigError(f"A film shows at most {MAX_CARS} cars, {len(wanted)} were asked for.")
     driven = [league.driven(race_id, number, user_id=user) for number in wanted]
     names, trial = league.names(wanted), league.counted_trial(wanted[0])
-    cars = []
-    for number, (path, is_over) in zip(wanted, driven, strict=True):
-        trace, laps = trial_poses(path, trial, grain=1 if is_over else OPEN_GRAIN)
-        cars.append(ReplayCar(entry=number, model=names[number], trace=trace, laps=laps))
+    cars = [
+        trial_of(path, trial, entry=number, model=names[number], grain=1 if is_over else OPEN_GRAIN)
+        for number, (path, is_over) in zip(wanted, driven, strict=True)
+    ]
     is_coarse = not all(is_over for _, is_over in driven)
     return replay_of(*league.track(race_id), cars, trial=trial, is_coarse=is_coarse)
 

@@ -102,4 +102,7 @@ export const races: Record<keyof typeof english, string> = {
   races_scrub: "Zeitpunkt im Rennen",
   races_pace: "Tempo",
   races_arrived: "im Ziel",
+  races_road_of:
+    "Jedes Auto fuhr allein. Kisten und Bot-Autos sind da, wo {model} sie traf; wähl ein anderes Auto, um seine zu sehen.",
+  races_road_choose: "{model} folgen und die Kisten und Bot-Autos sehen, die es traf.",
 };

@@ -99,4 +99,7 @@ export const races = {
   races_scrub: "Moment of the race",
   races_pace: "Pace",
   races_arrived: "arrived",
+  races_road_of:
+    "Each car drove alone. Boxes and bot cars are where {model} met them; choose another car to see its own.",
+  races_road_choose: "Follow {model}, and see the boxes and bot cars that it met.",
 } as const;
