@@ -63,6 +63,10 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
 
     page.get_by_role("button", name="Replay all together").click()
     page.locator(".stage canvas").wait_for()
+    page.get_by_role("button", name="Full screen").click()
+    page.locator(":fullscreen canvas").wait_for()
+    page.locator(":fullscreen").get_by_role("button", name="Full screen").click()
+    page.locator(":fullscreen").wait_for(state="detached")
     page.get_by_role("img", name="Time behind").wait_for()
     assert page.get_by_role("button", name="Why is").count() == 1
     clock = page.locator(".controls .number")

@@ -200,6 +200,25 @@ def test_ones_own_car_is_driven_against_its_way_round_and_in_its_car(visit: Visi
     assert page.get_by_label("Direction").input_value() == "reverse"
 
 
+def test_what_moves_fills_the_screen_and_gives_it_back(visit: Visit) -> None:
+    """A drive, and an evaluation's replay."""
+    visit.console.create(name="seal", train=False, track="oval")
+    write_raced(visit.console.runs / "seal", 9.0)
+    for path, region in (("/drive/oval", "The track and your car"), ("/models/seal/race", "Replay")):
+        page = visit.open(path)
+        part = page.get_by_role("region", name=region, exact=True)
+        part.locator("canvas").first.wait_for()
+        part.get_by_role("button", name="Full screen").click()
+        page.locator(":fullscreen canvas").wait_for()
+        page.wait_for_function(
+            "() => { const {width, height} = document.querySelector(':fullscreen canvas').getBoundingClientRect();"
+            " return width === innerWidth && height === innerHeight; }"
+        )
+        assert page.evaluate("document.activeElement === document.body"), "the keys are for what is shown"
+        page.locator(":fullscreen").get_by_role("button", name="Full screen").click()
+        page.locator(":fullscreen").wait_for(state="detached")
+
+
 @needs_axe
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_axe_finds_nothing_serious_and_nothing_sticks_out(visit: Visit, theme: str) -> None:
