@@ -41,7 +41,7 @@ def started(console: RunningConsole, room: str, **settings: Any) -> dict[str, An
 def test_a_heat_is_driven_on_one_road_and_can_be_verified(
     console: RunningConsole, cars: list[dict[str, str]], tmp_path: Path
 ) -> None:
-    road = {"track": "oval", "objects": "bots", "count": 2, "max_resets": 1, "seed": 7}
+    road = {"track": "oval", "objects": "bots", "count": 2, "max_resets": 1, "offtrack_penalty": 1.5, "seed": 7}
     heat = started(console, "heats", models=[*cars, cars[0]], title="Sunday", **road)
     assert (heat["kind"], heat["is_ladder"], heat["title"], heat["has_video"]) == ("grid", False, "Sunday", True)
     assert [row["place"] for row in heat["heat"]] == sorted(row["place"] for row in heat["heat"])
@@ -57,6 +57,7 @@ def test_a_heat_is_driven_on_one_road_and_can_be_verified(
     path.write_bytes(console.client.get(f"{address}/replay.file").content)
     replay = read_replay(path)
     assert verify(replay).is_genuine
+    assert (replay.conditions.rules.max_resets, replay.conditions.rules.offtrack_penalty) == (1, 1.5)
     longest = max((car.recording for car in replay.cars), key=len)
     assert [thing["kind"] for thing in film["objects"]] == [
         "bot_car",

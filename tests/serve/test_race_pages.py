@@ -114,7 +114,12 @@ def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
         add.select_option(name)
     page.get_by_role("combobox", name="Checkpoint of ada").nth(1).select_option("last")
     page.get_by_role("button", name="Forward: bob").click()
-    page.get_by_role("button", name="Start the heat with 3").click()
+    page.get_by_label("Off track costs, s").fill("1.5")
+    page.get_by_label("Resets allowed").fill("4")
+    with page.expect_request("**/api/contests/heats") as sent:
+        page.get_by_role("button", name="Start the heat with 3").click()
+    asked = sent.value.post_data_json
+    assert (asked["offtrack_penalty"], asked["max_resets"]) == (1.5, 4)
     page.get_by_role("heading", name="The heat in 3D").wait_for()
     grid = page.get_by_role("region", name="Result").locator("tbody tr")
     started = {row.locator("td").nth(1).inner_text(): row.locator("td").last.inner_text() for row in grid.all()}
