@@ -137,6 +137,7 @@ COMMANDS: dict[str, list[str]] = {
     "submit": ["submit R/a --race 1 --checkpoint best --wait --json"],
     "league": [
         "league audit --runs R --database sqlite:///D.db --count 5 --json",
+        "league token --runs R --database sqlite:///D.db --days 1 --json",
         "league reset you --runs R --database sqlite:///D.db --address https://x --json",
         "league backup B.tar --runs R --database sqlite:///D.db --json",
         "league restore B.tar --runs B --database sqlite:///E.db --json",
@@ -148,7 +149,8 @@ COMMANDS: dict[str, list[str]] = {
     ],
     "worker": [
         "worker --runs W --database sqlite:///D.db --artifacts file:///tmp/none --trainings 1 --others 1 --machine w"
-        " --json"
+        " --json",
+        "worker --server http://127.0.0.1:9 --token-file M --plain-http",
     ],
     "bench": ["bench --only reward --seconds 0.1 --seeds 1 --json"],
     "doctor": ["doctor --json"],

@@ -388,7 +388,7 @@ def test_the_command_line_enters_from_any_machine(cup: Cup, tmp_path: Path, monk
         return result.output + (str(result.exception) if result.exception is not None else "")
 
     assert "No league is known" in said("races")
-    assert "not signed in" in said("login", url, "--token", "rc_wrong")
+    assert "no longer good" in said("login", url, "--token", "rc_wrong")
     assert "knows you" in said("login", url, "--token", token)
     kept = tmp_path / "racecraft" / "league.json"
     assert kept.stat().st_mode & 0o077 == 0

@@ -23,7 +23,7 @@ from racecraft.replay import Replay, write_replay
 from racecraft.reward import load_preset
 from racecraft.run import RunFolder
 from racecraft.run.starters import FOLDER
-from racecraft.serve.evaluations.objects import _objects
+from racecraft.serve.evaluations.objects import objects_in
 from racecraft.sim import Objects, Obstacles
 from racecraft.sim.views import driver_frames
 from racecraft.site.javascript import javascript
@@ -125,6 +125,6 @@ def test_a_replays_laps_are_those_of_the_console(tmp_path: Path) -> None:
         assert results[name]["report"]["is_reversed"] == (name == "mistakes")
     assert any(lap["puts"] for lap in results["mistakes"]["report"]["laps"])
     rows = [trial.recording.lap(1).rows for trial in driven["boxes"].trials]
-    for lap, ours in zip(results["boxes"]["report"]["laps"], map(_objects, rows), strict=True):
+    for lap, ours in zip(results["boxes"]["report"]["laps"], map(objects_in, rows), strict=True):
         assert [thing["kind"] for thing in lap["objects"]] == [thing.kind for thing in ours]
         np.testing.assert_allclose([thing["x"] for thing in lap["objects"]], [thing.x for thing in ours], atol=1e-3)

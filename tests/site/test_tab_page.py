@@ -92,6 +92,7 @@ def test_what_a_preset_pays_is_painted_along_the_track(page: Page) -> None:
     page.wait_for_function(another, arg=before)
     page.get_by_label("What it is paid for").select_option("stay_inside")
     page.get_by_text("least").get_by_text("0.00100").wait_for()  # what it pays beside the road
+    page.get_by_label("What it is paid for").select_option("racing")
 
 
 def test_a_car_that_has_learned_drives_until_somebody_trains(page: Page) -> None:

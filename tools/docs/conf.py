@@ -40,6 +40,7 @@ html_theme_options: dict[str, Any] = {
 SECTION: Final = re.compile(r"^## (.+)$")
 PAGE: Final = re.compile(r"^- \[([^\]]+)\]\(([^)#]+)\.md\)")
 INLINE: Final = re.compile(r"\s*<script>\s*document\.body\.dataset\.theme.*?</script>", re.DOTALL)
+PICTURE: Final = re.compile(r'src="(images/[\w-]+\.\w+)"')
 UNUSED: Final = (".buildinfo", "objects.inv")
 
 
@@ -72,6 +73,11 @@ def tidy(app: Any, error: Exception | None) -> None:
         return
     for page in Path(app.outdir).rglob("*.html"):
         page.write_text(INLINE.sub("", page.read_text(encoding="utf-8")), encoding="utf-8")
+    for slides in Path(app.outdir).glob("_downloads/*/*.html"):  # they bring no pictures along
+        for picture in PICTURE.findall(slides.read_text(encoding="utf-8")):
+            place = slides.parent / picture
+            place.parent.mkdir(exist_ok=True)
+            shutil.copy(Path(app.srcdir) / picture, place)
     for name in UNUSED:
         (Path(app.outdir) / name).unlink(missing_ok=True)
     shutil.rmtree(Path(app.outdir) / "_sources", ignore_errors=True)

@@ -40,7 +40,7 @@ const model: Model = {
   ...{ reward: "def reward_function(params):\n    return 1.0\n", seconds: 1, laps: 5, bestLap: 9, space },
   ...{ race: { type: "time-trial", objects: NOTHING }, weights: Float32Array.from({ length: 27 }, (_, i) => i / 7) },
 };
-const digestOf = () => Promise.resolve("abc");
+const digestOf = (track: string) => Promise.resolve(track === "oval" ? "abc" : undefined);
 const arrives = (file: Blob) => arrivalOf(file, plan, digestOf);
 const all = async () => untar(await archive(model, plan), () => 1 << 20);
 const packed = async (files: Map<string, Uint8Array>) => gzip(tar(Object.fromEntries(files), 0));

@@ -182,7 +182,10 @@ def worker(
     ] = "",
     as_json: Json = False,
 ) -> None:
-    """Work for a console on another machine, until Ctrl-C: by its address and a token, or by its database and store."""
+    """Work for a console on another machine, until Ctrl-C.
+
+    By its address and a token, or by its database and object store.
+    """
     from racecraft.serve.quick import loading
 
     with needed_for("A worker"), loading():
