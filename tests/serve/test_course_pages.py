@@ -69,6 +69,8 @@ def test_a_learner_goes_through_three_lessons(visit: Visit) -> None:
     page.locator("fieldset").first.get_by_role("radio").nth(1).check()  # to see why changes nothing
     expect(page.get_by_text("3 of 4 right.")).to_be_visible()
 
+    page.get_by_role("link", name="A table drives a car").last.scroll_into_view_if_needed()
+    expect(page.get_by_text("read", exact=True)).to_be_attached()
     page.get_by_role("link", name="A table drives a car").last.click()
     page.get_by_role("heading", name="A table drives a car").wait_for()
     page.get_by_role("button", name="One step").click()
