@@ -113,6 +113,27 @@ def test_weights_that_are_none_are_refused(learned: tuple[Path, list[float]], tm
         Perceiver(tmp_path / "large", num_threads=1)
 
 
+@pytest.mark.parametrize("fault", ["no step", "a step too few", "a step of nothing", "one number"])
+def test_whole_numbers_without_their_steps_are_refused(
+    learned: tuple[Path, list[float]], tmp_path: Path, fault: str
+) -> None:
+    from safetensors.numpy import load_file, save_file
+
+    arrays = load_file(learned[0])
+    (step,) = [name for name in arrays if name.endswith(STEP)]
+    if fault == "no step":
+        del arrays[step]
+    elif fault == "a step too few":
+        arrays[step] = arrays[step][1:].copy()
+    elif fault == "a step of nothing":
+        arrays[f"policy.conv1.bias{STEP}"] = arrays[step]
+    else:
+        arrays[step.removesuffix(STEP)] = np.array(3, np.int8)
+    save_file(arrays, tmp_path / "w")
+    with pytest.raises(CheckpointError, match="cannot be read"):
+        Perceiver(tmp_path / "w", num_threads=1)
+
+
 def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
     from safetensors.numpy import save_file
 

@@ -144,7 +144,10 @@ class Perceiver:
             stored: Mapping[str, NDArray[np.generic]] = load_tensors(data)
         except Exception as error:  # whatever the reader makes of what is no such file
             raise CheckpointError(f"The weights of perception in {path} cannot be read: {error}.") from error
-        weights = _unpacked(stored)
+        try:
+            weights = _unpacked(stored)
+        except ValueError as error:
+            raise CheckpointError(f"The weights of perception in {path} cannot be read: {error}.") from error
         if not all(np.isfinite(array).all() for array in weights.values()):
             raise CheckpointError(f"The weights of perception in {path} are not all finite.")
         needed = self.network.weights()
@@ -165,12 +168,20 @@ def _packed(weights: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.
 
 
 def _unpacked(stored: Mapping[str, NDArray[np.generic]]) -> dict[str, NDArray[np.float32]]:
-    """Weights by name; what has a step that does not fit keeps its shape, and is refused by the network."""
+    """Weights by name.
+
+    Raises:
+        ValueError: Whole numbers have no step for each of their rows, or a step is of nothing.
+    """
     weights = {name: np.asarray(array, np.float32) for name, array in stored.items() if not name.endswith(STEP)}
-    for name, array in weights.items():
-        step = stored.get(name + STEP)
-        if step is not None and step.shape == (len(array), 1):
-            weights[name] = array * np.asarray(step, np.float32)
+    whole = {name for name in weights if stored[name].dtype == np.int8}
+    if whole != {name.removesuffix(STEP) for name in stored if name.endswith(STEP)}:
+        raise ValueError("its whole numbers and their steps do not go together")
+    for name in whole:
+        step = np.asarray(stored[name + STEP], np.float32)
+        if step.shape != (*weights[name].shape[:1], 1):
+            raise ValueError(f"{name} has not one step for each of its rows")
+        weights[name] *= step
     return weights
 
 
