@@ -12,6 +12,7 @@ from browsers import (
     SOFTWARE_3D,
     THEMES,
     Visit,
+    complaints_of,
     needs_axe,
     needs_browser,
     needs_pages,
@@ -39,7 +40,7 @@ class Lesson:
         page = self.browser.new_context(locale="en-GB").new_page()
         page.set_default_timeout(1000 * PATIENCE)
         visit = self.visits[name] = Visit(self.league.console, page)
-        page.on("console", lambda message: visit.complaints.append(message.text) if message.type == "error" else None)
+        page.on("console", lambda message: visit.complaints.extend(complaints_of(message)))
         page.on("pageerror", lambda error: visit.complaints.append(str(error)))
         return visit
 
@@ -198,7 +199,8 @@ def test_whoever_holds_the_league_makes_tokens_for_workers(lesson: Lesson, race:
 
 
 def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
-    page = lesson.visits["Turbo"].open("/me")
+    visit = lesson.visits["Turbo"]
+    page = visit.open("/me")
     page.get_by_label("New password, at least 10 characters").fill("correct horse")
     page.get_by_role("button", name="Save").nth(1).click()
     page.get_by_text("The password is set.").wait_for()
@@ -215,10 +217,12 @@ def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
     page.get_by_label("Password", exact=True).fill("correct horse")
     page.get_by_role("button", name="Come in").click()
     page.get_by_role("link", name="Friday cup").first.wait_for()
-    page = lesson.visits["Turbo"].open("/me")
+    page = visit.open("/me")
+    assert [one for one in visit.complaints if "401" not in one] == []
     page.get_by_label("Type your nickname").fill("Turbo")
     page.get_by_role("button", name="Delete my account").click()
     page.get_by_role("heading", name="Come in").wait_for()
+    visit.complaints.clear()  # what a page had asked when she signed out, and when there was no account any more
     assert "Turbo" not in [row["name"] for row in ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"]]
 
 
