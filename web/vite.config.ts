@@ -11,5 +11,5 @@ export default defineConfig({
     modulePreload: { polyfill: false },
     chunkSizeWarningLimit: 1000,
   },
-  test: { isolate: false }, // no test leaves anything behind for the next file
+  test: { isolate: false, setupFiles: ["tests/browser.ts"] }, // no test leaves anything behind for the next file
 });

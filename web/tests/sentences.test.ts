@@ -1,6 +1,9 @@
 import { describe, expect, it } from "vitest";
 import errors from "../src/i18n/de/errors.json";
-import { translator } from "../src/i18n/sentences";
+import { translator as of, type Sentences } from "../src/i18n/sentences";
+import { fixed } from "../src/lib/numbers";
+
+const translator = (sentences: Sentences) => of(sentences, fixed);
 
 describe("what the server says, in another language", () => {
   const say = translator({

@@ -1,16 +1,14 @@
-/** Texts in the chosen language; kept in this browser. */
+/** Texts in the chosen language. */
 import { de } from "./de";
 import { en, type Key } from "./en";
+import { fill, type Values } from "./fill";
+import { choose, language, type Language } from "./language.svelte";
 import { translator } from "./sentences";
+import { fixed } from "../lib/numbers";
 
-export const languages = { en: "English", de: "Deutsch" } as const;
-export type Language = keyof typeof languages;
+export { language, languages, type Language } from "./language.svelte";
 
-const STORE = "racecraft-language";
 const catalogues: Record<Language, Record<Key, string>> = { en, de };
-const first = localStorage.getItem(STORE) ?? navigator.language.slice(0, 2);
-export const language = $state({ choice: (first in catalogues ? first : "en") as Language });
-document.documentElement.lang = language.choice;
 
 /** In languages other than the server's own. */
 let translated = $state.raw<((text: string) => string) | undefined>();
@@ -18,7 +16,7 @@ let translated = $state.raw<((text: string) => string) | undefined>();
 /** Fetch what the server's errors are in the chosen language; `said` speaks it from then on. */
 export async function learnErrors(): Promise<void> {
   if (language.choice === "en" || translated) return;
-  translated = translator((await import("./de/errors.json")).default);
+  translated = translator((await import("./de/errors.json")).default, fixed);
 }
 void learnErrors();
 
@@ -26,16 +24,12 @@ void learnErrors();
 export const said = (text: string): string => (language.choice !== "en" && translated ? translated(text) : text);
 
 export function speak(choice: Language): void {
-  language.choice = choice;
+  choose(choice);
   void learnErrors();
-  localStorage.setItem(STORE, choice);
-  document.documentElement.lang = choice;
 }
 
 /** The text of a key, with {names} filled in. */
-export function t(key: Key, values: Record<string, string | number> = {}): string {
-  return catalogues[language.choice][key].replace(/\{(\w+)\}/g, (_, name: string) => String(values[name] ?? ""));
-}
+export const t = (key: Key, values: Values = {}): string => fill(catalogues[language.choice][key], values);
 
 /** The text of a key, or what there is where the catalogue has none. */
 export const known = (key: Key | undefined, otherwise: string): string => (key ? t(key) : otherwise);

@@ -11,10 +11,15 @@ interface Sentence {
 }
 
 const GAP = "{}";
+const DECIMAL = /^-?\d+\.(\d+)$/;
 const LONGEST = 600; // characters of a line that is looked for: names are short, and a stranger's text may not be
 
-/** Says a text in the other language, line by line; what it has no sentence for stays as it is. */
-export function translator(sentences: Sentences): (text: string) => string {
+/** Says a text in the other language, line by line; what it has no sentence for stays as it is. `number` writes a number with
+ *  so many digits after its sign. */
+export function translator(
+  sentences: Sentences,
+  number: (value: number, digits: number) => string,
+): (text: string) => string {
   const known = Object.entries(sentences)
     .map(([one, other]): Sentence => {
       const parts = one.split(GAP);
@@ -22,6 +27,12 @@ export function translator(sentences: Sentences): (text: string) => string {
       return { parts, pattern, other };
     })
     .sort((a, b) => b.parts.join("").length - a.parts.join("").length);
+
+  /** What fills a gap: words that have a sentence of their own, or a number. */
+  function filled(text: string): string {
+    const digits = DECIMAL.exec(text)?.[1];
+    return digits ? number(Number(text), digits.length) : line(text);
+  }
 
   function line(text: string): string {
     const whole = sentences[text];
@@ -32,7 +43,7 @@ export function translator(sentences: Sentences): (text: string) => string {
       const gaps = pattern.exec(text)?.slice(1);
       if (!gaps || gaps.includes(text)) continue;
       let next = 0;
-      return other.replace(/\{(\d*)\}/g, (_, place: string) => line(gaps[place ? Number(place) : next++] ?? ""));
+      return other.replace(/\{(\d*)\}/g, (_, place: string) => filled(gaps[place ? Number(place) : next++] ?? ""));
     }
     return text;
   }

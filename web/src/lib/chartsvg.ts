@@ -1,5 +1,6 @@
 /** A line chart as an SVG text of its own, for reports and slides. On the page uPlot draws the same on a canvas, which
  *  follows thousands of live points and a cursor, but cannot be saved as lines and words; hence two. */
+import { percent, tick } from "./numbers";
 import { span } from "./colors";
 import type { Band } from "./stretches";
 
@@ -65,14 +66,12 @@ export function chartSvg(chart: {
       `<rect x="${from.toFixed(1)}" y="${TOP}" width="${Math.max(to - from, 0).toFixed(1)}" height="${height - TOP - BOTTOM}" fill="${band.color}" fill-opacity="0.13"><title>${escape(band.label)}</title></rect>`,
     );
   }
-  for (const tick of ticks(y0, y1)) {
-    parts.push(`<path d="M${LEFT} ${py(tick).toFixed(1)}H${WIDTH - RIGHT}" stroke="${chart.grid}"/>`);
-    parts.push(
-      text(LEFT - 8, py(tick) + 4, chart.isPercent ? `${Math.round(100 * tick)} %` : String(tick), 'text-anchor="end"'),
-    );
+  for (const at of ticks(y0, y1)) {
+    parts.push(`<path d="M${LEFT} ${py(at).toFixed(1)}H${WIDTH - RIGHT}" stroke="${chart.grid}"/>`);
+    parts.push(text(LEFT - 8, py(at) + 4, chart.isPercent ? percent(at) : tick(at), 'text-anchor="end"'));
   }
-  for (const tick of ticks(x0, x1, 8, chart.isWhole))
-    parts.push(text(px(tick), height - BOTTOM + 20, String(tick), 'text-anchor="middle"'));
+  for (const at of ticks(x0, x1, 8, chart.isWhole))
+    parts.push(text(px(at), height - BOTTOM + 20, tick(at), 'text-anchor="middle"'));
   parts.push(text(WIDTH - RIGHT, height - 8, chart.xLabel, 'text-anchor="end"'));
   parts.push(
     `<text x="${LEFT}" y="24" font-weight="600" font-size="15" fill="${chart.ink}">${escape(chart.title)}</text>`,

@@ -1,4 +1,6 @@
 /** A training's curves: points arrive in pages and in a stream, and are never counted twice. */
+import { count, fixed, percent, short } from "./numbers";
+
 export interface Point {
   kind: "iteration" | "evaluation" | "note";
   step: number;
@@ -75,7 +77,6 @@ export interface Hint {
 
 const FEW = 20; // iterations before which nothing is said
 const MUCH = 20_000; // steps in which a usual training gets round
-const percent = (share: number) => `${Math.round(100 * share)} %`;
 
 /** What the curves say when something goes wrong, with the numbers that say it. */
 export function hints(curves: Curves, numActions: number): Hint[] {
@@ -90,21 +91,21 @@ export function hints(curves: Curves, numActions: number): Hint[] {
   if (entropy !== null && numActions > 1 && entropy < 0.05 * most && completion < 0.5)
     found.push({
       key: "entropy",
-      values: { now: entropy.toFixed(3), most: most.toFixed(2), completion: percent(completion) },
+      values: { now: fixed(entropy, 3), most: fixed(most, 2), completion: percent(completion) },
     });
 
   const losses = points.slice(-40).map((point) => number(point, "value_loss") ?? 0);
   const before = Math.max(...losses.slice(0, 20), 1e-9);
   const after = losses[losses.length - 1]!;
   if (losses.length === 40 && after > 50 * before)
-    found.push({ key: "value", values: { before: before.toPrecision(2), after: after.toPrecision(2) } });
+    found.push({ key: "value", values: { before: short(before, 2), after: short(after, 2) } });
 
   const steps = points
     .slice(-FEW)
     .map((point) => Math.abs(number(point, "approx_kl") ?? 0))
     .sort((a, b) => a - b);
   const usual = steps[steps.length >> 1]!;
-  if (usual > 0.15) found.push({ key: "kl", values: { now: usual.toFixed(2) } });
+  if (usual > 0.15) found.push({ key: "kl", values: { now: fixed(usual, 2) } });
 
   if (last.step >= MUCH) {
     // what was usual in the first half of the way, after its beginning, against what is usual now
@@ -121,10 +122,10 @@ export function hints(curves: Curves, numActions: number): Hint[] {
       if (r1 > r0 + 0.5 * Math.abs(r0) && c1 < c0 + 0.02 && c1 < 0.5)
         found.push({
           key: "exploit",
-          values: { r0: r0.toFixed(1), r1: r1.toFixed(1), c0: percent(c0), c1: percent(c1) },
+          values: { r0: fixed(r0, 1), r1: fixed(r1, 1), c0: percent(c0), c1: percent(c1) },
         });
       else if (last.step > 2 * MUCH && c1 < 0.15)
-        found.push({ key: "stuck", values: { completion: percent(c1), steps: String(last.step) } });
+        found.push({ key: "stuck", values: { completion: percent(c1), steps: count(last.step) } });
     }
   }
 
@@ -133,7 +134,7 @@ export function hints(curves: Curves, numActions: number): Hint[] {
   if (best && recent.length === 3 && completionOf(best) >= 0.9 && Math.max(...recent) < completionOf(best) - 0.3)
     found.push({
       key: "forgot",
-      values: { best: percent(completionOf(best)), step: String(best.step), now: percent(Math.max(...recent)) },
+      values: { best: percent(completionOf(best)), step: count(best.step), now: percent(Math.max(...recent)) },
     });
   return found;
 }

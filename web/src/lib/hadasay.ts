@@ -1,4 +1,6 @@
 /** The settings of a training that had a say in it, as they are held against another's. */
+import { plain } from "./numbers";
+
 type Document = Record<string, unknown>;
 
 const ALGORITHMS = ["ppo", "sac", "distill", "sb3"];
@@ -17,14 +19,16 @@ export function hadASay(settings: Document): Document {
   return found;
 }
 
-/** "-30°: 1, 2 m/s", a line for each angle; or from where to where. */
+/** "−30°: 1; 2 m/s", a line for each angle; or from where to where. */
 function actionsText(space: unknown): string {
   if (!Array.isArray(space)) {
     const { steering_angle: angle, speed } = space as Record<string, { low: number; high: number }>;
-    return angle && speed ? `${angle.low}° … ${angle.high}°\n${speed.low} … ${speed.high} m/s` : JSON.stringify(space);
+    return angle && speed
+      ? `${plain(angle.low)}° … ${plain(angle.high)}°\n${plain(speed.low)} … ${plain(speed.high)} m/s`
+      : JSON.stringify(space);
   }
   const speeds = new Map<number, number[]>();
   for (const { steering_angle, speed } of space as { steering_angle: number; speed: number }[])
     speeds.set(steering_angle, [...(speeds.get(steering_angle) ?? []), speed]);
-  return [...speeds].map(([angle, all]) => `${angle}°: ${all.join(", ")} m/s`).join("\n");
+  return [...speeds].map(([angle, all]) => `${plain(angle)}°: ${all.map(plain).join("; ")} m/s`).join("\n");
 }

@@ -1,6 +1,7 @@
 /** Why one lap is faster than another: what each corner gained, and what of the driving shows it. */
 import type { components } from "../api/schema";
 import type { Key } from "../i18n/en";
+import { fixed } from "./numbers";
 import { interpolate } from "./laps";
 
 export type Sector = components["schemas"]["TrackSector"];
@@ -159,7 +160,7 @@ export const sentenceOf = (gain: Gain, names: [string, string]): [Key, Record<st
     who: gain.seconds >= 0 ? names[1] : names[0],
     whom: gain.seconds >= 0 ? names[0] : names[1],
     corner: gain.sector.number,
-    amount: ["arrives", "middle", "leaves"].includes(gain.reason) ? gain.amount.toFixed(2) : gain.amount.toFixed(1),
+    amount: fixed(gain.amount, ["arrives", "middle", "leaves"].includes(gain.reason) ? 2 : 1),
   },
 ];
 
