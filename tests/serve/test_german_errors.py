@@ -38,6 +38,14 @@ OPERATORS = (
     *("importing/history.py", "importing/own.py", "serve/jobs/bench.py", "serve/jobs/line.py"),
 )
 """Where they come from that only terminals and logs show, or that quote others."""
+REPORTS = (
+    *("importing/importer.py", "importing/job.py", "importing/drfc.py", "importing/env_file.py", "importing/own.py"),
+    *("importing/report.py", "importing/weights.py", "importing/model_files.py"),
+    *("agent/hyperparameters.py", "agent/model_metadata.py", "agent/aws_file.py", "car/metadata.py"),
+)
+"""Where what a page tells of an import, or of a car, comes from."""
+TOLD = {"used", "unused", "becomes", "without_effect", "NO_EFFECT", "ELSEWHERE", "RACES", "_WHY"}
+"""What such a file calls its tables of these."""
 PLAIN = re.compile(
     r"(Value|Type|Key|Attribute|Assertion|Runtime|OS|Stop)\w*|HTTPException|SystemExit|BadParameter|NoAnswer"
 )
@@ -77,6 +85,36 @@ def said_in(path: Path) -> Iterator[str]:
                 yield text
 
 
+def name_of(node: ast.expr) -> str:
+    """Of a variable, an attribute, or of the table that something is an entry of."""
+    match node:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return name
+        case ast.Subscript(value=table):
+            return name_of(table)
+    return ""
+
+
+def told_in(path: Path) -> Iterator[str]:
+    """The notes of one file, and what its tables say became of something."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        texts: list[ast.expr] = []
+        pairs: list[tuple[ast.expr, ast.expr]] = []
+        match node:
+            case ast.Call(func=ast.Attribute(attr="append", value=told), args=[text]) if name_of(told) == "notes":
+                texts = [text]
+            case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Tuple(elts=values)):
+                pairs = list(zip(names, values, strict=True))
+            case ast.Assign(targets=[told], value=value) | ast.AnnAssign(target=told, value=ast.expr() as value):
+                pairs = [(told, value)]
+        for told, value in pairs:
+            if name_of(told) in TOLD:
+                texts += value.values if isinstance(value, ast.Dict) else [value]
+        for text in texts:
+            parts = [text.body, text.orelse] if isinstance(text, ast.IfExp) else [text]
+            yield from (said for said in map(sentence, parts) if said and re.search("[a-z] [a-z]", said))
+
+
 def files() -> list[Path]:
     found = [path for place in PLACES for path in (SOURCES / place).rglob("*.py") or [SOURCES / place]]
     found += [SOURCES / place for place in PLACES if place.endswith(".py")]
@@ -88,6 +126,9 @@ def test_every_error_that_a_page_can_show_is_said_in_german() -> None:
     german = json.loads(GERMAN.read_text())
     said = {text: path for path in files() for text in said_in(path)}
     assert len(said) > 300
+    told = {text: SOURCES / place for place in REPORTS for text in told_in(SOURCES / place)}
+    assert len(told) > 60
+    said.update(told)
     missing = [f"{path.relative_to(ROOT)}: {text}" for text, path in sorted(said.items()) if text not in german]
     assert missing == []
 
@@ -110,4 +151,4 @@ def test_nothing_is_translated_that_nobody_says() -> None:
     )
     for english in json.loads(GERMAN.read_text()):
         if not put_together.fullmatch(english):
-            assert max(english.split("{}"), key=len).strip(" .") in spoken, english
+            assert max(english.split("{}"), key=len).strip(" .,") in spoken, english
