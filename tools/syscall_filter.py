@@ -1,11 +1,12 @@
-"""Write the reward sandbox's filters of system calls: classic BPF programs as data, so that nothing is compiled to run.
+"""Write the sandbox's filters of system calls: classic BPF programs as data, so that nothing is compiled to run.
 
     python tools/syscall_filter.py          # rewrites src/racecraft/reward/sandbox/filters/
     python tools/syscall_filter.py --check  # fails where they are not what this script makes
 
-There are two for each processor. While *loading*, the worker still imports modules that are known and good: it may read
-files. While *serving*, user code runs: it may compute, wait, and use the pipes and memory it already has, and can no
-longer name any path. The kernel keeps both, so that the second only takes away.
+There are three for each processor. While *loading*, the reward worker still imports modules that are known and good: it
+may read files. While *serving*, user code runs: it may compute, wait, and use the pipes and memory it already has, and
+can no longer name any path. The kernel keeps both, so that the second only takes away. While *judging*, a league drives
+by weights of a stranger: it may read as while loading, and have threads.
 
 A call that is not listed fails with EPERM, which Python turns into a PermissionError with a line. Calls that have no
 business in any Python program of this kind end the process, as does every call by the 32-bit or x32 way.
@@ -20,7 +21,7 @@ from pathlib import Path
 from typing import Final
 
 FOLDER: Final = Path(__file__).parents[1] / "src" / "racecraft" / "reward" / "sandbox" / "filters"
-STAGES: Final = ("loading", "serving")
+STAGES: Final = ("loading", "serving", "judging")
 
 # Numbers from the kernel's arch/x86/entry/syscalls/syscall_64.tbl and include/uapi/asm-generic/unistd.h, which never
 # change; a test compares them with the headers of the machine it runs on. aarch64 has only the newer of similar calls.
@@ -36,6 +37,7 @@ NUMBERS: Final[Mapping[str, Mapping[str, int]]] = {
         **{"clock_gettime": 228, "clock_getres": 229, "clock_nanosleep": 230, "exit_group": 231, "openat": 257},
         **{"newfstatat": 262, "readlinkat": 267, "faccessat": 269, "prlimit64": 302, "seccomp": 317},
         **{"getrandom": 318, "statx": 332, "faccessat2": 439},
+        **{"clone": 56, "clone3": 435, "set_robust_list": 273, "rseq": 334},
         **{"ptrace": 101, "process_vm_readv": 310, "process_vm_writev": 311, "process_madvise": 440, "kcmp": 312},
         **{"bpf": 321, "perf_event_open": 298, "userfaultfd": 323, "io_uring_setup": 425, "io_uring_enter": 426},
         **{"io_uring_register": 427, "unshare": 272, "setns": 308, "mount": 165, "umount2": 166, "pivot_root": 155},
@@ -56,7 +58,7 @@ NUMBERS: Final[Mapping[str, Mapping[str, int]]] = {
         **{"gettimeofday": 169, "getpid": 172, "getppid": 173, "getuid": 174, "geteuid": 175, "getgid": 176},
         **{"getegid": 177, "gettid": 178, "sysinfo": 179, "brk": 214, "munmap": 215, "mremap": 216, "mmap": 222},
         **{"mprotect": 226, "madvise": 233, "prlimit64": 261, "seccomp": 277, "getrandom": 278, "statx": 291},
-        **{"faccessat2": 439},
+        **{"faccessat2": 439, "clone": 220, "clone3": 435, "set_robust_list": 99, "rseq": 293},
         **{"ptrace": 117, "process_vm_readv": 270, "process_vm_writev": 271, "process_madvise": 440, "kcmp": 272},
         **{"bpf": 280, "perf_event_open": 241, "userfaultfd": 282, "io_uring_setup": 425, "io_uring_enter": 426},
         **{"io_uring_register": 427, "unshare": 97, "setns": 268, "mount": 40, "umount2": 39, "pivot_root": 41},
@@ -83,6 +85,12 @@ READING: Final = (  # what importing a module takes, and installing the second f
     *("ioctl", "uname", "sysinfo", "sched_getaffinity", "getrusage", "prlimit64", "getuid", "geteuid", "getgid"),
     *("getegid", "getppid", "rt_sigprocmask", "sigaltstack", "seccomp"),
 )
+THREADING: Final = ("clone", "clone3", "set_robust_list", "rseq")
+ALLOWED: Final = {
+    "loading": (*COMPUTING, *READING),
+    "serving": COMPUTING,
+    "judging": (*COMPUTING, *THREADING, *READING),
+}
 DEADLY: Final = (
     *("ptrace", "process_vm_readv", "process_vm_writev", "process_madvise", "kcmp", "bpf", "perf_event_open"),
     *("userfaultfd", "io_uring_setup", "io_uring_enter", "io_uring_register", "unshare", "setns", "mount", "umount2"),
@@ -100,6 +108,7 @@ OPEN_FLAGS: Final = {
 }
 FUTEX_MODIFIERS: Final = 128 | 256  # FUTEX_PRIVATE_FLAG, FUTEX_CLOCK_REALTIME
 FUTEX_OPERATIONS: Final = (0, 1, 9, 10)  # WAIT, WAKE, WAIT_BITSET, WAKE_BITSET
+THREAD: Final = 0x10000  # CLONE_THREAD
 LAST_CLOCK: Final = 11  # CLOCK_TAI; larger and negative numbers are the clocks of processes and devices
 CRASHES: Final = (4, 6, 7, 8, 11)  # SIGILL, SIGABRT, SIGBUS, SIGFPE, SIGSEGV: their handler takes itself away, to end
 FCNTL_COMMANDS: Final = (0, 1, 2, 3, 1030)  # F_DUPFD, F_GETFD, F_SETFD, F_GETFL, F_DUPFD_CLOEXEC
@@ -111,6 +120,7 @@ LOAD, JUMP, EQUAL, GREATER, AT_LEAST, AND, RETURN = 0x20, 0x05, 0x15, 0x25, 0x35
 NUMBER, ARCHITECTURE, ARGUMENTS = 0, 4, 16  # offsets in struct seccomp_data
 ALLOW, REFUSE, KILL = "allow", "refuse", "kill"
 ACTIONS: Final = {ALLOW: 0x7FFF0000, REFUSE: 0x00050000 | 1, KILL: 0x80000000}  # RET_ALLOW, ERRNO | EPERM, KILL_PROCESS
+NOT_THERE: Final = 0x00050000 | 38  # ERRNO | ENOSYS
 
 Line = tuple[str, int, str, str, int, str]  # label, code, label if true, label if not ("" the next line), value, remark
 
@@ -128,7 +138,7 @@ def lines(machine: str, stage: str) -> Iterator[Line]:
     yield "", LOAD, "", "", NUMBER, "the number of the call"
     if machine == "x86_64":
         yield "", AT_LEAST, KILL, "", X32_BIT, "x32"
-    allowed = COMPUTING if stage == "serving" else (*COMPUTING, *READING)
+    allowed = ALLOWED[stage]
     blocks = {name: block for name, block in checks(machine).items() if name in allowed and name in numbers}
     for name in allowed:
         if name in numbers:
@@ -157,6 +167,13 @@ def checks(machine: str) -> dict[str, list[Line]]:
             *one_of(FUTEX_OPERATIONS),
         ],
         "rt_sigaction": [("", LOAD, "", "", argument(0), "the signal"), *one_of(CRASHES)],
+        "clone": [
+            ("", LOAD, "", "", argument(0), "the flags"),
+            ("", AND, "", "", THREAD, "a thread of this process"),
+            ("", EQUAL, ALLOW, REFUSE, THREAD, "and no process"),
+        ],
+        # whose flags lie in memory, where no filter sees them: the C library then takes the other one
+        "clone3": [("", RETURN, "", "", NOT_THERE, "ENOSYS")],
         "fcntl": [("", LOAD, "", "", argument(1), "the command"), *one_of(FCNTL_COMMANDS)],
         "ioctl": [("", LOAD, "", "", argument(1), "the request"), *one_of(IOCTL_COMMANDS)],
         "prlimit64": [

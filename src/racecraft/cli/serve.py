@@ -90,6 +90,7 @@ def serve(
     with needed_for("The console"), loading():
         from racecraft.serve import ServeSettings
         from racecraft.serve import serve as run_server
+        from racecraft.serve.submissions.walls import missing_walls
 
     def ready(link: str) -> None:
         also = f"{address.rstrip('/')}/?{link.partition('?')[2]}" if address else link
@@ -98,6 +99,8 @@ def serve(
         else:
             other = f"\nor, by its address, at {also}" if also != link else ""
             typer.echo(f"The console is open at {link}{other}\nThe link works once. Ctrl-C stops the console.")
+        if league and (lacks := missing_walls()):
+            typer.echo(f"Entries of others are judged behind fewer walls: the system has no {lacks}.", err=True)
         if browser and not as_json:
             import webbrowser
 

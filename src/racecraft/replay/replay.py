@@ -106,7 +106,16 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
         ReplayError: It is too long, or holds a number that is NaN or infinite.
         OSError: The file cannot be written.
     """
-    path = Path(path)
+    write_file(Path(path), pack_replay(replay))
+    return Path(path)
+
+
+def pack_replay(replay: Replay) -> bytes:
+    """A replay as the bytes of its file.
+
+    Raises:
+        ReplayError: It is too long, or holds a number that is NaN or infinite.
+    """
     track = replay.conditions.track
     if sum(car.recording.rows.size for car in replay.cars) > MAX_CELLS:
         raise ReplayError(f"The race is too long for a replay file: more than {MAX_CELLS:,} numbers.")
@@ -137,8 +146,7 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
                 "types": _pack(np.column_stack([recording.actions, rewards, rows]), columns),
             }
         )
-    write_file(path, pack(header, columns))
-    return path
+    return pack(header, columns)
 
 
 def read_replay(path: str | Path) -> Replay:

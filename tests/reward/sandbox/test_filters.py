@@ -110,6 +110,24 @@ def test_files_are_opened_for_reading_alone_and_only_while_loading(machine):
 
 
 @pytest.mark.parametrize("machine", MACHINES)
+def test_a_judge_may_read_and_have_threads_and_nothing_else(machine):
+    names = {number: name for name, number in maker.NUMBERS[machine].items()}
+    allowed = {
+        stage: {names[n] for n in range(1024) if number_answer(machine, stage, n) == ALLOW} for stage in maker.STAGES
+    }
+    assert allowed["judging"] == allowed["loading"] | {"set_robust_list", "rseq"}
+    thread, process, namespace = 0x3D0F00, 0x1200011, 0x10000000  # of pthread_create, of fork, a user's own
+    assert answer(machine, "judging", "clone", thread) == ALLOW
+    for flags in (process, namespace, 0, 0x4100):  # the last of vfork
+        assert answer(machine, "judging", "clone", flags) == EPERM
+    assert answer(machine, "judging", "clone3", 4096, 88) == 0x00050000 | 38  # ENOSYS: clone is asked instead
+    for stage in ("loading", "serving"):
+        assert answer(machine, stage, "clone", thread) == answer(machine, stage, "clone3", 4096, 88) == EPERM
+    for flags in (O_WRONLY, O_RDWR, O_CREAT, O_TRUNC, O_APPEND, O_TMPFILE):
+        assert answer(machine, "judging", "openat", -100, 0, flags) == EPERM
+
+
+@pytest.mark.parametrize("machine", MACHINES)
 def test_arguments_decide(machine):
     for stage in maker.STAGES:
         assert answer(machine, stage, "clock_gettime", 1) == ALLOW

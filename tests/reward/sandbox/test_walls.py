@@ -185,8 +185,8 @@ def test_foreign_code_is_not_compiled(track, rows):
 @pytest.mark.parametrize(
     "broken",
     [
-        {"loading": b"\x06\x00\x00\x00\x00\x00\xff\x7f" * 5000},  # longer than the kernel takes
-        {"loading": b"\xff" * 8},
+        {"filters": [b"\x06\x00\x00\x00\x00\x00\xff\x7f" * 5000]},  # longer than the kernel takes
+        {"filters": [b"\xff" * 8]},
         {"landlock": 1, "readable": ["/nowhere/at/all"]},
     ],
 )
@@ -203,7 +203,11 @@ def test_a_worker_that_cannot_be_locked_in_runs_nothing(track, monkeypatch, brok
 def test_a_broken_second_filter_is_an_error_too(track, monkeypatch):
     import racecraft.reward.worker as module
 
-    monkeypatch.setattr(module, "make_plan", lambda *a, **k: make_plan(*a, **k) | {"serving": b"\xff" * 8})
+    def broken(*args, **settings):
+        plan = make_plan(*args, **settings)
+        return plan | {"filters": [plan["filters"][0], b"\xff" * 8]}
+
+    monkeypatch.setattr(module, "make_plan", broken)
     with pytest.raises(RewardError, match="seccomp: Invalid argument"):
         RewardWorker(function("return 1.0"), track)
 

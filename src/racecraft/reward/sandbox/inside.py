@@ -1,7 +1,8 @@
-"""Locks the reward worker in, from the inside and before the first byte of user code.
+"""Locks a process in, from the inside and before the first byte of a stranger's.
 
-``worker_process.py`` loads this file by its path, without the rest of Racecraft, and calls `enter`. From then on the
-process may read what importing modules takes, and nothing else; the function that `enter` returns takes that, too.
+The reward worker's program loads this file by its path, without the rest of Racecraft; a league's judge imports it.
+Both call `enter`. From then on the process may read what importing modules takes, and what else its plan names; the
+function that `enter` returns takes that from the reward worker, too.
 Numbers are those of the kernel's ``include/uapi/linux`` headers.
 """
 
@@ -37,15 +38,16 @@ def enter(plan: dict[str, Any], descriptors: tuple[int, ...]) -> Callable[[], No
     """Put up the walls around this process, and leave it these file descriptors.
 
     Returns:
-        What takes the rest away: after it no path can be opened, or even looked at.
+        What takes the rest away, where the plan has more filters: after it no path can be opened, or even looked at.
 
     Raises:
         OSError: The kernel refuses a wall; the process must not go on.
     """
     if plan["memory_limit"]:
         close_all_but(*descriptors)
-        limit(plan["memory_limit"])
-    if not plan["landlock"] and not plan["loading"]:
+        limit(plan["memory_limit"], written=plan["written"], has_threads=plan["has_threads"])
+    first, others = plan["filters"][:1], plan["filters"][1:]
+    if not plan["landlock"] and not first:
         return lambda: None
     kernel = Kernel()
     kernel.require("prctl", kernel.prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
@@ -53,12 +55,12 @@ def enter(plan: dict[str, Any], descriptors: tuple[int, ...]) -> Callable[[], No
     kernel.drop_capabilities()
     if plan["landlock"]:
         kernel.restrict_paths(plan["landlock"], plan["readable"], plan["listed"])
-    if plan["loading"]:
-        kernel.filter_calls(plan["loading"])
+    for program in first:
+        kernel.filter_calls(program)
 
     def finish() -> None:
-        if plan["serving"]:
-            kernel.filter_calls(plan["serving"])
+        for program in others:
+            kernel.filter_calls(program)
 
     return finish
 
@@ -72,14 +74,17 @@ def close_all_but(*kept: int) -> None:
         first = descriptor + 1
 
 
-def limit(memory: int) -> None:
-    """Set limits that cannot be raised again: no file written, no process started, no more than ``memory`` bytes."""
+def limit(memory: int, *, written: int, has_threads: bool) -> None:
+    """Set limits that cannot be raised again, in bytes of memory and of a written file; and no process is started.
+
+    A process that has threads has no limit of processes: the system counts those as well, of all that the user runs.
+    """
     for kind, most in (
         (resource.RLIMIT_AS, memory),
-        (resource.RLIMIT_FSIZE, 0),
+        (resource.RLIMIT_FSIZE, written),
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_NOFILE, 64),
-        (resource.RLIMIT_NPROC, 0),
+        *(() if has_threads else ((resource.RLIMIT_NPROC, 0),)),
     ):
         hard = resource.getrlimit(kind)[1]
         value = most if hard == resource.RLIM_INFINITY else min(most, hard)

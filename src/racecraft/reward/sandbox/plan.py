@@ -19,7 +19,13 @@ PROCESSOR: Final = ("/proc/cpuinfo", "/sys/devices/system/cpu")  # by which some
 
 
 def make_plan(
-    confinement: Confinement, *, packages: Sequence[str], files: Sequence[str], memory_limit: int
+    confinement: Confinement,
+    *,
+    packages: Sequence[str],
+    files: Sequence[str],
+    memory_limit: int,
+    stages: Sequence[str] = ("loading", "serving"),
+    written: int = 0,
 ) -> dict[str, Any]:
     """What `inside.enter` is called with.
 
@@ -28,6 +34,8 @@ def make_plan(
         packages: Names of packages that may be imported, beside the standard library.
         files: Paths that may be read, too.
         memory_limit: Address space, bytes.
+        stages: Of the filters of system calls, one after the other; ``judging`` lets a process have threads.
+        written: Bytes of the largest file that may be written, of those that it already has open.
     """
     folders, listed = readable(packages)
     machine = confinement.syscalls
@@ -36,8 +44,9 @@ def make_plan(
         "landlock": confinement.landlock,
         "readable": [*folders, *files],
         "listed": listed,
-        "loading": read_filter(machine, "loading") if machine else b"",
-        "serving": read_filter(machine, "serving") if machine else b"",
+        "filters": [read_filter(machine, stage) for stage in stages] if machine else [],
+        "written": written,
+        "has_threads": "judging" in stages,
     }
 
 

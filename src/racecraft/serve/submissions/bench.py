@@ -15,9 +15,12 @@ from typing import IO, Any, Final
 
 from racecraft import system
 from racecraft.errors import RunError
+from racecraft.serve.submissions.judge import DIFFERED, DROVE, REFUSED
 
 PATIENCE: Final = 600.0  # s
 MOST: Final = 1 << 23  # bytes of an answer
+BUG: Final = "This is a bug in Racecraft; please report it."
+MOST_SHOWN: Final = 1000  # characters of a sentence
 CALM: Final[dict[str, str]] = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 """The whole environment of a judge."""
 
@@ -32,16 +35,23 @@ class Bench:
     def ask(self, told: dict[str, Any], *, folder: Path) -> dict[str, Any]:
         """What the judge says of a submission; it has nothing but the folder and what it is told.
 
+        A child of the judge that was got the better of says what it likes: what is not as it has to be is no verdict.
+
         Raises:
-            RunError: It cannot drive, or did not end; the message says why.
+            RunError: It cannot drive, drove differently the second time, or did not end; the message says why.
         """
         with self._lock:
             answer = self._answer({**told, "folder": str(folder.resolve())})
-        if answer["status"] not in (0, 3):
+        if answer["status"] == DIFFERED:
+            raise RunError("It drove differently the second time.", hint=BUG)
+        try:
+            said = dict(json.loads(answer["said"])) if answer["status"] in (DROVE, REFUSED) else {}
+        except (ValueError, TypeError, RecursionError):
+            said = {}
+        if answer["status"] == REFUSED and said:
+            raise RunError(str(said.get("message"))[:MOST_SHOWN], hint=str(said.get("hint"))[:MOST_SHOWN])
+        if not said:
             raise RunError("The judge's process failed.", hint="The server's jobs.log says why.")
-        said: dict[str, Any] = json.loads(answer["said"])
-        if answer["status"] == 3:
-            raise RunError(said["message"], hint=said["hint"])
         return said
 
     def _answer(self, told: dict[str, Any]) -> dict[str, Any]:

@@ -1,22 +1,25 @@
-"""The judge's process: ``python -m racecraft.serve.submissions.judge``; every entry is judged by a child of its own.
+"""The judge's process: ``python -m racecraft.serve.submissions.judge``; every entry is driven by children of its own.
 
     standard input    a line of JSON: a submission's folder, the race's document, its commitment, the seeds of its
                       starts and of its hidden frames, its track; no secret, no address
-    FOLDER/entry      what drives, read by the child
+    FOLDER/entry      what drives, read by the children
     FOLDER/judged     what was driven
-    standard output   a line of JSON: the child's status, and what it said: how far the model was trained and what it
-                      chooses on hidden frames, or why it cannot drive
+    standard output   a line of JSON: how the judging ended, and what was said: how far the model was trained and what
+                      it chooses on hidden frames, or why it cannot drive
 
-It has no environment, no database and no key: a file that got the better of a child would find nothing, and dies with
-it. A child drives twice, with one thread and with two, and answers only if every bit came out the same. What all of
-them need is loaded once; the process ends when nobody is at the other end of its standard input any more.
+It has no environment, no database and no key, and never reads an entry itself. Two children drive it, one with one
+thread and one with two, each within walls (`racecraft.serve.submissions.walls`): a file that got the better of one
+would find nothing, and die with it. The judge compares what they drove, to the bit. What all of them need is loaded
+once; the process ends when nobody is at the other end of its standard input any more.
 """
 
 from __future__ import annotations
 
+import filecmp
 import json
 import os
 import sys
+import traceback
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -26,7 +29,11 @@ from racecraft.serve.quick import loading
 
 ENTRY: Final = "entry.safetensors"
 JUDGED: Final = "judged.replay"
+AGAIN: Final = "again-judged.replay"
+DROVE, REFUSED, DIFFERED, FAILED = 0, 3, 4, 1
+"""How a judging ended: with a result, with a sentence, with two results, or not at all."""
 MOST_SAID: Final = 1 << 20  # bytes
+MOST_LOGGED: Final = 2000  # characters of a child's last words
 MOST_WRITTEN: Final = 1 << 28  # bytes of a file
 MOST_CPU: Final = 1200  # s
 
@@ -34,88 +41,136 @@ MOST_CPU: Final = 1200  # s
 def main() -> int:
     """Judge what is asked for, until nobody asks any more."""
     with loading():
+        import numpy.random  # noqa: F401  the children have all of it
+        import safetensors  # noqa: F401
+
         import racecraft.contest.contest
         import racecraft.contest.terms
         import racecraft.race.announcement
         import racecraft.race.entry_file
         import racecraft.race.likeness
         import racecraft.replay.replay
-        import racecraft.track  # noqa: F401  the children have all of it
+        import racecraft.track  # noqa: F401
+        from racecraft.serve.submissions.walls import missing_walls
 
+    if lacks := missing_walls():
+        _log(f"Entries are judged behind fewer walls: the system has no {lacks}.")
     for line in sys.stdin:
-        status, said = _by_a_child(json.loads(line))
+        status, said = judge(json.loads(line))
         sys.stdout.write(json.dumps({"status": status, "said": said}) + "\n")
         sys.stdout.flush()
     return 0
 
 
-def _by_a_child(told: dict[str, Any]) -> tuple[int, str]:
-    """Status and words of a child that judges one submission: 0 with a result, 3 with a sentence, others without."""
+def judge(told: dict[str, Any]) -> tuple[int, str]:
+    """How the judging of a submission ended, and what its first child said."""
+    folder = Path(told["folder"])
+    status, said = _by_a_child(told, number=1)
+    if status != DROVE:
+        return status, said
+    status, _ = _by_a_child(told, number=2)
+    if status == FAILED:
+        return FAILED, ""
+    is_same = status == DROVE and filecmp.cmp(folder / JUDGED, folder / AGAIN, shallow=False)
+    (folder / AGAIN).unlink(missing_ok=True)
+    return (DROVE, said) if is_same else (DIFFERED, "")
+
+
+def _by_a_child(told: dict[str, Any], *, number: int) -> tuple[int, str]:
+    """How the first or second child ended, which drives a submission, and what it said; `FAILED` where it was ended."""
     mouth, pen = os.pipe()
     if (child := os.fork()) == 0:
-        status = 1
+        status = FAILED
         try:
-            status = _judge_alone(told, pen)
+            status = _drive_alone(told, pen, number=number)
         finally:
             os._exit(status)
     os.close(pen)
     with open(mouth, "rb") as pipe:
-        said = pipe.read(MOST_SAID)
+        said = pipe.read(MOST_SAID).decode(errors="replace")
     _, ended = os.waitpid(child, 0)
-    return os.waitstatus_to_exitcode(ended), said.decode(errors="replace")
+    status = os.waitstatus_to_exitcode(ended)
+    if status not in (DROVE, REFUSED):
+        why = system.end_of(status) or "an error"
+        _log(f"A judge's child was ended by {why}. {said[-MOST_LOGGED:]}")
+        return FAILED, ""
+    return status, said
 
 
-def _judge_alone(told: dict[str, Any], pen: int) -> int:
-    """In the child: nothing is open to it but its folder and its way to answer."""
+def _drive_alone(told: dict[str, Any], pen: int, *, number: int) -> int:
+    """In the child: nothing is open to it but its way to answer, the entry to read, and a file for what it drove."""
     from racecraft.errors import RacecraftError
+    from racecraft.serve.submissions.walls import lock_in
 
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for file in (0, 1):
-        os.dup2(nothing, file)
-    os.chdir(told["folder"])
-    system.limit(seconds=MOST_CPU, written=MOST_WRITTEN)
+    folder = Path(told["folder"])
     try:
-        said, status = _judge(told), 0
-    except RacecraftError as error:
-        said, status = {"message": str(error), "hint": error.hint}, 3
-    with open(pen, "wb") as pipe:
-        pipe.write(json.dumps(said).encode())
-    return status
+        result = folder / (JUDGED if number == 1 else AGAIN)
+        written = os.open(result, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for file in (0, 1, 2):
+            os.dup2(nothing, file)
+        os.chdir("/")
+        system.limit(seconds=MOST_CPU, written=MOST_WRITTEN)
+        terms = _terms(told)
+        lock_in(entry=folder / ENTRY, kept=(0, 1, 2, pen, written), written=MOST_WRITTEN)
+        try:
+            said, driven = _drive(told, folder / ENTRY, terms, number=number)
+        except RacecraftError as error:
+            _write(pen, json.dumps({"message": str(error), "hint": error.hint}).encode())
+            return REFUSED
+        _write(written, driven)
+        _write(pen, json.dumps(said).encode())
+    except Exception:
+        _write(pen, traceback.format_exc().encode())
+        return FAILED
+    return DROVE
 
 
-def _judge(told: dict[str, Any]) -> dict[str, Any]:
-    from racecraft.contest.contest import hold_race
+def _terms(told: dict[str, Any]) -> Any:
+    """What the race is held by."""
     from racecraft.contest.terms import RaceTerms
-    from racecraft.errors import RunError
     from racecraft.race.announcement import Announcement
-    from racecraft.race.entry_file import read_entry_file
-    from racecraft.race.likeness import hidden_choices
-    from racecraft.replay.replay import write_replay
     from racecraft.track import load_track
 
     document = told["document"]
     announcement = Announcement(document=document, commitment=told["commitment"])
-    conditions = replace(announcement.conditions(load_track(told["track"])), seed=told["seed"])
-    terms = RaceTerms(
+    return RaceTerms(
         kind=document["kind"],
-        conditions=conditions,
+        conditions=replace(announcement.conditions(load_track(told["track"])), seed=told["seed"]),
         ranking=document["ranking"],
         minimum_laps=document["minimum_laps"],
         num_trials=document["trials"],
         announcement=announcement,
     )
-    file, written = read_entry_file(Path(ENTRY)), []
-    for number, threads in ((1, 1), (2, 2)):
-        contest = hold_race([file.entry(told["name"], num_threads=threads)], terms, num_threads=threads)
-        ((_, replay),) = contest.replays()
-        path = Path(JUDGED if number == 1 else f"again-{JUDGED}")
-        write_replay(replay, path)
-        written.append(path.read_bytes())
-    path.unlink()
-    if written[0] != written[1]:
-        raise RunError("It drove differently the second time.", hint="This is a bug in Racecraft; please report it.")
-    entry = file.entry(told["name"], num_threads=1)
-    return {"step": file.saved.step, "choices": hidden_choices(entry, conditions, seed=told["frames"]).tolist()}
+
+
+def _drive(told: dict[str, Any], path: Path, terms: Any, *, number: int) -> tuple[dict[str, Any], bytes]:
+    """What the first child says of an entry, and its replay's file."""
+    from racecraft.contest.contest import hold_race
+    from racecraft.race.entry_file import read_entry_file
+    from racecraft.race.likeness import hidden_choices
+    from racecraft.replay.replay import pack_replay
+
+    file, said = read_entry_file(path), {}
+    entry = file.entry(told["name"], num_threads=number)
+    ((_, replay),) = hold_race([entry], terms, num_threads=number).replays()
+    if number == 1:
+        choices = hidden_choices(entry, terms.conditions, seed=told["frames"])
+        said = {"step": file.saved.step, "choices": choices.tolist()}
+    return said, pack_replay(replay)
+
+
+def _write(file: int, data: bytes) -> None:
+    rest = memoryview(data)
+    while rest:
+        rest = rest[os.write(file, rest) :]
+
+
+def _log(text: str) -> None:
+    """A line for the operator; what a child says has no line of its own, and no control characters."""
+    lines = "\n    ".join(text.splitlines())
+    sys.stderr.write("".join(sign if sign.isprintable() or sign == "\n" else "?" for sign in lines) + "\n")
+    sys.stderr.flush()
 
 
 if __name__ == "__main__":

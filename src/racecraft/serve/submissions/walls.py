@@ -1,0 +1,47 @@
+"""The walls around who drives a stranger's entry: those of reward code, but for threads and a file to write.
+
+Its weights are data, and are looked at as such; the walls are for the day on which that goes wrong. Whoever drives then
+still reads the interpreter, the packages and its own entry alone; it writes into what it has open, and has no network,
+no signals and no programs. What a kernel lacks is left out and said (`missing_walls`).
+"""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Any, Final
+
+from racecraft.reward.sandbox import find_confinement, make_plan
+
+PACKAGES: Final = ("racecraft", "numpy", "safetensors")
+MOST_MEMORY: Final = 1 << 32
+"""Bytes of address space; AWS's deepest network takes a quarter of it."""
+
+
+def missing_walls() -> str:
+    """What the kernel lacks, for a sentence; empty where the walls are complete."""
+    return find_confinement().missing
+
+
+def lock_in(*, entry: Path, kept: tuple[int, ...], written: int) -> None:
+    """Put up the walls around this process for good.
+
+    Args:
+        entry: The file that it may read.
+        kept: File descriptors that it may go on using; others are closed.
+        written: Bytes of the largest file that it may write.
+
+    Raises:
+        OSError: The kernel refuses a wall; the process must not go on.
+    """
+    from racecraft.reward.sandbox.inside import enter
+
+    plan = _plan(written)
+    enter({**plan, "readable": [*plan["readable"], str(entry)]}, kept)
+
+
+@functools.cache
+def _plan(written: int) -> dict[str, Any]:
+    return make_plan(
+        find_confinement(), packages=PACKAGES, files=(), memory_limit=MOST_MEMORY, stages=("judging",), written=written
+    )

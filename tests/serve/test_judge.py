@@ -1,0 +1,184 @@
+"""The league's judge: what a child can reach that a stranger's weights got the better of; what its word is worth."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import shutil
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from leagues import untrained_run
+
+from racecraft.race.announcement import Announcement, draw_secret
+from racecraft.race.conditions import Conditions
+from racecraft.race.entry_file import pack_entry
+from racecraft.race.rules import RaceRules
+from racecraft.reward.sandbox import Confinement, find_confinement
+from racecraft.serve.submissions import judge, walls
+from racecraft.serve.submissions.judge import AGAIN, DROVE, ENTRY, FAILED, JUDGED
+from racecraft.track import load_track
+
+HERE = find_confinement()
+locked = pytest.mark.skipif(not HERE.is_complete, reason=f"no {HERE.missing} here")
+Told = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def entry(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return pack_entry(untrained_run(tmp_path_factory.mktemp("runs"), "novice"))
+
+
+@pytest.fixture
+def told(tmp_path: Path, entry: bytes) -> Told:
+    """What a judge is asked, of an entry in a folder of its own."""
+    conditions = Conditions(track=load_track("oval"), rules=RaceRules(laps=1, max_resets=1))
+    announced = Announcement.of(
+        conditions, kind="time-trial", ranking="total", minimum_laps=1, num_trials=1, secret=draw_secret()
+    )
+    folder = tmp_path / "state" / "submissions" / "mine"
+    folder.mkdir(parents=True)
+    (folder / ENTRY).write_bytes(entry)
+    about = {"document": dict(announced.document), "commitment": announced.commitment, "track": "oval", "name": "x"}
+    return {**about, "seed": 1, "frames": 2, "folder": str(folder)}
+
+
+# ---- walls
+
+
+class Prey:
+    """A server's things, of which none is the judge's: each attack says whether it got at one."""
+
+    def __init__(self, root: Path, entry: Path) -> None:
+        self.root, self.entry = root, entry
+        self.others = root / "state" / "submissions" / "yours" / ENTRY
+        self.others.parent.mkdir()
+        shutil.copy(entry, self.others)
+        self.database, self.secret = root / "state" / "console.db", root / "secret.txt"
+        for path in (self.database, self.secret):
+            path.write_text("of the server")
+        self.listening = socket.create_server(("127.0.0.1", 0))
+        self.leaked = os.open(self.secret, os.O_RDWR)
+        os.set_inheritable(self.leaked, True)
+        self.server = os.getpid()
+
+    def close(self) -> None:
+        self.listening.close()
+        os.close(self.leaked)
+
+    def attacks(self) -> dict[str, Callable[[], object]]:
+        def read(path: Path | str) -> Callable[[], object]:
+            return lambda: Path(path).read_bytes()
+
+        def write(path: Path) -> Callable[[], object]:
+            return lambda: path.write_text("by the child")
+
+        libc = ctypes.CDLL(None, use_errno=True)
+
+        def call(name: str, *arguments: Any) -> Callable[[], object]:
+            def called() -> None:
+                if getattr(libc, name)(*arguments) < 0:
+                    raise OSError(ctypes.get_errno(), name)
+
+            return called
+
+        return {
+            "read the database": read(self.database),
+            "read a secret": read(self.secret),
+            "read another's weights": read(self.others),
+            "read the server's environment": read(f"/proc/{self.server}/environ"),
+            "read the people of the machine": read("/etc/passwd"),
+            "list the submissions": lambda: os.listdir(self.others.parent.parent),
+            "read by a raw call": call("open", bytes(self.database), os.O_RDONLY),
+            "use what was left open": lambda: os.pread(self.leaked, 4, 0),
+            "change the database": write(self.database),
+            "change its own entry": write(self.entry),
+            "make a file beside it": write(self.entry.with_name("more")),
+            "change its own result by name": write(self.entry.with_name(JUDGED)),
+            "write where all may": write(Path("/dev/shm") / f"racecraft-{os.getpid()}"),
+            "remove its entry": lambda: self.entry.unlink(),
+            "rename another's": lambda: self.others.rename(self.others.with_name("gone")),
+            "open a way to the network": lambda: socket.create_connection(self.listening.getsockname(), 1).close(),
+            "ask for a name": lambda: socket.socket(socket.AF_INET, socket.SOCK_DGRAM).close(),
+            "signal the server": lambda: os.kill(self.server, 0),
+            "signal its judge": lambda: os.kill(os.getppid(), 0),
+            "have a child": lambda: os._exit(0) if (child := os.fork()) == 0 else os.waitpid(child, 0),
+            "start a program": lambda: os.posix_spawn("/bin/true", ["true"], {}),
+        }
+
+
+@pytest.fixture
+def prey(tmp_path: Path, told: Told) -> Iterator[Prey]:
+    prey = Prey(tmp_path, Path(told["folder"]) / ENTRY)
+    yield prey
+    prey.close()
+
+
+def tried(prey: Prey, told: Told, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """What each attack came to, made in a child's place of driving: empty where it got through."""
+
+    def attack(*_: object, **__: object) -> tuple[dict[str, str], bytes]:
+        found = {}
+        for name, attempt in attacks.items():
+            try:
+                attempt()
+                found[name] = ""
+            except Exception as error:
+                found[name] = f"{type(error).__name__}: {error}"
+        return found, b"the result"
+
+    attacks = prey.attacks()
+    monkeypatch.setattr(judge, "_drive", attack)
+    status, said = judge._by_a_child(told, number=1)
+    assert status == DROVE
+    found: dict[str, str] = json.loads(said)
+    assert set(found) == set(attacks)
+    return found
+
+
+@locked
+def test_a_child_that_was_got_the_better_of_reaches_nothing(
+    prey: Prey, told: Told, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = tried(prey, told, monkeypatch)
+    assert [name for name, refused in found.items() if not refused] == []
+    assert (prey.entry.with_name(JUDGED)).read_bytes() == b"the result", "the one thing that it may write"
+    assert prey.database.read_text() == "of the server"
+    assert sorted(path.name for path in prey.entry.parent.iterdir()) == sorted([ENTRY, JUDGED])
+
+
+@locked
+def test_without_walls_the_same_attacks_get_through(prey: Prey, told: Told, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that the test above proves walls, and not attacks that never worked."""
+    monkeypatch.setattr(walls, "lock_in", lambda **_: None)
+    found = tried(prey, told, monkeypatch)
+    assert {name: why for name, why in found.items() if why} == {}
+
+
+@locked
+@pytest.mark.skipif(sys.platform != "linux", reason="numbers are Linux's")
+def test_a_child_that_looks_into_its_judge_is_ended(
+    told: Told, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(judge, "_drive", lambda *_, **__: ctypes.CDLL(None).ptrace(16, os.getppid(), None, None))
+    assert judge._by_a_child(told, number=1) == (FAILED, "")
+    assert "ended by SIGSYS" in capfd.readouterr().err
+
+
+def test_where_the_kernel_has_no_walls_it_judges_all_the_same_and_says_so(
+    told: Told, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(walls, "find_confinement", Confinement)
+    walls._plan.cache_clear()
+    try:
+        assert walls.missing_walls() == "Landlock and a filter of system calls (seccomp)"
+        status, said = judge.judge(told)
+    finally:
+        walls._plan.cache_clear()
+    assert (status, json.loads(said)["step"]) == (DROVE, 64)
+    assert not (Path(told["folder"]) / AGAIN).exists()
