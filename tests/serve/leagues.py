@@ -76,20 +76,26 @@ def refused(reply: httpx.Response, status: int) -> str:
 
 
 def untrained_run(
-    root: Path, name: str, *, seed: int = 1, sensors: tuple[str, ...] = ("FRONT_FACING_CAMERA",)
+    root: Path,
+    name: str,
+    *,
+    seed: int = 1,
+    sensors: tuple[str, ...] = ("FRONT_FACING_CAMERA",),
+    actions: str = "default",
 ) -> RunFolder:
     """A run with a checkpoint of a network that was never trained: it drives, badly."""
-    metadata = ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL", sensors=sensors)
+    metadata = ModelMetadata(action_space=action_space(actions), neural_network="RACECRAFT_SMALL", sensors=sensors)
     settings = make_settings(metadata=metadata, track="oval", seed=seed)
     folder = start_run(settings, reward=load_preset("racing"), metadata=metadata, root=root, name=name)
     spec = NetworkSpec(
         name="RACECRAFT_SMALL",
         num_actions=metadata.action_space.size,
-        is_discrete=True,
+        is_discrete=actions != "continuous",
         lidar_size=metadata.suite.lidar_size,
     )
     weights = make_learner(spec, seed=seed, num_threads=1).weights()
-    described = {"name": spec.name, "num_actions": spec.num_actions, "is_discrete": True, "frame_shape": [120, 160]}
+    described = {"name": spec.name, "num_actions": spec.num_actions, "is_discrete": spec.is_discrete}
+    described["frame_shape"] = [120, 160]
     described |= {"lidar_size": spec.lidar_size} if spec.lidar_size else {}
     arrays = {f"{WEIGHTS}{key}": array for key, array in weights.items()}
     folder.checkpoints.save(64 * seed, arrays, metadata={"network": described})

@@ -31,6 +31,7 @@ from racecraft.run import RunFolder
 from racecraft.run.checkpoint import HEADER_KEY
 from racecraft.run.starters import unpack_starter
 from racecraft.run.tensor_file import tensor_file
+from racecraft.serve.races.races import time_limit
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Race, Submission, User, now
 from racecraft.serve.submissions.bench import Bench
@@ -130,6 +131,7 @@ def test_what_is_sent_in_is_judged_and_stands_on_the_board(cup: Cup, run: RunFol
 
     # until it is over nobody sees where it starts
     assert board["race"]["secret"] == ""
+    assert board["race"]["time_limit"] == time_limit(load_track("oval"), laps=1)
     assert "tells where it starts" in refused(cup.ada.get(f"/api/boards/{cup.race}/replays/{first['id']}"), 409)
     assert "secret" not in json.dumps(ok(cup.ada.get("/api/jobs")))
     with database_of(cup.league) as database, database.transaction() as session:

@@ -167,6 +167,7 @@ export const en = {
   race_close_sure: "End it now? It cannot be opened again: its secret is published.",
   race_remove: "Put away",
   race_screen: "Big screen",
+  race_time_limit: "a trial ends at {time} min",
   mine: "Your place",
   mine_of: "{place} of {entrants}",
   mine_none: "Not in the race yet",

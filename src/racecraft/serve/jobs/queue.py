@@ -10,10 +10,11 @@ Every step is one UPDATE whose WHERE says what it relies on, so two servers or w
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from importlib import import_module
 from typing import Any, Final, Literal
 
 import sqlalchemy as sa
@@ -52,6 +53,9 @@ class JobKind:
     """Whether its process waits for another job afterwards: it is short, and loading takes longer."""
     progress: str = "{run}/checkpoints/manifest.json"
     """File below the runs folder that changes whenever something is kept for good."""
+    counts: str = ""
+    """``module:function`` that writes elsewhere what comes of it being done, in that very transaction: of a job that
+    was cancelled a moment before nothing counts. It takes the session, the job's id and its result."""
 
 
 KINDS: Final[Mapping[str, JobKind]] = {
@@ -76,7 +80,12 @@ KINDS: Final[Mapping[str, JobKind]] = {
         folder="contests/{job}",
         news="driven.txt",
     ),
-    "judge": JobKind(slot="other", work="racecraft.serve.submissions.tasks:judge", stays=True),
+    "judge": JobKind(
+        slot="other",
+        work="racecraft.serve.submissions.tasks:judge",
+        stays=True,
+        counts="racecraft.serve.submissions.tasks:count",
+    ),
     "store": JobKind(slot="other", work="racecraft.serve.models.tasks:store"),
 }
 WRITERS: Final = tuple(name for name, kind in KINDS.items() if not kind.folder)
@@ -93,6 +102,13 @@ ENDED: Final = ("done", "failed", "cancelled")
 RESTING: Final = tuple(name for name, kind in KINDS.items() if kind.rests)
 WATCHED: Final = timedelta(seconds=5)
 """How long a look at a training on another machine makes that show its cars."""
+
+
+def function_named(name: str) -> Callable[..., Any]:
+    """What a kind of job names as ``module:function``; imported now."""
+    module, _, function = name.partition(":")
+    found: Callable[..., Any] = getattr(import_module(module), function)
+    return found
 
 
 def folder_of(job: Job) -> tuple[str, str] | None:
@@ -338,7 +354,11 @@ class JobQueue:
                 lease_until=None,
                 **_let_go(job, moment),
             )
-            return session.execute(ended).rowcount == 1  # type: ignore[attr-defined, no-any-return]
+            if session.execute(ended).rowcount != 1:  # type: ignore[attr-defined]
+                return False
+            if state == "done" and job.kind in KINDS and KINDS[job.kind].counts:
+                function_named(KINDS[job.kind].counts)(session, job_id, dict(result or {}))
+            return True
 
     def cancel(self, job_id: str) -> None:
         """Ask for a job's end: a queued one ends at once, a running one when its worker hears of it."""

@@ -12,7 +12,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +20,7 @@ from racecraft.moved import move
 from racecraft.serve.jobs.access import Access
 from racecraft.serve.jobs.courier import Courier
 from racecraft.serve.jobs.office import AWAY, Answer, Office
-from racecraft.serve.jobs.queue import KINDS, LEASE, JobKind
+from racecraft.serve.jobs.queue import KINDS, LEASE, function_named
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.settings import OWNER, runs_of
 from racecraft.serve.store.artifacts import Artifacts
@@ -39,7 +38,7 @@ def work(task: Task) -> dict[str, Any]:
     """
     if task.job.kind not in KINDS:
         raise RunError(f"Jobs of kind {task.job.kind!r} are not known here.", hint="Update Racecraft.")
-    result: dict[str, Any] = _function(KINDS[task.job.kind])(task)
+    result: dict[str, Any] = function_named(KINDS[task.job.kind].work)(task)
     is_copied = task.job.user_id == OWNER and not task.job.travels
     if task.artifacts is not None and task.job.run and is_copied:
         try:
@@ -54,13 +53,7 @@ def work(task: Task) -> dict[str, Any]:
 def load() -> None:
     """Import what any job may need."""
     for kind in KINDS.values():
-        _function(kind)
-
-
-def _function(kind: JobKind) -> Callable[[Task], dict[str, Any]]:
-    module, _, name = kind.work.partition(":")
-    found: Callable[[Task], dict[str, Any]] = getattr(import_module(module), name)
-    return found
+        function_named(kind.work)
 
 
 class Worker:

@@ -50,7 +50,11 @@ KIND: Final = "race"
 MAX_RACES: Final = 500
 MAX_ENTRIES: Final = 1000  # of a race
 RULES: Final = ("laps", "max_resets", "offtrack_penalty", "collision_penalty", "direction")
-"""Rules that who makes a race may choose; the others are deepracer-for-cloud's."""
+"""Rules that who makes a race may choose; the others are deepracer-for-cloud's, which have no limit of time."""
+MISTAKES: Final = 60.0
+"""s a lap that a group's race leaves for mistakes and their penalties."""
+SLOWEST: Final = 0.5
+"""m/s at which its laps can be driven in time, beside that."""
 
 
 class Races:
@@ -95,7 +99,8 @@ class Races:
                 f"An average over {request.minimum_laps} laps cannot be had from {request.laps}.",
                 hint="Ask for more laps, or average over fewer.",
             )
-        terms = _terms(request, self._courses.load(request.track))
+        track = self._courses.load(request.track)
+        terms = _terms(request, track, time_limit=0.0 if group_id is None else time_limit(track, laps=request.laps))
         announced = terms.announcement
         with self._database.transaction() as session:
             held = sa.and_(Race.owner_id == user_id, Race.deleted.is_(None))
@@ -296,9 +301,14 @@ def _entries(session: Any, race_ids: list[int]) -> dict[int, list[Entered]]:
     return found
 
 
-def _terms(request: NewRace, track: Track) -> RaceTerms:
+def time_limit(track: Track, *, laps: int) -> float:
+    """Whole seconds on a trial's clock after which it is over in a race of strangers: nobody keeps a judge for ever."""
+    return float(math.ceil(laps * (MISTAKES + track.length / SLOWEST)))
+
+
+def _terms(request: NewRace, track: Track, *, time_limit: float) -> RaceTerms:
     """What a new race is held by, with a secret unless its seed is given."""
-    changes = {name: getattr(request, name) for name in RULES}
+    changes = {**{name: getattr(request, name) for name in RULES}, "time_limit": time_limit}
     conditions = Conditions(
         track=track,
         rules=race_rules("drfc", changes),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import timedelta
-from typing import Final
+from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
@@ -11,6 +12,7 @@ from sqlalchemy.orm import Session
 from racecraft.serve.problems import Conflict
 from racecraft.serve.races.races import state_of
 from racecraft.serve.store.tables import Job, Race, Submission, now
+from racecraft.serve.submissions.bench import DriverFailed
 from racecraft.serve.submissions.board import read_board
 
 KIND: Final = "judge"
@@ -22,19 +24,20 @@ DAY: Final = timedelta(days=1)
 
 
 def require_room(session: Session, race: Race, user_id: int) -> None:
-    """Refuse what is too many; what failed or was cancelled costs no attempt of the day.
+    """Refuse what is too many; what was cancelled or failed by no fault of its driver costs no attempt of the day.
 
     That is no way to have a judge for nothing, or to find out bit by bit where a race starts by what makes a file
-    fail: only some a day are free. They are counted by their jobs, as the same file sent again is the same submission.
+    fail: a driver that fails, of NaN say, has had its attempt, and of the others only some a day are free. They are
+    counted by their jobs, as the same file sent again is the same submission.
 
     Raises:
         Conflict: It is.
     """
-    query = sa.select(Submission.created, Job.state).join(Job, Job.id == Submission.job_id)
+    query = sa.select(Submission.created, Job.state, Job.error).join(Job, Job.id == Submission.job_id)
     mine = session.execute(query.where(Submission.race_id == race.id, Submission.user_id == user_id)).all()
     if len(mine) >= MAX_SUBMISSIONS:
         raise Conflict(f"You have {MAX_SUBMISSIONS} submissions in this race already.")
-    if sum(state in ("queued", "running") for _, state in mine) >= MAX_WAITING:
+    if sum(state in ("queued", "running") for _, state, _ in mine) >= MAX_WAITING:
         raise Conflict(f"{MAX_WAITING} of your submissions are not judged yet.", hint="Wait for one of them.")
     since = now() - DAY
     free = sa.select(Job.created).where(Job.user_id == user_id, Job.kind == KIND, Job.created > since)
@@ -44,12 +47,16 @@ def require_room(session: Session, race: Race, user_id: int) -> None:
             f"{MAX_FREE} of your submissions failed or were cancelled within a day.",
             hint=f"The next one is possible at {lost[-MAX_FREE] + DAY:%H:%M} UTC.",
         )
-    today = sorted(created for created, state in mine if created > since and state not in ("failed", "cancelled"))
+    today = sorted(created for created, *ended in mine if created > since and not _is_free(*ended))
     if race.attempts_per_day and len(today) >= race.attempts_per_day:
         raise Conflict(
             f"This race takes {race.attempts_per_day} a day of everybody; yours are used up.",
             hint=f"The next one is possible at {today[-race.attempts_per_day] + DAY:%H:%M} UTC.",
         )
+
+
+def _is_free(state: str, error: Mapping[str, Any] | None) -> bool:
+    return state == "cancelled" or (state == "failed" and (error or {}).get("code") != DriverFailed.__name__)
 
 
 def require_place(session: Session, race: Race, user_id: int) -> None:

@@ -25,6 +25,10 @@ CALM: Final[dict[str, str]] = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "
 """The whole environment of a judge."""
 
 
+class DriverFailed(RunError):
+    """It was the entry's own fault that it was not judged to the end: one that costs an attempt."""
+
+
 class Bench:
     """Asks a judge's process, which it starts when it is needed; for one thread at a time."""
 
@@ -38,7 +42,8 @@ class Bench:
         A child of the judge that was got the better of says what it likes: what is not as it has to be is no verdict.
 
         Raises:
-            RunError: It cannot drive, drove differently the second time, or did not end; the message says why.
+            DriverFailed: It cannot drive, or did not end; the message says why.
+            RunError: It drove differently the second time, or the judge failed.
         """
         with self._lock:
             answer = self._answer({**told, "folder": str(folder.resolve())})
@@ -49,7 +54,7 @@ class Bench:
         except (ValueError, TypeError, RecursionError):
             said = {}
         if answer["status"] == REFUSED and said:
-            raise RunError(str(said.get("message"))[:MOST_SHOWN], hint=str(said.get("hint"))[:MOST_SHOWN])
+            raise DriverFailed(str(said.get("message"))[:MOST_SHOWN], hint=str(said.get("hint"))[:MOST_SHOWN])
         if not said:
             raise RunError("The judge's process failed.", hint="The server's jobs.log says why.")
         return said
@@ -63,7 +68,7 @@ class Bench:
             answer: dict[str, Any] = json.loads(_line(answers))
         except TimeoutError as error:
             self.close()
-            raise RunError(f"It drove for more than {PATIENCE:.0f} s and was stopped.") from error
+            raise DriverFailed(f"It drove for more than {PATIENCE:.0f} s and was stopped.") from error
         except (OSError, ValueError) as error:
             self.close()
             raise RunError("The judge's process failed.", hint="The server's jobs.log says why.") from error

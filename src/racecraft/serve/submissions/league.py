@@ -452,6 +452,7 @@ def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
             "part": part,
             "is_public": race.visibility == "public",
             "laps": int(race.rules.get("laps", 1)),
+            "time_limit": float(race.rules.get("time_limit", 0.0)),
             "state": state_of(race),
             "secret": "" if is_withheld(race) else race.secret,
         }

@@ -26,6 +26,8 @@ class LeagueRace(Message):
     kind: RaceKind
     track: str
     laps: int
+    time_limit: float
+    """s on the clock after which a trial is over; 0 for none, as in races that were made before there was one."""
     ranking: Ranking
     minimum_laps: int
     trials: int

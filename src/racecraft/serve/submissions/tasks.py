@@ -5,15 +5,18 @@
 
 The judge is given no secret. This process has it, drives the replay again from its actions alone, and only believes
 what comes out the same, from the starts that the secret gives: laps and mistakes are taken from there. What the judge
-says of choices on hidden frames is only compared with that of others, and never makes a place.
+says of choices on hidden frames is only compared with that of others, and never makes a place. The score comes onto the
+board in the moment in which the job is done (`count`), so that one which is cancelled a moment before has none.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import sqlalchemy as sa
+from sqlalchemy.orm import Session
 
 from racecraft.errors import RunError
 from racecraft.race.announcement import Announcement
@@ -28,6 +31,7 @@ from racecraft.serve.submissions.judge import JUDGED
 FOLDER: Final = "submissions"
 REPLAY: Final = "entry.replay"
 BUG: Final = "This is a bug in Racecraft."
+MOST_STEPS: Final = 10**18
 BENCH: Final = Bench()
 """Of this process, which does one job at a time."""
 
@@ -38,7 +42,7 @@ def submission_folder(state: Path, job_id: str) -> Path:
 
 
 def judge(task: Task) -> dict[str, Any]:
-    """Judge a submission, and write its score where the board is read from."""
+    """Judge a submission; its score, and what there is to tell of it."""
     from racecraft.contest.classification import classify
     from racecraft.replay.replay import read_replay, write_replay
     from racecraft.replay.verification import verify
@@ -56,24 +60,30 @@ def judge(task: Task) -> dict[str, Any]:
     }
     result = BENCH.ask(told, folder=folder)
     try:
-        choices = packed(result["choices"])
+        choices, step = packed(result["choices"]), result["step"]
+        if type(step) is not int or not 0 <= step < MOST_STEPS:
+            raise ValueError("no step")
     except (KeyError, ValueError) as error:
-        raise RunError("The judge's result does not hold: it has no choices.", hint=BUG) from error
+        raise RunError("The judge's result does not hold: it says neither choices nor steps.", hint=BUG) from error
     replay = read_replay(folder / JUDGED)
     found = verify(replay, race=announcement)
     if not found.is_genuine:
         raise RunError(f"The judge's result does not hold: {found.sentence}", hint=BUG)
-    write_replay(replay, folder / REPLAY)
+    public = Announcement(document=announcement.document, commitment=announcement.commitment)
+    write_replay(replace(replay, race=public), folder / REPLAY)
     (folder / JUDGED).unlink()
     terms = announcement.document
     (standing,) = classify([replay.cars], ranking=terms["ranking"], minimum_laps=terms["minimum_laps"])
-    values = {**standing.in_whole_ms(), "judged": now()}
     with task.own_database.transaction() as session:
         keep_choices(session, task.job.id, choices)
-    with task.own_database.transaction() as session:
-        mark_copies(session, task.job.id)
-        session.execute(sa.update(Submission).where(Submission.job_id == task.job.id).values(values))
-    return {**replay.evaluation.report(), "step": int(result["step"])}
+    return {**replay.evaluation.report(), "step": step, "standing": standing.in_whole_ms()}
+
+
+def count(session: Session, job_id: str, result: dict[str, Any]) -> None:
+    """Write the score of a job that is done where the board is read from."""
+    values = {name: result["standing"][name] for name in ("score_ms", "best_lap_ms", "resets", "completion")}
+    mark_copies(session, job_id)
+    session.execute(sa.update(Submission).where(Submission.job_id == job_id).values({**values, "judged": now()}))
 
 
 def _announcement(task: Task) -> Announcement:
