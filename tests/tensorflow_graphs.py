@@ -202,6 +202,7 @@ def _run(node: ParsedNode, inputs: list[Any]) -> Any:
     if kind == "Pack":
         return np.stack(inputs)
     if kind == "Reshape":
+        assert inputs[1].min() >= -1, "numpy takes any size below 0 for one that is open, TensorFlow -1 alone"
         return inputs[0].reshape([int(size) for size in inputs[1]])
     if kind == "ConcatV2":
         return np.concatenate(inputs[:-1], axis=int(inputs[-1]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from racecraft.classic import learn
 from racecraft.course.drivers import DRIVERS, earnings
 from racecraft.course.driving import Drives, drive
 from racecraft.errors import RewardError
@@ -45,6 +46,15 @@ def test_what_is_driven_ends_with_the_lap(driven: dict[str, Drives]) -> None:
         over = np.isnan(one.x)
         assert (over == np.isnan(one.rewards)).all()
         assert (over[1:] >= over[:-1]).all()
+
+
+@pytest.mark.costly
+def test_who_has_learned_drives_where_that_was_or_where_it_is_told_to() -> None:
+    learned = learn("racecraft:Racecraft-v0", "q-table", make={"track": "hairpin"}, seed=1, until="1 steps")
+    one = {"cars": 1, "seconds": 0.2}
+    assert drive(learned, **one).track.name == "hairpin"
+    assert drive(learned, "oval", **one).track.name == "oval"
+    assert drive(DRIVERS["slow"].driver(), **one, action_space="continuous").track.name == "oval"
 
 
 def test_earnings_are_those_of_a_second() -> None:

@@ -62,6 +62,7 @@ def test_a_drfc_folder(tmp_path: Path) -> None:
     assert sorted(found.kept) == ["metrics/TrainingMetrics.json", "training-simtrace/0-iteration.csv"]
     assert (found.unknown, found.track) == ({}, "oval")
     assert found.used["model/model_1.pb"] == "weights of the policy"
+    assert found.used["DR_LOCAL_S3_MODEL_PREFIX=my-model"].startswith("name of the run")
     assert [note[:26] for note in found.notes] == ["The model's critic is not "]
     assert {"DR_WORKERS", "DR_DOCKER_STYLE"} <= found.unused.keys()
     report = json.loads((found.run / "original" / "import.json").read_text())

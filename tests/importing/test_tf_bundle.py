@@ -134,5 +134,11 @@ def test_what_is_no_float_or_lies_elsewhere_is_left_out(tmp_path: Path) -> None:
     assert open_checkpoint(index).shapes == {"a": (2,)}
 
 
+def test_a_name_has_up_to_a_thousand_characters(tmp_path: Path) -> None:
+    index = tmp_path / "4_Step-9.ckpt.index"
+    index.write_bytes(table([HEADER, (b"a" * 1000, entry())]))
+    assert list(open_checkpoint(index).shapes) == ["a" * 1000]
+
+
 def test_names_share_their_beginnings() -> None:
     assert len(block([(b"x" * 100 + bytes([i]), b"") for i in range(65, 80)])) < 200

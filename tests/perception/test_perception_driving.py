@@ -59,6 +59,7 @@ def test_it_steers_back_to_the_middle_and_into_bends() -> None:
 
 def test_it_slows_for_bends_and_where_it_is_not_sure() -> None:
     fast = commands_of(belief_of())[1]
+    assert 1.2 < fast < 1.5
     assert commands_of(belief_of(curvature_near=2.0, curvature=2.0))[1] < 0.8 * fast
     assert commands_of(belief_of(error=0.2))[1] < 0.5 * fast
 

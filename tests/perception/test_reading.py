@@ -14,7 +14,7 @@ from racecraft.learn.native_regressor import NativeRegressor
 from racecraft.learn.networks import PERCEIVER
 from racecraft.perception import Belief, Perceiver, perceive
 from racecraft.perception.answers import NUM_OUTPUTS, NUMBERS
-from racecraft.perception.network import believe
+from racecraft.perception.network import believe, of_one_brightness
 from racecraft.perception.painting import paint
 from racecraft.perception.reading import read_pictures
 from racecraft.perception.telling import tell
@@ -104,6 +104,14 @@ def test_every_truncation_of_a_picture_is_refused_or_read(tmp_path: Path, percei
         except ConfigError:
             refused += 1
     assert refused > 30
+
+
+def test_dark_and_bright_pictures_are_seen_in_one_brightness_and_a_wall_stays_a_wall() -> None:
+    noise = np.random.default_rng(3).normal(0.0, 1.0, (120, 160))
+    pictures = np.stack([40 + 5 * noise, 190 + 15 * noise, 90 + noise]).round().astype(np.uint8)
+    seen = of_one_brightness(pictures)
+    assert seen.mean(axis=(1, 2)) == pytest.approx([112.0] * 3, abs=1.0)
+    assert seen.std(axis=(1, 2)) == pytest.approx([48.0, 48.0, 12.0], abs=1.5)  # less than 4 levels count as 4
 
 
 def test_what_is_told() -> None:
