@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -154,6 +155,22 @@ def test_what_succeeds_costs_nothing_and_what_breaks_neither() -> None:
         pass
     with tries.attempt(account="bob", address="192.0.2.1"):
         pass
+
+
+def test_every_way_in_has_its_number_for_each_network() -> None:
+    tries = Tries()
+
+    def password(*, address: str) -> None:
+        with tries.attempt(address=address) as attempt:
+            attempt.fail()
+
+    program, provider = (partial(tries.begins, what) for what in ("program", "provider"))
+    for ask, most in ((password, 200), (tries.wrong_secret, 200), (program, 200), (provider, 600)):
+        for _ in range(most):
+            ask(address="2001:db8::1")
+        with pytest.raises(TooMany):
+            ask(address="2001:db8::2")
+        ask(address="2001:db8:0:1::1")
 
 
 def test_an_ipv6_network_counts_as_one_address() -> None:
