@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -26,7 +27,7 @@ from joserfc.jwk import RSAKey
 
 from racecraft.errors import ConfigError
 from racecraft.serve.problems import NotLetIn, Unreachable
-from racecraft.serve.provider import discovery, fetch
+from racecraft.serve.provider import discovery, fetch, visits
 from racecraft.serve.provider.provider import Answer, Provider
 from racecraft.serve.provider.visits import Whom
 from racecraft.serve.provider_settings import SECRET, ProviderSettings, claim_of, secret_of
@@ -154,6 +155,12 @@ def test_a_state_works_once_and_in_its_browser_only(hostile: Hostile) -> None:
         league.arrive(answer, browser=browser, user_id=None)
 
 
+def test_who_takes_too_long_begins_again(hostile: Hostile, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(visits, "SECONDS", 0)
+    with pytest.raises(NotLetIn, match="This sign-in is over"):
+        come(hostile, hostile.league())
+
+
 def test_who_links_an_account_is_still_signed_in_as_it(hostile: Hostile) -> None:
     league = hostile.league()
     answer, browser = hostile.go(league, user_id=3)
@@ -219,6 +226,37 @@ def test_nobody_is_led_elsewhere(hostile: Hostile) -> None:
             with pytest.raises(Unreachable):
                 come(hostile, hostile.league())
         assert elsewhere.asked == []
+
+
+@pytest.mark.parametrize(
+    ("told", "problem", "sentence"),
+    [
+        (b'{"error": "invalid_grant"}', NotLetIn, "is over, or was used"),
+        (b'{"error": "invalid_client"}', Unreachable, "does not know this league"),
+        (b'{"error": "<b>call 555</b>"}', Unreachable, "does not answer as it should"),
+        (b'{"error": 7}', Unreachable, "does not answer as it should"),
+        (b"no", Unreachable, "does not answer as it should"),
+    ],
+)
+def test_why_it_refuses_is_told_where_that_is_a_word_of_the_standard(
+    hostile: Hostile, told: bytes, problem: type[Exception], sentence: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    hostile.answers = {"/token_endpoint": lambda at: reply(at, told, status=400)}
+    with pytest.raises(problem, match=sentence):
+        come(hostile, hostile.league())
+    assert "555" not in caplog.text
+
+
+def test_a_proxy_is_not_asked_for_what_is_here_and_no_clock_is_left_running(
+    hostile: Hostile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")  # where nobody listens
+    monkeypatch.delenv("no_proxy", raising=False)
+    come(hostile, hostile.league())
+    clocks = [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]
+    for clock in clocks:
+        clock.join(3.0)
+    assert not any(clock.is_alive() for clock in clocks)
 
 
 @pytest.mark.parametrize(
