@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from PIL import Image
 
 from racecraft.errors import ConfigError, ShapeError
@@ -18,6 +20,9 @@ from racecraft.perception.network import believe, of_one_brightness
 from racecraft.perception.painting import paint
 from racecraft.perception.reading import read_pictures
 from racecraft.perception.telling import tell
+from racecraft.race import RULE_SETS, evaluate
+from racecraft.replay import Replay, write_replay
+from racecraft.track import load_track
 
 
 @pytest.fixture(scope="module")
@@ -74,17 +79,34 @@ def test_a_video_may_be_badly_labelled(tmp_path: Path, perceiver: Perceiver) -> 
         perceive([tmp_path / "in.mp4"], perceiver=perceiver)
 
 
+def test_a_replay_shows_what_the_driver_saw(tmp_path: Path) -> None:
+    seen: list[NDArray[np.uint8]] = []
+
+    def driver(frames: NDArray[np.uint8]) -> NDArray[np.float32]:
+        seen.append(frames[0].copy())
+        return np.array([[0.1, 1.0]], np.float32)
+
+    rules = replace(RULE_SETS["first_lap"], time_limit=1.0)
+    evaluation = evaluate(driver, load_track("oval"), rules=rules, num_trials=1, randomize="none", num_threads=1)
+    pictures = list(read_pictures([write_replay(Replay.of(evaluation), tmp_path / "a.replay")]))
+    assert len(pictures) == len(seen) + 1  # the first is of the step that prepares the start
+    for picture, frame in zip(pictures[1:], seen, strict=True):
+        assert np.abs(picture.seen.astype(int) - frame).mean() < 2.0
+
+
+@pytest.mark.filterwarnings("default")  # no errors, which they are in tests alone
 def test_what_is_no_picture_is_refused(tmp_path: Path, perceiver: Perceiver) -> None:
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40))
     (tmp_path / "b.jpg").write_text("text")
     (tmp_path / "c.mp4").write_bytes(bytes(1000))
     (tmp_path / "d").mkdir()
     Image.new("1", (5000, 5000)).save(tmp_path / "e.png")  # 3 kB
+    Image.new("1", (9500, 9500)).save(tmp_path / "h.png")  # which Pillow warns of
     with (tmp_path / "f.png").open("wb") as large:
         large.truncate(30_000_000)
     says = {
         "a.png": "no picture", "b.jpg": "no picture", "c.mp4": "no video", "d": "no picture in",
-        "e.png": "5000 x 5000 pixels", "f.png": "larger than 20 MB", "g": "nothing at",
+        "e.png": "5000 x 5000 pixels", "f.png": "larger than 20 MB", "g": "nothing at", "h.png": "no picture that",
     }  # fmt: skip
     for name, sentence in says.items():
         with pytest.raises(ConfigError, match=sentence):
@@ -130,6 +152,17 @@ def test_an_offset_to_the_left_is_painted_on_the_left() -> None:
         painted = paint(plain, belief_of(offset=side, half_width=0.4), 0)
         white = np.asarray((painted[440:476] > 240).all(axis=2))
         assert white[:, columns].sum() > 0.95 * white.sum() > 50
+
+
+def test_how_sure_it_is_of_the_offset_is_painted_to_both_sides() -> None:
+    plain = np.full((480, 640, 3), 90, np.uint8)
+    unsure = belief_of(half_width=0.2)
+    sure = replace(unsure, offset_error=np.zeros(1, np.float32))
+    changed = (paint(plain, unsure, 0) != paint(plain, sure, 0))[456:461].any(axis=(0, 2))
+    off = round(0.2 * 640 * NUMBERS["offset"] / 0.2)  # an expected error of 1 in the network's unit
+    for side in (changed[:300][::-1], changed[340:]):  # the arrow of the car hides what is between
+        assert side[: off - 22].all()
+        assert not side[off - 18 :].any()
 
 
 def test_slopes_of_another_shape_are_refused() -> None:

@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from leagues import ok, running_league
 
 from racecraft.serve.jobs.queue import JobQueue
-from racecraft.serve.jobs.turns import FIRST_TURN, PATIENCE, SLOW, SPARE, TURN
+from racecraft.serve.jobs.turns import FIRST_TURN, PATIENCE, SLOW, SPARE, TURN, waiting_line
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job, User
 
@@ -107,6 +107,14 @@ def test_who_is_alone_is_never_asked(machine: Machine) -> None:
     machine.later(timedelta(hours=1))
     assert machine.tend() == []
     assert machine.told(first) == "go on"
+
+
+def test_the_line_stands_as_places_will_be_given(machine: Machine) -> None:
+    first, second, bobs = machine.add(ADA), machine.add(ADA), machine.add(BOB)
+    assert machine.tend() == [first]
+    with machine.database.transaction() as session:
+        line = [job.id for job in waiting_line(session, TRAIN, machine.database.moment(session))]
+    assert line == [first, bobs, second]
 
 
 def test_who_does_not_let_go_delays_nobody(machine: Machine) -> None:

@@ -39,7 +39,9 @@ def reward_function(params):
     for i in range(1, 4):
         if i == 2:
             continue
-        total += i**2 / params["steps"]
+        total += (i**2 + 1) / params["steps"]
+    for i in range(3):
+        total += i
     x, y = params["waypoints"][-1]
     low = min(x, y, -0.5) if not params["is_offtrack"] else -1
     total += max(0, params["speed"] - LIMIT) + (params["is_reversed"] and 2 or 5)
@@ -108,6 +110,7 @@ def test_rewards_in_a_tab_pay_what_they_pay_in_python(tmp_path: Path, objects: O
         ("return params['speed'].hex()", "calls"),
         ("return (lambda: 1)()", "calls"),
         ("import os\n    return 1", "not translated"),
+        ("return 9007199254740993", "Constant"),
     ],
 )
 def test_what_is_not_translated_is_refused(line: str, why: str) -> None:
