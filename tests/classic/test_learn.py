@@ -15,6 +15,7 @@ from racecraft.classic import ALGORITHMS, RECIPES, Progress, job, learn, resume
 from racecraft.classic.saved import load
 from racecraft.classic.settings import Settings
 from racecraft.classic.until import Goal
+from racecraft.classic.worlds import Worlds
 from racecraft.errors import ConfigError, RacecraftError, RunError, TrainingError
 
 CLASSIC = Path(__file__).parents[2] / "src" / "racecraft" / "classic"
@@ -96,6 +97,34 @@ def test_it_ends_when_it_should() -> None:
     assert (easy.reason, easy.steps) == ("return", 50_000) or easy.steps < 50_000
     assert short("q-table", until="0.2 s or 10000000 steps").reason == "seconds"
     assert short("q-table").reason == "steps"
+
+
+def test_its_worlds_are_closed_however_it_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, closed = list[Worlds](), list[Worlds]()
+    make, close = Worlds.__init__, Worlds.close
+    monkeypatch.setattr(Worlds, "__init__", lambda self, *a, **k: (made.append(self), make(self, *a, **k))[1])
+    monkeypatch.setattr(Worlds, "close", lambda self: (closed.append(self), close(self))[1])
+    short("q-table", until="1 steps")
+    assert made
+
+    def stop(progress: Progress) -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        short("q-table", on_progress=stop)
+    assert set(closed) == set(made)
+
+
+@pytest.mark.costly
+def test_who_goes_on_keeps_the_best_there_ever_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    means, seen = iter((50.0, 10.0, 30.0)), list[Progress]()
+    monkeypatch.setattr(job._Classroom, "_evaluate", lambda *_, **__: next(means))
+    short("a2c", root=tmp_path, name="a", until="40 steps", on_progress=seen.append)
+    best = load(tmp_path / "a")[1]
+    for steps in (80, 120):
+        resume(tmp_path / "a", until=f"{steps} steps", on_progress=seen.append)
+    assert [(one.mean_return, one.is_best) for one in seen] == [(50.0, True), (10.0, False), (30.0, False)]
+    assert all((array == best[name]).all() for name, array in load(tmp_path / "a")[1].items())
 
 
 def test_the_last_episodes_are_played_when_somebody_asks(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import pytest
 import sqlalchemy as sa
 
+from racecraft.serve.groups import groups as groups_module
 from racecraft.serve.groups.groups import Groups
 from racecraft.serve.people.people import People, add_person
-from racecraft.serve.problems import NotFound
+from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Member
 
@@ -52,6 +53,14 @@ def whose(groups: Groups, racer: int) -> list[int]:
             assert groups.may_look(organiser, racer)
             found.append(organiser)
     return found
+
+
+def test_an_organiser_makes_so_many_groups(groups: Groups, database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(groups_module, "MAX_GROUPS", 2)
+    teacher = People(database).get(TEACHER)
+    groups.create("second", by=teacher)
+    with pytest.raises(Conflict, match="in 2 groups already"):
+        groups.create("third", by=teacher)
 
 
 def test_a_racer_is_of_the_group_that_they_came_in_by_until_they_leave_it(groups: Groups) -> None:

@@ -6,17 +6,20 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
 from leagues import untrained_run
 
+from racecraft.errors import ConfigError
 from racecraft.race.entry_file import pack_entry
-from racecraft.serve.problems import Conflict
+from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User
+from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions.admission import MAX_FREE
 from racecraft.serve.submissions.league import League
+from racecraft.serve.submissions.schemas import LeagueRaceChange
 from racecraft.serve.tracks.courses import Courses
 
 ADA = 2
@@ -116,6 +119,45 @@ def test_only_some_that_fail_are_free(league: League, database: Database, files:
         for job in session.scalars(sa.select(Job)):
             job.created -= timedelta(days=1)
     submit(files[1])
+
+
+def test_a_change_of_a_race_changes_what_it_names_and_nothing_else(league: League, database: Database) -> None:
+    number = race_of(database)
+    with database.transaction() as session:
+        session.get_one(Member, (1, ADA)).role = "organiser"
+
+    def changed(**told: Any) -> dict[str, Any]:
+        league.change(number, LeagueRaceChange(**told), user_id=ADA)
+        race = league.get(number, ADA)
+        return {name: getattr(race, name) for name in ("title", "attempts_per_day", "is_frozen", "is_public")}
+
+    first = changed()
+    assert first == {"title": "Cup", "attempts_per_day": 1, "is_frozen": False, "is_public": False}
+    assert changed(is_frozen=True) == {**first, "is_frozen": True}
+    assert changed(title=" Final ") == {**first, "is_frozen": True, "title": "Final"}
+    assert changed(is_public=True, attempts_per_day=3, is_frozen=False) == {
+        "title": "Final", "attempts_per_day": 3, "is_frozen": False, "is_public": True
+    }  # fmt: skip
+    with pytest.raises(ConfigError, match="closes before it opens"):
+        changed(closes=now() - timedelta(days=9), title="Never")
+    assert changed()["title"] == "Final"
+
+
+def test_who_is_in_no_group_of_a_race_sees_no_entries_and_the_board_says_how_many_wait(
+    league: League, database: Database, files: list[bytes]
+) -> None:
+    first, number = race_of(database), enter(league, database)(files[0])
+    with database.transaction() as session:
+        session.add(User(id=ADA + 1, name="Bob", handle="bob"))
+        terms = {"track": "oval", "ranking": "total", "commitment": "0" * 64, "attempts_per_day": 0}
+        session.add(Race(owner_id=1, group_id=1, title="Second", visibility="public", **terms))
+    second = first + 1
+    assert [entry.id for entry in league.submissions(first, user_id=ADA)] == [number]
+    for race in (first, second):  # that it is public is for its board alone
+        with pytest.raises(NotFound):
+            league.submissions(race, user_id=ADA + 1)
+    waiting = {race: league.board(race, user_id=ADA, top=10)[2] for race in (first, second)}
+    assert waiting == {first: 1, second: 0}
 
 
 def test_judging_again_leaves_one_copy_of_the_file(
