@@ -26,6 +26,24 @@ SOFTWARE_3D = [
     "--disable-gpu-compositing",
     "--no-sandbox",
 ]
+# What moves on a page is drawn a few times a second: sixty would be most of a test's work, and show the same.
+FEW_FRAMES = """
+(() => {
+  const ask = window.requestAnimationFrame.bind(window), forget = window.cancelAnimationFrame.bind(window);
+  const asked = new Map();
+  let last = 0;
+  window.requestAnimationFrame = (draw) => {
+    const id = ++last;
+    asked.set(id, () => clearTimeout(timer));
+    const timer = setTimeout(() => {
+      const frame = ask((time) => (asked.delete(id), draw(time)));
+      asked.set(id, () => forget(frame));
+    }, 120);
+    return id;
+  };
+  window.cancelAnimationFrame = (id) => (asked.get(id)?.(), asked.delete(id));
+})()
+"""
 
 needs_pages = pytest.mark.skipif(
     not (ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html").exists(),
@@ -111,6 +129,7 @@ def visiting(console: RunningConsole) -> Iterator[Visit]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
         page = browser.new_context().new_page()
+        page.add_init_script(FEW_FRAMES)
         page.set_default_timeout(1000 * PATIENCE)
         cookie = console.client.cookies["racecraft_session"]
         page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from browsers import (
     CHROMIUM,
+    FEW_FRAMES,
     SOFTWARE_3D,
     THEMES,
     Visit,
@@ -38,6 +39,7 @@ class Lesson:
     def arrive(self, name: str) -> Visit:
         """Somebody's own browser, that knows nothing yet."""
         page = self.browser.new_context(locale="en-GB").new_page()
+        page.add_init_script(FEW_FRAMES)
         page.set_default_timeout(1000 * PATIENCE)
         visit = self.visits[name] = Visit(self.league.console, page)
         page.on("console", lambda message: visit.complaints.extend(complaints_of(message)))

@@ -179,18 +179,18 @@ def test_who_may_say_what_and_what_is_refused_by_it(tmp_path: Path) -> None:
         }
         for path, body in bodies.items():
             assert "You have 1 jobs at once" in refused(ada.post(path, json=body), 409), path
-        ok(teacher.put(f"/api/groups/{group}/members/{number}/quota", json={"models": 3, "minutes": 0}), 204)
+        ok(teacher.put(f"/api/groups/{group}/members/{number}/quota", json={"models": 3, "minutes": 30}), 204)
         ok(ada.post("/api/models", json={"name": "third", "train": False}), 201)
         seen = ok(teacher.get(f"/api/groups/{group}/quota"))
         assert seen["racers"] == [
             {
                 "id": number,
-                "said": {"minutes": 0, "models": 3, "places": None},
-                "limits": {"minutes": 0, "models": 3, "places": 1},
+                "said": {"minutes": 30, "models": 3, "places": None},
+                "limits": {"minutes": 30, "models": 3, "places": 1},
                 "used": {"minutes": 0.0, "models": 3, "places": 1},
             }
         ]
-        ok(teacher.put(f"/api/groups/{group}/members/{number}/quota", json={"models": 4, "minutes": 0}), 204)
+        ok(teacher.put(f"/api/groups/{group}/members/{number}/quota", json={"models": 4, "minutes": 30}), 204)
         with ThreadPoolExecutor(6) as pool:  # one of them fits, whichever comes first
             asked = [pool.submit(ada.post, "/api/models", json={"train": False}) for _ in range(6)]
             answers = sorted(one.result().status_code for one in asked)

@@ -270,11 +270,18 @@ class JobQueue:
     ) -> Job | None:
         """The next job for a place of a machine; where all are taken, have somebody rest for who waits."""
         job = None
+        if not self._has_waiting(kinds, is_home=is_home):  # nearly always, and asked twice a second
+            return None
         if self.has_room(kinds_of(slot), machine=machine, places=places):
             job = self.claim(kinds, owner=owner, machine=machine, is_home=is_home)
         if job is None:
             self.make_room(kinds, machine=machine, places=places, is_home=is_home)
         return job
+
+    def _has_waiting(self, kinds: tuple[str, ...], *, is_home: bool) -> bool:
+        query = sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds)).limit(1)
+        with self._database.transaction() as session:
+            return session.scalar(query if is_home else query.where(Job.travels)) is not None
 
     def claim(self, kinds: tuple[str, ...], *, owner: str, machine: str = "", is_home: bool = True) -> Job | None:
         """Take the next queued job of these kinds, or None; away from home one that travels.

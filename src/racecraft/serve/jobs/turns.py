@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Sequence
 from datetime import datetime, timedelta
+from functools import cache
 from typing import Any, Final
 
 import sqlalchemy as sa
@@ -31,7 +32,7 @@ SPARE: Final = 4
 """Jobs of a machine beyond its places, while others save themselves or cannot."""
 
 
-def turn_order(kinds: Collection[str], moment: datetime) -> tuple[Any, ...]:
+def turn_order(kinds: tuple[str, ...], moment: datetime) -> tuple[Any, ...]:
     """The order in which queued jobs of some kinds get a place.
 
     First come jobs whose owners have nothing else running or before them; of these the ones that never ran.
@@ -40,7 +41,8 @@ def turn_order(kinds: Collection[str], moment: datetime) -> tuple[Any, ...]:
     return turn_of(kinds), sa.case((is_served, 1), else_=0), sa.func.coalesce(Job.rested, Job.created), Job.id
 
 
-def turn_of(kinds: Collection[str]) -> sa.ScalarSelect[int]:
+@cache  # putting a statement together takes longer than answering it
+def turn_of(kinds: tuple[str, ...]) -> sa.ScalarSelect[int]:
     """How many jobs of its owner have a place already or come before a queued one."""
     other = aliased(Job)
     is_earlier = sa.or_(
@@ -50,7 +52,7 @@ def turn_of(kinds: Collection[str]) -> sa.ScalarSelect[int]:
     return query.where(other.state.in_(("queued", "running")), is_earlier).scalar_subquery()
 
 
-def waiting_line(session: Session, kinds: Collection[str], moment: datetime) -> Sequence[Job]:
+def waiting_line(session: Session, kinds: tuple[str, ...], moment: datetime) -> Sequence[Job]:
     """The jobs that have the places of these kinds, then those that wait for them in the order they get them."""
     has_place = sa.case((Job.state == "running", 0), else_=1)
     open_ = sa.select(Job).where(Job.kind.in_(kinds), Job.state.in_(("queued", "running")))
