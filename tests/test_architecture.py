@@ -78,6 +78,7 @@ CONSOLE = (
     "quotas",
     "desks",
     "submissions",
+    "finals",
     "workers",
     "context",
     "app",

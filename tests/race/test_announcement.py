@@ -11,7 +11,7 @@ import pytest
 
 from racecraft.errors import ConfigError
 from racecraft.race import Conditions, RaceRules
-from racecraft.race.announcement import Announcement, canonical, commitment_of, draw_secret, seed_of
+from racecraft.race.announcement import MAX_DUELS, Announcement, canonical, commitment_of, draw_secret, seed_of
 from racecraft.race.rules import race_rules
 from racecraft.sim import Bots, Objects, Obstacles, Vehicle
 from racecraft.sim.randomization import Randomization
@@ -188,6 +188,23 @@ def test_fewer_trials_than_announced_are_told() -> None:
         assert race.mismatch(conditions(seed=race.seed), num_cars=number) == (
             f"it has {number} cars and its race asks for 5"
         )
+
+
+def test_a_finals_duels_start_where_its_secret_says_and_nowhere_else() -> None:
+    final = {"form": "bracket", "best": 8, "qualifying": "c" * 64}
+    road = conditions(cars_per_race=2)
+    terms: dict[str, Any] = {"kind": "head-to-model", "ranking": "total", "minimum_laps": 1, "num_trials": 1}
+    race = Announcement.of(road, **terms, secret=SECRET, final=final)
+    seeds = [race.duel_seed(number) for number in range(MAX_DUELS)]
+    assert len({*seeds, race.seed}) == MAX_DUELS + 1
+    assert seeds[1] == int.from_bytes(hashlib.sha256(SECRET + b"duel 1").digest()[:8], "little")
+    for seed in seeds:
+        assert race.mismatch(replace(road, seed=seed), num_cars=2) == ""
+    assert "none of its race's duels" in race.mismatch(replace(road, seed=race.seed or 0), num_cars=2)
+    assert "asks for 2" in race.mismatch(replace(road, seed=seeds[0]), num_cars=1)
+    open_race = Announcement.of(road, **terms, secret=None, final=final)
+    assert open_race.duel_seed(0) != seeds[0]
+    assert open_race.mismatch(replace(road, seed=open_race.duel_seed(0)), num_cars=2) == ""
 
 
 def test_a_document_of_an_earlier_version_has_the_defaults_of_what_came_later() -> None:

@@ -61,6 +61,8 @@ class School:
             "member": number,
             "cup": cup,
             "submission_id": submission,
+            "duel": 0,
+            "heat": 0,
         }
 
 

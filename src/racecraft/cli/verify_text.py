@@ -62,16 +62,19 @@ def say_board_verified(found: BoardVerification) -> None:
     """Whether a league's race was what its board says."""
     for row in found.rows:
         place = "-" if row.place is None else str(row.place)
-        verdict = (f"genuine, submission {row.submission}", "dim")
+        verdict: tuple[str, str] = (f"genuine, submission {row.submission}", "dim")
         if row.foul:
             verdict = (f"submission {row.submission}: {_harmless(row.foul)}", "bold red")
         _say(f"{place:>3}  {_harmless(row.name)}: ", verdict)
+    for duel in found.duels:
+        verdict = (_harmless(duel.foul), "bold red") if duel.foul else ("genuine", "dim")
+        _say(f"  duel {duel.number + 1}, {_harmless(' and '.join(duel.names))}: ", verdict)
     _say_commitment(found.commitment, is_seed_known=found.is_seed_known)
     if found.is_genuine:
-        _say(("Genuine: ", "bold green"), f"starts, {len(found.rows)} replays and places are what the board says.")
+        driven = f"{len(found.duels)} duels" if found.duels else f"{len(found.rows)} replays"
+        _say(("Genuine: ", "bold green"), f"starts, {driven} and places are what the board says.")
     else:
-        fouls = sum(bool(row.foul) for row in found.rows)
-        reason = found.foul or f"{fouls} of {len(found.rows)} rows are not what was driven"
+        reason = found.foul or f"{found.num_fouls} of {len(found.rows) + len(found.duels)} rows are not what was driven"
         _say(("Not genuine: ", "bold red"), _harmless(reason), ".")
 
 

@@ -5,8 +5,9 @@ settings -> *race_terms* -> RaceTerms -> announcement (published), conditions (d
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from racecraft.checks import check_choice, require
 from racecraft.contest.standings import RANKINGS
@@ -60,6 +61,7 @@ def race_terms(
     minimum_laps: int | None = None,
     num_trials: int | None = None,
     secret: bytes | None = None,
+    final: Mapping[str, Any] | None = None,
 ) -> RaceTerms:
     """Settle what a race is held by.
 
@@ -72,6 +74,7 @@ def race_terms(
             ``average``, one for ``best``.
         num_trials: Of each entry that drives alone, 5 by default; cars on one road have one.
         secret: 32 bytes that the seed is drawn from, or None for one that everybody may know.
+        final: What else is announced of a race of duels, from `racecraft.contest.finals.FinalTerms`.
 
     Raises:
         ConfigError: No such race or ranking, or the number of entries, laps or trials does not go with it.
@@ -84,7 +87,13 @@ def race_terms(
     if kind in TOGETHER:
         conditions = replace(shared_road(conditions, num_cars), camera=conditions.camera or CameraSpec())
     announcement = Announcement.of(
-        conditions, kind=kind, ranking=ranking, minimum_laps=needed, num_trials=trials, secret=secret
+        conditions,
+        kind=kind,
+        ranking=ranking,
+        minimum_laps=needed,
+        num_trials=trials,
+        secret=secret,
+        final=final,
     )
     return RaceTerms(
         kind=kind,

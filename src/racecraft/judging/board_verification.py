@@ -10,36 +10,23 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Final
 
 from racecraft.contest.classification import Standing, classify
+from racecraft.contest.finals import FinalTerms
 from racecraft.contest.standings import places, ranking_key
 from racecraft.errors import ConfigError, ReplayError
+from racecraft.judging.board_rows import CheckedDuel, CheckedRow, are_figures, figures_foul, place_foul, read_fetched
+from racecraft.judging.final_verification import check_final
 from racecraft.judging.league import League, LeagueRefused, remembered_token
 from racecraft.judging.race import FORMAT
 from racecraft.race.announcement import Announcement
-from racecraft.replay.replay import Replay, read_replay
+from racecraft.replay.replay import Replay
 from racecraft.replay.verification import verify
 
 ADDRESS: Final = re.compile(r"(https?://[^/?#]+)/(?:.*/)?([0-9]{1,9})(?:/(?:race\.json)?)?")
-FIGURES: Final = {"score_ms": "score", "best_lap_ms": "best lap", "resets": "resets", "completion": "distance"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class CheckedRow:
-    """A row of a board, and what came of checking it."""
-
-    submission: int
-    name: str
-    """Whose it is."""
-    place: int | None
-    """On the board."""
-    foul: str
-    """What does not fit, in words; empty where all does."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +36,8 @@ class BoardVerification:
     title: str
     commitment: str
     rows: list[CheckedRow]
+    duels: list[CheckedDuel]
+    """Of a final in which two meet at a time, in the order in which they were driven."""
     foul: str
     """What else does not fit; empty if nothing."""
     is_seed_known: bool
@@ -57,11 +46,17 @@ class BoardVerification:
     @property
     def is_genuine(self) -> bool:
         """Whether everything is as it says."""
-        return not self.foul and not any(row.foul for row in self.rows)
+        return not self.foul and self.num_fouls == 0
+
+    @property
+    def num_fouls(self) -> int:
+        """Rows and duels that are not what was driven."""
+        return sum(bool(row.foul) for row in self.rows) + sum(bool(duel.foul) for duel in self.duels)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
-        return {"is_genuine": self.is_genuine, **vars(self), "rows": [vars(row) for row in self.rows]}
+        rows, duels = ([vars(one) for one in found] for found in (self.rows, self.duels))
+        return {"is_genuine": self.is_genuine, **vars(self), "rows": rows, "duels": duels}
 
 
 def is_address(race: str) -> bool:
@@ -89,17 +84,28 @@ def verify_board(address: str, *, commitment: str = "", num_threads: int = 0) ->
         foul = f"its commitment is {announcement.commitment}, and {commitment[:80]} was promised"
     elif told.get("running"):
         foul = f"{told['running']} submissions are not judged yet, so the board is not the last one"
+    terms = FinalTerms.of(announcement.document)
+    if terms is not None:
+        final = check_final(league, number, told, announcement, terms, num_threads=num_threads)
+        return _verified(told, announcement, final.rows, final.duels, foul or final.foul)
     checked, standings, driven = [], [], dict[str, int]()
     for row in rows:
         standing, fault = _check(league, number, row, announcement, driven, num_threads=num_threads)
         standings.append(standing)
         checked.append(CheckedRow(submission=row["submission"], name=row["name"], place=row["place"], foul=fault))
+    return _verified(told, announcement, _places_checked(checked, standings), [], foul)
+
+
+def _verified(
+    told: Mapping[str, Any], race: Announcement, rows: list[CheckedRow], duels: list[CheckedDuel], foul: str
+) -> BoardVerification:
     return BoardVerification(
         title=str(told.get("title", "")),
-        commitment=announcement.commitment,
-        rows=_places_checked(checked, standings),
+        commitment=race.commitment,
+        rows=rows,
+        duels=duels,
         foul=foul,
-        is_seed_known="seed" in announcement.document,
+        is_seed_known="seed" in race.document,
     )
 
 
@@ -143,8 +149,7 @@ def _rows(told: Mapping[str, Any]) -> list[dict[str, Any]]:
     for row in rows:
         is_row = isinstance(row, dict) and type(row.get("submission")) is int and 0 <= row["submission"] < 2**31
         is_row = is_row and isinstance(row.get("name"), str) and isinstance(row.get("model"), str)
-        is_row = is_row and all(isinstance(row.get(one), int | None) for one in ("place", "score_ms", "best_lap_ms"))
-        if not is_row or type(row.get("resets")) is not int or not isinstance(row.get("completion"), int | float):
+        if not is_row or not isinstance(row.get("place"), int | None) or not are_figures(row):
             raise ConfigError(f"The board has a row that is none: {str(row)[:200]}.")
         if row["submission"] in seen:
             raise ConfigError(f"Submission {row['submission']} stands twice on the board.")
@@ -163,7 +168,7 @@ def _check(
 ) -> tuple[Standing | None, str]:
     """How a row's replay stands alone, and what does not fit; `driven` remembers what was driven by whom."""
     try:
-        replay = _fetched(league.replay(number, row["submission"]))
+        replay = read_fetched(league.replay(number, row["submission"]))
     except LeagueRefused as error:
         return None, f"its replay is missing: {str(error).rstrip('.')}"
     except ReplayError as error:
@@ -183,18 +188,7 @@ def _check(
         return standing, f"its replay is that of submission {other}, choice for choice"
     if not all(name in (row["model"], f"{row['model']}, trial {n}") for n, name in enumerate(replay.names, 1)):
         return standing, f"its replay is one of {replay.names[0][:80]!r}, not of {row['model'][:80]!r}"
-    for name, value in standing.in_whole_ms().items():
-        if row[name] != value:
-            board, drive = _shown(name, row[name]), _shown(name, value)
-            return standing, f"its {FIGURES[name]} is {board} on the board, {drive} driven"
-    return standing, ""
-
-
-def _fetched(data: bytes) -> Replay:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "its.replay"
-        path.write_bytes(data)
-        return read_replay(path)
+    return standing, figures_foul(row, standing)
 
 
 def _drive_of(replay: Replay) -> str:
@@ -212,9 +206,7 @@ def _places_checked(rows: list[CheckedRow], standings: list[Standing | None]) ->
     ranks = places([_key(standing) for standing in known])
     due = [None if standing.score is None else rank for standing, rank in zip(known, ranks, strict=True)]
     return [
-        row
-        if row.foul or row.place == place
-        else replace(row, foul=f"its place is {_nth(row.place)} on the board, {_nth(place)} by the race's rules")
+        row if row.foul else replace(row, foul=place_foul(row.place, place))
         for row, place in zip(rows, due, strict=True)
     ]
 
@@ -223,13 +215,3 @@ def _key(standing: Standing) -> tuple[float, ...]:
     best = [] if standing.best is None else [standing.best]
     score = math.inf if standing.score is None else standing.score
     return ranking_key(score, lap_times=best, completion=standing.completion, resets=standing.resets)
-
-
-def _nth(place: int | None) -> str:
-    return "none" if place is None else str(place)
-
-
-def _shown(name: str, value: Any) -> str:
-    if value is None:
-        return "none"
-    return f"{value / 1000:.3f} s" if name.endswith("_ms") else f"{value:.6f}" if name == "completion" else str(value)

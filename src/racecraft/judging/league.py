@@ -117,6 +117,14 @@ class League:
         """
         return self._fetch("GET", f"/api/boards/{race}/replays/{submission}", most=MAX_FILE_BYTES + 1)
 
+    def heat(self, race: int, duel: int, heat: int) -> bytes:
+        """The replay file of a final's heat, when the race is over.
+
+        Raises:
+            LeagueRefused: There is none.
+        """
+        return self._fetch("GET", f"/api/boards/{race}/duels/{duel}/heats/{heat}/replay", most=MAX_FILE_BYTES + 1)
+
     def _ask(self, method: str, path: str, data: bytes | None = None, *, kind: str = WEIGHTS) -> Any:
         told = self._fetch(method, path, data, most=MOST, kind=kind)
         try:

@@ -5,6 +5,7 @@
     commitment   SHA-256(secret + document), published when the race opens
     seed         the first 8 bytes, little-endian, of SHA-256(secret + "seed"): of starts, objects and randomisation
     frames seed  the same of SHA-256(secret + "frames"): of hidden frames, by which a league knows copies
+    duel seeds   the same of SHA-256(secret + "duel 0"), "duel 1", …: of a final in which two meet at a time
 
 When the race is over its secret is published. Then everybody can see that the starts were drawn before anybody entered
 (the commitment is that of this secret and document) and that every entry was driven from them (a replay's conditions
@@ -34,6 +35,8 @@ from racecraft.track.track import Track
 SECRET_BYTES: Final = 32
 FORM: Final = 1
 """Of the document."""
+MAX_DUELS: Final = 32
+"""Of a final."""
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")
 
 
@@ -63,6 +66,7 @@ class Announcement:
         minimum_laps: int,
         num_trials: int,
         secret: bytes | None,
+        final: Mapping[str, Any] | None = None,
     ) -> Announcement:
         """Announce a race.
 
@@ -73,6 +77,7 @@ class Announcement:
             minimum_laps: Completed laps that a trial must have for a score.
             num_trials: Of each entry.
             secret: 32 bytes, or None for a race whose seed everybody may know.
+            final: What else is announced of a race in which two meet at a time, see `racecraft.contest.finals`.
         """
         document: dict[str, Any] = {
             "form": FORM,
@@ -84,6 +89,8 @@ class Announcement:
         }
         if secret is None:
             document["seed"] = conditions.seed
+        if final is not None:
+            document["final"] = final
         document = _whole(document)
         return cls(
             document=document,
@@ -143,6 +150,11 @@ class Announcement:
         """Of hidden frames; hidden from nobody where the race has no secret, or none is known here."""
         return _drawn(bytes.fromhex(self.secret), b"frames")
 
+    def duel_seed(self, number: int) -> int:
+        """Of starts and objects of a final's duel, from 0; of a race whose secret is known here, or that has none."""
+        source = bytes.fromhex(self.secret) if self.secret else canonical(self.document)
+        return _drawn(source, f"duel {number}".encode())
+
     def conditions(self, track: Track) -> Conditions:
         """What everybody drives under, on the track that the document names; with seed 0 while that is a secret.
 
@@ -188,7 +200,12 @@ class Announcement:
         due = expected.cars_per_race if expected.cars_per_race > 1 else self.document.get("trials")
         if num_cars != due:
             return f"it has {num_cars} cars and its race asks for {due}"
-        if not self.is_secret and conditions.seed != self.seed:
+        if self.is_secret:
+            return ""
+        if "final" in self.document:
+            if conditions.seed not in map(self.duel_seed, range(MAX_DUELS)):
+                return f"it was driven from the seed {conditions.seed}, which none of its race's duels has"
+        elif conditions.seed != self.seed:
             return f"it was driven from the seed {conditions.seed} and its race has {self.seed}"
         return ""
 

@@ -30,6 +30,7 @@ from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
 from racecraft.serve.evaluations import analysis, beliefs
 from racecraft.serve.evaluations import routes as evaluations
+from racecraft.serve.finals import routes as finals
 from racecraft.serve.groups import routes as groups
 from racecraft.serve.jobs import routes as jobs
 from racecraft.serve.jobs.access import Access
@@ -176,7 +177,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     parts += [contests, jobs, events, door, provider, audit, lessons, workers]
     for part in parts:
         app.include_router(part.router)
-    for part in (account, groups, league, quotas):
+    for part in (account, groups, league, finals, quotas):
         app.include_router(part.router, dependencies=[audit.Audited])
 
     @app.get("/assets/{name}", include_in_schema=False)

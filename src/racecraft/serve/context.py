@@ -15,6 +15,7 @@ from racecraft.serve.contests.contests import Contests
 from racecraft.serve.desks import Desks
 from racecraft.serve.driving.drives import Drives
 from racecraft.serve.driving.ghosts import Ghosts
+from racecraft.serve.finals.finals import Finals
 from racecraft.serve.groups.groups import Groups
 from racecraft.serve.jobs.follower import Follower
 from racecraft.serve.jobs.queue import JobQueue
@@ -86,6 +87,7 @@ class Consoles:
         self.quotas = Quotas(owner.database, owner.settings.runs)
         self.audit, self.devices = Audit(owner.database), Devices()
         self.league = League(owner.database, owner.settings.state, self._courses)
+        self.finals = Finals(owner.database, owner.settings.state, self._courses, self.league)
         self._others: dict[int, Context] = {}
         self._lock = threading.Lock()
 

@@ -86,6 +86,12 @@ KINDS: Final[Mapping[str, JobKind]] = {
         stays=True,
         counts="racecraft.serve.submissions.tasks:count",
     ),
+    "final": JobKind(
+        slot="other",
+        work="racecraft.serve.finals.tasks:final",
+        stays=True,
+        counts="racecraft.serve.finals.tasks:count",
+    ),
     "store": JobKind(slot="other", work="racecraft.serve.models.tasks:store"),
 }
 WRITERS: Final = tuple(name for name, kind in KINDS.items() if not kind.folder)

@@ -33,7 +33,7 @@ Scope = Literal["everybody", "group", "each", "person"]
 WHOLE: Final = 0
 """The number that goes with the scope ``everybody``."""
 DAY: Final = timedelta(days=1)
-UNCOUNTED: Final = ("judge", "store")
+UNCOUNTED: Final = ("judge", "final", "store")
 """Jobs that are limited otherwise, or nobody asked for."""
 
 

@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import sqlalchemy as sa
 
+from racecraft.contest.finals import FinalTerms
 from racecraft.contest.terms import RaceTerms, race_terms
 from racecraft.errors import ConfigError
 from racecraft.race.announcement import Announcement, draw_secret
@@ -85,8 +86,16 @@ class Races:
         self._own = sa.and_(Race.owner_id == user_id, Race.group_id.is_(None), Race.deleted.is_(None))
         self._share, self._see, self._user_id = share, see, user_id
 
-    def create(self, request: NewRace, *, user_id: int, group_id: int | None = None) -> int:
+    def create(
+        self, request: NewRace, *, user_id: int, group_id: int | None = None, final: FinalTerms | None = None
+    ) -> int:
         """Make a race, of a league's group if one is given; its id.
+
+        Args:
+            request: What it is to be.
+            user_id: Who holds it.
+            group_id: For whom.
+            final: Of a race in which two meet at a time.
 
         Raises:
             RacecraftError: The track or a setting is not usable.
@@ -100,7 +109,8 @@ class Races:
                 hint="Ask for more laps, or average over fewer.",
             )
         track = self._courses.load(request.track)
-        terms = _terms(request, track, time_limit=0.0 if group_id is None else time_limit(track, laps=request.laps))
+        limit = 0.0 if group_id is None else time_limit(track, laps=request.laps)
+        terms = _terms(request, track, final, time_limit=limit)
         announced = terms.announcement
         with self._database.transaction() as session:
             held = sa.and_(Race.owner_id == user_id, Race.deleted.is_(None))
@@ -306,7 +316,7 @@ def time_limit(track: Track, *, laps: int) -> float:
     return float(math.ceil(laps * (MISTAKES + track.length / SLOWEST)))
 
 
-def _terms(request: NewRace, track: Track, *, time_limit: float) -> RaceTerms:
+def _terms(request: NewRace, track: Track, final: FinalTerms | None, *, time_limit: float) -> RaceTerms:
     """What a new race is held by, with a secret unless its seed is given."""
     changes = {**{name: getattr(request, name) for name in RULES}, "time_limit": time_limit}
     conditions = Conditions(
@@ -318,11 +328,13 @@ def _terms(request: NewRace, track: Track, *, time_limit: float) -> RaceTerms:
     )
     return race_terms(
         conditions,
-        kind=request.kind,
+        kind=request.kind if final is None else "head-to-model",
+        num_cars=1 if final is None else 2,
         ranking=request.ranking,
         minimum_laps=request.minimum_laps if request.ranking == "average" else None,
-        num_trials=request.trials,
+        num_trials=request.trials if final is None else None,
         secret=draw_secret() if request.seed is None else None,
+        final=None if final is None else final.to_dict(),
     )
 
 

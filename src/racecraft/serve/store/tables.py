@@ -279,6 +279,8 @@ class Race(Table):
     """The race that this one follows: qualifying before a final."""
     best_of_it: Mapped[int] = mapped_column(default=0)
     """How many of the first of that race may enter this one."""
+    final_job_id: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
+    """What drives the duels of a final, once its organiser has begun it."""
     opens: Mapped[datetime] = mapped_column(default=now)
     closes: Mapped[datetime | None]
     created: Mapped[datetime] = mapped_column(default=now)
@@ -343,6 +345,37 @@ class Choices(Table):
     """To that one, see racecraft.race.likeness."""
     is_accepted: Mapped[bool] = mapped_column(default=False)
     """Whether a person has looked at it and let it stand."""
+
+
+class Finalist(Table):
+    """Who drives in a final in which two meet at a time, with what they qualified with."""
+
+    __tablename__ = "finalists"
+
+    race_id: Mapped[int] = mapped_column(ForeignKey("races.id"), primary_key=True)
+    seed: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    """From 1, the best in qualifying."""
+    submission_id: Mapped[int] = mapped_column(ForeignKey("submissions.id"))
+    """To the race that it follows."""
+    place: Mapped[int | None]
+    """From 1, once all duels are decided."""
+
+
+class Duel(Table):
+    """Two finalists who met; see racecraft.contest.finals."""
+
+    __tablename__ = "duels"
+
+    race_id: Mapped[int] = mapped_column(ForeignKey("races.id"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    """From 0, in the order in which they are driven."""
+    first: Mapped[int]
+    """Seed of the better one."""
+    second: Mapped[int]
+    winner: Mapped[int]
+    """Its seed."""
+    results: Mapped[dict[str, Any]]
+    """By seed, what the duel was decided by: racecraft.contest.classification.Standing.in_whole_ms."""
 
 
 class DrivenRecord(Table):

@@ -13,7 +13,8 @@ from racecraft.serve.problems import Conflict
 from racecraft.serve.races.races import state_of
 from racecraft.serve.store.tables import Job, Race, Submission, now
 from racecraft.serve.submissions.bench import DriverFailed
-from racecraft.serve.submissions.board import read_board
+from racecraft.serve.submissions.finalists import board_of
+from racecraft.serve.submissions.stages import final_of
 
 KIND: Final = "judge"
 """Of a submission's job."""
@@ -65,6 +66,8 @@ def require_place(session: Session, race: Race, user_id: int) -> None:
     Raises:
         Conflict: They may not enter.
     """
+    if final_of(race) is not None:
+        raise Conflict("Nobody enters this final: those drive who qualify, with what they qualified with.")
     if race.is_frozen:
         raise Conflict("The race is frozen: nobody enters it for the time being.")
     if race.after_id is None:
@@ -72,7 +75,7 @@ def require_place(session: Session, race: Race, user_id: int) -> None:
     before = session.get_one(Race, race.after_id)
     if state_of(before) != "closed":
         raise Conflict(f"Who drives here is decided by {before.title!r}, which is not over yet.")
-    rows = read_board(session, before.id, user_id=user_id, top=1).rows
+    rows = board_of(session, before, user_id=user_id, top=1).rows
     place = next((row.place for row in rows if row.user == user_id), None)
     if place is None or place > race.best_of_it:
         raise Conflict(f"The first {race.best_of_it} of {before.title!r} drive here.")

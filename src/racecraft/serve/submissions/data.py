@@ -10,6 +10,7 @@ from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import (
     Card,
     Deed,
+    Finalist,
     Group,
     Identity,
     Job,
@@ -41,6 +42,8 @@ def data_of(database: Database, user_id: int) -> dict[str, Any]:
     """A document of everything that is about somebody."""
     with database.transaction() as session:
         groups = sa.select(Group.title, Member).join(Member, Member.group_id == Group.id)
+        finals = sa.select(Race.title, Finalist).join(Finalist, Finalist.race_id == Race.id)
+        finals = finals.join(Submission, Submission.id == Finalist.submission_id)
         submissions = sa.select(Race.title, Submission).join(Submission, Submission.race_id == Race.id)
         return {
             "account": _row(session.get_one(User, user_id)),
@@ -52,6 +55,10 @@ def data_of(database: Database, user_id: int) -> dict[str, Any]:
                 {"title": title, **_row(row)} for title, row in session.execute(groups.where(Member.user_id == user_id))
             ],
             "races": [_row(row) for row in session.scalars(sa.select(Race).where(Race.owner_id == user_id))],
+            "finals": [
+                {"race": title, **_row(row)}
+                for title, row in session.execute(finals.where(Submission.user_id == user_id))
+            ],
             "submissions": [
                 {"race": title, "file": row.digest, **_row(row)}
                 for title, row in session.execute(submissions.where(Submission.user_id == user_id))

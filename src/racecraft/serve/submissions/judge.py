@@ -4,6 +4,7 @@
                       starts and of its hidden frames, its track; no secret, no address
     FOLDER/entry      what drives, read by the children
     FOLDER/judged     what was driven
+                      of a heat of a final instead the files of both who drive, and their names, who is in front first
     standard output   a line of JSON: how the judging ended, and what was said: how far the model was trained and what
                       it chooses on hidden frames, or why it cannot drive
 
@@ -111,10 +112,10 @@ def _drive_alone(told: dict[str, Any], pen: int, *, number: int) -> int:
             os.dup2(nothing, file)
         os.chdir("/")
         system.limit(seconds=MOST_CPU, written=MOST_WRITTEN)
-        terms = _terms(told)
-        lock_in(entry=folder / ENTRY, kept=(0, 1, 2, pen, written), written=MOST_WRITTEN)
+        terms, grid = _terms(told), _grid(told)
+        lock_in(entries=[path for path, _ in grid], kept=(0, 1, 2, pen, written), written=MOST_WRITTEN)
         try:
-            said, driven = _drive(told, folder / ENTRY, terms, number=number)
+            said, driven = _drive(told, grid, terms, number=number)
         except RacecraftError as error:
             _write(pen, json.dumps({"message": str(error), "hint": error.hint}).encode())
             return REFUSED
@@ -126,17 +127,27 @@ def _drive_alone(told: dict[str, Any], pen: int, *, number: int) -> int:
     return DROVE
 
 
+def _grid(told: dict[str, Any]) -> list[tuple[Path, str]]:
+    """What drives and what it is called: an entry alone, or both of a heat."""
+    folder = Path(told["folder"])
+    if "grid" in told:
+        return [(folder / one["file"], one["name"]) for one in told["grid"]]
+    return [(folder / ENTRY, told["name"])]
+
+
 def _terms(told: dict[str, Any]) -> Any:
     """What the race is held by."""
     from racecraft.contest.terms import RaceTerms
     from racecraft.race.announcement import Announcement
+    from racecraft.sim.camera import CameraSpec
     from racecraft.track import load_track
 
     document = told["document"]
     announcement = Announcement(document=document, commitment=told["commitment"])
+    camera = CameraSpec() if "grid" in told else None  # what a road that several share is told of
     return RaceTerms(
         kind=document["kind"],
-        conditions=replace(announcement.conditions(load_track(told["track"])), seed=told["seed"]),
+        conditions=replace(announcement.conditions(load_track(told["track"])), seed=told["seed"], camera=camera),
         ranking=document["ranking"],
         minimum_laps=document["minimum_laps"],
         num_trials=document["trials"],
@@ -144,19 +155,22 @@ def _terms(told: dict[str, Any]) -> Any:
     )
 
 
-def _drive(told: dict[str, Any], path: Path, terms: Any, *, number: int) -> tuple[dict[str, Any], bytes]:
-    """What the first child says of an entry, and its replay's file."""
+def _drive(
+    told: dict[str, Any], grid: list[tuple[Path, str]], terms: Any, *, number: int
+) -> tuple[dict[str, Any], bytes]:
+    """What the first child says of what drives, and the replay's file."""
     from racecraft.contest.contest import hold_race
     from racecraft.race.entry_file import read_entry_file
     from racecraft.race.likeness import hidden_choices
     from racecraft.replay.replay import pack_replay
 
-    file, said = read_entry_file(path), {}
-    entry = file.entry(told["name"], num_threads=number)
-    ((_, replay),) = hold_race([entry], terms, num_threads=number).replays()
-    if number == 1:
-        choices = hidden_choices(entry, terms.conditions, seed=told["frames"])
-        said = {"step": file.saved.step, "choices": choices.tolist()}
+    files = [(read_entry_file(path), name) for path, name in grid]
+    entries = [file.entry(name, num_threads=number) for file, name in files]
+    ((_, replay),) = hold_race(entries, terms, num_threads=number).replays()
+    said: dict[str, Any] = {"steps": [entry.step for entry in entries]} if number == 1 else {}
+    if number == 1 and "grid" not in told:
+        choices = hidden_choices(entries[0], terms.conditions, seed=told["frames"])
+        said = {"step": entries[0].step, "choices": choices.tolist()}
     return said, pack_replay(replay)
 
 

@@ -19,6 +19,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
+from racecraft.contest.finals import FinalTerms
 from racecraft.errors import ConfigError, RacecraftError, RunError
 from racecraft.limits import Medals
 from racecraft.limits.limit import known_limit
@@ -32,11 +33,13 @@ from racecraft.serve.races.standings import trial_scores
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions.admission import KIND, require_place, require_room
-from racecraft.serve.submissions.board import NONE, Board, read_board
+from racecraft.serve.submissions.board import NONE, Board
 from racecraft.serve.submissions.copies import accept
+from racecraft.serve.submissions.finalists import board_of, published_final
 from racecraft.serve.submissions.infos import pace, submission_info, told_of, whose
 from racecraft.serve.submissions.judge import ENTRY
-from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, Stage, SubmissionInfo
+from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, NewLeagueRace, Stage, SubmissionInfo
+from racecraft.serve.submissions.stages import announced_final, final_of, let_follow, require_alone
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.vehicle import load_vehicle
@@ -86,6 +89,22 @@ class League:
             raise NotFound(f"There is no race {race_id} of {'yours' if organiser else 'a group that you are in'}.")
         return _info(race, title, part)
 
+    def announce(self, request: NewLeagueRace, group_id: int) -> FinalTerms | None:
+        """What is announced of a group's new race, if two meet at a time in it.
+
+        Raises:
+            NotFound: The group has no such race to follow.
+            ConfigError: The final is none that can be.
+        """
+        with self._database.transaction() as session:
+            return announced_final(session, request, group_id)
+
+    def begin(self, race_id: int, request: NewLeagueRace) -> None:
+        """Let a race that was just made follow the one that it was announced with."""
+        if request.after is not None:
+            with self._database.transaction() as session:
+                let_follow(session, race_id, request.after, best=request.best)
+
     def change(self, race_id: int, request: LeagueRaceChange, *, user_id: int) -> None:
         """Another title, description, end or audience.
 
@@ -98,6 +117,8 @@ class League:
             race = session.get_one(Race, race_id)
             if "closes" in request.model_fields_set and state_of(race) == "closed":
                 raise Conflict("The race is over: everybody knows its secret.", hint="Make another one.")
+            if "closes" in request.model_fields_set and final_of(race) is not None:
+                raise Conflict("A final in which two meet at a time ends when it has been driven.")
             if "closes" in request.model_fields_set:
                 race.closes = request.closes
             race.title = request.title.strip() if request.title is not None else race.title
@@ -258,32 +279,27 @@ class League:
 
         Raises:
             NotFound: They do not organise both, or the other is of another group.
-            Conflict: Somebody has entered already, or it would follow itself.
+            Conflict: Somebody has entered already, it would follow itself, or is a final in which two meet at a time.
         """
         race = self.get(race_id, user_id, organiser=True)
         before = self.get(stage.race, user_id, organiser=True)
         if race.group != before.group:
             raise NotFound(f"There is no race {stage.race} in this race's group.")
         with self._database.transaction() as session:
-            if session.scalar(sa.select(Submission.id).where(Submission.race_id == race_id).limit(1)) is not None:
-                raise Conflict("Somebody has entered already.", hint="Make another race.")
-            one: int | None = stage.race
-            while one is not None:
-                if one == race_id:
-                    raise Conflict("A race does not follow itself.")
-                one = session.get_one(Race, one).after_id
-            row = session.get_one(Race, race_id)
-            row.after_id, row.best_of_it = stage.race, stage.best
+            require_alone(session.get_one(Race, race_id))
+            let_follow(session, race_id, stage.race, best=stage.best)
 
     def follow_none(self, race_id: int, *, user_id: int) -> None:
         """Let everybody of the group enter a race again.
 
         Raises:
             NotFound: They do not organise it.
+            Conflict: It is a final in which two meet at a time.
         """
         self.get(race_id, user_id, organiser=True)
         with self._database.transaction() as session:
             row = session.get_one(Race, race_id)
+            require_alone(row)
             row.after_id, row.best_of_it = None, 0
 
     def judge_again(self, race_id: int, submission_id: int, *, user_id: int) -> None:
@@ -329,7 +345,7 @@ class League:
         """
         with self._database.transaction() as session:
             race, title, part = self._seen(session, race_id, user_id)
-            board = read_board(session, race_id, user_id=user_id, top=top)
+            board = board_of(session, race, user_id=user_id, top=top)
             waiting = sa.select(sa.func.count(Submission.id)).join(Job, Job.id == Submission.job_id)
             waiting = waiting.where(Submission.race_id == race_id, Job.state.in_(("queued", "running")))
             return _info(race, title, part), board, session.scalar(waiting) or 0
@@ -367,7 +383,11 @@ class League:
         race, board, running = self.board(race_id, user_id=user_id, top=NONE)
         told = {"title": race.title, "state": race.state, "running": running}
         rows = [vars(row) for row in board.rows] if race.state == "closed" else []
-        return {**told, **announced, "board": [{name: row[name] for name in PUBLISHED} for row in rows]}
+        found = {**told, **announced, "board": [{name: row[name] for name in PUBLISHED} for row in rows]}
+        if race.form == "alone" or race.state != "closed":
+            return found
+        with self._database.transaction() as session:
+            return {**found, "final": published_final(session, session.get_one(Race, race_id))}
 
     def replay(self, race_id: int, submission_id: int, *, user_id: int | None) -> Path:
         """The replay file of a judged submission, once the race is over: it has every action.
@@ -451,6 +471,8 @@ def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
             "group_title": group_title,
             "part": part,
             "is_public": race.visibility == "public",
+            "form": (race.document.get("final") or {}).get("form", "alone"),
+            "is_practice": "seed" in race.document,
             "laps": int(race.rules.get("laps", 1)),
             "time_limit": float(race.rules.get("time_limit", 0.0)),
             "state": state_of(race),

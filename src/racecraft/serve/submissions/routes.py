@@ -15,7 +15,7 @@ from racecraft.limits import Medals
 from racecraft.race.entry_file import pack_entry
 from racecraft.serve.context import Computes, Consoles, InConsoles, InLeague, InPerson
 from racecraft.serve.races.replays import replay_of, trial_of
-from racecraft.serve.races.schemas import MAX_CARS, NewRace, RaceReplay
+from racecraft.serve.races.schemas import MAX_CARS, RaceReplay
 from racecraft.serve.schemas import RunName
 from racecraft.serve.submissions.board import Row
 from racecraft.serve.submissions.data import data_of
@@ -27,6 +27,7 @@ from racecraft.serve.submissions.schemas import (
     EnterModel,
     LeagueRace,
     LeagueRaceChange,
+    NewLeagueRace,
     SeasonRow,
     Stage,
     SubmissionInfo,
@@ -49,10 +50,12 @@ def list_league_races(consoles: InConsoles, person: InPerson) -> list[LeagueRace
 
 
 @router.post("/groups/{group_id}/races", status_code=201)
-def create_league_race(group_id: Id, body: NewRace, consoles: InConsoles, person: InPerson) -> LeagueRace:
+def create_league_race(group_id: Id, body: NewLeagueRace, consoles: InConsoles, person: InPerson) -> LeagueRace:
     """A race for a group."""
     consoles.groups.require(group_id, person.id, organiser=True)
-    number = consoles.of(person.id).races.create(body, user_id=person.id, group_id=group_id)
+    final = consoles.league.announce(body, group_id)
+    number = consoles.of(person.id).races.create(body, user_id=person.id, group_id=group_id, final=final)
+    consoles.league.begin(number, body)
     return consoles.league.get(number, person.id)
 
 

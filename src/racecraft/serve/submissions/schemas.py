@@ -7,8 +7,21 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AwareDatetime, Field
 
-from racecraft.serve.races.schemas import RaceKind, RaceState, Ranking, Title
+from racecraft.serve.races.schemas import NewRace, RaceKind, RaceState, Ranking, Title
 from racecraft.serve.schemas import Message, RunName
+
+RaceForm = Literal["alone", "head-to-head", "bracket"]
+"""Everybody against the clock, or two at a time: everyone against everyone, or who loses is out."""
+
+
+class NewLeagueRace(NewRace):
+    """A race for a group; a final in which two meet at a time is announced with the race that it follows."""
+
+    form: RaceForm = "alone"
+    after: int | None = Field(None, ge=0, lt=2**31)
+    """The race whose first drive in this one."""
+    best: int = Field(8, ge=1, le=500)
+    """How many of its first: 2 to 8 where everyone meets everyone, 2 to 32 in a bracket."""
 
 
 class LeagueRace(Message):
@@ -24,6 +37,9 @@ class LeagueRace(Message):
     is_public: bool
     """Whether its board is shown to everybody."""
     kind: RaceKind
+    form: RaceForm
+    is_practice: bool
+    """Whether everybody knows where it starts."""
     track: str
     laps: int
     time_limit: float

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session, aliased
 
 from racecraft.serve.races.races import state_of
 from racecraft.serve.store.tables import Race
-from racecraft.serve.submissions.board import read_board
+from racecraft.serve.submissions.finalists import board_of
 
 POINTS: Final = (25, 18, 15, 12, 10, 8, 6, 4, 2, 1)
 """By place, as Formula 1 gives them since 2010."""
@@ -37,7 +37,7 @@ def read_season(session: Session, group_id: int) -> list[SeasonStanding]:
     for race in session.scalars(held.order_by(Race.id)).all():
         if state_of(race) != "closed":
             continue
-        for row in read_board(session, race.id, user_id=None, top=len(POINTS)).rows:
+        for row in board_of(session, race, user_id=None, top=len(POINTS)).rows:
             if row.place is not None and row.place <= len(POINTS):
                 one = found.setdefault(row.user, SeasonStanding(row.user, row.name))
                 one.points += POINTS[row.place - 1]

@@ -1,13 +1,14 @@
 """The walls around who drives a stranger's entry: those of reward code, but for threads and a file to write.
 
 Its weights are data, and are looked at as such; the walls are for the day on which that goes wrong. Whoever drives then
-still reads the interpreter, the packages and its own entry alone; it writes into what it has open, and has no network,
-no signals and no programs. What a kernel lacks is left out and said (`missing_walls`).
+still reads the interpreter, the packages and its own entry alone (in a heat both); it writes into what it has open, and
+has no network, no signals and no programs. What a kernel lacks is left out and said (`missing_walls`).
 """
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,11 +24,11 @@ def missing_walls() -> str:
     return find_confinement().missing
 
 
-def lock_in(*, entry: Path, kept: tuple[int, ...], written: int) -> None:
+def lock_in(*, entries: Sequence[Path], kept: tuple[int, ...], written: int) -> None:
     """Put up the walls around this process for good.
 
     Args:
-        entry: The file that it may read.
+        entries: The files that it may read.
         kept: File descriptors that it may go on using; others are closed.
         written: Bytes of the largest file that it may write.
 
@@ -37,7 +38,7 @@ def lock_in(*, entry: Path, kept: tuple[int, ...], written: int) -> None:
     from racecraft.reward.sandbox.inside import enter
 
     plan = _plan(written)
-    enter({**plan, "readable": [*plan["readable"], str(entry)]}, kept)
+    enter({**plan, "readable": [*plan["readable"], *map(str, entries)]}, kept)
 
 
 @functools.cache
