@@ -17,6 +17,7 @@ from racecraft.race.entry_file import pack_entry
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
+from racecraft.serve.submissions import admission
 from racecraft.serve.submissions.admission import MAX_FREE
 from racecraft.serve.submissions.league import League
 from racecraft.serve.submissions.schemas import LeagueRaceChange
@@ -119,6 +120,26 @@ def test_only_some_that_fail_are_free(league: League, database: Database, files:
         for job in session.scalars(sa.select(Job)):
             job.created -= timedelta(days=1)
     submit(files[1])
+
+
+def test_so_many_wait_and_so_many_are_kept(
+    league: League, database: Database, files: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(admission, "MAX_WAITING", 2)
+    monkeypatch.setattr(admission, "MAX_SUBMISSIONS", 3)
+    with database.transaction() as session:
+        session.get_one(Race, race_of(database)).attempts_per_day = 0
+    submit = enter(league, database)
+    first, second = submit(files[0]), submit(files[1])
+    with pytest.raises(Conflict, match="2 of your submissions are not judged yet"):
+        submit(files[2])
+    end(database, first, "done")
+    end(database, second, "running")
+    third = submit(files[2])
+    for number in (second, third):
+        end(database, number, "done")
+    with pytest.raises(Conflict, match="You have 3 submissions in this race"):
+        submit(files[3])
 
 
 def test_a_change_of_a_race_changes_what_it_names_and_nothing_else(league: League, database: Database) -> None:
