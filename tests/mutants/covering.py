@@ -28,6 +28,7 @@ PRINTS: Final = "tests/training/test_faults.py::test_prints_are_kept_up_to_the_o
 ENVIRONMENT: Final[Tests] = ("tests/training/test_teacher.py", "tests/training/test_many_tracks.py", PRINTS)
 LESSONS: Final = "tests/classic/test_learn.py"
 NUMBERS: Final = "tests/classic/test_network.py"
+REMEMBERED: Final = "tests/classic/test_remembered.py"
 PROVIDER: Final[Tests] = ("tests/serve/test_provider.py",)
 PEOPLE: Final = "tests/serve/test_league_people.py"
 DOOR: Final = "tests/serve/test_league_door.py"
@@ -124,9 +125,9 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "classic/policy.py": (3, (NUMBERS, "tests/classic/test_tables.py", LESSONS, "-k", "not test_learn or reinforce")),
     "classic/ppo.py": (3, (NUMBERS, LESSONS, "-k", "test_network or ppo")),
     "classic/q_table.py": (3, ("tests/classic/test_tables.py",)),
-    "classic/reinforce.py": (3, (NUMBERS, LESSONS, "-k", "test_network or reinforce")),
-    "classic/replay.py": (2, (NUMBERS, LESSONS, "-k", "dqn or sac")),
-    "classic/rollout.py": (3, (NUMBERS, LESSONS, "-k", "test_network or a2c or ppo")),
+    "classic/reinforce.py": (3, (NUMBERS, REMEMBERED, LESSONS, "-k", "not test_learn or reinforce")),
+    "classic/replay.py": (2, (REMEMBERED, LESSONS, "-k", "test_remembered or dqn or sac")),
+    "classic/rollout.py": (3, (NUMBERS, REMEMBERED, LESSONS, "-k", "not test_learn or a2c or ppo")),
     "classic/sac.py": (4, (NUMBERS, LESSONS, "-k", "test_network or sac")),
     "classic/sarsa.py": (2, ("tests/classic/test_tables.py",)),
     "classic/saved.py": (2, (LESSONS, "-k", "saved or changed or damaged or taken or interrupted")),
