@@ -1,4 +1,4 @@
-"""What DQN does when: how much it explores, how often it learns, and when its clock runs out."""
+"""What DQN, and SAC, do when: how much it explores, how often it learns, and when its clock runs out."""
 
 from __future__ import annotations
 
@@ -34,6 +34,16 @@ def test_so_many_steps_make_an_update_once_it_is_warm(
     warm = 240 - 40 + num_envs  # the step that makes it warm counts
     assert len(updates) == warm // steps_per_update
     assert updates == sorted(updates, reverse=True)
+
+
+def test_sac_learns_from_every_step_once_it_is_warm(monkeypatch: pytest.MonkeyPatch) -> None:
+    stepped = list[int]()
+    monkeypatch.setattr(Adam, "step", lambda self, gradient: stepped.append(len(gradient)))
+    monkeypatch.setattr(job, "EPISODES", 1)
+    settings = {"warm_up": 40, "batch": 4, "num_envs": 4, "steps_per_update": 2, "memory": 500}
+    learn("Pendulum-v1", "sac", seed=1, settings=settings, until="100 steps")
+    optimizers = 4  # of the actor, two critics and the temperature
+    assert len(stepped) == optimizers * (100 - 40) // 2
 
 
 def test_a_limit_in_seconds_lets_it_learn_until_then(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -128,7 +128,7 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "classic/reinforce.py": (3, (NUMBERS, REMEMBERED, LESSONS, "-k", "not test_learn or reinforce")),
     "classic/replay.py": (2, (REMEMBERED, LESSONS, "-k", "test_remembered or dqn or sac")),
     "classic/rollout.py": (3, (NUMBERS, REMEMBERED, LESSONS, "-k", "not test_learn or a2c or ppo")),
-    "classic/sac.py": (4, (NUMBERS, LESSONS, "-k", "test_network or sac")),
+    "classic/sac.py": (4, (NUMBERS, "tests/classic/test_dqn.py", LESSONS, "-k", "test_network or sac")),
     "classic/sarsa.py": (2, ("tests/classic/test_tables.py",)),
     "classic/saved.py": (2, (LESSONS, "-k", "saved or changed or damaged or taken or interrupted")),
     "classic/until.py": (2, (LESSONS, "-k", "stop or ends")),
