@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from racecraft.classic import ALGORITHMS, RECIPES, Progress, job, learn, resume
+from racecraft.classic import ALGORITHMS, RECIPES, Progress, job, learn, ppo, resume
 from racecraft.classic.saved import load
 from racecraft.classic.settings import Settings
 from racecraft.classic.until import Goal
@@ -89,6 +89,20 @@ def test_what_was_learned_is_saved_and_goes_on(algorithm: str, tmp_path: Path) -
     assert more.steps >= learned.steps + 400
     assert len(more.curve) == len(learned.curve) + 1
     assert load(folder)[2] == more.steps
+
+
+@pytest.mark.costly
+def test_the_cuts_of_a_table_are_saved_with_it(tmp_path: Path) -> None:
+    learned = learn("racecraft:Racecraft-v0", "q-table", seed=1, until="1 steps", root=tmp_path, name="a")
+    assert learned.lesson.settings.cuts
+    assert load(tmp_path / "a")[0] == learned.lesson
+
+
+def test_ppo_looks_at_every_step_once_in_every_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked, clipped = list[int](), ppo.clipped
+    monkeypatch.setattr(ppo, "clipped", lambda ratio, *more: (looked.append(len(ratio)), clipped(ratio, *more))[1])
+    learned = short("ppo", until="300 steps")
+    assert sum(looked) == learned.lesson.settings.epochs * learned.steps
 
 
 @pytest.mark.costly

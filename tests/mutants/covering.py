@@ -32,6 +32,7 @@ REMEMBERED: Final = "tests/classic/test_remembered.py"
 PROVIDER: Final[Tests] = ("tests/serve/test_provider.py",)
 PEOPLE: Final = "tests/serve/test_league_people.py"
 DOOR: Final = "tests/serve/test_league_door.py"
+KEYS: Final[Tests] = ("tests/serve/test_keys.py", PEOPLE, "-k", "test_keys or code_has or stolen or tokens or anew")
 GROUPS: Final[Tests] = (
     "tests/serve/test_homes.py",
     PEOPLE,
@@ -40,7 +41,7 @@ GROUPS: Final[Tests] = (
 )
 ENTRIES: Final[Tests] = ("tests/serve/test_submission_limits.py", "-k", "not postgresql")
 BOARD: Final = "tests/serve/test_league_races.py::test_the_board_places_by_the_rules_of_every_race"
-TOKENS: Final[Tests] = ("tests/serve/test_token_workers.py",)
+TOKENS: Final[Tests] = ("tests/serve/test_token_workers.py", "-k", "reads_and_writes or too_large or opens_nothing")
 WAYS: Final[Tests] = ("tests/training/test_algorithms.py", "tests/training/test_lap_place.py")
 
 COVERING: Final[dict[str, tuple[int, Tests]]] = {
@@ -178,7 +179,7 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "serve/door/known_browsers.py": (3, (DOOR, "-k", "mark or signed_in_here")),
     "serve/door/routes.py": (3, (DOOR, PEOPLE, "-k", "guesses or locked_out or card or code or anew")),
     "serve/people/tries.py": (4, (DOOR, "-k", "forty or succeeds or every_way or ipv6")),
-    "serve/people/keys.py": (4, (PEOPLE, "-k", "code_has or stolen or tokens or anew")),
+    "serve/people/keys.py": (4, KEYS),
     "serve/people/names.py": (1, (PEOPLE, "-k", "names")),
     "serve/provider/discovery.py": (3, PROVIDER),
     "serve/provider/fetch.py": (3, PROVIDER),

@@ -239,6 +239,14 @@ def test_a_hostile_list_of_files_is_refused(tmp_path: Path, files: Any) -> None:
     assert not (tmp_path / "up").exists()
 
 
+def test_cars_are_shown_as_they_were_last(tmp_path: Path) -> None:
+    store = Artifacts(f"file://{tmp_path / 'store'}")
+    assert store.shown("a") == b""
+    for live in (b"first", b"second"):
+        store.show("a", live)
+    assert (store.shown("a"), store.shown("b")) == (b"second", b"")
+
+
 def test_a_store_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))
