@@ -94,6 +94,8 @@ def test_a_band_shows_its_change_and_a_model_branches_off_from_before_it(changed
 
 def test_the_log_is_searched_narrowed_and_kept(changed: Visit) -> None:
     page = changed.open("/models/heron/watch")
+    page.get_by_role("link", name="Whole log:").click()
+    page.wait_for_url("**/models/heron/log")
     log = page.get_by_role("region", name="Log", exact=True)
     log.locator("tbody tr").first.wait_for()
     everything = log.locator("tbody tr").count()
@@ -105,6 +107,10 @@ def test_the_log_is_searched_narrowed_and_kept(changed: Visit) -> None:
     page.get_by_role("searchbox", name="Search the log").fill("BEST")
     page.locator("tr.evaluation").first.wait_for(state="detached")
     assert page.locator("tr.best").count() == len(best)
+    assert page.url.endswith("/models/heron/log?words=BEST")
+    page.reload()  # what is wanted of it is in its address
+    page.locator("tr.best").first.wait_for()
+    assert page.locator("tbody tr").count() == len(best)
     with page.expect_download() as download:
         page.get_by_role("button", name="Download", exact=True).click()
     assert download.value.suggested_filename == "heron-log.txt"
@@ -139,6 +145,21 @@ def test_the_medal_of_the_best_lap_is_on_the_card_and_on_its_pages(changed: Visi
         won.wait_for()
         assert f"Bronze {model['medals']['bronze']:.2f} s" in str(won.get_attribute("title"))
         shutil.rmtree(folder)
+
+
+def test_whose_best_lap_is_meant_is_said_wherever_one_stands(changed: Visit) -> None:
+    client = changed.console.client
+    job = client.post("/api/models/heron/evaluations", json={"laps": 1, "num_trials": 1, "rules": "first_lap"}).json()
+    assert changed.console.wait_for(changed.console.job_ended(job["id"]))["state"] == "done"
+    for path, whose in (
+        ("/models/heron/watch", "the model's track"),
+        ("/models/heron/race", "of this evaluation."),
+        ("/models/heron/setup", "that this checkpoint was saved with."),
+        ("/compare/heron/other", "in that stretch of the training."),
+    ):
+        term = changed.open(path).locator(".term", has_text="Best lap").first
+        assert str(term.get_attribute("title")).startswith("The fastest whole lap, penalties included: of ")
+        assert whose in " ".join(one.get_attribute("title") for one in changed.page.locator(".term").all())
 
 
 def test_when_nobody_trains_the_best_car_drives_its_lap(changed: Visit) -> None:

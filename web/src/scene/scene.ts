@@ -3,6 +3,7 @@
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { TrackGeometry } from "../api/client";
+import { CAR_TONE, hueOf } from "../lib/colors";
 import { boxGeometry } from "./box";
 import { carGeometry } from "./car";
 import { standBack } from "./fit";
@@ -328,7 +329,7 @@ export class Scene {
         car,
         tint !== undefined
           ? colour.setHex(tint)
-          : colour.setHSL(0.58 - 0.5 * Math.min(Math.max(pose.progress, 0), 1), 0.75, 0.55),
+          : colour.setHSL(hueOf(pose.progress), CAR_TONE.saturation, CAR_TONE.lightness),
       );
     });
     leader = this.now?.focus ?? leader;

@@ -140,6 +140,7 @@ export const create: Record<keyof typeof english, string> = {
   reward: "Belohnung",
   reward_lead: "Wofür du das Auto bezahlst, nach jedem Schritt gefragt. Es lernt, so viel wie möglich zu verdienen.",
   preset: "Vorlage",
+  preset_colours: "Jedes Bild mit eigener Skala:",
   own_code: "Eigener Code",
   reward_needs_boxes: "Diese Belohnung achtet auf Kisten; die Strecke ist leer.",
   reward_needs_bots: "Diese Belohnung achtet auf andere Autos; die Strecke ist leer.",

@@ -14,8 +14,15 @@ export const garage: Record<keyof typeof english, string> = {
   sort_completion: "Geschafft",
   sort_name: "Name",
   nothing_found: "Nichts passt zur Suche.",
-  best_lap_is:
-    "Die schnellste ganze Runde samt Strafen aus allen Auswertungen auf ihrer Strecke: im Training und danach.",
+  best_lap_is: "Die schnellste ganze Runde samt Strafen:",
+  best_lap_of_model: "aus allen Auswertungen auf der Strecke des Modells, im Training und danach.",
+  best_lap_of_stretch: "aus allen Auswertungen dessen, was in dem Abschnitt des Trainings gelernt wurde.",
+  best_lap_of_checkpoint: "aus der Auswertung, mit der dieser Zwischenstand gespeichert wurde.",
+  best_lap_of_evaluation: "aus dieser Auswertung.",
+  best_lap_of_race: "aus den Runden des Modells in diesem Rennen.",
+  best_lap_of_heat: "aus den Runden des Modells in diesem Lauf.",
+  best_lap_of_sweep: "aus allen Auswertungen eines Trainings; im Mittel über die Seeds, und wie sicher das ist.",
+  best_lap_of_tab: "aus der letzten Auswertung in diesem Tab.",
   medals_are:
     "Die Zeit des Autors fährt unser Linienfahrer wirklich; Gold ist 6 % langsamer, Silber 20 %, Bronze 50 %.",
   medal_author: "Autor",
@@ -28,8 +35,6 @@ export const garage: Record<keyof typeof english, string> = {
   medal_to_gold: "Gold",
   medal_to_silver: "Silber",
   medal_to_bronze: "Bronze",
-  best_lap_race: "Beste Runde dieser Auswertung",
-  best_lap_checkpoint: "In der Prüfung, mit der dieser Stand gespeichert wurde",
   import_trackless: "{name} braucht eine Strecke",
   import_trackless_lead:
     "Auf einer anderen Strecke beginnt das Training mit frischen Gewichten; Belohnung, Aktionen und Zahlen werden übernommen.",

@@ -23,7 +23,6 @@ export const sweeps: Record<keyof typeof english, string> = {
     "Das Mittel über die Startwerte; der Balken enthält das wahre Mittel mit 95 %. Mehr Startwerte machen ihn schmaler. „Gleichauf“ könnte so gut sein wie die erste.",
   sweeps_setting: "Einstellung",
   sweeps_laps_after: "Alle Runden nach, Schritte",
-  sweeps_best_lap: "Beste Runde",
   sweeps_range: "{mean} ({low} bis {high})",
   sweeps_came: "{count} von {all} Startwerten kamen so weit",
   sweeps_tied: "gleichauf",

@@ -137,6 +137,7 @@ export const create = {
   reward: "Reward",
   reward_lead: "What you pay the car for, called after every step. It learns to earn as much as it can.",
   preset: "Preset",
+  preset_colours: "Each picture on a scale of its own:",
   own_code: "Own code",
   reward_needs_boxes: "This reward looks out for boxes; the road is empty.",
   reward_needs_bots: "This reward looks out for other cars; the road is empty.",

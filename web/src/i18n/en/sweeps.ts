@@ -20,7 +20,6 @@ export const sweeps = {
     "The mean over the seeds; the bar holds the true mean with 95 %. More seeds make it narrower. “Tied” could be as good as the first.",
   sweeps_setting: "Setting",
   sweeps_laps_after: "All laps after, steps",
-  sweeps_best_lap: "Best lap",
   sweeps_range: "{mean} ({low} to {high})",
   sweeps_came: "{count} of {all} seeds came so far",
   sweeps_tied: "tied",
