@@ -73,6 +73,19 @@ def test_actions_reach_the_bounds() -> None:
     assert to_bounds(np.array([[-1.0, 1.0], [0.0, 0.0], [9.0, -9.0]]), space).tolist() == [[-2, 1], [0, 0.5], [2, 0]]
 
 
+def test_actions_without_bounds_stay_as_they_are() -> None:
+    space = spaces.Box(-np.inf, np.inf, (2,), np.float32)
+    assert to_bounds(np.array([[0.5, -3.0]]), space).tolist() == [[0.5, -3.0]]
+
+
+def test_environments_are_closed_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = list[Any]()
+    close = gymnasium.Wrapper.close
+    monkeypatch.setattr(gymnasium.Wrapper, "close", lambda self: (closed.append(self.unwrapped), close(self))[1])
+    Worlds("FrozenLake-v1", num_envs=3, seed=1, view=CellView).close()
+    assert len(set(map(id, closed))) == 3
+
+
 def test_a_world_begins_anew_and_still_tells_what_came_last() -> None:
     made = worlds("CartPole-v1")
     begun = made.observations.copy()

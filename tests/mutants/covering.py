@@ -41,7 +41,11 @@ GROUPS: Final[Tests] = (
 )
 ENTRIES: Final[Tests] = ("tests/serve/test_submission_limits.py", "-k", "not postgresql")
 BOARD: Final = "tests/serve/test_league_races.py::test_the_board_places_by_the_rules_of_every_race"
-TOKENS: Final[Tests] = ("tests/serve/test_token_workers.py", "-k", "reads_and_writes or too_large or opens_nothing")
+TOKENS: Final[Tests] = (
+    "tests/serve/test_token_workers.py",
+    "-k",
+    "test_leases or reads_and_writes or too_large or opens_nothing",
+)
 WAYS: Final[Tests] = ("tests/training/test_algorithms.py", "tests/training/test_lap_place.py")
 
 COVERING: Final[dict[str, tuple[int, Tests]]] = {
@@ -195,6 +199,6 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "serve/submissions/board.py": (4, (BOARD,)),
     "serve/submissions/copies.py": (2, ("tests/serve/test_copies.py",)),
     "serve/submissions/league.py": (6, (*ENTRIES, BOARD)),
-    "serve/workers/leases.py": (4, TOKENS),
+    "serve/workers/leases.py": (4, ("tests/serve/test_leases.py", *TOKENS)),
     "serve/workers/parcels.py": (4, TOKENS),
 }
