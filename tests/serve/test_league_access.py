@@ -185,6 +185,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "GET /api/league/races/{cup}/submissions": ("member", None),
     "POST /api/league/races/{cup}/enter": ("own", {"model": "adas-model"}),
     "GET /api/league/races/{cup}/submissions/{submission_id}": ("own", None),
+    "PATCH /api/league/races/{cup}/submissions/{submission_id}": ("organiser", {"model": "x"}),
     "POST /api/league/races/{cup}/submissions/{submission_id}/disqualify": ("organiser", {"reason": "x"}),
     "POST /api/league/races/{cup}/submissions/{submission_id}/restore": ("organiser", None),
     "POST /api/league/races/{cup}/submissions/{submission_id}/accept": ("organiser", None),

@@ -20,7 +20,7 @@ from running_consoles import running_console
 
 from racecraft.course import find_lesson
 from racecraft.errors import ConfigError
-from racecraft.serve.people.devices import Devices
+from racecraft.serve.people.devices import MOST, Devices
 from racecraft.serve.people.names import checked_name, handle_of
 from racecraft.serve.problems import NotFound, NotLetIn, TooMany
 from racecraft.serve.settings import ServeSettings
@@ -268,10 +268,18 @@ def test_a_program_waits_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
         devices.confirm(code, 2)
     with pytest.raises(NotLetIn):
         devices.take(secret)
-    for _ in range(500):
+    begun = [devices.begin() for _ in range(MOST)]
+    with pytest.raises(TooMany) as caught:
         devices.begin()
+    assert str(caught.value) == "Too many programs wait to be let in."
+    assert caught.value.hint == "Try again in ten minutes."
+    devices.confirm(begun[0][1], 2)
+    assert devices.take(begun[0][0]) == 2
+    devices.begin()  # in the place of the one that was let in
     with pytest.raises(TooMany):
         devices.begin()
+    monkeypatch.setattr(time, "monotonic", lambda: clock + 1202)
+    devices.begin()
 
 
 def test_everybodys_models_are_their_own_and_may_have_the_same_name(
@@ -334,6 +342,10 @@ def test_real_names_are_for_organisers_and_names_can_be_moderated(
     assert ok(school["bob"].get(f"/api/groups/{group}"))["joining"] is None
     ok(teacher.patch(address, json={"name": "Countess"}), 204)
     assert ok(ada.get("/api/account"))["name"] == "Countess"
+    assert "gave you this name" in refused(ada.patch("/api/account", json={"name": "Ada"}), 409)
+    ok(ada.put("/api/account/password", json={"new": "a password of hers"}), 204)
+    ok(teacher.patch(address, json={"name": "Lady Ada"}), 204)
+    assert ok(ada.get("/api/account"))["name"] == "Lady Ada", "a password is no way round it"
     refused(teacher.patch(address, json={"name": "bob"}), 409)
     refused(school["other"].patch(address, json={"name": "Rude"}), 404)
 

@@ -84,6 +84,8 @@ export const leagueApi = {
   enter: (id: number, model: string) => ask<SubmissionInfo>("POST", `/league/races/${id}/enter`, { model }),
   submissions: (id: number, everybody: boolean) =>
     ask<SubmissionInfo[]>("GET", `/league/races/${id}/submissions?everybody=${everybody}`),
+  renameModel: (id: number, submission: number, model: string) =>
+    ask<void>("PATCH", `/league/races/${id}/submissions/${submission}`, { model }),
   disqualify: (id: number, submission: number, reason: string) =>
     ask<void>("POST", `/league/races/${id}/submissions/${submission}/disqualify`, { reason }),
   accept: (id: number, submission: number) => ask<void>("POST", `/league/races/${id}/submissions/${submission}/accept`),

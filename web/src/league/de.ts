@@ -173,6 +173,7 @@ export const de: Record<LeagueKey, string> = {
   race_close_sure: "Jetzt beenden? Es lässt sich nicht wieder öffnen: Das Geheimnis wird veröffentlicht.",
   race_remove: "Weglegen",
   race_screen: "Großbild",
+  model_name: "Wie das Modell heißt",
   race_time_limit: "ein Versuch endet nach {time} min",
   mine: "Dein Platz",
   mine_of: "{place} von {entrants}",

@@ -167,6 +167,7 @@ export const en = {
   race_close_sure: "End it now? It cannot be opened again: its secret is published.",
   race_remove: "Put away",
   race_screen: "Big screen",
+  model_name: "What the model is called",
   race_time_limit: "a trial ends at {time} min",
   mine: "Your place",
   mine_of: "{place} of {entrants}",

@@ -109,12 +109,12 @@ def add_members(
 
 @router.patch("/groups/{group_id}/members/{member}", status_code=204)
 def change_member(group_id: Id, member: Id, body: MemberChange, consoles: InConsoles, person: InPerson) -> Response:
-    """Another name for somebody, if the one they chose will not do, or a real name, which is each group's own."""
+    """Another name for somebody, which then stays, or a real name, which is each group's own."""
     consoles.groups.require(group_id, person.id, organiser=True)
     consoles.groups.racer(group_id, member)
     if body.name is not None:
-        _require_ward(consoles, group_id, member, person.id)
-        consoles.people.rename(member, body.name)
+        _require_own_racer(consoles, group_id, member)
+        consoles.people.rename(member, body.name, by_organiser=True)
     if body.real_name is not None:
         consoles.groups.set_real_name(group_id, member, body.real_name)
     return Response(status_code=204)
@@ -248,6 +248,17 @@ def _require_ward(consoles: Consoles, group_id: int, member: int, user_id: int) 
     if _is_independent(ward):
         raise NotFound(f"{ward.name} has an account of their own, with a password.")
     consoles.groups.ward(group_id, member)
+
+
+def _require_own_racer(consoles: Consoles, group_id: int, member: int) -> None:
+    """Make sure that a racer came in by a group: its organisers name them, also with a password, which a name is not.
+
+    Raises:
+        NotFound: They did not, or have power themselves.
+    """
+    consoles.groups.ward(group_id, member)
+    if (one := consoles.people.get(member)).may_organise:
+        raise NotFound(f"{one.name} organises groups.")
 
 
 def _is_independent(person: Person) -> bool:

@@ -66,14 +66,17 @@ class People:
                 raise NotFound(f"There is nobody called {name[:64]!r}.")
             return _person(user)
 
-    def rename(self, user_id: int, name: str) -> None:
-        """Another name.
+    def rename(self, user_id: int, name: str, *, by_organiser: bool = False) -> None:
+        """Another name; one that an organiser gave is only changed by an organiser.
 
         Raises:
-            Conflict: It is taken, or looks like one that is.
+            Conflict: It is taken, or looks like one that is; or the one that there is stays.
         """
         with self._database.transaction() as session:
             user = session.get_one(User, user_id)
+            if user.is_moderated and not by_organiser:
+                raise Conflict("Who organises your group gave you this name.", hint="Ask them for another one.")
+            user.is_moderated = by_organiser
             user.name, user.handle = checked_name(name), handle_of(checked_name(name))
             _flush(session, user.name)
 

@@ -52,6 +52,8 @@ class User(Table):
     """As everybody sees it."""
     handle: Mapped[str | None] = mapped_column(String(200), unique=True)
     """The name as `racecraft.serve.people.names.handle_of` folds it, so that no two look alike; None once deleted."""
+    is_moderated: Mapped[bool] = mapped_column(default=False)
+    """Whether an organiser gave them their name, which they do not change any more."""
     role: Mapped[str] = mapped_column(String(16), default="racer")
     """``admin``, ``organiser`` or ``racer``."""
     password: Mapped[str] = mapped_column(String(200), default="")
@@ -318,7 +320,9 @@ class Submission(Table):
     digest: Mapped[str] = mapped_column(String(64))
     """SHA-256 of what drives, whatever it was called."""
     model: Mapped[str] = mapped_column(String(64))
-    """What its owner calls it."""
+    """What its owner calls it, or who organises the race."""
+    is_moderated: Mapped[bool] = mapped_column(default=False)
+    """Whether it is the latter, which its owner does not change any more."""
     score_ms: Mapped[int | None]
     """None until it is judged, and for one that did not complete enough laps."""
     best_lap_ms: Mapped[int | None]

@@ -38,6 +38,7 @@ from racecraft.serve.submissions.copies import accept
 from racecraft.serve.submissions.finalists import board_of, published_final
 from racecraft.serve.submissions.infos import pace, submission_info, told_of, whose
 from racecraft.serve.submissions.judge import ENTRY
+from racecraft.serve.submissions.moderation import rename_model
 from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, NewLeagueRace, Stage, SubmissionInfo
 from racecraft.serve.submissions.stages import announced_final, final_of, let_follow, require_alone
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
@@ -195,7 +196,9 @@ class League:
                 session.flush()
                 if known is not None:  # its job failed, which costs no attempt; this one is of today
                     earlier = known.job_id
-                    known.job_id, known.model, known.created = job.id, model, now()
+                    known.job_id, known.created = job.id, now()
+                    known.model = known.model if known.is_moderated else model
+                    job.payload = {"track": track, "name": known.model}
                     return known, earlier
                 fresh = Submission(race_id=race_id, user_id=user_id, job_id=job.id, digest=digest, model=model)
                 session.add(fresh)
@@ -273,6 +276,17 @@ class League:
                 raise NotFound(f"There is no submission {submission_id} in this race.")
             if not accept(session, submission_id):
                 raise Conflict("It drives like nobody else's entry.")
+
+    def rename_model(self, race_id: int, submission_id: int, model: str, *, user_id: int) -> None:
+        """Call a submission otherwise, for good, if what its owner calls it will not do.
+
+        Raises:
+            NotFound: They do not organise the race, or it has no such submission.
+            Conflict: It is not judged yet.
+        """
+        self.get(race_id, user_id, organiser=True)
+        with self._database.transaction() as session:
+            rename_model(session, self._state, race_id, submission_id, model)
 
     def follow(self, race_id: int, stage: Stage, *, user_id: int) -> None:
         """Let a race take its drivers from another one of its group.

@@ -30,6 +30,7 @@ from racecraft.serve.submissions.schemas import (
     NewLeagueRace,
     SeasonRow,
     Stage,
+    SubmissionChange,
     SubmissionInfo,
 )
 from racecraft.serve.submissions.season import read_season
@@ -202,6 +203,15 @@ def list_submissions(
 def get_submission(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> SubmissionInfo:
     """One of one's own."""
     return consoles.league.submission(race_id, submission_id, user_id=person.id)
+
+
+@router.patch("/league/races/{race_id}/submissions/{submission_id}", status_code=204)
+def rename_model(
+    race_id: Id, submission_id: Id, body: SubmissionChange, consoles: InConsoles, person: InPerson
+) -> Response:
+    """Another name for somebody's entry, if the one it has will not do; it stays."""
+    consoles.league.rename_model(race_id, submission_id, body.model, user_id=person.id)
+    return Response(status_code=204)
 
 
 @router.post("/league/races/{race_id}/submissions/{submission_id}/disqualify", status_code=204)

@@ -174,6 +174,12 @@ class EnterModel(Message):
     checkpoint: Literal["best", "last"] = "best"
 
 
+class SubmissionChange(Message):
+    """What an organiser changes about somebody's submission."""
+
+    model: RunName
+
+
 class Disqualify(Message):
     """Why somebody's submission does not count."""
 
