@@ -181,7 +181,7 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     # a league: who comes in, what is sent in, how much of the machine is whose, who lends one
     "serve/door/guard.py": (4, ("tests/serve/test_door.py", "-k", "not postgresql")),
     "serve/door/known_browsers.py": (3, (DOOR, "-k", "mark or signed_in_here")),
-    "serve/door/routes.py": (3, (DOOR, PEOPLE, "-k", "guesses or locked_out or card or code or anew")),
+    "serve/door/routes.py": (3, ("tests/serve/test_audit.py", DOOR, PEOPLE, "-k", "came_in or one_pupil or anew")),
     "serve/people/tries.py": (4, (DOOR, "-k", "forty or succeeds or every_way or ipv6")),
     "serve/people/keys.py": (4, KEYS),
     "serve/people/names.py": (1, (PEOPLE, "-k", "names")),

@@ -48,6 +48,7 @@ def test_one_pupil_does_not_lock_out_the_class_that_shares_an_address(tmp_path: 
         pupil, other = league.stranger(), league.stranger()
         assert statuses_of(pupil, "/api/door/devices", 201) == [201] * 200 + [429]
         assert statuses_of(pupil, "/api/door/card", 201, {"secret": "wrong"}) == [401] * 200 + [429]
+        assert statuses_of(pupil, "/api/door/devices/token", 1, {"secret": "wrong"}) == [429], "counted with the cards"
         ok(other.post("/api/door/card", json=shown[0]))
         ok(other.post("/api/door/join", json={"code": code, "name": "Carl"}), 201)
         guessed = statuses_of(pupil, "/api/door/join", 201, {"code": "WRNG-CODE", "name": "Eve"})

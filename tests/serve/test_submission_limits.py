@@ -18,6 +18,7 @@ from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions import admission
+from racecraft.serve.submissions import league as league_module
 from racecraft.serve.submissions.admission import MAX_FREE
 from racecraft.serve.submissions.league import League
 from racecraft.serve.submissions.schemas import LeagueRaceChange
@@ -179,6 +180,17 @@ def test_who_is_in_no_group_of_a_race_sees_no_entries_and_the_board_says_how_man
             league.submissions(race, user_id=ADA + 1)
     waiting = {race: league.board(race, user_id=ADA, top=10)[2] for race in (first, second)}
     assert waiting == {first: 1, second: 0}
+
+
+def test_the_trial_that_counts_is_that_with_the_score(
+    league: League, database: Database, files: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(league_module, "trial_scores", lambda race, job: [19.985, 20.0, 30.0])
+    number = enter(league, database)(files[0])
+    assert league.counted_trial(number) == 0, "it has no score"
+    with database.transaction() as session:
+        session.get_one(Submission, number).score_ms = 20_000
+    assert league.counted_trial(number) == 1
 
 
 def test_judging_again_leaves_one_copy_of_the_file(
