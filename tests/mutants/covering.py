@@ -19,6 +19,7 @@ SERVE: Final[Tests] = (
     "not beginning_to_end and not postgresql",
 )
 QUEUE: Final[Tests] = (
+    "tests/serve/test_leases.py",
     "tests/serve/test_jobs.py",
     "-k",
     "not a_stopped_server and not a_killed_server and not postgresql",

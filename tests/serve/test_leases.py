@@ -79,6 +79,8 @@ def test_what_it_lets_go_of_is_taken_by_another(queue: JobQueue, leases: Leases)
         one = leases.of(TOKEN, "a" * 16)
         assert take(one) is not None
         assert one.required().id == job
+        with one.holding(queue.get(job)):
+            pass
         one.release(why)  # type: ignore[arg-type]
         losses += why != "asked"
         assert one.held() is None
