@@ -79,13 +79,13 @@ def race(lesson: Lesson) -> int:
     page.get_by_role("button", name="Done").click()
     page.get_by_role("cell", name="Ada Lovelace").wait_for()
     page.get_by_label("Title").fill("Friday cup")
-    page.get_by_label("Track").select_option("oval")
-    page.get_by_label("Laps").fill("1")
+    page.get_by_label("Track", exact=True).select_option("oval")
+    page.get_by_label("Laps", exact=True).fill("1")
     page.get_by_role("button", name="Make the race").click()
     page.get_by_text("Nobody has arrived yet.").wait_for()
     number = int(page.url.split("/")[-1])
 
-    for name, link, seed in zip(("Comet", "Turbo"), links, (1, 2), strict=True):
+    for name, link, seed in zip(("Comet", "Turbo"), links, (1, 3), strict=True):
         pupil = lesson.arrive(name).page
         address, _, secret = link.partition("/card")
         pupil.goto(f"{address}/card#{secret}")
@@ -144,6 +144,41 @@ def test_the_teacher_judges_and_ends_it_and_everybody_sees_the_films(lesson: Les
     pupil.locator(f"button[aria-label='Film: {'Turbo' if last == 'Comet' else 'Comet'}']").click()
     pupil.locator("#film").get_by_label("Live").wait_for()
     assert sorted(pupil.locator("#film li button span:first-of-type").all_inner_texts()) == ["Comet", "Turbo"]
+
+
+def test_the_best_meet_in_a_final_and_the_wall_shows_it_heat_by_heat(lesson: Lesson, race: int) -> None:
+    teacher, group = lesson.visits["teacher"], ok(lesson.league.owner.get("/api/groups"))[0]["id"]
+    page = teacher.open(f"/groups/{group}")
+    page.get_by_role("button", name="Final", exact=True).click()
+    page.get_by_label("Title", exact=True).fill("Grand final")
+    page.get_by_label("Qualifying is").select_option("Friday cup")
+    page.get_by_label("How many of its first").fill("2")
+    page.get_by_label("Track", exact=True).select_option("oval")
+    page.get_by_label("Laps", exact=True).fill("1")
+    page.get_by_role("button", name="Make the race").click()
+    page.get_by_text("with what they qualified with, once that is over").wait_for()
+    final = int(page.url.split("/")[-1])
+    pupil = lesson.visits["Comet"].open(f"/league/{final}")
+    pupil.get_by_role("heading", name="Bracket").wait_for()
+    assert pupil.get_by_role("button", name="Enter").count() == 0
+    page.get_by_role("button", name="Drive the final").click()
+    duel = page.get_by_role("button", name=" wins")
+    duel.wait_for()
+    first, second = ok(lesson.league.owner.get(f"/api/boards/{final}"))["rows"]
+    assert f"{first['name']} wins" in str(duel.get_attribute("aria-label"))
+    pupil.get_by_text("1 of 2" if first["name"] == "Comet" else "2 of 2").wait_for()
+    duel.click()
+    page.locator("#film").get_by_label("Live").wait_for()
+
+    wall = teacher.open(f"/league/{final}/screen")
+    wall.get_by_role("heading", name=f"{first['name']} and {second['name']}").or_(
+        wall.get_by_role("heading", name=f"{second['name']} and {first['name']}")
+    ).wait_for()
+    wall.get_by_label("Live").wait_for()
+    assert wall.get_by_role("button", name=" wins").count() == 0, "nothing is told before it was shown"
+    wall.get_by_role("button", name="To its end").click()
+    wall.get_by_role("button", name=" wins").wait_for()
+    wall.get_by_role("listitem").filter(has_text=f"1 {first['name']}").wait_for()
 
 
 def test_a_code_at_the_wall_and_a_card_that_was_lost(lesson: Lesson, race: int) -> None:
@@ -274,7 +309,10 @@ def flaws(lesson: Lesson, race: int) -> dict[str, dict[str, Any]]:
         (
             "teacher",
             teacher,
-            ("/league", f"/groups/{group}", f"/league/{race}", f"/league/{race}/screen", "/me", "/league/audit"),
+            (
+                *("/league", f"/groups/{group}", f"/league/{race}", f"/league/{race}/screen", "/me", "/league/audit"),
+                *(f"/league/{race + 1}", f"/league/{race + 1}/screen"),
+            ),
         ),
         ("pupil", pupil, ("/league", f"/groups/{group}", f"/league/{race}")),
         ("stranger", stranger, ("/",)),

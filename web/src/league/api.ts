@@ -12,9 +12,11 @@ export type MemberModels = Schemas["MemberModels"];
 export type MemberLessons = Schemas["MemberLessons"];
 export type JoiningInfo = Schemas["JoiningInfo"];
 export type LoginCard = Schemas["LoginCard"];
+export type NewLeagueRace = Schemas["NewLeagueRace"];
 export type LeagueRace = Schemas["LeagueRace"];
 export type BoardPage = Schemas["BoardPage"];
 export type BoardRow = Schemas["BoardRow"];
+export type FinalPage = Schemas["FinalPage"];
 export type SubmissionInfo = Schemas["SubmissionInfo"];
 export type SeasonRow = Schemas["SeasonRow"];
 export type SessionInfo = Schemas["SessionInfo"];
@@ -68,12 +70,16 @@ export const leagueApi = {
   invite: () => ask<JoiningInfo>("POST", "/invitations", { uses: 1, hours: 24 * 7 }),
 
   races: () => ask<LeagueRace[]>("GET", "/league/races"),
-  makeRace: (group: number, race: Partial<Schemas["NewRace"]> & { title: string }) =>
+  makeRace: (group: number, race: Partial<NewLeagueRace> & { title: string }) =>
     ask<LeagueRace>("POST", `/groups/${group}/races`, race),
   changeRace: (id: number, change: Partial<Schemas["LeagueRaceChange"]>) =>
     ask<LeagueRace>("PATCH", `/league/races/${id}`, change),
   follow: (id: number, race: number, best: number) =>
     ask<LeagueRace>("POST", `/league/races/${id}/follow`, { race, best }),
+  final: (id: number) => ask<FinalPage>("GET", `/boards/${id}/final`),
+  hold: (id: number) => ask<FinalPage>("POST", `/league/races/${id}/hold`),
+  duelFilm: (id: number, duel: number, heat: number) =>
+    ask<RaceReplay>("GET", `/boards/${id}/duels/${duel}/heats/${heat}/film`),
   season: (group: number) => ask<SeasonRow[]>("GET", `/groups/${group}/season`),
   judgeAgain: (id: number, submission: number) =>
     ask<unknown>("POST", `/league/races/${id}/submissions/${submission}/judge`),
