@@ -180,6 +180,10 @@ def test_the_best_meet_in_a_final_and_the_wall_shows_it_heat_by_heat(lesson: Les
     wall.get_by_role("button", name=" wins").wait_for()
     wall.get_by_role("listitem").filter(has_text=f"1 {first['name']}").wait_for()
 
+    page = teacher.open(f"/groups/{group}/season")
+    row = page.get_by_role("row", name=first["name"])
+    assert "+25" in row.inner_text()
+
 
 def test_a_code_at_the_wall_and_a_card_that_was_lost(lesson: Lesson, race: int) -> None:
     teacher = lesson.visits["teacher"].open("/league")
@@ -311,7 +315,7 @@ def flaws(lesson: Lesson, race: int) -> dict[str, dict[str, Any]]:
             teacher,
             (
                 *("/league", f"/groups/{group}", f"/league/{race}", f"/league/{race}/screen", "/me", "/league/audit"),
-                *(f"/league/{race + 1}", f"/league/{race + 1}/screen"),
+                *(f"/groups/{group}/season", f"/league/{race + 1}", f"/league/{race + 1}/screen"),
             ),
         ),
         ("pupil", pupil, ("/league", f"/groups/{group}", f"/league/{race}")),

@@ -290,7 +290,7 @@ def test_a_final_of_the_first_a_day_that_is_used_up_and_a_season(league: Running
     code = league.code(group)
     pupils = {name: league.join(code, name) for name in ("Mia", "Noah")}
     terms = {"track": "oval", "laps": 1, "trials": 1}
-    files = [pack_entry(untrained_run(tmp_path, f"novice-{seed}", seed=seed)) for seed in (1, 2, 3)]
+    files = [pack_entry(untrained_run(tmp_path, f"novice-{seed}", seed=seed)) for seed in (1, 6, 3)]
 
     def race(title: str) -> int:
         return int(ok(owner.post(f"/api/groups/{group}/races", json={"title": title, **terms}), 201)["id"])
@@ -350,10 +350,19 @@ def test_a_final_of_the_first_a_day_that_is_used_up_and_a_season(league: Running
     assert "The first 1 of 'Qualifying' drive here" in refused(submit(final, loser, 1), 409)
     number = ok(submit(final, winner, 0), 202)["id"]
     judged(final, winner, number)
-    assert ok(owner.get(f"/api/groups/{group}/season")) == []
+    assert [row["points"] for row in ok(owner.get(f"/api/groups/{group}/season"))] == [0, 0], "qualifying gives none"
     ok(owner.patch(address, json={"closes": now().isoformat()}))
-    season = ok(pupils[winner].get(f"/api/groups/{group}/season"))
-    assert season == [{"name": winner, "points": 25, "races": 1, "wins": 1, "is_me": True}], "qualifying gives none"
+    first_row, second_row = ok(pupils[winner].get(f"/api/groups/{group}/season"))
+    told = [first_row[name] for name in ("name", "points", "races", "wins", "is_me")]
+    assert told == [winner, 25, 1, 1, True]
+    assert [(one["title"], one["place"], one["points"], one["gap"]) for one in first_row["results"]] == [
+        *(("Qualifying", 1, 0, 0.0), ("Final", 1, 25, 0.0))
+    ]
+    (only,) = second_row["results"]
+    assert (second_row["name"], second_row["points"], only["place"]) == (loser, 0, 2)
+    times = [row["score"] for row in ok(owner.get(f"/api/boards/{qualifying}"))["rows"]]
+    assert only["gap"] == pytest.approx(times[1] / times[0] - 1.0)
+    assert only["gap"] > 0
 
 
 @contextmanager

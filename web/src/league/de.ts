@@ -188,6 +188,14 @@ export const de: Record<LeagueKey, string> = {
   quota_mine_lead:
     "Die Plätze gehen reihum: Wer noch nie dran war, kommt als Nächstes, und was ruht, geht weiter, wo es war.",
   season: "Saison",
+  season_lead: "Punkte aus jedem Rennen, das vorbei ist, und wie nah alle dem Ersten kamen.",
+  season_none: "Noch ist kein Rennen dieser Saison vorbei.",
+  season_all: "Rennen für Rennen",
+  pace: "Tempo",
+  pace_lead:
+    "Die Linie geht von Rennen zu Rennen: Oben ist, wer Erster war, unten, wer doppelt so lange brauchte. Das Qualifying zählt darin mit und gibt keine Punkte; Training tut beides nicht.",
+  pace_first: "{title}: Erster",
+  pace_at: "{title}: {percent} % hinter dem Ersten",
   season_points: "Punkte",
   season_races: "Rennen",
   season_wins: "Siege",

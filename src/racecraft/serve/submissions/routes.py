@@ -28,6 +28,7 @@ from racecraft.serve.submissions.schemas import (
     LeagueRace,
     LeagueRaceChange,
     NewLeagueRace,
+    SeasonResult,
     SeasonRow,
     Stage,
     SubmissionChange,
@@ -62,12 +63,19 @@ def create_league_race(group_id: Id, body: NewLeagueRace, consoles: InConsoles, 
 
 @router.get("/groups/{group_id}/season")
 def get_season(group_id: Id, consoles: InConsoles, person: InPerson) -> list[SeasonRow]:
-    """Points of a group's races that are over, most first."""
+    """Points of a group's races that are over, most first, and what led to them."""
     consoles.groups.require(group_id, person.id)
     with consoles.owner.database.transaction() as session:
         found = read_season(session, group_id)
     return [
-        SeasonRow(name=one.name, points=one.points, races=one.races, wins=one.wins, is_me=one.user == person.id)
+        SeasonRow(
+            name=one.name,
+            points=one.points,
+            races=one.races,
+            wins=one.wins,
+            is_me=one.user == person.id,
+            results=[SeasonResult(**vars(result)) for result in one.results],
+        )
         for one in found
     ]
 

@@ -81,6 +81,18 @@ class Stage(Message):
     best: int = Field(8, ge=1, le=500)
 
 
+class SeasonResult(Message):
+    """What somebody did in a race that is over."""
+
+    race: int
+    title: str
+    place: int
+    points: int
+    """0 in qualifying, whose final gives them."""
+    gap: float | None
+    """Behind the first, as a fraction of its score; None of a final in which two meet at a time."""
+
+
 class SeasonRow(Message):
     """Somebody's season in a group so far."""
 
@@ -90,6 +102,8 @@ class SeasonRow(Message):
     """In which they have points."""
     wins: int
     is_me: bool
+    results: list[SeasonResult]
+    """The earliest race first, qualifying among them."""
 
 
 class BoardRow(Message):

@@ -1,8 +1,8 @@
-"""A group's season: points for places in all its races that are over and lead to no other one."""
+"""A group's season: what everybody did in its races that are over, and points where they lead to no other one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import sqlalchemy as sa
@@ -14,6 +14,20 @@ from racecraft.serve.submissions.finalists import board_of
 
 POINTS: Final = (25, 18, 15, 12, 10, 8, 6, 4, 2, 1)
 """By place, as Formula 1 gives them since 2010."""
+DEEPEST: Final = 100  # places of a race that are looked at
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeasonRace:
+    """What somebody did in a race."""
+
+    race: int
+    title: str
+    place: int
+    points: int
+    """0 in qualifying, whose final gives them."""
+    gap: float | None
+    """Behind the first, as a fraction of its score; None of a final in which two meet at a time."""
 
 
 @dataclass
@@ -22,25 +36,40 @@ class SeasonStanding:
 
     user: int
     name: str
-    points: int = 0
-    races: int = 0
-    """In which they have points."""
-    wins: int = 0
+    results: list[SeasonRace] = field(default_factory=list)
+    """The earliest race first."""
+
+    @property
+    def points(self) -> int:
+        """In all races."""
+        return sum(one.points for one in self.results)
+
+    @property
+    def races(self) -> int:
+        """In which they have points."""
+        return sum(one.points > 0 for one in self.results)
+
+    @property
+    def wins(self) -> int:
+        """That gave points."""
+        return sum(one.points == POINTS[0] for one in self.results)
 
 
 def read_season(session: Session, group_id: int) -> list[SeasonStanding]:
-    """Who has how many points in a group, most first; of equals who has won more. Practice gives none."""
+    """Who has how many points in a group, most first; of equals who has won more. Practice is none of it."""
     later = aliased(Race)
-    leads_on = sa.exists().where(later.after_id == Race.id, later.deleted.is_(None))
-    held = sa.select(Race).where(Race.group_id == group_id, Race.deleted.is_(None), Race.secret != "", ~leads_on)
+    leads_on = sa.exists().where(later.after_id == Race.id, later.deleted.is_(None)).label("leads_on")
+    held = sa.select(Race, leads_on).where(Race.group_id == group_id, Race.deleted.is_(None), Race.secret != "")
     found: dict[int, SeasonStanding] = {}
-    for race in session.scalars(held.order_by(Race.id)).all():
+    for race, gives_none in session.execute(held.order_by(Race.id)).all():
         if state_of(race) != "closed":
             continue
-        for row in board_of(session, race, user_id=None, top=len(POINTS)).rows:
-            if row.place is not None and row.place <= len(POINTS):
-                one = found.setdefault(row.user, SeasonStanding(row.user, row.name))
-                one.points += POINTS[row.place - 1]
-                one.races += 1
-                one.wins += row.place == 1
+        board = board_of(session, race, user_id=None, top=DEEPEST)
+        for row in board.rows:
+            if row.place is None:
+                continue
+            points = POINTS[row.place - 1] if row.place <= len(POINTS) and not gives_none else 0
+            behind = row.score_ms / board.first_ms - 1.0 if row.score_ms and board.first_ms else None
+            result = SeasonRace(race=race.id, title=race.title, place=row.place, points=points, gap=behind)
+            found.setdefault(row.user, SeasonStanding(row.user, row.name)).results.append(result)
     return sorted(found.values(), key=lambda one: (-one.points, -one.wins, one.user))
