@@ -51,6 +51,7 @@ CONSOLE = (
     "provider_settings",
     "settings",
     "schemas",
+    "road",
     "compression",
     "tab",
     "problems",

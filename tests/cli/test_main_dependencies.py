@@ -64,7 +64,7 @@ COMMANDS: dict[str, list[str]] = {
     ],
     "ladder": [
         "ladder R/b R/b@last -t oval --type time-trial --schedule round-robin --starts 1 -l 1 --rules drfc"
-        " --time-limit 4 --vehicle v5 -s 1 --json",
+        " --randomize light --time-limit 4 --vehicle v5 -s 1 --json",
         f"ladder R/b R/b@last -t oval --schedule swiss --rounds 1 --starts 1 --type object-avoidance {BOXES}",
         f"ladder R/b R/b@last -t oval --starts 1 --type head-to-bot {BOTS}",
         "ladder R/b R/b@last -t oval --starts 1 --time-limit 4 --type object-avoidance --objects 1 --positions 0.5,1",

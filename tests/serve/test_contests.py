@@ -9,7 +9,12 @@ from typing import Any
 import pytest
 from running_consoles import RunningConsole
 
+from racecraft.race.rules import RaceRules
 from racecraft.replay import read_replay, verify
+from racecraft.serve.contests.terms import terms_of
+from racecraft.sim.objects import Bots, Objects, Obstacles
+from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
+from racecraft.sim.vehicle import PRESETS as VEHICLES
 
 pytestmark = pytest.mark.costly
 
@@ -30,6 +35,10 @@ def over(console: RunningConsole, contest: str) -> Callable[[], Any]:
         return found if found["state"] == "done" else None
 
     return ended
+
+
+def by_car(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return sorted(rows, key=lambda row: int(row["car"]))
 
 
 def started(console: RunningConsole, room: str, **settings: Any) -> dict[str, Any]:
@@ -96,6 +105,70 @@ def test_a_ladder_rates_and_shows_every_race(console: RunningConsole, cars: list
     assert console.client.get(f"/api/contests/{ladder['id']}/replay?match=2").status_code == 404
 
 
+def test_everything_asked_of_a_heat_is_what_it_is_driven_under(
+    console: RunningConsole, cars: list[dict[str, str]], tmp_path: Path
+) -> None:
+    (kept, *_) = console.client.get("/api/models/ada").json()["checkpoints"]
+    asked: dict[str, Any] = {
+        **{"rules": "worker", "laps": 2, "time_limit": 20.0, "collision_penalty": 0.5, "max_resets": 3},
+        **{"ranking": "best", "direction": "reverse", "vehicle": "v4", "randomize": "light", "seed": 11},
+        **{"objects": "bots", "bot_speed": 0.7, "lane_changes": True, "positions": [[0.25, 1], [0.75, -1]]},
+    }
+    heat = started(console, "heats", models=[cars[0] | {"checkpoint": kept["step"]}, cars[1]], track="oval", **asked)
+    assert heat["models"] == [f"ada@{kept['step']}", "bob@last"] == [row["name"] for row in by_car(heat["heat"])]
+    path = tmp_path / "heat.replay"
+    path.write_bytes(console.client.get(f"/api/contests/{heat['id']}/replay.file").content)
+    driven = read_replay(path).conditions
+    rules = driven.rules
+    assert (rules.laps, rules.time_limit, rules.collision_penalty, rules.max_resets) == (2, 20.0, 0.5, 3)
+    assert (rules.offtrack_penalty, rules.direction) == (2.0, "reverse")  # of the worker's; and what was asked
+    assert (driven.vehicle, driven.randomize, driven.seed) == (VEHICLES["v4"], RANDOMIZATIONS["light"], 11)
+    bots = Bots(count=2, speed=0.7, changes_lane=True, placement="fixed", positions=((0.25, 1), (0.75, -1)))
+    assert driven.objects == Objects(bots=bots)
+    race = read_replay(path).race
+    assert race is not None
+    assert race.document["ranking"] == "best"
+    # and its page is told just that
+    assert RaceRules.from_dict(heat["rules"]) == rules
+    assert Objects.from_dict(heat["objects"]) == driven.objects
+    assert {name: heat[name] for name in ("vehicle", "randomize", "seed", "ranking")} == {
+        name: asked[name] for name in ("vehicle", "randomize", "seed", "ranking")
+    }
+
+
+def test_everything_asked_of_a_ladder_is_what_it_is_driven_under(
+    console: RunningConsole, cars: list[dict[str, str]]
+) -> None:
+    asked: dict[str, Any] = {
+        **{"kind": "head-to-model", "schedule": "swiss", "rounds": 3, "starts": 1, "seed": 3, "time_limit": 2.0},
+        **{"objects": "boxes", "parked_cars": True, "positions": [[0.3, 1], [0.6, -1], [0.9, 1]]},
+    }
+    ladder = started(console, "ladders", models=cars, tracks=["oval"], **asked)
+    assert (len(ladder["matches"]), ladder["rounds"], ladder["rules"]["time_limit"]) == (3, 3, 2.0)
+    film = console.client.get(f"/api/contests/{ladder['id']}/replay?match=0").json()
+    assert [one["kind"] for one in film["objects"]] == ["parked_car"] * 3
+    assert [car["objects"] for car in film["cars"]] == [[], []]  # both met the same
+    assert max(len(car["trace"]) for car in film["cars"]) <= 31  # 2 s
+    usual = console.client.post("/api/contests/ladders", json={"models": cars, "tracks": ["oval"], "starts": 1}).json()
+    assert usual["rules"]["time_limit"] == 180.0
+    assert console.wait_for(over(console, usual["id"]))["objects"] == Objects().to_dict()
+
+
+def test_a_heat_from_before_its_terms_were_kept_still_tells_them() -> None:
+    before = {
+        **{"models": [{"model": "ada", "checkpoint": "best"}] * 2, "track": "oval", "laps": 2, "title": ""},
+        **{"direction": "reverse", "objects": "boxes", "count": 2, "offtrack_penalty": 1.0, "max_resets": 4},
+        **{"kind": "head-to-model", "tracks": ["oval"], "paths": ["oval"], "seed": 5, "vehicle": "v5"},
+    }
+    terms = terms_of(before)
+    assert (terms.rules.laps, terms.rules.direction, terms.rules.max_resets) == (2, "reverse", 4)
+    assert terms.objects == Objects(obstacles=Obstacles(count=2))
+    assert terms_of(before | {"terms": terms.to_dict(), "laps": 9}) == terms
+    ladder = {"models": before["models"], "tracks": ["oval"], "schedule": "swiss", "kind": "head-to-bot", "laps": 1}
+    assert terms_of(ladder).rules.time_limit == 0.0  # under none, as ladders were
+    assert terms_of(ladder).objects == Objects(bots=Bots())
+
+
 def test_what_cannot_be_driven_is_refused(console: RunningConsole, cars: list[dict[str, str]]) -> None:
     client = console.client
     heats: list[tuple[int, dict[str, Any]]] = [
@@ -105,11 +178,33 @@ def test_what_cannot_be_driven_is_refused(console: RunningConsole, cars: list[di
         (404, {"models": cars, "track": "nowhere"}),
         (404, {"models": cars, "track": "/etc/passwd.npy"}),
         (422, {"models": [{"model": "../ada"}, cars[1]]}),
+        (409, {"models": [cars[0] | {"checkpoint": 1}, cars[1]]}),
+        (422, {"models": [cars[0] | {"checkpoint": "1/../../x"}, cars[1]]}),
+        (422, {"models": cars, "rules": "mine"}),
+        (422, {"models": cars, "randomize": "/etc/passwd"}),
+        (422, {"models": cars, "time_limit": -1}),
+        (422, {"models": cars, "bot_speed": 1.0}),  # of no bots
+        (422, {"models": cars, "objects": "bots", "parked_cars": True}),
+        (422, {"models": cars, "objects": "boxes", "lane_changes": True}),
+        (422, {"models": cars, "placement": "even"}),  # of nothing
+        (422, {"models": cars, "objects": "boxes", "placement": "even", "positions": [[0.5, 1]]}),
+        (422, {"models": cars, "objects": "boxes", "placement": "fixed"}),  # nowhere
+        (422, {"models": cars, "objects": "boxes", "positions": [[0.5, 0]]}),
+        (422, {"models": cars, "objects": "boxes", "positions": [[1.5, 1]]}),
+        (422, {"models": cars, "ranking": "best", "minimum_laps": 2}),  # of one lap
     ]
     for status, body in heats:
         reply = client.post("/api/contests/heats", json=body)
         assert reply.status_code == status, (body, reply.text)
-    assert client.post("/api/contests/ladders", json={"models": cars, "tracks": []}).status_code == 422
+    ladders: list[dict[str, Any]] = [
+        {"tracks": []},
+        {"tracks": ["oval"], "rounds": 2},  # of a round-robin
+        {"tracks": ["oval"], "kind": "time-trial", "objects": "boxes"},
+        {"tracks": ["oval"], "kind": "time-trial", "placement": "random"},
+    ]
+    for body in ladders:
+        reply = client.post("/api/contests/ladders", json={"models": cars, **body})
+        assert reply.status_code == 422, (body, reply.text)
     console.create(name="fresh", track="oval", train=False)
     assert client.post("/api/contests/heats", json={"models": [*cars, {"model": "fresh"}]}).status_code == 409
     job = client.get("/api/jobs?run=ada").json()[-1]

@@ -112,6 +112,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     },
     "GET /api/contests": ("each", None),
     "GET /api/races": ("each", None),
+    "GET /api/races/rules": ("each", None),
     "POST /api/races": ("each", None),
     "GET /api/jobs": ("each", None),
     "GET /api/health": ("open", None),

@@ -105,6 +105,80 @@ def test_a_race_for_practice_shows_everything_and_opens_again(visit: Visit) -> N
     page.get_by_role("button", name="Close the race").wait_for()
 
 
+def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit: Visit) -> None:
+    page = visit.open("/contests/new")
+    for name in ("ada", "bob"):
+        page.get_by_role("combobox", name="Add a model").select_option(name)
+    (kept, *_) = visit.console.client.get("/api/models/bob").json()["checkpoints"]
+    page.get_by_role("combobox", name="Checkpoint of bob").select_option(str(kept["step"]))
+    page.get_by_label("Rules").select_option("worker")
+    assert (page.get_by_label("Resets allowed").input_value(), page.get_by_label("Off track").input_value()) == (
+        "0",
+        "2",
+    )
+    page.get_by_label("Time limit, s").fill("9")
+    page.get_by_label("Ranked by").select_option("best")
+    page.get_by_label("On the road").select_option("bots")
+    page.get_by_label("Speed of the bots").fill("0.5")
+    page.get_by_label("They change lanes").check()
+    page.get_by_label("Where they are").select_option("fixed")
+    page.get_by_label("Place 1, % of the lap").fill("40")
+    page.get_by_role("button", name="Take away place 3").click()
+    page.get_by_label("Otherwise than they know").select_option("light")
+    page.get_by_label("Seed").fill("7")
+    page.get_by_label("Direction").select_option("reverse")
+    with page.expect_request("**/api/contests/heats") as sent:
+        page.get_by_role("button", name="Start the heat with 2").click()
+    asked = sent.value.post_data_json
+    assert asked["models"] == [{"model": "ada", "checkpoint": "best"}, {"model": "bob", "checkpoint": kept["step"]}]
+    wanted = {
+        **{"rules": "worker", "max_resets": 0, "offtrack_penalty": 2, "time_limit": 9, "ranking": "best", "seed": 7},
+        **{"objects": "bots", "bot_speed": 0.5, "lane_changes": True, "placement": "fixed", "randomize": "light"},
+        **{"positions": [[0.4, 1], [0.5, -1]], "direction": "reverse"},
+    }
+    assert {name: asked[name] for name in wanted} == wanted
+    page.get_by_role("heading", name="The heat in 3D").wait_for()
+    held = page.get_by_role("heading", name="Held by these rules").locator("..")
+    for told in (
+        "9 s",
+        "Bot cars: 2 · 0.5 m/s · change lanes · 40 % inner lane, 50 % outer lane",
+        "The other way",
+        "7",
+    ):
+        assert held.get_by_text(told, exact=True).is_visible()
+
+    page = visit.open("/contests/new")
+    page.get_by_role("button", name="Ladder").click()
+    page.get_by_role("button", name="Add all").click()
+    page.get_by_label("They race").select_option("object-avoidance")
+    page.get_by_label("Parked cars instead").check()
+    page.get_by_label("Parked cars", exact=True).fill("2")
+    page.get_by_label("Who meets whom").select_option("swiss")
+    page.get_by_label("Rounds").fill("2")
+    with page.expect_request("**/api/contests/ladders") as sent:
+        page.get_by_role("button", name="Start the ladder of 2").click()
+    asked = sent.value.post_data_json
+    wanted = {"rounds": 2, "count": 2, "parked_cars": True, "placement": "even", "time_limit": 180}
+    assert {name: asked[name] for name in wanted} == wanted
+    page.get_by_role("heading", name="Held by these rules").wait_for()
+
+    page = visit.open("/races/new")
+    page.get_by_label("Title").fill("Final")
+    page.get_by_role("button", name="Head to bot").click()
+    page.get_by_label("Rules").select_option("live")
+    page.get_by_label("Otherwise than they know").select_option("strong")
+    page.get_by_label("Where they are").select_option("random")
+    page.get_by_role("button", name="Make the race").click()
+    page.get_by_text("Held by these rules").click()
+    for told in ("180 s", "Bot cars: 6 · 0.2 m/s · elsewhere each time", "Much of everything", "15"):
+        assert page.locator("details dl").get_by_text(told, exact=True).is_visible()
+    page.get_by_role("checkbox", name="bob").check()
+    page.get_by_label("Which state of it").select_option(str(kept["step"]))
+    with page.expect_request("**/entries") as sent:
+        page.get_by_role("button", name="Enter 1 and drive").click()
+    assert sent.value.post_data_json == {"models": ["bob"], "checkpoint": kept["step"]}
+
+
 def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
     page = visit.open("/races")
     page.get_by_role("link", name="New heat or ladder").click()
@@ -129,6 +203,9 @@ def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
     assert page.locator(".stage li").first.locator("span").first.inner_text() == first
     clock = page.locator(".controls .number")
     visit.console.wait_for(lambda: float(clock.inner_text().split()[0]) > 0.5)
+
+    held = page.get_by_role("heading", name="Held by these rules").locator("..")
+    assert held.get_by_text("1.5 s", exact=True).is_visible()
 
     page = visit.open("/contests/new")
     page.get_by_role("button", name="Ladder").click()

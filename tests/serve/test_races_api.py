@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import httpx
 import pytest
@@ -13,6 +13,8 @@ from running_consoles import RunningConsole
 from racecraft.judging.verification import published
 from racecraft.race.announcement import commitment_of, seed_of
 from racecraft.replay import read_replay, verify
+from racecraft.serve.races.schemas import RaceSettings, RuleSet
+from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.vehicle import PRESETS
 
 pytestmark = pytest.mark.costly
@@ -183,6 +185,13 @@ def test_entries_that_cannot_be(console: RunningConsole) -> None:
         {"offtrack_penalty": -1},
         {"objects": 1000, "kind": "object-avoidance"},
         {"seed": -1},
+        {"rules": "none"},
+        {"randomize": "../../x.json"},
+        {"time_limit": 1e9},
+        {"bot_speed": 0.4},
+        {"kind": "object-avoidance", "lane_changes": True},
+        {"kind": "head-to-bot", "parked_cars": True},
+        {"positions": [[0.5, 1]]},
         {"closes": "2001-01-01T00:00:00Z"},
         {"opens": "2001-01-01T00:00:00"},
         {"opens": "soon"},
@@ -203,7 +212,42 @@ def test_races_that_cannot_be(console: RunningConsole, settings: dict[str, Any])
 
 @pytest.mark.parametrize(("kind", "group"), [("object-avoidance", "obstacles"), ("head-to-bot", "bots")])
 def test_races_with_objects(console: RunningConsole, kind: str, group: str) -> None:
-    race = make(console, kind=kind, objects=2, bot_speed=0.4)
-    assert race["objects"][group]["count"] == 2
+    own = {"bot_speed": 0.4, "lane_changes": True} if group == "bots" else {"parked_cars": True}
+    race = make(console, kind=kind, objects=2, placement="random", **own)
+    there = race["objects"][group]
+    assert (there["count"], there["placement"]) == (2, "random")
     if group == "bots":
-        assert race["objects"][group]["speed"] == 0.4
+        assert (there["speed"], there["changes_lane"]) == (0.4, True)
+    else:
+        assert there["kind"] == "car"
+    placed = make(console, kind=kind, positions=[[0.2, 1], [0.5, -1], [0.8, 1]], **own)["objects"][group]
+    assert (placed["count"], placed["placement"], placed["positions"][1]) == (3, "fixed", [0.5, -1])
+
+
+def test_a_kept_checkpoint_is_what_drives(console: RunningConsole) -> None:
+    client = console.client
+    name = console.create(track="oval", until="1000 steps", seed=1)
+    (job,) = client.get("/api/jobs", params={"run": name}).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    (first, *_) = client.get(f"/api/models/{name}").json()["checkpoints"]
+    race = make(console, laps=1, trials=1, max_resets=0, seed=1, time_limit=5)
+    entries = f"/api/races/{race['id']}/entries"
+    assert str(first["step"]) in refused(client.post(entries, json={"models": [name], "checkpoint": 1}), 409)["message"]
+    reply = client.post(entries, json={"models": [name], "checkpoint": first["step"]})
+    assert reply.status_code == 202, reply.text
+    (drive,) = [one for one in client.get("/api/jobs", params={"run": name}).json() if one["state"] != "done"]
+    assert console.wait_for(console.job_ended(drive["id"]))["result"]["step"] == first["step"]
+
+
+def test_a_race_is_announced_by_all_that_was_asked(console: RunningConsole) -> None:
+    sets = {one["name"]: one for one in console.client.get("/api/races/rules").json()}
+    assert list(sets) == ["drfc", "worker", "droa", "live"]
+    assert set(get_args(RaceSettings.model_fields["randomize"].annotation)) == set(RANDOMIZATIONS)
+    race = make(console, rules="live", randomize="strong", offtrack_penalty=1.5, direction="reverse")
+    assert (race["randomize"], race["laps"], race["rules"]["direction"]) == ("strong", 15, "reverse")
+    document = console.client.get(f"/api/races/{race['id']}/race.json").json()["document"]
+    told = {name: document["rules"][name] for name in RuleSet.model_fields if name != "name"}
+    assert told == {name: value for name, value in (sets["live"] | {"offtrack_penalty": 1.5}).items() if name != "name"}
+    assert document["randomize"]["friction"] == list(RANDOMIZATIONS["strong"].friction)
+    assert make(console)["rules"]["time_limit"] == 0.0
+    assert make(console, rules="live", time_limit=60)["rules"]["time_limit"] == 60.0

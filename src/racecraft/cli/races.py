@@ -22,6 +22,7 @@ Kind = Annotated[
 ]
 Rules = Annotated[str, typer.Option("--rules", help="drfc, worker, droa or live.")]
 Vehicle = Annotated[str, typer.Option("--vehicle", help="Everybody's: v4, v5, v6 or a file.")]
+Randomize = Annotated[str, typer.Option("--randomize", help="none, light, strong, real, aws or a JSON file.")]
 
 
 @app.command()
@@ -53,9 +54,7 @@ def race(
     placement: race_options.Placement = "",
     positions: race_options.Positions = "",
     vehicle: Vehicle = "v5",
-    randomize: Annotated[
-        str, typer.Option("--randomize", help="none, light, strong, real, aws or a JSON file.")
-    ] = "none",
+    randomize: Randomize = "none",
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts and objects, known to everybody.")] = 0,
     secret: Annotated[
         bool, typer.Option("--secret", help="Draw them from a secret instead; its commitment is told first.")
@@ -135,6 +134,7 @@ def ladder(
     placement: race_options.Placement = "",
     positions: race_options.Positions = "",
     vehicle: Vehicle = "v5",
+    randomize: Randomize = "none",
     seed: Annotated[int, typer.Option("--seed", "-s", help="Of starts, objects and the order of races.")] = 0,
     as_json: Json = False,
 ) -> None:
@@ -153,6 +153,7 @@ def ladder(
         changes={"time_limit": time_limit},
         objects=_objects(kind, context.params),
         vehicle=vehicle,
+        randomize=randomize,
         seed=seed,
         progress=(lambda line: None) if as_json else text().say_progress,
     )

@@ -12,6 +12,7 @@ from racecraft.race.entry import load_entries
 from racecraft.race.results import Trial
 from racecraft.race.rules import RaceRules, race_rules
 from racecraft.sim.objects import NO_OBJECTS, Objects
+from racecraft.sim.randomization import Randomization, load_randomization
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import load_tracks
 
@@ -28,6 +29,7 @@ def rate_models(
     rules: str | RaceRules = "drfc",
     objects: Objects = NO_OBJECTS,
     vehicle: str | Vehicle = STANDARD_CAR,
+    randomize: Randomization | str = "none",
     changes: dict[str, Any] | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda text: None,
@@ -47,6 +49,7 @@ def rate_models(
         rules: A name of `RULE_SETS`, or rules.
         objects: On the track.
         vehicle: What everybody drives, whatever they were trained with.
+        randomize: What differs from what the models know; the same for all.
         changes: Single rules that differ, by name.
         seed: Of the starts and of the order of matches.
         progress: Is told what is being driven.
@@ -66,6 +69,7 @@ def rate_models(
             seed=seed,
             vehicle=vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle),
             objects=objects,
+            randomize=randomize if isinstance(randomize, Randomization) else load_randomization(randomize),
         )
         for track in load_tracks(tracks)
     ]

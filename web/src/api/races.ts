@@ -7,6 +7,8 @@ export type RaceCard = Schemas["RaceCard"];
 export type RaceDetail = Schemas["RaceDetail"];
 export type RaceReplay = Schemas["RaceReplay"];
 export type Standing = Schemas["Standing"];
+export type RuleSet = Schemas["RuleSet"];
+export type CheckpointChoice = NonNullable<Schemas["Enter"]["checkpoint"]>;
 export type NewRace = Partial<Schemas["NewRace"]> & { title: string };
 
 export const raceApi = {
@@ -16,7 +18,9 @@ export const raceApi = {
   change: (id: number, change: Partial<Schemas["RaceChange"]>) => ask<RaceDetail>("PATCH", `/races/${id}`, change),
   remove: (id: number) => ask<void>("DELETE", `/races/${id}`),
   restore: (id: number) => ask<RaceDetail>("POST", `/races/${id}/restore`),
-  enter: (id: number, models: string[]) => ask<RaceDetail>("POST", `/races/${id}/entries`, { models }),
+  rules: () => ask<RuleSet[]>("GET", "/races/rules"),
+  enter: (id: number, models: string[], checkpoint: CheckpointChoice) =>
+    ask<RaceDetail>("POST", `/races/${id}/entries`, { models, checkpoint }),
   withdraw: (id: number, entry: number) => ask<void>("DELETE", `/races/${id}/entries/${entry}`),
   replay: (id: number, entries: number[]) => ask<RaceReplay>("GET", `/races/${id}/replay?entries=${entries.join(",")}`),
 };

@@ -13,6 +13,12 @@ export type MemberLessons = Schemas["MemberLessons"];
 export type JoiningInfo = Schemas["JoiningInfo"];
 export type LoginCard = Schemas["LoginCard"];
 export type NewLeagueRace = Schemas["NewLeagueRace"];
+/** What the page of a new race asks for; all else is as every race has it. */
+export type RaceWishes = Pick<
+  NewLeagueRace,
+  | ("description" | "kind" | "track" | "direction" | "laps" | "ranking" | "minimum_laps" | "offtrack_penalty")
+  | ("collision_penalty" | "max_resets" | "objects" | "bot_speed" | "vehicle" | "trials" | "seed")
+>;
 export type LeagueRace = Schemas["LeagueRace"];
 export type BoardPage = Schemas["BoardPage"];
 export type BoardRow = Schemas["BoardRow"];

@@ -16,10 +16,10 @@ from typing import Any, Final
 import sqlalchemy as sa
 
 from racecraft.contest.ladder import check_ladder
-from racecraft.contest.terms import shared_road
+from racecraft.contest.terms import TOGETHER, race_terms
+from racecraft.errors import ConfigError
 from racecraft.race.conditions import Conditions
-from racecraft.race.rules import race_rules
-from racecraft.serve.contests.files import VIDEO, contest_folder, count_matches
+from racecraft.serve.contests.files import VIDEO, contest_folder, count_matches, entry_name
 from racecraft.serve.contests.schemas import (
     ContestCard,
     ContestDetail,
@@ -30,6 +30,7 @@ from racecraft.serve.contests.schemas import (
     NewLadder,
     Starter,
 )
+from racecraft.serve.contests.terms import Terms, settle, terms_of
 from racecraft.serve.jobs.queue import ENDED, JobQueue
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
@@ -75,14 +76,21 @@ class Contests:
         Raises:
             RacecraftError: A model or the track is not usable, or there are too many contests.
         """
-        track = self._courses.load(request.track)
-        shared_road(Conditions(track=track, rules=race_rules("drfc", {"laps": request.laps})), len(request.models))
+        terms, kind = settle(request), "head-to-model" if len(request.models) == 2 else "grid"
+        conditions = Conditions(track=self._courses.load(request.track), rules=terms.rules, objects=terms.objects)
+        race_terms(
+            conditions,
+            kind=kind,
+            num_cars=len(request.models),
+            ranking=request.ranking,
+            minimum_laps=request.minimum_laps,
+        )
         payload = request.model_dump() | {
-            "kind": "head-to-model" if len(request.models) == 2 else "grid",
+            "kind": kind,
             "tracks": [request.track],
             "paths": [self._courses.path_or_name(request.track)],
         }
-        return self._add("heat", payload, request.models)
+        return self._add("heat", payload, request.models, terms)
 
     def start_ladder(self, request: NewLadder) -> str:
         """Queue a ladder; its id.
@@ -90,9 +98,19 @@ class Contests:
         Raises:
             RacecraftError: A model or a track is not usable, or there are too many contests.
         """
-        check_ladder(len(request.models), kind=request.kind, schedule=request.schedule, starts=request.starts, rounds=0)
+        check_ladder(
+            len(request.models),
+            kind=request.kind,
+            schedule=request.schedule,
+            starts=request.starts,
+            rounds=request.rounds,
+        )
+        if request.rounds and request.schedule != "swiss":
+            raise ConfigError(f"rounds are those of a swiss schedule; this one is {request.schedule}.")
+        if request.objects is not None and request.kind not in TOGETHER:
+            raise ConfigError(f"objects go with the ladder head-to-model; a {request.kind} has its own.")
         payload = request.model_dump() | {"paths": [self._courses.path_or_name(name) for name in request.tracks]}
-        return self._add("ladder", payload, request.models)
+        return self._add("ladder", payload, request.models, settle(request))
 
     def cards(self) -> list[ContestCard]:
         """All of them, newest first."""
@@ -102,14 +120,19 @@ class Contests:
         """A heat or a ladder with its result."""
         job = self.job(contest)
         payload, result = job.payload, job.result or {}
+        terms = terms_of(payload)
         return ContestDetail(
             **self._card(job).model_dump(),
+            **terms.to_dict(),
             laps=payload["laps"],
             vehicle=payload["vehicle"],
+            randomize=payload.get("randomize", "none"),
             seed=payload["seed"],
-            direction=payload.get("direction", ""),
+            direction=terms.rules.direction,
+            ranking=payload.get("ranking", "total"),
             schedule=payload.get("schedule", ""),
             starts=payload.get("starts", 0),
+            rounds=payload.get("rounds", 0),
             heat=[HeatRow(**row) for row in result.get("heat", ())],
             ladder=[LadderPlace(**row) for row in result.get("ladder", ())],
             matches=[LadderMatch(number=number, **row) for number, row in enumerate(result.get("matches", ()))],
@@ -159,12 +182,12 @@ class Contests:
         found = [job for kind in KINDS for job in self._queue.list(kind=kind, limit=MAX_CONTESTS)]
         return sorted(found, key=lambda job: job.created, reverse=True)
 
-    def _add(self, kind: str, payload: dict[str, Any], starters: list[Starter]) -> str:
+    def _add(self, kind: str, payload: dict[str, Any], starters: list[Starter], terms: Terms) -> str:
         for starter in starters:
-            if self._garage.folder(starter.model).checkpoints.last is None:
-                raise Conflict(f"Model {starter.model!r} has no checkpoint to race with.", hint="Train it first.")
+            self._garage.require_checkpoint(starter.model, starter.checkpoint)
         if len(self._jobs()) >= MAX_CONTESTS:
             raise Conflict(f"There are {MAX_CONTESTS} heats and ladders already.", hint="Delete some first.")
+        payload["terms"] = terms.to_dict()
         if payload["seed"] is None:
             payload["seed"] = secrets.randbelow(2**32)
         folders = [self._garage.folder(starter.model) for starter in starters]
@@ -181,7 +204,7 @@ class Contests:
             kind=payload["kind"],
             title=payload["title"],
             tracks=payload["tracks"],
-            models=[one["model"] for one in payload["models"]],
+            models=[entry_name(one) for one in payload["models"]],
             state=job.state,  # type: ignore[arg-type]
             created=job.created,
             winner=first["name"] if first and first["place"] == 1 else None,

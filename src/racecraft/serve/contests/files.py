@@ -22,6 +22,12 @@ DRIVEN: Final = "driven.txt"
 """How many races of a ladder are decided."""
 
 
+def entry_name(starter: dict[str, Any]) -> str:
+    """A model at the start, with its checkpoint unless that is the best."""
+    model, checkpoint = starter["model"], starter["checkpoint"]
+    return str(model) if checkpoint == "best" else f"{model}@{checkpoint}"
+
+
 def contest_folder(state: Path, contest: str) -> Path:
     """Where they lie."""
     return state / FOLDER / contest

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import FileResponse
 
+from racecraft.contest.terms import TOGETHER
 from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
 from racecraft.serve.contests.schemas import ContestCard, ContestDetail, NewHeat, NewLadder
 from racecraft.serve.context import InContext, TakesPlace
@@ -87,8 +88,11 @@ def get_contest_replay(
         if row is None:
             raise NotFound(f"The ladder has no race {match}.")
         order = sorted(range(len(row.models)), key=lambda car: row.places[car])
-        two = document["cars"]
+        two, road = document["cars"], []
         before: dict[str, Any] = {"objects": []}  # in files from before they were kept
         cars = [ReplayCar(entry=car, model=row.models[car], **(before | two[car])) for car in order]
-        track, road = document["track"], []
+        if found.kind in TOGETHER:  # what stood there stood there for both, as whoever drove longer saw it
+            road = max(cars, key=lambda car: len(car.trace)).objects
+            cars = [car.model_copy(update={"objects": []}) for car in cars]
+        track = document["track"]
     return replay_of(track, context.courses.load(track), cars, trial=0, objects=road)

@@ -3,49 +3,44 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from racecraft.contest.terms import MAX_GRID
-from racecraft.serve.races.schemas import RaceKind, Seconds
+from racecraft.serve.races.schemas import CheckpointChoice, RaceKind, RaceSettings, Ranking
 from racecraft.serve.schemas import Message, RunName
 
 Title = Annotated[str, Field(max_length=100)]
-Vehicle = Literal["v4", "v5", "v6"]
-Objects = Literal["none", "boxes", "bots"]
+Among = Literal["none", "boxes", "bots"]
 
 
 class Starter(Message):
     """A model at the start; the same one may stand there twice."""
 
     model: RunName
-    checkpoint: Literal["best", "last"] = "best"
+    checkpoint: CheckpointChoice = "best"
 
 
-class NewHeat(Message):
+class NewHeat(RaceSettings):
     """A race of two to eight models on one road, who see and hit each other."""
 
     models: list[Starter] = Field(min_length=2, max_length=MAX_GRID)
     """In the order of the grid."""
     title: Title = ""
     track: str = Field("reinvent_2018", max_length=200)
-    direction: Literal["forward", "reverse"] = "forward"
     laps: int = Field(1, ge=1, le=20)
-    objects: Objects = "none"
+    ranking: Ranking = "total"
+    minimum_laps: int | None = Field(None, ge=1, le=20)
+    """That a car must have for a score; by default all for the total, three in a row for the average, one for the
+    best."""
+    objects: Among = "none"
     """What else is on the road."""
     count: int = Field(3, ge=1, le=20)
     """How many boxes or bot cars."""
-    offtrack_penalty: Seconds = 5.0
-    collision_penalty: Seconds = 5.0
-    max_resets: int = Field(100, ge=0, le=10_000)
-    vehicle: Vehicle = "v5"
-    """Everybody's, whatever they were trained with."""
-    seed: int | None = Field(None, ge=0, le=2**32 - 1)
-    """Of the start and the objects; by default drawn."""
 
 
-class NewLadder(Message):
+class NewLadder(RaceSettings):
     """Many races between models, two at a time, and what they say about each model's strength."""
 
     models: list[Starter] = Field(min_length=2, max_length=20)
@@ -56,9 +51,15 @@ class NewLadder(Message):
     """Everyone meets everyone at every start, or each meets one of about the same strength in each round."""
     starts: int = Field(4, ge=1, le=20)
     """On each track."""
+    rounds: int = Field(0, ge=0, le=200)
+    """Of ``swiss``; 0 for one for every start, and as many as find the best."""
     laps: int = Field(1, ge=1, le=10)
-    vehicle: Vehicle = "v5"
-    seed: int | None = Field(None, ge=0, le=2**32 - 1)
+    time_limit: float | None = Field(180.0, ge=0.0, le=86_400.0, allow_inf_nan=False)
+    """s on the clock that end a race; 0 for none."""
+    objects: Among | None = None
+    """What else is on the road that two share; the other kinds have their own."""
+    count: int | None = Field(None, ge=1, le=20)
+    """How many boxes or bot cars; 6 and 3 otherwise."""
 
 
 class HeatRow(Message):
@@ -117,6 +118,7 @@ class ContestCard(Message):
     title: str
     tracks: list[str]
     models: list[str]
+    """With the checkpoint where it is not the best: ``heron@last``."""
     state: Literal["queued", "running", "done", "failed", "cancelled"]
     created: datetime
     winner: str | None
@@ -129,13 +131,22 @@ class ContestDetail(ContestCard):
     """The same, whole."""
 
     laps: int
+    rules: dict[str, Any]
+    """All that it is held by."""
+    objects: dict[str, Any]
+    """What stands or drives on the road besides the models."""
     vehicle: str
+    randomize: str
     seed: int
     direction: str
+    ranking: Ranking
+    """Of a heat: what places go by."""
     schedule: str
     """Of a ladder."""
     starts: int
     """Of a ladder, on each track."""
+    rounds: int
+    """Of a Swiss ladder; 0 for as many as there need be."""
     heat: list[HeatRow]
     ladder: list[LadderPlace]
     matches: list[LadderMatch]

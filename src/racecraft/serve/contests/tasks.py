@@ -9,18 +9,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder
+from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder, entry_name
+from racecraft.serve.contests.terms import terms_of
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.settings import STATE_FOLDER
 
 if TYPE_CHECKING:
     from racecraft.contest.ladder import Match
     from racecraft.race.results import Trial
-    from racecraft.sim.objects import Objects
 
 FILMED = 90.0
 """s of a heat that are filmed."""
-RULES = ("laps", "max_resets", "offtrack_penalty", "collision_penalty", "direction")
 
 
 def heat(task: Task) -> dict[str, Any]:
@@ -31,21 +30,29 @@ def heat(task: Task) -> dict[str, Any]:
     from racecraft.film.video import film
     from racecraft.race.conditions import Conditions
     from racecraft.race.entry import load_entries
-    from racecraft.race.rules import race_rules
     from racecraft.replay.replay import write_replay
+    from racecraft.sim.randomization import load_randomization
     from racecraft.sim.vehicle import load_vehicle
     from racecraft.track import load_track
 
     payload, folder = task.job.payload, _folder(task)
+    held = terms_of(payload)
     conditions = Conditions(
         track=load_track(payload["paths"][0]),
-        rules=race_rules("drfc", {name: payload[name] for name in RULES}),
+        rules=held.rules,
         seed=payload["seed"],
         vehicle=load_vehicle(payload["vehicle"]),
-        objects=_objects(payload["objects"], payload["count"]),
+        objects=held.objects,
+        randomize=load_randomization(payload.get("randomize", "none")),
     )
     entries = load_entries(_models(task))
-    terms = race_terms(conditions, kind=payload["kind"], num_cars=len(entries))
+    terms = race_terms(
+        conditions,
+        kind=payload["kind"],
+        num_cars=len(entries),
+        ranking=payload.get("ranking", "total"),
+        minimum_laps=payload.get("minimum_laps"),
+    )
     contest = hold_race(entries, terms)
     ((_, replay),) = contest.replays()
     write_replay(replay, folder / REPLAY)
@@ -83,6 +90,7 @@ def ladder(task: Task) -> dict[str, Any]:
     from racecraft.judging.ladder import rate_models
 
     payload, folder = task.job.payload, _folder(task)
+    held = terms_of(payload)
     names = dict(zip(payload["paths"], payload["tracks"], strict=True))
     shown = {Path(path).stem: name for path, name in names.items()}
     unfinished = folder / f".{MATCHES}.{os.getpid()}"  # hidden: nobody copies it while it grows
@@ -101,9 +109,12 @@ def ladder(task: Task) -> dict[str, Any]:
             kind=payload["kind"],
             schedule=payload["schedule"],
             starts=payload["starts"],
+            rounds=payload.get("rounds", 0),
             laps=payload["laps"],
-            objects=_objects({"object-avoidance": "boxes", "head-to-bot": "bots"}.get(payload["kind"], "none"), 0),
+            rules=held.rules,
+            objects=held.objects,
             vehicle=payload["vehicle"],
+            randomize=payload.get("randomize", "none"),
             seed=payload["seed"],
             watch=watch,
         )
@@ -122,15 +133,7 @@ def _driven(trial: Trial) -> dict[str, Any]:
 
 def _models(task: Task) -> list[str]:
     """Their best checkpoint unless another is asked for, which their names then say."""
-    asked = [(task.runs / one["model"], one["checkpoint"]) for one in task.job.payload["models"]]
-    return [str(run) if checkpoint == "best" else f"{run}@{checkpoint}" for run, checkpoint in asked]
-
-
-def _objects(name: str, count: int) -> Objects:
-    from racecraft.sim.objects import objects_for_race
-
-    race = {"none": "time-trial", "boxes": "object-avoidance", "bots": "head-to-bot"}[name]
-    return objects_for_race(race, settings={"count": count} if count and name != "none" else {})
+    return [str(task.runs / entry_name(one)) for one in task.job.payload["models"]]
 
 
 def _folder(task: Task) -> Path:

@@ -152,6 +152,26 @@ class Garage:
         names = (f"{name[:58]}-{number}" for number in itertools.count(2))
         return next(one for one in names if not (self._runs / one).exists())
 
+    def require_checkpoint(self, name: str, choice: str | int) -> None:
+        """Refuse a model that cannot race with a checkpoint.
+
+        Args:
+            name: Of the model.
+            choice: ``best``, ``last`` or a number of camera steps.
+
+        Raises:
+            NotFound: There is no such model.
+            Conflict: It has no such checkpoint.
+        """
+        steps = [entry.step for entry in self.folder(name).checkpoints.entries()]
+        if not steps:
+            raise Conflict(f"Model {name!r} has no checkpoint to race with.", hint="Train it first.")
+        if isinstance(choice, int) and choice not in steps:
+            raise Conflict(
+                f"Model {name!r} has no checkpoint at step {choice}; it has {', '.join(map(str, steps))}.",
+                hint="Choose one of those, best or last.",
+            )
+
     def checkpoints(self, folder: RunFolder) -> list[Checkpoint]:
         """The states of a model's policy that are kept."""
         store, stretches = folder.checkpoints, read_stretches(folder)

@@ -22,11 +22,12 @@ from racecraft.contest.terms import RaceTerms, race_terms
 from racecraft.errors import ConfigError
 from racecraft.race.announcement import Announcement, draw_secret
 from racecraft.race.conditions import Conditions
-from racecraft.race.rules import race_rules
+from racecraft.race.rules import RaceRules
 from racecraft.serve.jobs.cargo import Cargo
 from racecraft.serve.jobs.queue import JobQueue, new_job
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.races.rules import randomization_name, rules_of
 from racecraft.serve.races.schemas import (
     Enter,
     NewRace,
@@ -37,12 +38,12 @@ from racecraft.serve.races.schemas import (
     Undecided,
 )
 from racecraft.serve.races.standings import Entered, key_of, score_of, standings_of
+from racecraft.serve.road import road_objects
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Race, User, now
 from racecraft.serve.tracks.courses import Courses
-from racecraft.sim import objects_for_race
-from racecraft.sim.objects import NO_OBJECTS, Objects
+from racecraft.sim.randomization import load_randomization
 from racecraft.sim.vehicle import load_vehicle
 from racecraft.track import Track
 
@@ -50,8 +51,6 @@ KIND: Final = "race"
 """Of the jobs."""
 MAX_RACES: Final = 500
 MAX_ENTRIES: Final = 1000  # of a race
-RULES: Final = ("laps", "max_resets", "offtrack_penalty", "collision_penalty", "direction")
-"""Rules that who makes a race may choose; the others are deepracer-for-cloud's, which have no limit of time."""
 MISTAKES: Final = 60.0
 """s a lap that a group's race leaves for mistakes and their penalties."""
 SLOWEST: Final = 0.5
@@ -103,14 +102,17 @@ class Races:
         opens = request.opens or now()
         if request.closes is not None and request.closes <= opens:
             raise ConfigError("The race closes before it opens.", hint="Choose a later end, or none.")
-        if request.ranking == "average" and request.minimum_laps > request.laps:
+        rules = rules_of(request, laps=request.laps)
+        if request.ranking == "average" and request.minimum_laps > rules.laps:
             raise ConfigError(
-                f"An average over {request.minimum_laps} laps cannot be had from {request.laps}.",
+                f"An average over {request.minimum_laps} laps cannot be had from {rules.laps}.",
                 hint="Ask for more laps, or average over fewer.",
             )
         track = self._courses.load(request.track)
-        limit = 0.0 if group_id is None else time_limit(track, laps=request.laps)
-        terms = _terms(request, track, final, time_limit=limit)
+        if group_id is not None:
+            most = time_limit(track, laps=rules.laps)
+            rules = replace(rules, time_limit=min(rules.time_limit or most, most))
+        terms = _terms(request, track, final, rules)
         announced = terms.announcement
         with self._database.transaction() as session:
             held = sa.and_(Race.owner_id == user_id, Race.deleted.is_(None))
@@ -166,6 +168,7 @@ class Races:
             rules=race.rules,
             objects=race.objects,
             vehicle=race.vehicle,
+            randomize=randomization_name(race.document["randomize"]) if race.document else "none",
             seed=None if race.secret else race.seed,
             commitment=race.commitment,
             secret="" if is_withheld(race) else race.secret,
@@ -215,8 +218,7 @@ class Races:
             hold(session, race_id)
             race = self._race(session, race_id)
             for name in models:
-                if self._garage.folder(name).checkpoints.last is None:
-                    raise Conflict(f"Model {name!r} has no checkpoint to race with.", hint="Train it first.")
+                self._garage.require_checkpoint(name, request.checkpoint)
             if (state := state_of(race)) != "open":
                 raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
             count = session.scalar(sa.select(sa.func.count(Entry.id)).where(Entry.race_id == race_id)) or 0
@@ -316,15 +318,15 @@ def time_limit(track: Track, *, laps: int) -> float:
     return float(math.ceil(laps * (MISTAKES + track.length / SLOWEST)))
 
 
-def _terms(request: NewRace, track: Track, final: FinalTerms | None, *, time_limit: float) -> RaceTerms:
+def _terms(request: NewRace, track: Track, final: FinalTerms | None, rules: RaceRules) -> RaceTerms:
     """What a new race is held by, with a secret unless its seed is given."""
-    changes = {**{name: getattr(request, name) for name in RULES}, "time_limit": time_limit}
     conditions = Conditions(
         track=track,
-        rules=race_rules("drfc", changes),
+        rules=rules,
         seed=request.seed or 0,
         vehicle=load_vehicle(request.vehicle),
-        objects=_objects(request),
+        objects=road_objects(request, request.kind, count=request.objects),
+        randomize=load_randomization(request.randomize),
     )
     return race_terms(
         conditions,
@@ -351,15 +353,6 @@ def _is_told(race: Race) -> bool:
 def is_withheld(race: Race) -> bool:
     """Whether nobody may see yet where it starts."""
     return bool(race.secret) and state_of(race) != "closed"
-
-
-def _objects(request: NewRace) -> Objects:
-    if request.kind == "time-trial":
-        return NO_OBJECTS
-    settings: dict[str, Any] = {"count": request.objects}
-    if request.kind == "head-to-bot":
-        settings["speed"] = request.bot_speed
-    return objects_for_race(request.kind, settings=settings)
 
 
 def state_of(race: Race) -> RaceState:

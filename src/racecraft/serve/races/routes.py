@@ -16,6 +16,7 @@ from racecraft.serve.context import InConsoles, InContext, InUser, TakesPlace
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.replays import replay_of, trial_of
+from racecraft.serve.races.rules import rule_sets
 from racecraft.serve.races.schemas import (
     MAX_CARS,
     Enter,
@@ -25,6 +26,7 @@ from racecraft.serve.races.schemas import (
     RaceDetail,
     RaceReplay,
     ReplayCar,
+    RuleSet,
 )
 from racecraft.serve.races.standings import replay_trace
 from racecraft.serve.races.tasks import REPLAY, VIDEO, entry_folder
@@ -45,6 +47,12 @@ def list_races(context: InContext) -> list[RaceCard]:
 def create_race(request: NewRace, context: InContext, user: InUser) -> RaceDetail:
     """Make a race."""
     return context.races.get(context.races.create(request, user_id=user))
+
+
+@router.get("/rules")
+def list_rules() -> list[RuleSet]:
+    """Sets of rules that models can race by, the usual one first."""
+    return rule_sets()
 
 
 @router.get("/{race_id}")

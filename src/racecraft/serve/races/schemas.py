@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AwareDatetime, Field
 
 from racecraft.serve.evaluations.schemas import RoadObject
+from racecraft.serve.road import OnRoad
 from racecraft.serve.schemas import Message, RunName
 from racecraft.serve.tracks.schemas import TrackGeometry, TrackSector
 
@@ -16,32 +17,61 @@ Ranking = Literal["total", "best", "average"]
 RaceState = Literal["upcoming", "open", "closed"]
 Title = Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S")]
 Seconds = Annotated[float, Field(ge=0.0, le=600.0, allow_inf_nan=False)]
+CheckpointChoice = Literal["best", "last"] | Annotated[int, Field(ge=0, le=10**12)]
+"""Of a model; a number is that of the camera steps of training behind it."""
 
 MAX_CARS: Final = 12
 """Of a replay."""
 
 
-class NewRace(Message):
+class RuleSet(Message):
+    """Rules by a name, and of them those that whoever holds a race may choose one by one."""
+
+    name: str
+    laps: int
+    offtrack_penalty: float
+    """s"""
+    collision_penalty: float
+    """s"""
+    max_resets: int
+    time_limit: float
+    """s; 0 for none."""
+
+
+class RaceSettings(OnRoad):
+    """By which rules models race, in which car and among what: what races, heats and ladders are asked alike."""
+
+    rules: Literal["drfc", "worker", "droa", "live"] = "drfc"
+    """A set of rules; single ones may differ."""
+    offtrack_penalty: Seconds | None = None
+    """By default the rules', as all that follow."""
+    collision_penalty: Seconds | None = None
+    max_resets: int | None = Field(None, ge=0, le=10_000)
+    time_limit: float | None = Field(None, ge=0.0, le=86_400.0, allow_inf_nan=False)
+    """s on the clock, penalties included, that end a trial; 0 for none."""
+    direction: Literal["forward", "reverse"] = "forward"
+    vehicle: Literal["v4", "v5", "v6"] = "v5"
+    """Everybody's, whatever they were trained with."""
+    randomize: Literal["none", "light", "strong", "real", "aws"] = "none"
+    """What differs from what the models know; the same for all."""
+    seed: int | None = Field(None, ge=0, le=2**32 - 1)
+    """Of starts and objects; by default drawn."""
+
+
+class NewRace(RaceSettings):
     """A race; but for the title every field has a good default."""
 
     title: Title
     description: str = Field("", max_length=500)
     kind: RaceKind = "time-trial"
     track: str = Field("reinvent_2018", max_length=200)
-    direction: Literal["forward", "reverse"] = "forward"
-    laps: int = Field(3, ge=1, le=20)
+    laps: int | None = Field(None, ge=1, le=20)
+    """By default the rules'."""
     ranking: Ranking = "total"
     minimum_laps: int = Field(1, ge=1, le=20)
     """Laps in a row that an average is taken over, and that have to be completed."""
-    offtrack_penalty: Seconds = 5.0
-    collision_penalty: Seconds = 5.0
-    max_resets: int = Field(100, ge=0, le=10_000)
     objects: int = Field(6, ge=1, le=20)
     """Boxes or bot cars, where the kind has them."""
-    bot_speed: float = Field(0.2, ge=0.0, le=4.0, allow_inf_nan=False)
-    """m/s"""
-    vehicle: Literal["v4", "v5", "v6"] = "v5"
-    """Everybody's, whatever they were trained with."""
     trials: int = Field(5, ge=1, le=15)
     """Of each entry, from as many places of the lap; the median of their scores counts."""
     seed: int | None = Field(None, ge=0, le=2**32 - 1)
@@ -139,6 +169,8 @@ class RaceDetail(RaceCard):
     rules: dict[str, Any]
     objects: dict[str, Any]
     vehicle: str
+    randomize: str
+    """A preset's name; empty where it is none of this version's."""
     seed: int | None
     """None where it is drawn from a secret."""
     commitment: str
@@ -155,7 +187,8 @@ class Enter(Message):
     """Enter models."""
 
     models: list[RunName] = Field(min_length=1, max_length=50)
-    checkpoint: Literal["best", "last"] = "best"
+    checkpoint: CheckpointChoice = "best"
+    """Of each of them."""
 
 
 class ReplayCar(Message):
