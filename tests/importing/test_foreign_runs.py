@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import models
@@ -73,7 +74,8 @@ def test_a_run_on_a_drawn_road_goes_on_where_that_road_comes_with_it(tmp_path: P
     oval = load_track("oval")
     road = tmp_path / "mine.npy"
     np.save(road, np.concatenate((oval.centerline * 1.1, oval.inner * 1.1, oval.outer * 1.1), axis=1))
-    settings = {"ppo": TINY, "evaluate_every": 64, "evaluation_trials": 1, "num_threads": 1}
+    fast = replace(TINY, learning_rate=0.0015)  # more than AWS's file may say
+    settings = {"ppo": fast, "evaluate_every": 64, "evaluation_trials": 1, "num_threads": 1}
     mine = train(str(road), until="64 steps", root=tmp_path, name="mine", **settings).run
     archive = tmp_path / "mine.tar.gz"
     archive.write_bytes(b"".join(archive_chunks(RunFolder.open(mine))))
@@ -83,6 +85,11 @@ def test_a_run_on_a_drawn_road_goes_on_where_that_road_comes_with_it(tmp_path: P
     assert RunFolder.open(with_road).checkpoints.load("last").step == RunFolder.open(mine).checkpoints.load("last").step
     with open_source(archive) as source:
         assert read_own(source, "mine/", track="oval") is None
+    anew = import_run(archive, root=tmp_path / "theirs", name="elsewhere", track="oval")
+    began = RunFolder.open(anew.run)
+    assert (began.read_info().track, began.checkpoints.last) == ("oval", None)
+    assert began.read_hyperparameters() is None  # what was left for AWS's tools is not what it learned with
+    assert any("Racecraft's own settings" in note for note in anew.notes)
 
 
 @pytest.mark.costly

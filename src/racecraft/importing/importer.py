@@ -300,6 +300,8 @@ def _actions(metadata: ModelMetadata) -> str:
 
 def _read_hyperparameters(model: _Model) -> Hyperparameters | None:
     name = model.find(HYPERPARAMETERS)
+    if model.root + RUN in model.source.files and name != model.root + HYPERPARAMETERS:
+        name = ""  # what a run of ours leaves for AWS's tools is never read back: ours may lie outside of AWS's ranges
     if not name:
         model.notes.append(f"There is no {HYPERPARAMETERS}: it trains with Racecraft's own settings.")
         return None
