@@ -112,10 +112,9 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
     (kept, *_) = visit.console.client.get("/api/models/bob").json()["checkpoints"]
     page.get_by_role("combobox", name="Checkpoint of bob").select_option(str(kept["step"]))
     page.get_by_label("Rules").select_option("worker")
-    assert (page.get_by_label("Resets allowed").input_value(), page.get_by_label("Off track").input_value()) == (
-        "0",
-        "2",
-    )
+    filled = [page.get_by_label(label).input_value() for label in ("Resets allowed", "Off track costs")]
+    assert filled == ["0", "2"]
+    page.get_by_label("Title").fill("All of it")
     page.get_by_label("Time limit, s").fill("9")
     page.get_by_label("Ranked by").select_option("best")
     page.get_by_label("On the road").select_option("bots")
@@ -139,12 +138,8 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
     assert {name: asked[name] for name in wanted} == wanted
     page.get_by_role("heading", name="The heat in 3D").wait_for()
     held = page.get_by_role("heading", name="Held by these rules").locator("..")
-    for told in (
-        "9 s",
-        "Bot cars: 2 · 0.5 m/s · change lanes · 40 % inner lane, 50 % outer lane",
-        "The other way",
-        "7",
-    ):
+    bots = "Bot cars: 2 · 0.5 m/s · change lanes · 40 % inner lane, 50 % outer lane"
+    for told in ("9 s", bots, "The other way", "7"):
         assert held.get_by_text(told, exact=True).is_visible()
 
     page = visit.open("/contests/new")
@@ -155,10 +150,13 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
     page.get_by_label("Parked cars", exact=True).fill("2")
     page.get_by_label("Who meets whom").select_option("swiss")
     page.get_by_label("Rounds").fill("2")
+    page.get_by_label("Starts on each track").fill("1")
+    assert page.get_by_label("Time limit, s").input_value() == "180"
+    page.get_by_label("Time limit, s").fill("5")
     with page.expect_request("**/api/contests/ladders") as sent:
         page.get_by_role("button", name="Start the ladder of 2").click()
     asked = sent.value.post_data_json
-    wanted = {"rounds": 2, "count": 2, "parked_cars": True, "placement": "even", "time_limit": 180}
+    wanted = {"rounds": 2, "count": 2, "parked_cars": True, "placement": "even", "time_limit": 5}
     assert {name: asked[name] for name in wanted} == wanted
     page.get_by_role("heading", name="Held by these rules").wait_for()
 
@@ -166,17 +164,38 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
     page.get_by_label("Title").fill("Final")
     page.get_by_role("button", name="Head to bot").click()
     page.get_by_label("Rules").select_option("live")
+    assert page.get_by_label("Time limit, s").input_value() == "180"
+    page.get_by_label("Time limit, s").fill("5")
+    page.get_by_label("Trials").fill("1")
     page.get_by_label("Otherwise than they know").select_option("strong")
     page.get_by_label("Where they are").select_option("random")
     page.get_by_role("button", name="Make the race").click()
     page.get_by_text("Held by these rules").click()
-    for told in ("180 s", "Bot cars: 6 · 0.2 m/s · elsewhere each time", "Much of everything", "15"):
+    for told in ("5 s", "Bot cars: 6 · 0.2 m/s · elsewhere each time", "Much of everything", "15"):
         assert page.locator("details dl").get_by_text(told, exact=True).is_visible()
     page.get_by_role("checkbox", name="bob").check()
     page.get_by_label("Which state of it").select_option(str(kept["step"]))
     with page.expect_request("**/entries") as sent:
         page.get_by_role("button", name="Enter 1 and drive").click()
     assert sent.value.post_data_json == {"models": ["bob"], "checkpoint": kept["step"]}
+
+
+def test_tables_of_heats_and_ladders_lead_to_why_the_first_is_faster(visit: Visit) -> None:
+    client = visit.console.client
+    models = [{"model": client.post(f"/api/models/starters/{name}").json()["name"]} for name in ("quick", "steady")]
+    heat = client.post("/api/contests/heats", json={"models": models, "title": "Starters", "seed": 1}).json()["id"]
+    ladder = {"models": models, "tracks": ["reinvent_2018"], "kind": "time-trial", "starts": 1, "title": "Rated"}
+    rated = client.post("/api/contests/ladders", json=ladder).json()["id"]
+    for contest, room in ((heat, "heat"), (rated, "ladder")):
+        assert visit.console.wait_for(visit.console.job_ended(contest))["state"] == "done"
+        found = client.get(f"/api/contests/{contest}").json()[room]
+        why = f"Why is {found[0]['name']} faster than {found[1]['name']}?"
+        page = visit.open(f"/contests/{contest}")
+        page.get_by_role("button", name=why).click()
+        page.locator("#film").get_by_role("heading", name=why).wait_for()
+        page.get_by_label("Moment of the race").last.fill("10000")
+        states = [label.inner_text() for label in page.locator("#film .stage li .number").all()]
+        assert states == ["arrived", "arrived"]
 
 
 def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
@@ -196,7 +215,7 @@ def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
     assert (asked["offtrack_penalty"], asked["max_resets"]) == (1.5, 4)
     page.get_by_role("heading", name="The heat in 3D").wait_for()
     grid = page.get_by_role("region", name="Result").locator("tbody tr")
-    started = {row.locator("td").nth(1).inner_text(): row.locator("td").last.inner_text() for row in grid.all()}
+    started = {row.locator("td").nth(1).inner_text(): row.locator("td").nth(7).inner_text() for row in grid.all()}
     assert started == {"bob": "1", "ada": "2", "ada@last": "3"}
     first = grid.first.locator("td").nth(1).inner_text()
     page.locator(".stage canvas").wait_for()

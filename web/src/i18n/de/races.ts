@@ -102,6 +102,7 @@ export const races: Record<keyof typeof english, string> = {
   races_scrub: "Zeitpunkt im Rennen",
   races_pace: "Tempo",
   races_arrived: "im Ziel",
+  races_ended: "{done} von {laps} Runden",
   races_checkpoint: "Welcher Stand davon",
   races_offtrack_told: "Abkommen kostet",
   races_collision_told: "Ein Aufprall kostet",

@@ -99,6 +99,7 @@ export const races = {
   races_scrub: "Moment of the race",
   races_pace: "Pace",
   races_arrived: "arrived",
+  races_ended: "{done} of {laps} laps",
   races_checkpoint: "Which state of it",
   races_offtrack_told: "Leaving the track costs",
   races_collision_told: "A crash costs",
