@@ -236,6 +236,13 @@ def test_a_model_learns_against_itself_or_against_others(console: RunningConsole
     assert found["self-taught"]["settings"]["opponents"]["drivers"] == ["self"]
     assert found["pupil"]["settings"]["opponents"]["cars"] == 3
     assert [Path(path).name for path in found["pupil"]["settings"]["opponents"]["drivers"]] == ["ada", "bob"]
+    for name in found:  # it drives its lap behind those that it met
+        lap = console.client.get(f"/api/models/{name}/demonstration").json()
+        assert [thing["kind"] for thing in lap["objects"]] == ["racer", "racer"]
+        place = [thing["x"][0] - lap["poses"][0][0] / 1000 for thing in lap["objects"]]
+        assert max(abs(away) for away in place) > 0.2
+        assert (lap["road"], lap["roads"], lap["geometry"]["name"]) == (0, ["oval"], "oval")
+        assert console.client.get(f"/api/models/{name}/demonstration?road=1").status_code == 404
     alone = console.client.post("/api/models", json={**wanted, "race": "time-trial", "opponents": ["ada"]})
     assert alone.status_code == 422
     assert "head-to-head" in alone.json()["error"]["message"]

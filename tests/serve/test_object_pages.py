@@ -58,6 +58,15 @@ def test_what_is_on_the_road_is_seen_live_and_again_in_the_replay(
             expected = table[:, index, 1:3] if len(where) > 1 else table[:1, index, 1:3]
             np.testing.assert_allclose(where, expected, atol=1e-3)
 
+    # nobody trains any more: the best car drives its lap among them, also after a reload
+    lap = console.client.get(f"/api/models/{race}/demonstration").json()
+    assert [len(thing["x"]) for thing in lap["objects"]] == [1 if seen[0] != "0" else len(lap["poses"])] * count
+    page = visit.open(f"/models/{race}/watch")
+    for _ in range(2):
+        page.get_by_text("The best car").wait_for()
+        page.locator(there).wait_for()
+        page.reload()
+
 
 def test_what_is_on_the_road_is_seen_in_the_film_of_a_race(visit: Visit) -> None:
     console = visit.console

@@ -39,8 +39,8 @@ def trained_objects(info: RunInfo) -> Objects:
     return Objects.from_dict(info.settings.get("objects") or {})
 
 
-def trained_track(info: RunInfo) -> Track:
-    """The track of run.json, the first if there are several.
+def trained_tracks(info: RunInfo) -> list[Track]:
+    """The tracks of run.json, at least one.
 
     Raises:
         ConfigError: There is another by that name now.
@@ -51,4 +51,13 @@ def trained_track(info: RunInfo) -> Track:
             f"Track {info.track!r} has changed since the run was trained on it.",
             hint="Choose the track anew (--track), be it the same.",
         )
-    return tracks[0]
+    return tracks
+
+
+def trained_track(info: RunInfo) -> Track:
+    """The first of them.
+
+    Raises:
+        ConfigError: There is another by that name now.
+    """
+    return trained_tracks(info)[0]

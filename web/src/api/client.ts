@@ -107,7 +107,8 @@ export const api = {
   console: () => ask<ConsoleFacts>("GET", "/console"),
   models: () => ask<ModelCard[]>("GET", "/models"),
   model: (run: string) => ask<ModelDetail>("GET", `/models/${name(run)}`),
-  demonstration: (run: string) => ask<Demonstration>("GET", `/models/${name(run)}/demonstration`),
+  demonstration: (run: string, road = 0) =>
+    ask<Demonstration>("GET", `/models/${name(run)}/demonstration${road ? `?road=${road}` : ""}`),
   evolution: (run: string) => ask<Evolution>("GET", `/models/${name(run)}/evolution`),
   filmEvolution: (run: string) => ask<JobInfo>("POST", `/models/${name(run)}/evolution`),
   again: (run: string) => ask<Schemas["NewModel"]>("GET", `/models/${name(run)}/again`),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
@@ -237,11 +237,11 @@ def get_again(name: str, context: InContext) -> NewModel:
 
 
 @router.get("/{name}/demonstration", dependencies=[Computes])
-def get_demonstration(name: str, context: InContext) -> Demonstration:
-    """The lap that a model's best checkpoint drives alone on its road."""
-    found = demonstration(_of_one_road(context, name))
+def get_demonstration(name: str, context: InContext, road: Annotated[int, Query(ge=0, lt=10_000)] = 0) -> Demonstration:
+    """The lap that a model's best checkpoint drives on one of its roads, by number, among what it met there."""
+    found = demonstration(context.garage.folder(name), road=road)
     if found is None:
-        raise NotFound(f"Model {name!r} has no checkpoint that could drive a lap on one road.")
+        raise NotFound(f"Model {name!r} has no checkpoint, or no road {road}, to drive a lap.")
     return found
 
 

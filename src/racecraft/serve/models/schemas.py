@@ -7,8 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.jobs.schemas import JobInfo
 from racecraft.serve.schemas import Message, RunName
+from racecraft.serve.tracks.schemas import TrackGeometry
 from racecraft.training.regimes import TIME_TRIAL
 from racecraft.training.settings import DEFAULT_TRACK
 
@@ -130,7 +132,7 @@ class ExportNotes(Message):
 
 
 class Demonstration(Message):
-    """A lap of a model's best checkpoint, driven to be looked at."""
+    """A lap of a model's best checkpoint among what it met while it learned, driven to be looked at."""
 
     step: int
     """Of the checkpoint."""
@@ -138,6 +140,13 @@ class Demonstration(Message):
     """Of the lap, where it was completed."""
     poses: list[list[int]]
     """X, y [mm], heading [mrad], speed [mm/s], steering [mrad] and share of the lap [1/1000], every 1/15 s."""
+    objects: list[RoadObject]
+    """Boxes and other cars of its road, step by step."""
+    road: int
+    """Number of the track, from 0."""
+    roads: list[str]
+    """All the tracks that it learned on."""
+    geometry: TrackGeometry
 
 
 class EvolutionLap(Message):

@@ -74,6 +74,7 @@ export const watch: Record<keyof typeof english, string> = {
   not_live: "Gerade wird nicht trainiert.",
   best_drives: "Das beste Auto auf seiner Runde: {lap}",
   best_drives_is: "Gefahren zum Zusehen, mit einem eigenen Start: Als beste Runde zählt sie nicht.",
+  best_drives_on: "Strecke, auf der es fährt",
   best_drives_part: "Das beste Auto; ganz herum kam es noch nicht",
   camera_orbit: "Frei",
   camera_follow: "Verfolgen",

@@ -70,6 +70,7 @@ export const watch = {
   not_live: "No training is running.",
   best_drives: "The best car on its lap: {lap}",
   best_drives_is: "Driven to be watched, from a start of its own: it does not count as a best lap.",
+  best_drives_on: "Track that it drives on",
   best_drives_part: "The best car; it has not come all the way round yet",
   camera_orbit: "Free",
   camera_follow: "Follow",
