@@ -76,6 +76,7 @@ CONSOLE = (
     "machine",
     "lessons",
     "groups",
+    "comments",
     "quotas",
     "desks",
     "submissions",

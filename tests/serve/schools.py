@@ -37,7 +37,10 @@ class School:
         race = ok(ada.post("/api/races", json=RACE), 201)["id"]
         heat = {"models": [{"model": "adas-model"}] * 2, "track": "oval", "max_resets": 0}
         entry = ok(ada.post(f"/api/races/{race}/entries", json={"models": ["adas-model"]}), 202)["undecided"]
+        said = {"member": number, "model": "adas-model", "text": "Look at the hairpin."}
+        (comment,) = ok(teacher.post(f"/api/groups/{group}/comments", json=said), 201)
         self.objects = {
+            "comment_id": comment["id"],
             "lesson": 4,
             "picture": "lake",
             "track": "adas-track",

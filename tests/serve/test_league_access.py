@@ -156,6 +156,10 @@ ROWS: dict[str, tuple[str, Any]] = {
     "POST /api/groups/{group_id}/cards": ("organiser", {"members": [0]}),
     "GET /api/groups/{group_id}/models": ("organiser", None),
     "POST /api/groups/{group_id}/models/copy": ("organiser", {"member": 0, "model": "adas-model"}),
+    "GET /api/comments": ("each", None),
+    "DELETE /api/comments/{comment_id}": ("herself", None),
+    "GET /api/groups/{group_id}/comments": ("organiser", "?member={member}"),
+    "POST /api/groups/{group_id}/comments": ("organiser", {"member": 0, "model": "adas-model", "text": "x"}),
     "POST /api/invitations": ("admin", {}),
     "POST /api/resets": ("admin", {"person": "Ada"}),
     "GET /api/audit": ("admin", None),
@@ -231,6 +235,7 @@ POWER: dict[str, Any] = {  # over a racer, of the group by which she came in alo
     "POST /api/groups/{group_id}/members/{member}/admit": None,
     "POST /api/groups/{group_id}/members/{member}/revoke": None,
     "POST /api/groups/{group_id}/models/copy": {"member": 0, "model": "adas-model"},
+    "POST /api/groups/{group_id}/comments": {"member": 0, "model": "adas-model", "text": "x"},
 }
 
 
@@ -243,7 +248,7 @@ def request(school: School, client: httpx.Client, label: str, **other: Any) -> h
         body = {**body}
         body |= {"members": [school.objects["member"]]} if "members" in body else {}
         body |= {"member": school.objects["member"]} if "member" in body else {}
-    query = body if isinstance(body, str) else ""
+    query = body.format(**objects) if isinstance(body, str) else ""
     json = body if isinstance(body, dict) else None
     with client.stream(method, path.format(**objects) + query, json=json) as reply:
         if not reply.headers.get("content-type", "").startswith("text/event-stream"):

@@ -79,7 +79,7 @@ def race(lesson: Lesson) -> int:
     page.get_by_role("button", name="Done").click()
     page.get_by_role("cell", name="Ada Lovelace").wait_for()
     page.get_by_label("Title").fill("Friday cup")
-    page.get_by_label("Track", exact=True).select_option("oval")
+    page.get_by_role("combobox", name="Track", exact=True).select_option("oval")
     page.get_by_label("Laps", exact=True).fill("1")
     page.get_by_role("button", name="Make the race").click()
     page.get_by_text("Nobody has arrived yet.").wait_for()
@@ -153,7 +153,7 @@ def test_the_best_meet_in_a_final_and_the_wall_shows_it_heat_by_heat(lesson: Les
     page.get_by_label("Title", exact=True).fill("Grand final")
     page.get_by_label("Qualifying is").select_option("Friday cup")
     page.get_by_label("How many of its first").fill("2")
-    page.get_by_label("Track", exact=True).select_option("oval")
+    page.get_by_role("combobox", name="Track", exact=True).select_option("oval")
     page.get_by_label("Laps", exact=True).fill("1")
     page.get_by_role("button", name="Make the race").click()
     page.get_by_text("with what they qualified with, once that is over").wait_for()
@@ -183,6 +183,22 @@ def test_the_best_meet_in_a_final_and_the_wall_shows_it_heat_by_heat(lesson: Les
     page = teacher.open(f"/groups/{group}/season")
     row = page.get_by_role("row", name=first["name"])
     assert "+25" in row.inner_text()
+
+
+def test_the_teacher_says_something_about_a_model_and_its_owner_reads_it(lesson: Lesson, race: int) -> None:
+    group = ok(lesson.league.owner.get("/api/groups"))[0]["id"]
+    page = lesson.visits["teacher"].open(f"/groups/{group}")
+    page.get_by_role("button", name="Comment: comet-one, Comet").click()
+    page.get_by_label("About comet-one").fill("Brake before the hairpin.")
+    page.get_by_role("button", name="Say it").click()
+    page.get_by_role("button", name="Remove: Brake before the hairpin.").wait_for()
+    pupil = lesson.visits["Comet"].open("/league")
+    pupil.get_by_text("Brake before the hairpin.").wait_for()
+    pupil.get_by_role("link", name="comet-one").click()
+    said = pupil.get_by_role("region", name="What was said about it")
+    said.get_by_text("Brake before the hairpin.").wait_for()
+    said.get_by_role("button", name="Remove").click()
+    said.wait_for(state="detached")
 
 
 def test_a_code_at_the_wall_and_a_card_that_was_lost(lesson: Lesson, race: int) -> None:

@@ -19,6 +19,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from racecraft.serve import replies, tab
 from racecraft.serve.audit import routes as audit
+from racecraft.serve.comments import routes as comments
 from racecraft.serve.compression import Compressed, accepts, gzipped
 from racecraft.serve.contests import routes as contests
 from racecraft.serve.contests.contests import Contests
@@ -177,7 +178,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     parts += [contests, jobs, events, door, provider, audit, lessons, workers]
     for part in parts:
         app.include_router(part.router)
-    for part in (account, groups, league, finals, quotas):
+    for part in (account, groups, comments, league, finals, quotas):
         app.include_router(part.router, dependencies=[audit.Audited])
 
     @app.get("/assets/{name}", include_in_schema=False)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from fastapi import Depends, Request
 
 from racecraft.serve.audit.audit import Audit
+from racecraft.serve.comments.comments import Comments
 from racecraft.serve.contests.contests import Contests
 from racecraft.serve.desks import Desks
 from racecraft.serve.driving.drives import Drives
@@ -87,6 +88,7 @@ class Consoles:
         self.quotas = Quotas(owner.database, owner.settings.runs)
         self.audit, self.devices = Audit(owner.database), Devices()
         self.league = League(owner.database, owner.settings.state, self._courses)
+        self.comments = Comments(owner.database)
         self.finals = Finals(owner.database, owner.settings.state, self._courses, self.league)
         self._others: dict[int, Context] = {}
         self._lock = threading.Lock()

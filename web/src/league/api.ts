@@ -24,6 +24,7 @@ export type BoardPage = Schemas["BoardPage"];
 export type BoardRow = Schemas["BoardRow"];
 export type FinalPage = Schemas["FinalPage"];
 export type SubmissionInfo = Schemas["SubmissionInfo"];
+export type CommentInfo = Schemas["CommentInfo"];
 export type SeasonRow = Schemas["SeasonRow"];
 export type SessionInfo = Schemas["SessionInfo"];
 export type AuditLine = Schemas["AuditLine"];
@@ -73,6 +74,11 @@ export const leagueApi = {
   models: (id: number) => ask<MemberModels[]>("GET", `/groups/${id}/models`),
   copy: (id: number, member: number, model: string) =>
     ask<Schemas["ModelCard"]>("POST", `/groups/${id}/models/copy`, { member, model }),
+  comments: () => ask<CommentInfo[]>("GET", "/comments"),
+  memberComments: (id: number, member: number) => ask<CommentInfo[]>("GET", `/groups/${id}/comments?member=${member}`),
+  comment: (id: number, member: number, model: string, text: string) =>
+    ask<CommentInfo[]>("POST", `/groups/${id}/comments`, { member, model, text }),
+  removeComment: (comment: number) => ask<void>("DELETE", `/comments/${comment}`),
   invite: () => ask<JoiningInfo>("POST", "/invitations", { uses: 1, hours: 24 * 7 }),
 
   races: () => ask<LeagueRace[]>("GET", "/league/races"),

@@ -28,7 +28,7 @@ from racecraft.serve.models.schemas import Checkpoint, ModelCard, TrainingStretc
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Entry, Job, Model, now
+from racecraft.serve.store.tables import Comment, Entry, Job, Model, now
 from racecraft.sim.objects import RACE_TYPES, Objects
 from racecraft.sim.vehicle import Vehicle
 from racecraft.track import load_track, single_names
@@ -228,6 +228,8 @@ class Garage:
         with self._database.transaction() as session:
             session.execute(sa.delete(Model).where(self._named(new)))
             session.execute(sa.update(Model).where(self._named(old)).values(name=new))
+            about_it = sa.and_(Comment.owner_id == self._user_id, Comment.model == old)
+            session.execute(sa.update(Comment).where(about_it).values(model=new))
             for table in (Job, Entry):
                 of_it = sa.and_(table.user_id == self._user_id, table.run == old)
                 session.execute(sa.update(table).where(of_it).values(run=new))

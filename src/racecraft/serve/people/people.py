@@ -15,7 +15,7 @@ from racecraft.serve.people.passwords import hash_password, is_password
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Invitation, Job, Member, Quota, StudiedLesson, Submission, User, now
+from racecraft.serve.store.tables import Comment, Invitation, Job, Member, Quota, StudiedLesson, Submission, User, now
 
 Role = Literal["admin", "organiser", "racer"]
 
@@ -127,6 +127,7 @@ class People:
             revoke_all(session, user_id)
             session.execute(sa.delete(Member).where(Member.user_id == user_id))
             session.execute(sa.delete(StudiedLesson).where(StudiedLesson.user_id == user_id))
+            session.execute(sa.delete(Comment).where(sa.or_(Comment.owner_id == user_id, Comment.author_id == user_id)))
             session.execute(sa.delete(Quota).where(Quota.scope == "person", Quota.number == user_id))
             waiting = sa.update(Job).where(Job.user_id == user_id, Job.state.in_(("queued", "running")))
             session.execute(waiting.values(is_cancelled=True))

@@ -194,6 +194,20 @@ class Model(Table):
     deleted: Mapped[datetime | None]
 
 
+class Comment(Table):
+    """What an organiser has said about a racer's model."""
+
+    __tablename__ = "comments"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    owner_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
+    """Whose model it is."""
+    model: Mapped[str] = mapped_column(String(64))
+    author_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    text: Mapped[str] = mapped_column(String(1000))
+    created: Mapped[datetime] = mapped_column(default=now)
+
+
 class Job(Table):
     """Work for a child process; see racecraft.serve.jobs.queue."""
 

@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import (
     Card,
+    Comment,
     Deed,
     Finalist,
     Group,
@@ -58,6 +59,12 @@ def data_of(database: Database, user_id: int) -> dict[str, Any]:
             "finals": [
                 {"race": title, **_row(row)}
                 for title, row in session.execute(finals.where(Submission.user_id == user_id))
+            ],
+            "comments": [
+                _row(row)
+                for row in session.scalars(
+                    sa.select(Comment).where(sa.or_(Comment.owner_id == user_id, Comment.author_id == user_id))
+                )
             ],
             "submissions": [
                 {"race": title, "file": row.digest, **_row(row)}
