@@ -1,6 +1,6 @@
 """How fast cars learn in a browser's tab, how smooth the page stays, and how much is loaded; on a quiet machine.
 
-python benchmarks/site.py [--only page pace python slow bits] [--seeds 5] [--json]
+python benchmarks/site.py [--only page pace threads python slow bits] [--seeds 5] [--json]
 
 Needs `make site`, Playwright and Chromium, and Brotli of Node. With --json the last line is one object; the bits are
 those of tests/site, which it runs.
@@ -25,7 +25,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-PARTS = ["page", "pace", "python", "slow", "bits"]
+PARTS = ["page", "pace", "threads", "python", "slow", "bits"]
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "build" / "site"
 OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"]
@@ -51,7 +51,7 @@ seconds = time.monotonic() - began
 shutil.rmtree(result.run)
 print(steps / seconds)
 """
-TRAIN = """async ([site, address, most, seed]) => {
+TRAIN = """async ([site, address, most, seed, isTeam]) => {
   const read = async (file) => (await fetch(new URL(file, site))).json();
   const [plan, track] = await Promise.all([read("data/plan.json"), read("data/tracks/reinvent_2018.json")]);
   const text = `import ${JSON.stringify(new URL(address, site).href)};`;
@@ -59,14 +59,15 @@ TRAIN = """async ([site, address, most, seed]) => {
   const race = { ...plan.races["time-trial"], evaluateEvery: 1e9 };
   const asked = { plan, race, policy: race.policies.default, objects: race.objects, track, seed };
   return new Promise((told, failed) => {
-    let last;
+    let last, threads;
     worker.onmessage = ({ data }) => {
       if (data.kind === "ready") worker.postMessage({ kind: "train", ...asked, reward: "racing", most });
+      else if (data.kind === "loaded") threads = data.threads;
       else if (data.kind === "iteration") last = { steps: data.iteration.steps, seconds: data.seconds };
       else if (data.kind === "failed") failed(new Error(data.message));
-      else if (data.kind === "ended") (worker.terminate(), told(last));
+      else if (data.kind === "ended") (worker.terminate(), told({ ...last, threads }));
     };
-    worker.postMessage({ kind: "load", site, hasPython: false });
+    worker.postMessage({ kind: "load", site, hasPython: false, isTeam });
   });
 }"""
 
@@ -75,20 +76,33 @@ class Files(http.server.SimpleHTTPRequestHandler):
     """A static host."""
 
     asked: list[str] = []  # noqa: RUF012  # of all of them
+    more: dict[str, str] = {}  # noqa: RUF012  # headers
+
+
+class Isolating(Files):
+    """One whose pages may share memory between threads."""
+
+    more = {"Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp"}  # noqa: RUF012
 
     def do_GET(self) -> None:
         """Notes what was asked for."""
         self.asked.append(self.path)
         super().do_GET()
 
+    def end_headers(self) -> None:
+        """With those below."""
+        for name, value in self.more.items():
+            self.send_header(name, value)
+        super().end_headers()
+
     def log_message(self, *_: object) -> None:
         """Says nothing."""
 
 
 @contextmanager
-def hosted() -> Iterator[str]:
+def hosted(kind: type[Files]) -> Iterator[str]:
     """The site's address."""
-    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE)))
+    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(kind, directory=str(SITE)))
     threading.Thread(target=host.serve_forever, daemon=True).start()
     try:
         yield f"http://127.0.0.1:{host.server_port}/"
@@ -104,12 +118,12 @@ def compressed(path: Path) -> int:
 
 
 @contextmanager
-def browsing() -> Iterator[tuple[Any, str]]:
+def browsing(kind: type[Files] = Files) -> Iterator[tuple[Any, str]]:
     """A browser, and the site's address."""
     from playwright.sync_api import sync_playwright
 
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    with hosted() as address, sync_playwright() as playwright:
+    with hosted(kind) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
         yield browser, address
         browser.close()
@@ -165,18 +179,43 @@ def python() -> dict[str, Any]:
 
 def side_by_side(steps: int) -> dict[str, Any]:
     """The same training in a page's worker and natively, in turns."""
-    worker = next((SITE / "assets").glob("worker-*.js")).name
     tab, native = [], []
-    with browsing() as (browser, address):
-        page = browser.new_page()
-        page.goto(f"{address}docs/index.html")  # a page of the site on which nothing moves
+    with in_a_worker(Files, steps) as train:
         for seed in range(1, TURNS + 1):
-            done = page.evaluate(TRAIN, [address, f"assets/{worker}", steps, seed])
-            tab.append(done["steps"] / done["seconds"])
+            tab.append(train(seed, False)[0])
             native.append(natively(steps, seed))
     pace, beside = statistics.median(tab), statistics.median(native)
     print(f"{pace:,.0f} camera steps/s, {pace / beside:.0%} of native's on one thread with AVX2")
     return {"train": {"steps_per_second": pace, "native_steps_per_second": beside, "of_native": pace / beside}}
+
+
+def several(steps: int) -> dict[str, Any]:
+    """The same training in a page's worker on one thread and on as many as there are, in turns."""
+    one, all_ = [], []
+    count = 1
+    with in_a_worker(Isolating, steps) as train:
+        for seed in range(1, TURNS + 1):
+            one.append(train(seed, False)[0])
+            pace, count = train(seed, True)
+            all_.append(pace)
+    pace, beside = statistics.median(all_), statistics.median(one)
+    print(f"{pace:,.0f} camera steps/s on {count} threads, {pace / beside:.2f} times one thread's {beside:,.0f}")
+    return {"threads": {"count": count, "steps_per_second": pace, "one_thread": beside, "of_one": pace / beside}}
+
+
+@contextmanager
+def in_a_worker(kind: type[Files], steps: int) -> Iterator[Callable[[int, bool], tuple[float, int]]]:
+    """Trains with a seed, in several threads or not: camera steps per second, and threads."""
+    worker = next((SITE / "assets").glob("worker-*.js")).name
+    with browsing(kind) as (browser, address):
+        page = browser.new_page()
+        page.goto(f"{address}docs/index.html")  # a page of the site on which nothing moves
+
+        def train(seed: int, is_team: bool) -> tuple[float, int]:
+            done = page.evaluate(TRAIN, [address, f"assets/{worker}", steps, seed, is_team])
+            return done["steps"] / done["seconds"], done["threads"]
+
+        yield train
 
 
 def slowly() -> dict[str, Any]:
@@ -268,6 +307,7 @@ def main() -> None:
     parts: dict[str, Callable[[], dict[str, Any]]] = {
         "page": lambda: in_the_tab(options.seeds),
         "pace": lambda: side_by_side(options.steps),
+        "threads": lambda: several(options.steps),
         "python": python,
         "slow": slowly,
         "bits": bits,

@@ -1,5 +1,5 @@
-// A fixed set of threads that run the same loop body over [0, count) and then wait for the next loop. A
-// browser's tab has one thread: there native/wasm/one_thread.cpp takes the place of thread_pool.cpp.
+// A fixed set of threads that run the same loop body over [0, count) and then wait for the next loop. In a
+// browser's tab native/wasm/one_thread.cpp or shared_threads.cpp takes the place of thread_pool.cpp.
 #pragma once
 
 #include <cstddef>

@@ -212,7 +212,7 @@ RC_EXPORT(truncated_of) bool* truncated_of(Engine* cars) {
 // ---- a network
 
 RC_EXPORT(make_learner) Learner* make_learner(const double* settings) {
-    return new Learner(network_of(settings), 1);
+    return new Learner(network_of(settings), 0);
 }
 RC_EXPORT(free_learner) void free_learner(Learner* learner) {
     delete learner;

@@ -165,7 +165,7 @@ inline EngineConfig config_of(const CarSettings& s) {
     config.seed = static_cast<uint64_t>(s.seed_high) << 32 | static_cast<uint64_t>(s.seed);
     config.baseline = static_cast<float>(s.baseline);
     config.substeps = static_cast<int>(s.substeps);
-    config.num_threads = 1;
+    config.num_threads = 0;
     config.has_lidar = s.has_lidar != 0.0;
     config.limits = {static_cast<int>(s.laps), static_cast<int>(s.max_steps), s.time_limit};
     config.start = {static_cast<StartMode>(static_cast<int>(s.start_mode)),

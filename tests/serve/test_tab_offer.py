@@ -55,6 +55,13 @@ def test_what_runs_in_it_may_ask_for_its_own_files_only(client: Asking) -> None:
         assert "connect-src 127.0.0.1:8000/tab/;" in policy
 
 
+def test_every_file_lets_the_page_have_several_threads(client: Asking) -> None:
+    for path in ("/tab/", "/tab/files.js"):
+        headers = client.get(path).headers
+        assert headers["cross-origin-opener-policy"] == "same-origin"
+        assert headers["cross-origin-embedder-policy"] == "require-corp"
+
+
 @pytest.mark.parametrize("path", ["/tab/../../pyproject.toml", "/tab/%2e%2e/%2e%2e/pyproject.toml"])
 def test_nothing_outside_its_folder_is_read(client: Asking, path: str) -> None:
     assert "secret" not in client.get(path).text

@@ -2,8 +2,9 @@
 // hashes of all that came out:  node bits.mjs WEB CORE.wasm CASES.json
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
-import { dirname, join } from "node:path";
+import { basename, dirname, join } from "node:path";
 import { pathToFileURL } from "node:url";
+import { Worker } from "node:worker_threads";
 
 const [pages, code, cases] = process.argv.slice(2);
 const { build } = await import(
@@ -11,7 +12,10 @@ const { build } = await import(
 );
 
 /** A TypeScript file of the pages, bundled as they are. */
-async function load(file) {
+const load = async (file) =>
+  import(`data:text/javascript,${encodeURIComponent(await bundle(file))}`);
+
+async function bundle(file) {
   const lib = { entry: join(pages, file), formats: ["es"] };
   const bundled = await build({
     configFile: false,
@@ -19,9 +23,29 @@ async function load(file) {
     logLevel: "error",
     build: { lib, write: false },
   });
-  return import(
-    `data:text/javascript,${encodeURIComponent(bundled[0].output[0].code)}`
-  );
+  return bundled[0].output[0].code;
+}
+
+const THREADS = 3;
+const AS_A_BROWSER = `const { parentPort } = require("node:worker_threads");
+globalThis.postMessage = (data) => parentPort.postMessage(data);
+parentPort.on("message", (data) => globalThis.onmessage({ data }));
+`;
+const helpers = [];
+/** The page's helper, as a thread of Node. */
+function openHelper() {
+  const helper = new Worker(AS_A_BROWSER + helperCode, { eval: true });
+  helpers.push(helper);
+  return {
+    postMessage: (data) => helper.postMessage(data),
+    terminate: () => helper.terminate(),
+    set onmessage(hear) {
+      helper.on("message", (data) => hear({ data }));
+    },
+    set onerror(hear) {
+      helper.on("error", hear);
+    },
+  };
 }
 
 /** Python as the page has it, from the same package. */
@@ -348,7 +372,13 @@ async function driven(core, { plan, track, settings, controls }) {
 }
 
 const { Core, loadCore } = await load("src/tab/core.ts");
-const core = await Core.load(readFileSync(code));
+const { loadTeam } = await load("src/tab/team.ts");
+const bytes = readFileSync(code);
+const isTeam = basename(code) === "threads.wasm";
+const helperCode = await bundle("src/tab/helper.ts");
+const core = isTeam
+  ? new Core(await loadTeam(bytes, THREADS, openHelper))
+  : await Core.load(bytes);
 const run = {
   ...{ ask, check, drive, train, refuse },
   ...{ verify, policies, session, driven, arrival, paintings },
@@ -360,16 +390,19 @@ const python = files ? await startPython(files) : undefined;
 const results = [];
 for (const { what, ...rest } of all) results.push(await run[what](core, rest));
 // What a page takes where the first builds it asks for do not run.
-const bytes = readFileSync(code);
 const taken = async (broken) => {
   const files = [];
-  const { isSlow } = await loadCore(async (file) => {
+  const read = async (file) => {
     files.push(file);
     return broken.includes(file) ? new Uint8Array(8) : bytes;
-  });
-  return [files.at(-1), isSlow];
+  };
+  const { isSlow, threads } = await loadCore(read, THREADS, openHelper);
+  return [files.at(-1), isSlow, threads];
 };
-const doors = core.isFused
-  ? [await taken(["core.wasm"]), await taken(["core.wasm", "exact.wasm"])]
-  : [];
+const ASKED = ["threads.wasm", "core.wasm", "exact.wasm"];
+const doors = [];
+if (isTeam) doors.push(await taken([]));
+else if (core.isFused)
+  for (const count of [1, 2, 3]) doors.push(await taken(ASKED.slice(0, count)));
 console.log(JSON.stringify({ isFused: core.isFused, doors, results }));
+for (const helper of helpers) helper.terminate();

@@ -34,6 +34,8 @@ class _Files(StaticFiles):
     ) -> Response:
         response = super().file_response(full_path, stat_result, scope, status_code)
         response.headers["Content-Security-Policy"] = _policy(Headers(scope=scope).get("host", ""))
+        response.headers["Cross-Origin-Opener-Policy"] = "same-origin"  # with the next one: threads over one memory
+        response.headers["Cross-Origin-Embedder-Policy"] = "require-corp"
         response.headers["Cache-Control"] = "no-cache"  # ask whether it has changed
         return response
 

@@ -14,9 +14,21 @@ self.addEventListener("activate", (event) => {
   event.waitUntil(caches.keys().then((names) => Promise.all(old(names).map((name) => caches.delete(name)))));
 });
 
+// Alone in its process the page may have several threads over one memory; many hosts cannot say so themselves.
+const ISOLATED = [
+  ["Cross-Origin-Opener-Policy", "same-origin"],
+  ["Cross-Origin-Embedder-Policy", "require-corp"],
+];
+
+function isolated({ body, headers: kept }) {
+  const headers = new Headers(kept);
+  for (const [name, value] of ISOLATED) headers.set(name, value);
+  return new Response(body, { headers });
+}
+
 self.addEventListener("fetch", (event) => {
   const { request } = event;
   if (request.method !== "GET" || !request.url.startsWith(self.registration.scope)) return;
   const where = { cacheName: VERSION, ignoreSearch: true }; // what the documentation is asked for stands behind a "?"
-  event.respondWith(caches.match(request, where).then((found) => found ?? fetch(request)));
+  event.respondWith(caches.match(request, where).then((found) => (found ? isolated(found) : fetch(request))));
 });

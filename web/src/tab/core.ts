@@ -1,6 +1,7 @@
 // The native core in a tab, as objects: cars on a track, a network, and PPO's loop over both. The other side is
 // native/wasm/interface.cpp, where shapes and units are said.
 import { type Address, CoreModule } from "./module";
+import { type Helper, loadTeam } from "./team";
 
 /** A track as `racecraft.sim.simulation.native_track` gives it, both directions. */
 export interface TrackArrays {
@@ -40,24 +41,39 @@ const MOST_EPISODES = 4096;
 
 export interface LoadedCore {
   core: Core;
+  threads: number;
   /** Whether the learner works without this machine's multiply-add, right but many times slower. */
   isSlow: boolean;
 }
 
-/** The fast build where its sums keep every bit, else the exact one, or without SIMD the scalar one. `read` gets a file
- * of the site. */
-export async function loadCore(read: (file: string) => Promise<BufferSource>): Promise<LoadedCore> {
+type Read = (file: string) => Promise<BufferSource>; // of the site
+
+/** The fast build where its sums keep every bit, else the exact one, or without SIMD the scalar one. With helpers to
+ * open, and so many threads, the fast build over shared memory where it runs. */
+export async function loadCore(read: Read, threads = 1, open?: () => Helper): Promise<LoadedCore> {
+  const team = threads > 1 && open ? await teamOf(read, threads, open) : undefined;
+  if (team) return { core: team, threads, isSlow: false };
   for (const file of ["core.wasm", "exact.wasm", "scalar.wasm"]) {
     const code = await read(file);
     if (!WebAssembly.validate(code)) continue;
     const core = await Core.load(code);
-    if (core.isFused) return { core, isSlow: file !== "core.wasm" };
+    if (core.isFused) return { core, threads: 1, isSlow: file !== "core.wasm" };
   }
   throw new Error("This browser runs no build of the core.");
 }
 
+async function teamOf(read: Read, threads: number, open: () => Helper): Promise<Core | undefined> {
+  try {
+    const code = await read("threads.wasm");
+    const core = new Core(await loadTeam(code, threads, open));
+    return core.isFused ? core : undefined;
+  } catch {
+    return undefined; // a browser that refuses shared memory, or that much of it, has one thread
+  }
+}
+
 export class Core {
-  private constructor(readonly module: CoreModule) {}
+  constructor(readonly module: CoreModule) {}
 
   static async load(code: BufferSource): Promise<Core> {
     return new Core(await CoreModule.load(code));

@@ -21,6 +21,7 @@ export const de: Record<TabKey, string> = {
   stopped: "Angehalten nach {time}.",
   laps: "Runden",
   laps_of: "{laps} von {trials}",
+  threads: "Threads",
   slow: "Diesem Browser oder Rechner fehlt eine verschmolzene Multiplikation mit Addition: Das Lernen ergibt dieselben Zahlen, dauert aber viel länger.",
   unable: "Dieser Browser kann den Simulator nicht ausführen: {why}",
   models: "Deine Modelle",

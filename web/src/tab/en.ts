@@ -19,6 +19,7 @@ export const en = {
   stopped: "Stopped after {time}.",
   laps: "Laps",
   laps_of: "{laps} of {trials}",
+  threads: "Threads",
   slow: "This browser or machine has no fused multiply-add: learning gives the same numbers, but many times slower.",
   unable: "This browser cannot run the simulator: {why}",
   models: "Your models",

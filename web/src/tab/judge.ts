@@ -34,7 +34,7 @@ function evaluation(site: string, asked: Judge): Promise<Evaluation> {
       if (data.kind === "judged") done(data.evaluation);
       else if (data.kind === "failed") failed(new Error(data.message));
     };
-    worker.postMessage({ kind: "load", site, hasPython: false } satisfies Load);
+    worker.postMessage({ kind: "load", site, hasPython: false, isTeam: false } satisfies Load);
     worker.postMessage(asked);
   }).finally(() => worker.terminate());
 }

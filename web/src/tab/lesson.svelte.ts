@@ -70,6 +70,7 @@ export class Lesson {
   version = $state(0); // of the curves
   seconds = $state(0);
   isSlow = $state(false);
+  threads = $state(1);
   failure = $state("");
   failedReward = $state(""); // what a reward of one's own did wrong
   printed = $state(""); // by it, the last of it
@@ -109,7 +110,8 @@ export class Lesson {
     worker.onerror = ({ message }) =>
       this.hear({ kind: "failed", message: message || "worker", isReward: false }, kind);
     if (kind === "python") this.isPythonReady = false;
-    worker.postMessage({ kind: "load", site: this.site, hasPython: kind === "python" } satisfies Load);
+    const asked = { site: this.site, hasPython: kind === "python", isTeam: true };
+    worker.postMessage({ kind: "load", ...asked } satisfies Load);
   }
 
   /** Until somebody trains, a car that has learned already drives; not for who wants nothing to move. */
@@ -249,7 +251,7 @@ export class Lesson {
         break;
       case "loaded":
         clearTimeout(this.painter);
-        [this.isSlow, this.state] = [report.isSlow, "learning"];
+        [this.isSlow, this.threads, this.state] = [report.isSlow, report.threads, "learning"];
         break;
       case "look":
         if (kind === this.running && this.state !== "loading")

@@ -7,17 +7,32 @@ export class Refusal extends Error {}
 export type Address = number;
 
 type Numbers = Float64Array | Float32Array | Int32Array | Uint8Array | BigUint64Array | BigInt64Array;
+type Exports = Record<string, ((...args: number[]) => number) & WebAssembly.Global<"i32">>;
 type Kind<T extends Numbers> = new (buffer: ArrayBufferLike, at: number, length: number) => T;
 
 export class CoreModule {
   private constructor(
     private readonly memory: WebAssembly.Memory,
-    private readonly exports: Record<string, (...args: number[]) => number>,
+    private readonly exports: Exports,
     private readonly stack: WebAssembly.Global<"i32">,
   ) {}
 
-  static async load(code: BufferSource | WebAssembly.Module): Promise<CoreModule> {
+  /** With memory that other threads are to share where the build asks for one. */
+  static async load(code: BufferSource | WebAssembly.Module, shared?: WebAssembly.Memory): Promise<CoreModule> {
     const module = code instanceof WebAssembly.Module ? code : await WebAssembly.compile(code);
+    const core = await CoreModule.instantiate(module, shared);
+    core.call("_initialize");
+    return core;
+  }
+
+  /** One more thread in a memory that is in use, on a stack of its own that ends there. */
+  static async join(module: WebAssembly.Module, shared: WebAssembly.Memory, stack: Address): Promise<CoreModule> {
+    const core = await CoreModule.instantiate(module, shared);
+    core.stack.value = stack;
+    return core;
+  }
+
+  private static async instantiate(module: WebAssembly.Module, shared?: WebAssembly.Memory): Promise<CoreModule> {
     const imports: WebAssembly.Imports = {};
     for (const { module: from, name } of WebAssembly.Module.imports(module)) {
       // The C library's ways out, of which the core takes none.
@@ -26,16 +41,12 @@ export class CoreModule {
       };
     }
     (imports["racecraft"] ??= {})["refuse"] = (at: Address, size: number) => {
-      throw new Refusal(new TextDecoder().decode(new Uint8Array(memory.buffer, at, size)));
+      throw new Refusal(new TextDecoder().decode(new Uint8Array(memory.buffer, at, size).slice()));
     };
+    if (shared) (imports["env"] ??= {})["memory"] = shared;
     const { exports } = await WebAssembly.instantiate(module, imports);
-    const memory = exports["memory"] as WebAssembly.Memory;
-    (exports["_initialize"] as () => void)();
-    return new CoreModule(
-      memory,
-      exports as Record<string, (...args: number[]) => number>,
-      exports["__stack_pointer"] as WebAssembly.Global<"i32">,
-    );
+    const memory = shared ?? (exports["memory"] as WebAssembly.Memory);
+    return new CoreModule(memory, exports as Exports, exports["__stack_pointer"] as WebAssembly.Global<"i32">);
   }
 
   /** Calls one of native/wasm/interface.cpp's functions. */
@@ -49,6 +60,11 @@ export class CoreModule {
       this.stack.value = before; // an exception leaves the core's frames where they are
       throw error;
     }
+  }
+
+  /** A number that the linker wrote down. */
+  constant(name: string): number {
+    return this.exports[name]!.value;
   }
 
   /** Calls with arrays, which are copied in and gone afterwards. */

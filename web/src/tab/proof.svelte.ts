@@ -24,7 +24,7 @@ export class Proof {
     const worker = (this.worker = openWorker());
     worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data);
     worker.onerror = ({ message }) => this.end(l("replay_unable", { why: message || "worker" }));
-    worker.postMessage({ kind: "load", site: this.site, hasPython: false } satisfies Load);
+    worker.postMessage({ kind: "load", site: this.site, hasPython: false, isTeam: false } satisfies Load);
     worker.postMessage({ kind: "verify", plan: this.plan, file } satisfies Verify);
   }
 

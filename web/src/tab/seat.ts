@@ -25,7 +25,7 @@ export class TabSeat implements Seat {
   ) {
     this.worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data);
     this.worker.onerror = ({ message }) => this.hear({ kind: "failed", message: message || "worker", isReward: false });
-    this.worker.postMessage({ kind: "load", site, hasPython: false } satisfies Load);
+    this.worker.postMessage({ kind: "load", site, hasPython: false, isTeam: false } satisfies Load);
   }
 
   /** Answers come in the order of the questions. */

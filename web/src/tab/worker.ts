@@ -9,10 +9,13 @@ import { DrivenCar, type Trace } from "./drivencar";
 import type { EvaluationLaps } from "../lib/laps";
 import type { ToPay } from "./laps/paid";
 import type { Eyes, Watched } from "./laps/watched";
+import helperAddress from "./helper?worker&url";
 import { objectsOf } from "./objects";
 import { read, readTrack, type Plan, type Policy, type RacePlan, type TrackFile } from "./plan";
+import { openUnderPolicy } from "./policed";
 import { type Pay, Python, RewardFailure } from "./python";
 import { ShownCar, shownWeights } from "./shown";
+import { availableThreads } from "./team";
 import {
   payWith,
   Trainer,
@@ -30,6 +33,7 @@ export interface Load {
   kind: "load";
   site: string; // address of the site's folder
   hasPython: boolean;
+  isTeam: boolean; // as many threads as the page may have
 }
 
 /** A car that has learned already drives until a training begins. */
@@ -140,7 +144,7 @@ export type Report =
   | { kind: "checked"; question: number; verdict: RewardVerdict }
   | { kind: "painting" }
   | { kind: "painted"; question: number; painting: RewardPainting }
-  | { kind: "loaded"; isSlow: boolean }
+  | { kind: "loaded"; isSlow: boolean; threads: number }
   | { kind: "paying"; isPaying: boolean } // rewards are computed from here on, or no longer
   | { kind: "printed"; text: string }
   | { kind: "look"; look: Look; picture: Picture }
@@ -310,17 +314,21 @@ async function payFor({ source, track, laps }: PayLaps, { python }: Loaded): Pro
   tell({ kind: "paid", rewards: paid });
 }
 
-async function load({ site, hasPython }: Load): Promise<Loaded> {
+async function load({ site, hasPython, isTeam }: Load): Promise<Loaded> {
   const address = new URL("data/rewards.js", site).href;
   const [core, { rewards }, python] = await Promise.all([
-    loadCore(async (file) => (await read(site, `core/${file}`)).arrayBuffer()),
+    loadCore(
+      async (file) => (await read(site, `core/${file}`)).arrayBuffer(),
+      isTeam ? availableThreads() : 1,
+      () => openUnderPolicy(helperAddress),
+    ),
     import(/* @vite-ignore */ address) as Promise<{ rewards: Record<string, Reward> }>,
     hasPython ? Python.load(site) : undefined,
   ]);
   return { site, core, presets: rewards, python };
 }
 
-function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded): void {
+function train(start: Start, { core: { core, isSlow, threads }, python, presets }: Loaded): void {
   leave();
   newest = 0;
   const began = performance.now();
@@ -337,7 +345,7 @@ function train(start: Start, { core: { core, isSlow }, python, presets }: Loaded
     return paid.pay;
   };
   const trainer = new Trainer(core, { plan, race, policy, objects, track, seed, begin }, payFor);
-  tell({ kind: "loaded", isSlow });
+  tell({ kind: "loaded", isSlow, threads });
   let looked = -Infinity;
   const look = () => {
     if (performance.now() - looked < OFTEN) return;

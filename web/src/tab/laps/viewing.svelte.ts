@@ -19,7 +19,7 @@ class Asked {
   private last: Promise<unknown> = Promise.resolve();
 
   constructor(site: string, hasPython: boolean) {
-    this.worker.postMessage({ kind: "load", site, hasPython } satisfies Load);
+    this.worker.postMessage({ kind: "load", site, hasPython, isTeam: false } satisfies Load);
   }
 
   ask<K extends Report["kind"]>(question: Question, kind: K): Promise<Answer<K>> {
