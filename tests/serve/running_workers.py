@@ -36,9 +36,12 @@ class RunningWorker:
 
 
 @contextmanager
-def running_worker(runs: Path, *options: str, database: str = "", artifacts: str = "") -> Iterator[RunningWorker]:
+def running_worker(
+    runs: Path, *options: str, database: str = "", artifacts: str = "", trusted: Path | None = None
+) -> Iterator[RunningWorker]:
     command = [sys.executable, "-m", "racecraft", "worker", "--json", "--runs", str(runs), "--machine", runs.name]
     shared = {"RACECRAFT_DATABASE": database, "RACECRAFT_ARTIFACTS": artifacts} if database else {}
+    shared |= {} if trusted is None else {"SSL_CERT_FILE": str(trusted)}
     with subprocess.Popen(
         [*command, *options], env={**os.environ, **shared}, stdout=subprocess.PIPE, text=True
     ) as process:

@@ -7,6 +7,7 @@ import socket
 import ssl
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import httpx
 import pytest
 from leagues import ok, refused
 from running_consoles import PATIENCE, RunningConsole, end, running_console
+from running_workers import running_worker
 
 from racecraft.errors import ConfigError
 from racecraft.serve.server import serve
@@ -83,7 +85,8 @@ def test_a_league_with_a_certificate_of_its_own(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "racecraft", "serve", "--json", "--league", "--runs", str(tmp_path / "runs")]
     command += ["--port", str(port), "--address", f"https://localhost:{port}"]
     command += ["--certificate", str(certificate), "--key", str(key)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    command += ["--artifacts", f"file://{tmp_path}/store", "--trainings", "0"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
         link = json.loads(process.stdout.readline())["link"]
@@ -93,10 +96,38 @@ def test_a_league_with_a_certificate_of_its_own(tmp_path: Path) -> None:
             let_in = client.get(link)
             assert "Secure" in let_in.headers["set-cookie"].split("; ")
             assert ok(client.get("/api/account"))["role"] == "admin"
-        with pytest.raises(httpx.HTTPError):
-            httpx.get(f"http://localhost:{port}/api/door")
+            with pytest.raises(httpx.HTTPError):
+                httpx.get(f"http://localhost:{port}/api/door")
+            work_encrypted(client, certificate, tmp_path)
+            with running_worker(tmp_path / "idle", *worker_options(client, tmp_path), trusted=certificate):
+                time.sleep(1.0)  # it waits for news now
+                process.terminate()
+                _, said = process.communicate(timeout=PATIENCE)
+        assert "Traceback" not in said, "a server that stops sends home who waits for news"
+        assert "Cancel 0" in said or not said, said
     finally:
         end(process)
+
+
+def worker_options(client: httpx.Client, folder: Path) -> tuple[str, ...]:
+    file = folder / "token"
+    file.write_text(ok(client.post("/api/account/tokens", json={"scopes": ["worker"]}), 201)["secret"])
+    return ("--server", str(client.base_url).rstrip("/"), "--token-file", str(file))
+
+
+def work_encrypted(client: httpx.Client, certificate: Path, folder: Path) -> None:
+    """A worker does a job through that certificate, and nothing where it does not know it: no token is sent."""
+    options = worker_options(client, folder)
+    command = [sys.executable, "-m", "racecraft", "worker", "--runs", str(folder / "no"), "--machine", "no", *options]
+    strange = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert strange.returncode == 1
+    assert "certificate verify failed" in strange.stderr
+    ok(client.post("/api/models", json={"name": "away", "track": "oval", "until": "1024 steps"}), 201)
+    with running_worker(folder / "lab", *options, trusted=certificate):
+        deadline = time.monotonic() + PATIENCE
+        while (job := ok(client.get("/api/jobs"))[0])["state"] != "done" and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert (job["state"], job["machine"].partition("#")[0]) == ("done", "lab")
 
 
 @pytest.mark.costly

@@ -195,6 +195,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "POST /api/league/races/{cup}/submissions/{submission_id}/restore": ("organiser", None),
     "POST /api/league/races/{cup}/submissions/{submission_id}/accept": ("organiser", None),
     "GET /api/workers": ("worker", None),
+    "GET /api/workers/news": ("worker", None),
     "POST /api/workers/{worker}/take": (
         "worker",
         {"slot": "other", "kinds": [], "machine": "x", "places": 1, "version": "x"},

@@ -56,7 +56,20 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
     listener.listen(128)
     at = settings.address.rstrip("/") if settings.certificate else f"http://{ADDRESS}:{port}"
     on_ready(f"{at}/?ticket={app.state.guard.ticket()}")
-    uvicorn.Server(config).run(sockets=[listener])
+    _Server(config, on_stop=app.state.context.supervisor.news.end).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    """Says that it stops before it waits for open requests, among them those that wait for news themselves."""
+
+    def __init__(self, config: uvicorn.Config, *, on_stop: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._on_stop = on_stop
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop."""
+        self._on_stop()
+        await super().shutdown(sockets)
 
 
 def _encryption(settings: ServeSettings) -> dict[str, Any]:

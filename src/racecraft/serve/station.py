@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Final
 from urllib.parse import urlsplit
 
 from racecraft.errors import ConfigError, RunError
@@ -17,6 +20,8 @@ from racecraft.serve.settings import LOOPBACK, ServeSettings
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.system import STOPS
 from racecraft.version import VERSION
+
+DEAF: Final = 2.0  # s before a server that tells no news is asked again
 
 
 def work_for(settings: ServeSettings, *, on_ready: Callable[[], None]) -> None:
@@ -76,12 +81,36 @@ def work_through(
             f"The console is Racecraft {said}, this worker is {VERSION}.",
             hint="Install the same version of Racecraft on both machines.",
         )
-    _work(settings, RemoteOffice(line), access, on_ready)
+    office = RemoteOffice(line)
+    _work(settings, office, access, on_ready, listen=office.later_than)
 
 
-def _work(settings: ServeSettings, office: Office, access: Access, on_ready: Callable[[], None]) -> None:
+def _work(
+    settings: ServeSettings,
+    office: Office,
+    access: Access,
+    on_ready: Callable[[], None],
+    *,
+    listen: Callable[[int], int] | None = None,
+) -> None:
     settings.state.mkdir(parents=True, exist_ok=True)
-    asyncio.run(_until_signalled(Supervisor(settings, office, access, is_home=False), on_ready))
+    supervisor = Supervisor(settings, office, access, is_home=False)
+    if listen is not None:
+        # a daemon, as it may wait for an answer when everything else has ended
+        threading.Thread(target=_hear, args=(listen, supervisor.wake), name="news", daemon=True).start()
+    asyncio.run(_until_signalled(supervisor, on_ready))
+
+
+def _hear(listen: Callable[[int], int], wake: Callable[[], None]) -> None:
+    """Look at the queue as soon as there is something new; in between it is looked at now and then as well."""
+    number = -1
+    while True:
+        try:
+            number = listen(number)
+        except RunError:  # nobody answers, or says no: whoever looks at the queue hears that, too
+            time.sleep(DEAF)
+        else:
+            wake()
 
 
 async def _until_signalled(supervisor: Supervisor, on_ready: Callable[[], None]) -> None:

@@ -41,6 +41,14 @@ class RemoteOffice:
         asked = {"slot": slot, "kinds": list(kinds), "machine": machine, "places": places, "version": VERSION}
         return _job(self._line.ask("POST", f"{ROOM}/{owner}/take", asked))
 
+    def later_than(self, number: int) -> int:
+        """The number of the newest news of the queue, once it is another one, or after some seconds."""
+        told = self._line.ask("GET", f"{ROOM}/news?after={number}")
+        found = told.get("number") if isinstance(told, dict) else None
+        if type(found) is not int:
+            raise OfficeAway("The console's answer is no news.")
+        return found
+
     def held(self, owner: str) -> Job | None:
         """The job that a worker has."""
         return _job(self._line.ask("GET", f"{ROOM}/{owner}/job"))

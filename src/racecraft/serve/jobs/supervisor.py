@@ -25,6 +25,7 @@ from racecraft import system
 from racecraft.errors import RunError
 from racecraft.run.lock import exclusive_lock
 from racecraft.serve.jobs.access import Access
+from racecraft.serve.jobs.news import News
 from racecraft.serve.jobs.office import AWAY, Office, Slot
 from racecraft.serve.jobs.queue import KINDS, kinds_of
 from racecraft.serve.settings import WORKERS, ServeSettings
@@ -56,12 +57,18 @@ class Supervisor:
         self._started = float("-inf")  # the newest job, in `time.monotonic()` seconds
         self._workers = settings.state / WORKERS
         self._workers.mkdir(parents=True, exist_ok=True)
+        self.news = News()
+        """For workers that wait elsewhere."""
         self._standby = Standby(settings.runs, workers=self._workers, access=access, log=log)
 
     def wake(self) -> None:
         """There is something new in the queue; safe from any thread."""
         if self._loop is not None:
-            self._loop.call_soon_threadsafe(self._awake.set)
+            self._loop.call_soon_threadsafe(self._look)
+
+    def _look(self) -> None:
+        self._awake.set()
+        self.news.tell()
 
     async def run(self) -> None:
         """Until cancelled."""

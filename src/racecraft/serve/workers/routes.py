@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path as File
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Path, Request, Response
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
@@ -24,6 +24,8 @@ from racecraft.version import VERSION
 
 SMALL: Final = 1 << 20
 """Bytes of what is kept in memory until it is in the store; more goes over a file."""
+WAIT: Final = 5.0
+"""s that a worker waits for news; half of what it waits for any answer."""
 BINARY: Final = {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}
 
 
@@ -49,6 +51,12 @@ InLease = Annotated[Lease, Depends(_lease)]
 def greet_worker() -> schemas.Welcome:
     """Before a worker begins."""
     return schemas.Welcome(version=VERSION)
+
+
+@router.get("/news")
+async def hear_news(consoles: InConsoles, after: Annotated[int, Query(ge=-1, lt=2**53)] = -1) -> schemas.News:
+    """Waits until there is something new in the queue since the number that was told last, or some seconds."""
+    return schemas.News(number=await consoles.owner.supervisor.news.later_than(after, seconds=WAIT))
 
 
 @router.post("/{worker}/take")

@@ -19,6 +19,13 @@ class Welcome(Message):
     version: str
 
 
+class News(Message):
+    """Whether there is something new in the queue."""
+
+    number: int
+    """Another one than before where there is."""
+
+
 class Take(Message):
     """A place is free, or all are taken."""
 
