@@ -51,7 +51,7 @@ def trained_tracks(info: RunInfo) -> list[Track]:
             f"Track {info.track!r} has changed since the run was trained on it.",
             hint="Choose the track anew (--track), be it the same.",
         )
-    return tracks
+    return list(tracks)
 
 
 def trained_track(info: RunInfo) -> Track:
