@@ -12,12 +12,14 @@ import httpx
 import numpy as np
 import pytest
 from leagues import untrained_run
+from model_requests import BESIDE, REQUESTS
 from running_consoles import RunningConsole
 
 from racecraft import load_track
 from racecraft.car.export import read_exported
 from racecraft.race.policy import load_policy
 from racecraft.run import RunFolder
+from racecraft.serve.models.schemas import NewModel
 
 pytestmark = pytest.mark.costly
 
@@ -254,6 +256,14 @@ def test_a_race_among_bots_tuned_by_hand(console: RunningConsole) -> None:
         ({"tuning": {"lr": 1.0}}, "lr"),
         ({"tuning": {"lr": 0.001}, "hyperparameters": {}}, "tuning"),
         ({"sensors": ["FRONT_FACING_CAMERA"], "model_metadata": {}}, "sensors"),
+        ({"vehicle": "/etc/passwd"}, "vehicle"),
+        ({"vehicle": {"masses": 2.0}}, "masses"),
+        ({"vehicle": {"mass": -1.0}}, "mass"),
+        ({"randomize": {"weather": [0, 1]}}, "weather"),
+        ({"randomize": {"friction": [2, 1]}}, "friction"),
+        ({"bot_speed": 1.0}, "bot_speed"),
+        ({"race": "head-to-bot", "parked_cars": True}, "parked_cars"),
+        ({"race": "head-to-head", "positions": [[0.5, 1]]}, "positions"),
     ],
 )
 def test_choices_that_do_not_go_together(console: RunningConsole, settings: dict[str, Any], text: str) -> None:
@@ -330,3 +340,26 @@ def test_a_model_says_what_it_is_made_of(raced: tuple[RunningConsole, str, str])
     console.create(train=False, **boxes)
     request = console.client.get("/api/models/boxes/again").json()
     assert boxes.items() <= {**request, "name": "boxes"}.items()
+
+
+@pytest.mark.parametrize("settings", REQUESTS, ids=lambda settings: settings.get("race", "time-trial"))
+def test_every_field_of_a_request_comes_back_for_a_copy(
+    raced: tuple[RunningConsole, str, str], settings: dict[str, Any]
+) -> None:
+    console, driven, _ = raced
+    asked = settings | ({"opponents": [driven]} if "opponents" in settings else {})
+    name = console.create(train=False, **asked)
+    request = console.client.get(f"/api/models/{name}/again").json()
+    for field, value in asked.items():
+        if field == "sensors":
+            assert request["model_metadata"]["sensor"] == value
+        elif field == "actions":
+            assert NewModel(**request).model_metadata is not None
+        elif isinstance(value, dict):
+            assert {key: request[field][key] for key in value} == value, field
+        else:
+            assert request[field] == value, field
+    copy = console.create(train=False, **{key: value for key, value in request.items() if key not in BESIDE})
+    first, second = (console.client.get(f"/api/models/{one}").json() for one in (name, copy))
+    for key in ("reward", "model_metadata", "hyperparameters", "settings", "seed", "track", "num_tracks", "until"):
+        assert first[key] == second[key], key

@@ -6,12 +6,16 @@ import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from browsers import Visit, needs_browser, needs_pages, visiting
+from model_requests import REQUESTS
 from running_consoles import PATIENCE, RunningConsole, running_console
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page, Route
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
@@ -278,6 +282,67 @@ def test_how_it_learned_notes_and_a_copy_to_change(changed: Visit) -> None:
     page.get_by_text("-params['speed']").first.wait_for()
     page.get_by_role("radio", checked=True, name="Paperclip").wait_for()
     page.evaluate("sessionStorage.clear()")
+
+
+@pytest.mark.parametrize("settings", REQUESTS, ids=lambda settings: settings.get("race", "time-trial"))
+def test_a_copy_whose_every_field_is_kept_is_the_same_model(changed: Visit, settings: dict[str, Any]) -> None:
+    console = changed.console
+    asked = settings | ({"opponents": ["heron"]} if "opponents" in settings else {})
+    name = console.create(train=False, **asked)
+    page = _copy_of(changed, name)
+    copied = _made(page)
+    first, second = (console.client.get(f"/api/models/{one}").json() for one in (name, copied))
+    for key in ("reward", "model_metadata", "hyperparameters", "settings", "seed", "track", "num_tracks", "until"):
+        assert first[key] == second[key], key
+
+
+def test_every_field_of_a_copy_can_be_changed(changed: Visit) -> None:
+    console = changed.console
+    page = _copy_of(changed, console.create(train=False, **REQUESTS[0]))
+    page.get_by_role("button", name="Leave out: Four Hairpins").click()
+    page.get_by_label("one more track").select_option("kidney")
+    page.get_by_label("mass", exact=True).fill("3.25")
+    page.get_by_label("friction, least").fill("0.6")
+    page.get_by_role("button", name="Leave out: blur").click()
+    page.get_by_label("One more quantity").select_option("latency")
+    page.get_by_label("latency, most").fill("1")
+    page.get_by_role("button", name="Object avoidance").click()
+    page.get_by_label("Parked cars instead").check()
+    page.get_by_label("Where they are").select_option("fixed")
+    for _ in range(4):
+        page.get_by_role("button", name="Take away place 1").click()
+    page.get_by_label("Place 1, % of the lap").fill("12.5")
+    page.get_by_label("Lane of place 2").select_option("outer lane")
+    settings = console.client.get(f"/api/models/{_made(page)}").json()["settings"]
+    assert settings["vehicle"]["mass"] == 3.25
+    assert (settings["randomize"]["friction"], settings["randomize"]["blur"]) == ([0.6, 1.1], [0.0, 0.0])
+    assert settings["randomize"]["latency"] == [0.0, 1.0]
+    there = settings["objects"]["obstacles"]
+    assert (there["kind"], there["placement"], there["count"]) == ("car", "fixed", 2)
+    assert (there["positions"][0][0], there["positions"][1][1]) == (0.125, -1)
+
+
+def _copy_of(visit: Visit, name: str) -> Page:
+    page = visit.open(f"/models/{name}/setup")
+    page.evaluate("sessionStorage.clear()")
+    page.get_by_role("button", name="Change a copy").click()
+    page.wait_for_url("**/create")
+    page.get_by_text("The function is fine.").wait_for()
+    return page
+
+
+def _made(page: Page) -> str:
+    """The name of the model that the page asks for, which does not train."""
+
+    def hold(route: Route) -> None:
+        route.continue_(post_data=json.dumps({**route.request.post_data_json, "train": False}))
+
+    page.route("**/api/models", hold)
+    with page.expect_response("**/api/models") as answer:
+        page.get_by_role("button", name="Train now").first.click()
+    page.unroute("**/api/models")
+    assert answer.value.status == 201, answer.value.text()
+    return str(answer.value.json()["name"])
 
 
 def test_the_end_of_a_training_is_said_on_another_page(changed: Visit) -> None:

@@ -13,7 +13,9 @@ from racecraft.errors import ConfigError
 from racecraft.serve.schemas import Message
 from racecraft.sim.objects import MAX_OBJECTS, Objects, objects_for_race
 
-Place = tuple[Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)], Literal[1, -1]]
+Lane = Literal[1, -1]
+Placement = Literal["even", "random", "fixed"]
+Place = tuple[Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)], Lane]
 """Fraction of a lap in driving direction, and lane: 1 inner, -1 outer."""
 
 _NEEDS: Final = (
@@ -32,7 +34,7 @@ class OnRoad(Message):
     """Bot cars change lanes every 3 to 5 s."""
     parked_cars: bool = False
     """Obstacles are parked cars, not boxes."""
-    placement: Literal["even", "random", "fixed"] | None = None
+    placement: Placement | None = None
     """Along the lap in alternating lanes; with every episode anew; or where `positions` say."""
     positions: list[Place] = Field(default_factory=list, max_length=MAX_OBJECTS)
     """Fixed places, one for each: with them their number is how many there are."""

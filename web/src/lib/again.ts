@@ -2,6 +2,7 @@
 import type { ActionPreset, Choices, RewardPreset } from "../api/client";
 import { saidBy } from "./awsfiles";
 import { presetOf, usualObjects, type Numbers } from "./newmodel";
+import { roadOf } from "./raceterms";
 import type { Typed } from "./newdraft";
 import type { components } from "../api/schema";
 
@@ -27,6 +28,7 @@ export function typedOf(request: Request, { rewards, spaces, choices }: Offered)
   return {
     name: "",
     track: request.track,
+    moreTracks: request.more_tracks ?? [],
     direction: request.direction,
     space,
     sensors: said.sensors ?? [],
@@ -42,8 +44,7 @@ export function typedOf(request: Request, { rewards, spaces, choices }: Offered)
     opponents: request.opponents ?? [],
     cars: request.cars ?? 2,
     objects: request.objects ?? usualObjects(race),
-    botSpeed: request.bot_speed ?? 0.2,
-    laneChanges: request.lane_changes,
+    road: roadOf(request),
     learning: isAws ? "learning_aws" : "learning_fast",
     tuned: Object.fromEntries(tuned),
   };

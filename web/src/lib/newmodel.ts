@@ -1,30 +1,32 @@
 /** What a person chose for a new model, and the request that it becomes. */
 import type { ActionPreset, Choices, NewModel, RewardPreset } from "../api/client";
 import { metadataOf, sameSpace } from "./actions";
+import { askedRoad, thingsOf, type Road } from "./raceterms";
 
 export type Learning = "learning_fast" | "learning_aws";
+export type Ranges = Record<string, [number, number]>;
 export type Numbers = Record<string, number | string>;
 
 export interface Wishes {
   name: string;
   track: string;
+  moreTracks: string[]; // on which it learns at the same time
   direction: "forward" | "reverse" | "alternate";
   space: ActionPreset;
   sensors: string[]; // none: the front camera
   source: string;
   until: string;
   seed: number;
-  vehicle: string;
+  vehicle: string | Record<string, number>; // a preset, or every parameter
   network: string;
   algorithm: string;
   critic: string;
-  randomize: string;
+  randomize: string | Ranges; // a preset, or what differs by its quantity
   race: string;
   opponents: string[]; // of a race head to head; none: itself, as it is and as it was
   cars: number;
   objects: number;
-  botSpeed: number;
-  laneChanges: boolean;
+  road: Road;
   learning: Learning;
   tuned: Numbers;
 }
@@ -94,11 +96,12 @@ export function newModel(wishes: Wishes, known: Known): NewModel {
   const reward = known.rewards.find((preset) => preset.source === wishes.source)?.name ?? wishes.source;
   return {
     ...(name ? { name } : {}),
+    ...(wishes.moreTracks.length ? { more_tracks: wishes.moreTracks } : {}),
     ...{ track, direction, until, seed, vehicle, network, algorithm, critic, randomize, race, reward },
     ...actionsOf(wishes, known),
     ...(race === "head-to-head" ? { opponents: wishes.opponents, cars: wishes.cars } : {}),
-    ...(["time-trial", "head-to-head"].includes(race) ? {} : { objects: wishes.objects }),
-    ...(race === "head-to-bot" ? { bot_speed: wishes.botSpeed, lane_changes: wishes.laneChanges } : {}),
+    ...(thingsOf(race) ? { objects: wishes.objects } : {}),
+    ...askedRoad(wishes.road, thingsOf(race)),
     ...numbersOf(wishes, known),
   };
 }

@@ -56,6 +56,20 @@ export const byRules = (terms: Terms, { name, ...numbers }: RuleSet): Terms => (
   time_limit: numbers.time_limit,
 });
 
+/** What a request said of the road. */
+export const roadOf = (
+  asked: Pick<
+    components["schemas"]["NewModel"],
+    "bot_speed" | "lane_changes" | "parked_cars" | "placement" | "positions"
+  >,
+): Road => ({
+  botSpeed: asked.bot_speed ?? 0.2,
+  laneChanges: asked.lane_changes,
+  parkedCars: asked.parked_cars,
+  placement: asked.placement ?? "random",
+  places: (asked.positions ?? []).map(([at, lane]) => ({ at: Math.round(1e6 * at) / 1e4, lane })),
+});
+
 /** Whether a kind of race has things on the road, and which. */
 export const thingsOf = (kind: string): "boxes" | "bots" | undefined =>
   kind === "object-avoidance" || kind === "boxes"

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Final, Literal, cast
 
 from racecraft.learn import PPOConfig
 from racecraft.run import RunFolder
 from racecraft.serve.models.garage import RACED, race_of
 from racecraft.serve.models.schemas import ModelCard, NewModel, Tuning
+from racecraft.serve.road import Lane, Place, Placement
+from racecraft.sim.objects import Bots, Obstacles
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
+from racecraft.sim.randomization import Randomization
 from racecraft.sim.vehicle import Vehicle, load_vehicle
+from racecraft.track import single_names
 from racecraft.training.opponents import SELF
 from racecraft.training.start import read_settings
 
@@ -19,18 +24,19 @@ VEHICLES: Final = ("v5", "v4", "v6")
 def again(folder: RunFolder, card: ModelCard) -> NewModel:
     """The request that would make this model once more.
 
-    What a request cannot say, a fitted car or ranges of one's own, has its default.
+    What a request cannot say, how far apart things are placed and how long bots stay in a lane, has its default.
 
     Raises:
         RacecraftError: Its files cannot be read.
     """
     settings, hyperparameters = read_settings(folder), folder.read_hyperparameters()
     race, objects = race_of(folder.read_info()), settings.objects
-    bots, raced = objects.bots, settings.opponents
+    group, bots, raced = objects.bots or objects.obstacles, objects.bots, settings.opponents
     rivals = () if raced is None else tuple(driver for driver in raced.drivers if driver != SELF)
     return NewModel(
         sensors=None,  # the metadata says them
         track=card.track,
+        more_tracks=single_names(settings.track)[1:],
         direction=cast(Literal["forward", "reverse", "alternate"], settings.direction),
         reward=folder.read_reward_function(),
         model_metadata=folder.read_model_metadata().to_dict(),
@@ -42,7 +48,10 @@ def again(folder: RunFolder, card: ModelCard) -> NewModel:
         objects=objects.count or None if race != RACED else None,
         bot_speed=bots.speed if bots is not None else None,
         lane_changes=bots is not None and bots.changes_lane,
-        randomize=next((name for name, one in RANDOMIZATIONS.items() if one == settings.randomize), "none"),
+        parked_cars=objects.obstacles is not None and objects.obstacles.kind == "car",
+        placement=cast(Placement, group.placement) if group is not None else None,
+        positions=_places(group),
+        randomize=_randomization(settings.randomize),
         algorithm=settings.algorithm,
         critic=settings.critic,
         network=settings.network,
@@ -52,8 +61,21 @@ def again(folder: RunFolder, card: ModelCard) -> NewModel:
     )
 
 
-def _vehicle(vehicle: Vehicle) -> str:
-    return next((name for name in VEHICLES if load_vehicle(name) == vehicle), "")
+def _places(group: Bots | Obstacles | None) -> list[Place]:
+    if group is None or group.placement != "fixed":
+        return []
+    return [(at, cast(Lane, lane)) for at, lane in group.positions]
+
+
+def _vehicle(vehicle: Vehicle) -> str | dict[str, float]:
+    return next((name for name in VEHICLES if load_vehicle(name) == vehicle), asdict(vehicle))
+
+
+def _randomization(found: Randomization) -> str | dict[str, tuple[float, float]]:
+    """A preset's name, or the ranges that change something."""
+    ranges, nothing = asdict(found), asdict(RANDOMIZATIONS["none"])
+    own = {name: ends for name, ends in ranges.items() if ends != nothing[name]}
+    return next((name for name, one in RANDOMIZATIONS.items() if one == found), own)
 
 
 def _tuning(ppo: PPOConfig) -> Tuning:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import asdict
 from typing import Final
 
 from fastapi import APIRouter
@@ -18,6 +19,7 @@ from racecraft.serve.models.garage import RACED, race_of
 from racecraft.serve.models.schemas import Choices, NumberChoice
 from racecraft.sim.objects import RACE_TYPES
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
+from racecraft.sim.vehicle import load_vehicle
 from racecraft.training.regimes import METHODS
 from racecraft.training.settings import CRITICS
 from racecraft.training.start import aws_hyperparameters
@@ -42,6 +44,8 @@ def list_choices(context: InContext) -> Choices:
         races=[*RACE_TYPES, RACED],
         critics=list(CRITICS),
         randomizations=list(RANDOMIZATIONS),
+        cars={name: asdict(load_vehicle(name)) for name in VEHICLES},
+        ranges={name: asdict(preset) for name, preset in RANDOMIZATIONS.items()},
         hyperparameters=_numbers(),
         aws=Hyperparameters().to_dict(),
         fast={name: fast[name] for name in names},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, did_you_mean
 from racecraft.learn import PPOConfig
 from racecraft.reward import load_preset, preset_names
 from racecraft.run import RunFolder, read_stretches, stretch_at
@@ -43,9 +43,11 @@ from racecraft.serve.models.schemas import (
     Tuning,
 )
 from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.road import road_objects
 from racecraft.sim import Objects
-from racecraft.sim.objects import NO_OBJECTS, objects_for_race
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
+from racecraft.sim.randomization import Randomization
+from racecraft.sim.vehicle import Vehicle
 from racecraft.training import Until
 from racecraft.training.opponents import SELF, Opponents
 from racecraft.training.parent import open_parent
@@ -76,7 +78,7 @@ def create_model(request: NewModel, context: InContext, consoles: InConsoles, us
     settings = make_settings(
         metadata=metadata,
         hyperparameters=parameters,
-        track=context.courses.path_or_name(request.track),
+        track=[context.courses.path_or_name(name) for name in (request.track, *request.more_tracks)],
         direction=request.direction,
         network=request.network,
         vehicle=_vehicle(request.vehicle),
@@ -322,24 +324,22 @@ def _opponents(context: Context, request: NewModel) -> Opponents | None:
 
 
 def _objects(request: NewModel) -> Objects:
-    if request.race == RACED:
-        return NO_OBJECTS
-    settings: dict[str, Any] = {} if request.race == "time-trial" else {"placement": "random"}
-    if request.objects is not None:
-        settings["count"] = request.objects
-    if request.race == "head-to-bot":
-        settings["changes_lane"] = request.lane_changes
-        if request.bot_speed is not None:
-            settings["speed"] = request.bot_speed
-    if request.race == "time-trial" and settings:
+    race = "time-trial" if request.race == RACED else request.race
+    if race == "time-trial" and request.objects is not None and request.race != RACED:
         raise ConfigError("objects go with the races object-avoidance and head-to-bot; this one is a time-trial.")
-    return objects_for_race(request.race, settings=settings)
+    return road_objects(request, race, count=request.objects, placement="random")
 
 
-def _randomization(name: str) -> str:
-    if name not in RANDOMIZATIONS:  # never a path
-        raise ConfigError(f"randomize is {name[:40]!r}; allowed are {', '.join(RANDOMIZATIONS)}.")
-    return name
+def _randomization(asked: str | dict[str, tuple[float, float]]) -> Randomization:
+    if isinstance(asked, str):
+        if asked not in RANDOMIZATIONS:  # never a path
+            raise ConfigError(f"randomize is {asked[:40]!r}; allowed are {', '.join(RANDOMIZATIONS)}.")
+        return RANDOMIZATIONS[asked]
+    known = [field.name for field in fields(Randomization)]
+    for name in asked:
+        if name not in known:
+            raise ConfigError(f"randomize has no quantity {name[:40]!r}.", hint=did_you_mean(name, known))
+    return Randomization(**asked)
 
 
 def _tuned(ppo: PPOConfig, tuning: Tuning) -> PPOConfig:
@@ -354,7 +354,13 @@ def _tuned(ppo: PPOConfig, tuning: Tuning) -> PPOConfig:
     return replace(ppo, **{name: value for name, value in changes.items() if value is not None})
 
 
-def _vehicle(name: str) -> str:
-    if name not in ("", "v4", "v5", "v6"):
-        raise ConfigError(f"vehicle is {name[:40]!r}; allowed are v4, v5 and v6.")
-    return name
+def _vehicle(asked: str | dict[str, float]) -> Vehicle | str:
+    if isinstance(asked, str):
+        if asked not in ("", "v4", "v5", "v6"):  # never a path
+            raise ConfigError(f"vehicle is {asked[:40]!r}; allowed are v4, v5 and v6.")
+        return asked
+    known = [field.name for field in fields(Vehicle)]
+    for name in asked:
+        if name not in known:
+            raise ConfigError(f"A vehicle has no parameter {name[:40]!r}.", hint=did_you_mean(name, known))
+    return Vehicle(**asked)

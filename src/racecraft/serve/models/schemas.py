@@ -9,6 +9,7 @@ from pydantic import Field
 
 from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.jobs.schemas import JobInfo
+from racecraft.serve.road import OnRoad
 from racecraft.serve.schemas import Message, RunName
 from racecraft.serve.tracks.schemas import TrackGeometry
 from racecraft.training.regimes import TIME_TRIAL
@@ -26,11 +27,17 @@ class Tuning(Message):
     loss_type: Literal["huber", "mean squared error"] | None = None
 
 
-class NewModel(Message):
+Parameter = Annotated[float, Field(allow_inf_nan=False)]
+Name = Annotated[str, Field(max_length=40)]
+
+
+class NewModel(OnRoad):
     """Everything about a new model; every field has a good default."""
 
     name: RunName | None = None
     track: str = Field(DEFAULT_TRACK, max_length=200)
+    more_tracks: list[Annotated[str, Field(max_length=200)]] = Field(default_factory=list, max_length=200)
+    """On which it learns at the same time."""
     direction: Literal["forward", "reverse", "alternate"] = "forward"
     reward: str = Field(TIME_TRIAL.reward, max_length=140_000)
     """Name of a preset, or the source of a reward function."""
@@ -52,16 +59,15 @@ class NewModel(Message):
     """To a head-to-head race, the learner's included; 2 otherwise."""
     objects: int | None = Field(None, ge=1, le=32)
     """How many boxes or bot cars; 6 and 3 otherwise."""
-    bot_speed: float | None = Field(None, ge=0, le=4)
-    lane_changes: bool = False
-    randomize: str = Field("none", max_length=40)
-    """A preset of what differs from episode to episode."""
+    randomize: Name | dict[Name, tuple[Parameter, Parameter]] = "none"
+    """What differs from episode to episode: a preset, or ranges by their quantity."""
     algorithm: str = Field("", max_length=40)
     """``ppo`` or ``sac``, which needs a continuous action space; by default the metadata's."""
     critic: str = Field(TIME_TRIAL.critic, max_length=40)
     """What the critic sees while training: ``privileged`` state, that and the ``lap``'s place, or the ``camera``."""
     network: str = ""
-    vehicle: str = ""
+    vehicle: Name | dict[Name, Parameter] = ""
+    """``v4``, ``v5``, ``v6`` or parameters of one's own; those left out are v5's."""
     seed: int = Field(0, ge=0, le=2**32 - 1)
     until: str = Field(TIME_TRIAL.until, max_length=200)
     tags: list[Annotated[str, Field(min_length=1, max_length=40)]] = Field(default_factory=list, max_length=20)
@@ -281,6 +287,10 @@ class Choices(Message):
     races: list[str]
     critics: list[str]
     randomizations: list[str]
+    cars: dict[str, dict[str, float]]
+    """Parameters of each of the vehicles."""
+    ranges: dict[str, dict[str, tuple[float, float]]]
+    """Every quantity's range, of each of the randomizations."""
     hyperparameters: list[NumberChoice]
     aws: dict[str, Any]
     """AWS's hyperparameters by default."""
