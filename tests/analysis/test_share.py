@@ -10,13 +10,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from racecraft.agent import ModelMetadata, action_space
 from racecraft.analysis.share import draw_share, share, write_share
-from racecraft.errors import RunError
+from racecraft.analysis.share_picture import finish_picture
+from racecraft.errors import ReplayError, RunError
+from racecraft.film.racing_line import draw_racing_line
 from racecraft.judging.evaluation import evaluate_run
 from racecraft.learn import PPOConfig
 from racecraft.replay import read_replay, verify
+from racecraft.replay.in_picture import CHUNK
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.training import Until
@@ -71,11 +75,12 @@ def test_the_lap_and_its_replay_are_inside(run: RunFolder, stamp: str, tmp_path:
     lap = json.loads(document)
     laps = [(time, car) for car in read_replay(replay).cars for time in car.recording.lap_times.values()]
     recording = min(laps, key=lambda one: one[0])[1].recording
-    np.testing.assert_allclose(np.column_stack([lap["x"], lap["y"]]), recording.origins, atol=1e-3)
+    (car,) = lap["cars"]
+    np.testing.assert_allclose(np.column_stack([car["x"], car["y"]]), recording.origins, atol=1e-3)
     edges = np.array(lap["inner"]) - np.array(lap["outer"])
     np.testing.assert_allclose(np.hypot(*edges.T), recording.track.mean_width, rtol=0.1)
     assert "<dt>Rundenzeit</dt>" in text
-    assert f"<dd>{min(laps, key=lambda one: one[0])[0]:.3f} s</dd>" in text
+    assert f"<dd>{min(laps, key=lambda one: one[0])[0]:.3f} s</dd>".replace(".", ",") in text
     assert "<dt>Medaille</dt>" not in text  # nine resets win none
 
 
@@ -83,12 +88,50 @@ def test_a_medal_is_told(run: RunFolder, stamp: str, monkeypatch: pytest.MonkeyP
     from racecraft.limits import TrackLimit
 
     drawn: list[list[tuple[str, str]]] = []
-    monkeypatch.setattr("racecraft.analysis.share.draw_racing_line", lambda *_, figures, **__: drawn.append(figures))
+    monkeypatch.setattr("racecraft.analysis.share.draw_line", lambda *_, figures, **__: drawn.append(figures))
+    monkeypatch.setattr("racecraft.analysis.share.finish_picture", lambda path, *_, **__: path)
     draw_share(run, stamp, tmp_path / "plain.png")
     monkeypatch.setattr("racecraft.analysis.share.known_limit", lambda *_: TrackLimit(ideal=900.0, driven=1000.0))
     draw_share(run, stamp, tmp_path / "won.png", language="de")
-    assert drawn == [[], [("MEDAILLE", "Autor")]]
+    assert [
+        [figure for figure in figures if figure[0][:5] == "MEDAI" or figure[0] == "MEDAL"] for figures in drawn
+    ] == [[], [("MEDAILLE", "Autor")]]
     assert "<dt>Medal</dt><dd>Author</dd>" in share(run, stamp)
+
+
+def test_a_picture_has_the_reward_and_the_replay_inside(run: RunFolder, stamp: str, tmp_path: Path) -> None:
+    path = draw_share(run, stamp, tmp_path / "sent.png")
+    plain = draw_racing_line(
+        read_replay(run.evaluation(stamp) / "evaluation.replay").cars[0].recording, tmp_path / "p.png"
+    )
+    with Image.open(path) as picture, Image.open(plain) as line:
+        assert picture.info["Description"] == REWARD
+        assert picture.width == line.width
+        below = np.asarray(picture.convert("L"))[line.height :]
+    assert below.shape[0] > 100
+    assert (below < 100).sum() > 1000  # letters
+    assert verify(read_replay(path)).is_genuine
+    assert read_replay(path).num_steps == read_replay(run.evaluation(stamp) / "evaluation.replay").num_steps
+
+    with pytest.raises(ReplayError, match="is a picture without a replay inside"):
+        read_replay(plain)
+    content = path.read_bytes()
+    cut = tmp_path / "cut.png"
+    cut.write_bytes(content[: content.index(CHUNK) + 40])
+    with pytest.raises(ReplayError, match="without a replay inside"):
+        read_replay(cut)
+
+
+def test_a_long_line_and_a_long_function_end_on_the_paper(tmp_path: Path) -> None:
+    heights = []
+    for lines in (10, 60, 61, 5000):
+        path = tmp_path / f"{lines}.png"
+        Image.new("RGB", (800, 40)).save(path)
+        finish_picture(path, "Reward", "\n".join(["    " + "x\t" * 2000] * lines), replay=b"")
+        with Image.open(path) as picture:
+            heights.append(picture.height)
+            assert (np.asarray(picture.convert("L"))[40:, -20:] > 200).all()
+    assert heights[0] < heights[1] < heights[2] == heights[3]
 
 
 def test_what_cannot_be_shared_is_told(run: RunFolder, stamp: str, tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -78,6 +81,19 @@ def test_a_heat_is_driven_on_one_road_and_can_be_verified(
         assert there == [pytest.approx(view[:3], abs=6e-4) for view in longest.objects(step)[:2]]
     assert film["objects"][0]["x"][0] != film["objects"][0]["x"][-1]
     assert console.client.get(f"{address}/video").headers["content-type"] == "video/mp4"
+
+    sent = console.client.get(f"{address}/share.html", params={"language": "de"}).text
+    (document,) = re.findall(r'<script type="application/json" id="lap">(.*?)</script>', sent, re.DOTALL)
+    shown = json.loads(document)["cars"]
+    assert [car["name"] for car in shown] == [row["name"] for row in heat["heat"]]
+    assert [len(car["x"]) for car in shown] == [len(replay.cars[row["car"]].recording) for row in heat["heat"]]
+    assert "<h1>Sunday</h1>" in sent
+    assert "<dt>Sieger</dt>" in sent
+    (inside,) = re.findall(r'download="heat.replay" href="data:application/octet-stream;base64,([^"]+)"', sent)
+    assert base64.b64decode(inside) == path.read_bytes()
+    picture = tmp_path / "heat.png"
+    picture.write_bytes(console.client.get(f"{address}/share.png").content)
+    assert verify(read_replay(picture)).is_genuine
 
     again = started(console, "heats", models=[*cars, cars[0]], **road)
     assert again["heat"] == heat["heat"]

@@ -12,7 +12,7 @@ from running_consoles import running_console
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
-FILES = {
+FILES: dict[str, str] = {
     "model_metadata.json": json.dumps(
         {
             "action_space": [{"steering_angle": angle, "speed": 1.0} for angle in (-25, 0, 25)],

@@ -103,6 +103,8 @@ ROWS: dict[str, tuple[str, Any]] = {
             "GET /api/contests/{contest}/video": None,
             "GET /api/contests/{contest}/replay.file": None,
             "GET /api/contests/{contest}/replay": None,
+            "GET /api/contests/{contest}/share.html": None,
+            "GET /api/contests/{contest}/share.png": None,
             "POST /api/contests/heats": {"models": [{"model": "adas-model"}] * 2, "track": "oval"},
             "POST /api/contests/ladders": {"models": [{"model": "adas-model"}] * 2, "tracks": ["oval"]},
             "GET /api/jobs/{job_id}": None,

@@ -163,7 +163,7 @@ def test_whose_best_lap_is_meant_is_said_wherever_one_stands(changed: Visit) -> 
     ):
         term = changed.open(path).locator(".term", has_text="Best lap").first
         assert str(term.get_attribute("title")).startswith("The fastest whole lap, penalties included: of ")
-        assert whose in " ".join(one.get_attribute("title") for one in changed.page.locator(".term").all())
+        assert whose in " ".join(str(one.get_attribute("title")) for one in changed.page.locator(".term").all())
 
 
 def test_when_nobody_trains_the_best_car_drives_its_lap(changed: Visit) -> None:

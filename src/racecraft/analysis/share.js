@@ -1,23 +1,25 @@
-// The replay on a shared page: one lap on its road, from behind the car or from above, on a canvas and from this page alone.
+// The replay on a shared page: cars on their road, from behind the car or from above, on a canvas and from this page alone.
 "use strict";
 const lap = JSON.parse(document.getElementById("lap").textContent);
 const canvas = document.getElementById("stage");
 const pen = canvas.getContext("2d");
 const [button, slider, clock, view] = ["play", "moment", "clock", "view"].map((id) => document.getElementById(id));
 const STEP = 1 / 15; // s
-const END = (lap.x.length - 1) * STEP;
-const COLORS = { sky: "#dfe6ea", field: "#86a37e", road: "#3b4350", line: "#f4f4ef", dash: "#ffb02e", car: "#ff7a2f" };
-let [time, isPlaying, isAbove, last] = [0, false, false, 0];
+const END = (Math.max(...lap.cars.map((car) => car.x.length)) - 1) * STEP;
+const COLORS = { sky: "#dfe6ea", field: "#86a37e", road: "#3b4350", line: "#f4f4ef", dash: "#ffb02e" };
+let [time, isPlaying, isAbove, last, followed] = [0, false, false, 0, 0];
 
+const written = (value, digits) =>
+  value.toLocaleString(document.documentElement.lang, { minimumFractionDigits: digits, maximumFractionDigits: digits });
 const mix = (a, b, share) => a + (b - a) * share;
-/** Where the car is at a moment. */
-function pose() {
-  const place = Math.min(time / STEP, lap.x.length - 1);
+/** Where a car is at the moment; after its end it stays. */
+function pose({ x, y, heading, speed, color }) {
+  const place = Math.min(time / STEP, x.length - 1);
   const row = Math.floor(place);
-  const next = Math.min(row + 1, lap.x.length - 1);
-  const turn = Math.atan2(Math.sin(lap.heading[next] - lap.heading[row]), Math.cos(lap.heading[next] - lap.heading[row]));
+  const next = Math.min(row + 1, x.length - 1);
+  const turn = Math.atan2(Math.sin(heading[next] - heading[row]), Math.cos(heading[next] - heading[row]));
   const at = (list) => mix(list[row], list[next], place - row);
-  return { x: at(lap.x), y: at(lap.y), heading: lap.heading[row] + turn * (place - row), speed: at(lap.speed) };
+  return { x: at(x), y: at(y), heading: heading[row] + turn * (place - row), speed: at(speed), color };
 }
 
 /** A way from metres to pixels: [x, y, z] to [x, y], or null behind the camera. */
@@ -82,7 +84,7 @@ function drawRoad(see) {
   fill(see, [start(0, 0), start(1, 0), start(1, 0.08), start(0, 0.08)], COLORS.line);
 }
 
-function drawCar(see, { x, y, heading }) {
+function drawCar(see, { x, y, heading, color }) {
   const [cos, sin] = [Math.cos(heading), Math.sin(heading)];
   const point = (along, side, high) => [x + along * cos - side * sin, y + along * sin + side * cos, high];
   const slab = (from, to, half, high, color) =>
@@ -101,8 +103,8 @@ function drawCar(see, { x, y, heading }) {
         ],
         "#15181c",
       );
-  fill(see, [point(-0.16 * big, 0.07 * big, 0.03), point(-0.16 * big, -0.07 * big, 0.03), point(-0.16 * big, -0.07 * big, 0.1), point(-0.16 * big, 0.07 * big, 0.1)], "#c9570f");
-  slab(-0.16 * big, 0.16 * big, 0.06 * big, 0.09, COLORS.car);
+  fill(see, [point(-0.16 * big, 0.07 * big, 0.03), point(-0.16 * big, -0.07 * big, 0.03), point(-0.16 * big, -0.07 * big, 0.1), point(-0.16 * big, 0.07 * big, 0.1)], color);
+  slab(-0.16 * big, 0.16 * big, 0.06 * big, 0.09, color);
   slab(-0.09 * big, 0.05 * big, 0.045 * big, 0.13, "#262b33");
 }
 
@@ -110,7 +112,8 @@ function draw() {
   const share = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth * share, canvas.clientHeight * share];
   if (canvas.width !== Math.round(width) || canvas.height !== Math.round(height)) [canvas.width, canvas.height] = [Math.round(width), Math.round(height)];
-  const car = pose();
+  const poses = lap.cars.map(pose);
+  const car = poses[followed];
   const see = isAbove ? topCamera(width, height) : chaseCamera(car, width, height);
   const horizon = isAbove ? 0 : height / 2 - 0.9 * Math.min(width, 1.5 * height) * Math.tan(0.33);
   pen.lineWidth = 1;
@@ -119,9 +122,10 @@ function draw() {
   pen.fillStyle = COLORS.field;
   pen.fillRect(0, Math.max(horizon, 0), width, height);
   drawRoad(see);
-  drawCar(see, car);
+  const far = (one) => see([one.x, one.y, 0])?.[2] ?? 0;
+  for (const one of [...poses].sort((a, b) => far(b) - far(a))) drawCar(see, one);
   slider.value = String(time);
-  clock.textContent = `${time.toFixed(2)} s · ${car.speed.toFixed(1)} m/s`;
+  clock.textContent = `${written(time, 2)} s · ${written(car.speed, 1)} m/s`;
   button.textContent = isPlaying ? "❚❚" : "▶";
 }
 
@@ -151,5 +155,12 @@ view.addEventListener("click", () => {
   view.setAttribute("aria-pressed", String(isAbove));
   draw();
 });
+const choices = [...document.querySelectorAll("[data-car]")];
+for (const choice of choices)
+  choice.addEventListener("click", () => {
+    followed = Number(choice.dataset.car);
+    for (const one of choices) one.setAttribute("aria-pressed", String(one === choice));
+    draw();
+  });
 new ResizeObserver(draw).observe(canvas);
 if (!matchMedia("(prefers-reduced-motion: reduce)").matches) button.click();

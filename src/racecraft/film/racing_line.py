@@ -38,6 +38,8 @@ def draw_racing_line(
     title: str = "",
     subtitle: str = "",
     figures: Sequence[tuple[str, str]] = (),
+    has_own_figures: bool = True,
+    speed: str = "SPEED",
     width_px: int = 1600,
 ) -> Path:
     """Write the picture of a trial's or lap's racing line.
@@ -48,6 +50,8 @@ def draw_racing_line(
         title: Default: the track's name.
         subtitle: Whose line it is; default: the track's description.
         figures: (label, value) pairs beside what the line itself says.
+        has_own_figures: Whether the line says its own: times, speeds, resets.
+        speed: What the colours are called.
         width_px: Width of the picture, pixels.
 
     Raises:
@@ -79,8 +83,9 @@ def draw_racing_line(
         picture.canvas.disc(place, (255, 255, 255), radius_px=1.25 * width)
         picture.canvas.disc(place, MISTAKE, radius_px=0.95 * width)
     name, description = describe(recording.track)
-    picture.caption(title=title or name, subtitle=subtitle or description, figures=[*_figures(recording), *figures])
-    color_bar(picture.canvas, unit, low, high)
+    own = _figures(recording) if has_own_figures else []
+    picture.caption(title=title or name, subtitle=subtitle or description, figures=[*own, *figures])
+    color_bar(picture.canvas, unit, low, high, speed)
     return picture.save(path)
 
 
@@ -145,17 +150,17 @@ def _figures(recording: Recording) -> list[tuple[str, str]]:
     return figures
 
 
-def color_bar(canvas: Canvas, unit: float, low: float, high: float) -> None:
+def color_bar(canvas: Canvas, unit: float, low: float, high: float, speed: str = "SPEED") -> None:
     """The colours from slow to fast in the upper right corner, with their speeds."""
     right, top, width, height, pieces = 95.0 * unit, 5.0 * unit, 20.0 * unit, 1.0 * unit, 100
     left = right - width
-    canvas.text((left, top - 0.8 * unit), "SPEED", SOFT_INK, size=0.95 * unit, spacing=0.12, weight=0.01)
+    canvas.text((left, top - 0.8 * unit), speed, SOFT_INK, size=0.95 * unit, spacing=0.12, weight=0.01)
     canvas.text((right, top - 0.8 * unit), "m/s", SOFT_INK, size=1.1 * unit, anchor="rs")
     for piece in range(pieces):
         x = left + width * piece / pieces
         color = speed_color((piece + 0.5) / pieces)
         canvas.box((x, top, x + width / pieces + 0.5, top + height), color)
     for fraction, anchor in ((0.0, "ls"), (0.5, "ms"), (1.0, "rs")):
-        speed = low + fraction * (high - low)
-        words = f"{speed:.2f}".rstrip("0").rstrip(".") if fraction == 0.5 else f"{speed:.1f}"
+        value = low + fraction * (high - low)
+        words = f"{value:.2f}".rstrip("0").rstrip(".") if fraction == 0.5 else f"{value:.1f}"
         canvas.text((left + fraction * width, top + height + 1.9 * unit), words, INK, size=1.3 * unit, anchor=anchor)

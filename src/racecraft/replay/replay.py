@@ -24,6 +24,7 @@ from racecraft.race.recording import Recording
 from racecraft.race.results import Evaluation, Trial
 from racecraft.replay.codec import MAX_FILE_BYTES, TYPES, pack, pack_column, unpack, unpack_column
 from racecraft.replay.header import CarHeader, Header, check_header, conditions_of, header_of, lap_of, race_of
+from racecraft.replay.in_picture import is_picture, replay_in
 from racecraft.run.atomic import write_file
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES, row_width
 from racecraft.sim.objects import OBJECT_KINDS
@@ -150,7 +151,7 @@ def pack_replay(replay: Replay) -> bytes:
 
 
 def read_replay(path: str | Path) -> Replay:
-    """Read a replay file, which may come from a stranger.
+    """Read a replay file, or the one inside a picture to send around; it may come from a stranger.
 
     Raises:
         ReplayError: It is damaged, hostile, or of another version.
@@ -160,6 +161,8 @@ def read_replay(path: str | Path) -> Replay:
     except ConfigError as error:
         raise ReplayError(str(error)) from error
     name = Path(path).name
+    if is_picture(data):
+        data = replay_in(data, name=name)
     document, body = unpack(data, name=name)
     return _replay(check_header(document, name=name), body, name=name)
 

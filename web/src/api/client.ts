@@ -165,9 +165,8 @@ export const exportedOf = (run: string, target: "car" | "onnx", checkpoint: stri
 /** Address of a model's report. */
 export const reportOf = (run: string) => `/api/models/${name(run)}/report`;
 
-/** Address of an evaluation's best lap as one file. */
-export const sharedOf = (run: string, stamp: string, kind: "html" | "png", language: string) =>
-  `/api/models/${name(run)}/evaluations/${stamp}/share.${kind}?language=${language}`;
+/** Address of an evaluation. */
+export const evaluationOf = (run: string, stamp: string) => `/api/models/${name(run)}/evaluations/${stamp}`;
 
 /** Address of one of a model's files. */
 export const fileOf = (run: string, path: string) =>

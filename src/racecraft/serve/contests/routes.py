@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Query, Response
+from fastapi import Path as PathPart
 from fastapi.responses import FileResponse
 
 from racecraft.contest.terms import TOGETHER
 from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
 from racecraft.serve.contests.schemas import ContestCard, ContestDetail, NewHeat, NewLadder
-from racecraft.serve.context import InContext, TakesPlace
+from racecraft.serve.context import Computes, InContext, TakesPlace
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.replays import car_of, replay_of, road_of
 from racecraft.serve.races.schemas import RaceReplay, ReplayCar
 
+if TYPE_CHECKING:
+    from racecraft.analysis.share_heat import Placed
+
 router = APIRouter(prefix="/api/contests", tags=["contests"])
 
-Id = Annotated[str, Path(max_length=40)]
+Id = Annotated[str, PathPart(max_length=40)]
 
 
 @router.get("")
@@ -70,6 +76,38 @@ def get_heat_file(contest: Id, context: InContext) -> FileResponse:
     return FileResponse(path, media_type="application/octet-stream", filename="heat.replay")
 
 
+@router.get(
+    "/{contest}/share.html",
+    response_class=Response,
+    responses={200: {"content": {"text/html": {}}}},
+    dependencies=[Computes],
+)
+def get_heat_share(contest: Id, context: InContext, language: Literal["en", "de"] = "en") -> Response:
+    """A heat as one HTML file that opens offline, with the replay inside."""
+    from racecraft.analysis.share_heat import share_heat
+
+    file, found = context.contests.file(contest, REPLAY), context.contests.get(contest)
+    text = share_heat(file, _placed(found), title=_title(found), language=language)
+    return Response(text, media_type="text/html", headers={"Content-Disposition": 'attachment; filename="heat.html"'})
+
+
+@router.get(
+    "/{contest}/share.png",
+    response_class=Response,
+    responses={200: {"content": {"image/png": {}}}},
+    dependencies=[Computes],
+)
+def get_heat_picture(contest: Id, context: InContext, language: Literal["en", "de"] = "en") -> Response:
+    """The winner's racing line and the result as a picture, with the replay inside."""
+    from racecraft.analysis.share_heat import draw_heat
+
+    file, found = context.contests.file(contest, REPLAY), context.contests.get(contest)
+    with tempfile.TemporaryDirectory() as place:
+        path = Path(place) / "heat.png"
+        data = draw_heat(file, _placed(found), path, title=_title(found), language=language).read_bytes()
+    return Response(data, media_type="image/png", headers={"Content-Disposition": 'attachment; filename="heat.png"'})
+
+
 @router.get("/{contest}/replay")
 def get_contest_replay(
     contest: Id, context: InContext, match: Annotated[int | None, Query(ge=0, lt=100_000)] = None
@@ -96,3 +134,23 @@ def get_contest_replay(
             cars = [car.model_copy(update={"objects": []}) for car in cars]
         track = document["track"]
     return replay_of(track, context.courses.load(track), cars, trial=0, objects=road)
+
+
+def _title(contest: ContestDetail) -> str:
+    return contest.title or " – ".join(contest.models)
+
+
+def _placed(contest: ContestDetail) -> list[Placed]:
+    """The result of a heat, the winner first.
+
+    Raises:
+        NotFound: It has none.
+    """
+    from racecraft.analysis.share_heat import Placed
+
+    if not contest.heat:
+        raise NotFound("The heat has no result to share.")
+    return [
+        Placed(car=row.car, name=row.name, place=row.place, score=row.score, best_lap=row.best, gap=row.gap)
+        for row in contest.heat
+    ]

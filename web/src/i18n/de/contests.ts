@@ -66,4 +66,6 @@ export const contests: Record<keyof typeof english, string> = {
   contests_matches: "Rennen",
   contests_all: "Alle Modelle",
   contests_missing: "Diesen Lauf oder dieses Turnier gibt es nicht; vielleicht wurde es gelöscht.",
+  contests_share:
+    "Der Lauf in einer Datei: alle Autos, das Ergebnis, die Ideallinie des Siegers und das Replay. Sie öffnet sich überall, auch offline.",
 };

@@ -62,4 +62,6 @@ export const contests = {
   contests_matches: "Races",
   contests_all: "All models",
   contests_missing: "There is no such heat or ladder; it may have been deleted.",
+  contests_share:
+    "The heat in one file: all cars, the result, the winner's racing line and the replay. It opens anywhere, offline, too.",
 } as const;
