@@ -178,7 +178,7 @@ def test_the_best_meet_in_a_final_and_the_wall_shows_it_heat_by_heat(lesson: Les
     assert wall.get_by_role("button", name=" wins").count() == 0, "nothing is told before it was shown"
     wall.get_by_role("button", name="To its end").click()
     wall.get_by_role("button", name=" wins").wait_for()
-    wall.get_by_role("listitem").filter(has_text=f"1 {first['name']}").wait_for()
+    wall.locator(".stage li", has_text=first["name"]).get_by_text("1", exact=True).wait_for()
 
     page = teacher.open(f"/groups/{group}/season")
     row = page.get_by_role("row", name=first["name"])
