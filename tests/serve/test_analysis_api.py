@@ -64,7 +64,7 @@ def test_laps_have_the_reward_of_their_own_training(raced: tuple[RunningConsole,
     client, path = console.client, f"/api/models/{name}/evaluations/{stamp}/laps"
     before = client.get(path).json()
     assert before["reward"] == {"stretch": 1, "stretches": 1, "is_afresh": False, "error": None}
-    x_pays = "def reward_function(params):\n    return 100 * params['x']\n"
+    x_pays = "BEFORE = {}\ndef reward_function(params):\n    BEFORE['x'] = params['x']\n    return 100 * params['x']\n"
     steps = client.get(f"/api/models/{name}").json()["steps"]
     job = client.post(f"/api/models/{name}/train", json={"reward": x_pays, "until": f"{steps + 1024} steps"}).json()
     assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
@@ -76,7 +76,7 @@ def test_laps_have_the_reward_of_their_own_training(raced: tuple[RunningConsole,
     assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
     newest = client.get(f"/api/models/{name}/evaluations").json()[0]["stamp"]
     found = client.get(f"/api/models/{name}/evaluations/{newest}/laps").json()
-    assert found["reward"]["stretch"] == 2
+    assert found["reward"] == {"stretch": 2, "stretches": 2, "is_afresh": True, "error": None}
     for lap in found["laps"]:
         asked = [(x, paid) for x, paid in zip(lap["x"], lap["reward"], strict=True) if paid is not None]
         assert len(asked) > 3

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from browsers import Visit, needs_browser, needs_pages, visiting
 from running_consoles import running_console
+
+from racecraft.replay import read_replay, verify
+from racecraft.replay.in_picture import SIGNATURE
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
@@ -59,6 +63,16 @@ def test_a_pupil_trains_a_car_by_keyboard_alone(visit: Visit) -> None:
     card = trained(visit)
     assert card["completion"] == 1
     assert card["best_lap"] is not None
+    press(page, "Evaluate it against the clock")
+    page.wait_for_url("**/race")
+    page.get_by_label("Trials").wait_for()
+    press(page, "Start an evaluation")
+    page.get_by_role("link", name="As a picture").wait_for()
+    with page.expect_download() as sent:
+        press(page, "As a picture")
+    picture = sent.value.path()
+    assert picture.read_bytes().startswith(SIGNATURE)
+    assert verify(read_replay(picture)).is_genuine  # a picture to send, and its proof inside
 
 
 def test_a_veteran_brings_files_of_aws_and_takes_an_archive_home(visit: Visit) -> None:
@@ -80,7 +94,7 @@ def test_a_veteran_brings_files_of_aws_and_takes_an_archive_home(visit: Visit) -
     assert archive.content[:2] == b"\x1f\x8b"
 
 
-def test_a_racer_lets_both_meet_and_a_spectator_watches(visit: Visit) -> None:
+def test_a_racer_lets_both_meet_and_a_spectator_watches(visit: Visit, tmp_path: Path) -> None:
     visit.look("dark", "en")
     page = visit.open("/contests/new")
     page.get_by_role("button", name="Add all").click()
@@ -89,6 +103,17 @@ def test_a_racer_lets_both_meet_and_a_spectator_watches(visit: Visit) -> None:
     page.get_by_role("heading", name="The heat in 3D").wait_for()
     (heat,) = visit.console.client.get("/api/contests").json()
     assert heat["winner"]
+    with page.expect_download() as sent:
+        page.get_by_role("link", name="As a page").click()
+    sent.value.save_as(tmp_path / "heat.html")
+    offline = page.context.new_page()
+    offline.goto((tmp_path / "heat.html").as_uri())
+    offline.get_by_role("heading", name="Final").wait_for()
+    second = offline.locator("button.car").nth(1)
+    second.click()
+    assert second.get_attribute("aria-pressed") == "true"
+    visit.console.wait_for(lambda: float(offline.locator("#clock").inner_text().split()[0]) > 0.5)
+    offline.close()
 
     visit.look("light", "de")
     page = visit.open("/races", width=390)

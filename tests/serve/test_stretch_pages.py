@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import shutil
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from browsers import Visit, needs_browser, needs_pages, visiting
 from model_requests import REQUESTS
+from PIL import Image
 from running_consoles import PATIENCE, RunningConsole, running_console
 
 if TYPE_CHECKING:
@@ -269,6 +271,12 @@ def test_how_it_learned_notes_and_a_copy_to_change(changed: Visit) -> None:
     assert shown.locator("li").count() == len(laps) > 1
     shown.get_by_label("Moment of the lap").fill("0.5")
     shown.get_by_text("0.50 /").wait_for()
+    shown.get_by_role("button", name="Make a film of it").click()
+    shown.get_by_role("button", name="Filming…").wait_for()
+    with page.expect_download() as film:
+        shown.get_by_role("link", name="Save the film").click()
+    assert film.value.suggested_filename == "heron.mp4"
+    assert Path(film.value.path()).read_bytes()[4:8] == b"ftyp"
     notes = page.get_by_label("Notes")
     notes.fill("The inside line is shorter.")
     page.get_by_text("Kept", exact=True).wait_for()
@@ -355,3 +363,58 @@ def test_the_end_of_a_training_is_said_on_another_page(changed: Visit) -> None:
     page.locator(".toast").get_by_text("other has finished its training.").wait_for()
     page.locator(".toast").get_by_role("button", name="Look").click()
     page.wait_for_url("**/models/other")
+
+
+HIDDEN = """() => {
+    Object.defineProperty(document, "hidden", { get: () => window.isAway, configurable: true });
+    window.isAway = false;
+    window.told = [];
+    window.Notification = class {
+        static permission = "granted";
+        static requestPermission = async () => "granted";
+        constructor(text, { tag }) { window.told.push([text, tag]); }
+    };
+}"""
+"""Lets a page believe that it lies behind others, and keeps what it has the browser say."""
+
+
+def test_the_title_and_the_browser_say_the_end_to_whoever_is_away(changed: Visit) -> None:
+    console = changed.console
+    page = changed.open("/models/other/watch")
+    page.evaluate(HIDDEN)
+    steps = console.client.get("/api/models/other").json()["steps"]
+    for wanted in (True, False):
+        steps += 2000
+        console.client.post("/api/models/other/train", json={"until": f"{steps} steps"})
+        page.get_by_role("button", name="Stop").wait_for()
+        page.get_by_role("checkbox", name="Let the browser tell me").set_checked(wanted)
+        page.evaluate("window.isAway = true")
+        console.wait_for(lambda: page.title().startswith("✓ "))
+        job = console.client.get("/api/jobs", params={"run": "other"}).json()[0]
+        told = page.evaluate("window.told.splice(0)")
+        assert told == ([["other has finished its training.", job["id"]]] if wanted else [])
+        page.evaluate("window.isAway = false; document.dispatchEvent(new Event('visibilitychange'))")
+        console.wait_for(lambda: page.title() == "other: Watch · Racecraft")
+        page.reload()
+        page.get_by_role("button", name="Go on").wait_for()
+        page.evaluate(HIDDEN)
+
+
+def test_a_picture_that_grows_has_the_whole_road_as_one_that_was_large_from_the_start(changed: Visit) -> None:
+    page = changed.page
+    page.emulate_media(reduced_motion="reduce")  # the best car stands
+    pictures = []
+    for widths in ((420, 1440), (1440,)):
+        changed.open("/models/heron/watch", width=widths[0])
+        live = page.get_by_role("region", name="Live")
+        page.get_by_text("The best car on its lap").wait_for()
+        live.get_by_role("button", name="Free").click()
+        canvas = live.locator("canvas")
+        for width in widths:
+            page.set_viewport_size({"width": width, "height": 900})
+            page.wait_for_timeout(1500)
+        pictures.append(Image.open(io.BytesIO(canvas.screenshot())).convert("L"))
+    page.emulate_media(reduced_motion="no-preference")
+    grown, large = (np.asarray(picture, float) for picture in pictures)
+    assert grown.shape == large.shape
+    assert np.abs(grown - large).mean() < 2.0  # of 255; as they were before, most of the road is elsewhere

@@ -268,7 +268,7 @@ def test_every_page_works_without_any_network_but_its_own_server(studio: tuple[R
     stranger.close()
     assert foreign == ["http://racecraft.invalid/"]
     foreign.clear(), complaints.clear()
-    models = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "tune", "setup")]
+    models = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "tune", "log", "setup")]
     others = ("/create", "/tracks", "/draw", "/drive/oval", "/races", "/races/new", "/compare/left/right", "/settings")
     for path in ("/", *others, *models):
         visit((console, page), path)
@@ -298,8 +298,8 @@ def flaws(studio: tuple[RunningConsole, Any]) -> dict[str, dict[str, Any]]:
     """What axe finds in each theme on pages that are opened once for both."""
     page = studio[1].context.new_page()  # axe itself tries what the page's policy forbids
     found: dict[str, dict[str, Any]] = {theme: {} for theme in THEMES}
-    own = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "tune", "setup")]
-    for path in ("/", "/create", "/compare/left/right", *own):
+    own = [f"/models/left/{tab}" for tab in ("watch", "race", "analysis", "tune", "log", "setup")]
+    for path in ("/", "/create", "/compare/left/right", "/drive/oval/left", "/lessons", "/lessons/1", *own):
         visit((studio[0], page), path)
         page.wait_for_timeout(1500)
         page.evaluate("document.querySelectorAll('details:not(.keep)').forEach(part => { part.open = true; })")
