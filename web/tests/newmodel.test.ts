@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { ActionPreset, Choices } from "../src/api/client";
 import { newModel, suited, type Known, type Wishes } from "../src/lib/newmodel";
+import { newRoad } from "../src/lib/raceterms";
 
 const space: ActionPreset = {
   name: "default",
@@ -21,6 +22,7 @@ const known: Known = {
 const wishes: Wishes = {
   name: "",
   track: "oval",
+  moreTracks: [],
   direction: "forward",
   space,
   sensors: [],
@@ -36,8 +38,7 @@ const wishes: Wishes = {
   opponents: [],
   cars: 2,
   objects: 6,
-  botSpeed: 0.2,
-  laneChanges: true,
+  road: { ...newRoad(), laneChanges: true },
   learning: "learning_fast",
   tuned: {},
 };
@@ -65,6 +66,11 @@ describe("the request for a new model", () => {
     expect(made({ source: "def f(): ...", name: "heron" })).toMatchObject({ reward: "def f(): ...", name: "heron" });
   });
 
+  it("names the other tracks that it learns on, where there are any", () => {
+    expect(made({ moreTracks: ["hairpin"] }).more_tracks).toEqual(["hairpin"]);
+    expect(made()).not.toHaveProperty("more_tracks");
+  });
+
   it("sends an edited space as AWS's document, with the sensors in it and not beside it", () => {
     const edited = { ...space, actions: [...space.actions, { steering_angle: 0, speed: 2 }] };
     const request = made({ space: edited, sensors: ["STEREO_CAMERAS"] });
@@ -80,6 +86,9 @@ describe("the request for a new model", () => {
     expect(made()).not.toHaveProperty("objects");
     expect(made({ race: "object-avoidance" })).toMatchObject({ objects: 6 });
     expect(made({ race: "object-avoidance" })).not.toHaveProperty("bot_speed");
+    const places = [{ at: 50, lane: 1 as const }];
+    expect(made({ race: "object-avoidance", road: { ...newRoad("fixed"), places } }).positions).toEqual([[0.5, 1]]);
+    expect(made()).not.toHaveProperty("placement");
     expect(made({ race: "head-to-bot" })).toMatchObject({ objects: 6, bot_speed: 0.2, lane_changes: true });
   });
 
