@@ -68,7 +68,7 @@ def get_telemetry(name: str, stamp: str, context: InContext) -> Telemetry:
     """Every step of an evaluation, as columns named as AWS names them."""
     folder = context.garage.folder(name)
     path = folder.evaluation(stamp) / "evaluation-simtrace" / "0-iteration.csv"
-    if not stamp.isdigit() or not path.is_file():
+    if not (stamp.isascii() and stamp.isdigit()) or not path.is_file():
         raise NotFound(f"Model {name!r} has no evaluation {stamp[:40]!r}.")
     columns: dict[str, list[Any]] = {column: [] for column in COLUMNS}
     with path.open(encoding="utf-8") as file:

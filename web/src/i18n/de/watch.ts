@@ -72,6 +72,7 @@ export const watch: Record<keyof typeof english, string> = {
   cars: "{count} Autos lernen zugleich",
   on_machine: "{told} · auf {machine}",
   not_live: "Gerade wird nicht trainiert.",
+  no_scene: "Dieser Browser zeichnet hier kein 3D (WebGL fehlt oder ist ausgeschaltet). Alles andere geht.",
   best_drives: "Das beste Auto auf seiner Runde: {lap}",
   best_drives_is: "Gefahren zum Zusehen, mit einem eigenen Start: Als beste Runde zählt sie nicht.",
   best_drives_on: "Strecke, auf der es fährt",

@@ -68,6 +68,7 @@ export const watch = {
   cars: "{count} cars learning at once",
   on_machine: "{told} · on {machine}",
   not_live: "No training is running.",
+  no_scene: "This browser draws no 3D here (WebGL is missing or switched off). All else works.",
   best_drives: "The best car on its lap: {lap}",
   best_drives_is: "Driven to be watched, from a start of its own: it does not count as a best lap.",
   best_drives_on: "Track that it drives on",
