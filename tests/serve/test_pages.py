@@ -132,6 +132,14 @@ def visited() -> Iterator[tuple[RunningConsole, Page]]:
         yield console, visit.page
 
 
+ONE_BEST_LAP = r"""() => {
+  const told = document.querySelector(".figures dd").innerText.match(/[\d.]+ s/)?.[0];
+  const above = document.querySelector("header p.row").innerText;
+  if (told && !above.includes(told)) throw new Error(`${told} is not in ${above}`);
+  return told;
+}"""  # wherever the page says it, while a training goes on
+
+
 @pytest.mark.slow
 @needs_pages
 @needs_browser
@@ -149,6 +157,7 @@ def test_a_newcomers_path_to_a_lap_on_video(visited: tuple[RunningConsole, Any])
     for drawn in (".scene canvas", "[aria-label='What the car sees']"):
         assert len(_colours(page.locator(drawn).screenshot())) > 20
     page.get_by_role("button", name="From above").click()
+    page.wait_for_function(ONE_BEST_LAP)
     page.locator(".badge.finished").wait_for()
     page.get_by_role("tab", name="Evaluation").click()
     page.get_by_role("spinbutton", name="Laps").fill("1")
