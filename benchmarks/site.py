@@ -78,12 +78,6 @@ class Files(http.server.SimpleHTTPRequestHandler):
     asked: list[str] = []  # noqa: RUF012  # of all of them
     more: dict[str, str] = {}  # noqa: RUF012  # headers
 
-
-class Isolating(Files):
-    """One whose pages may share memory between threads."""
-
-    more = {"Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp"}  # noqa: RUF012
-
     def do_GET(self) -> None:
         """Notes what was asked for."""
         self.asked.append(self.path)
@@ -97,6 +91,12 @@ class Isolating(Files):
 
     def log_message(self, *_: object) -> None:
         """Says nothing."""
+
+
+class Isolating(Files):
+    """One whose pages may share memory between threads."""
+
+    more = {"Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp"}  # noqa: RUF012
 
 
 @contextmanager

@@ -95,7 +95,7 @@ def test_a_track_is_drawn_with_the_mouse_and_with_keys_tried_and_kept(visit: Vis
     cell = page.get_by_role("spinbutton", name="1: x")
     cell.fill("0.5")
     cell.press("Tab")
-    assert "0.5, -2.2" in str(points.nth(0).get_attribute("aria-label"))
+    assert "0.5, −2.2" in str(points.nth(0).get_attribute("aria-label"))
     page.get_by_role("button", name="Mirror").click()
     page.get_by_text("It can be driven.").wait_for()
 

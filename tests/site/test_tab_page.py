@@ -92,7 +92,7 @@ def test_what_a_preset_pays_is_painted_along_the_track(page: Page) -> None:
     another = "before => document.querySelector('figure svg[role=img]').getAttribute('viewBox') !== before"
     page.wait_for_function(another, arg=before)
     page.get_by_label("What it is paid for").select_option("stay_inside")
-    page.get_by_text("least").get_by_text("0.00100").wait_for()  # what it pays beside the road
+    page.get_by_text("least").get_by_text("0.001").wait_for()  # what it pays beside the road
     page.get_by_label("What it is paid for").select_option("racing")
 
 
@@ -308,7 +308,7 @@ def test_a_reward_of_ones_own_is_checked_and_trains(page: Page) -> None:
     write(page, "def reward_function(params):\n    print('seen', params['steps'])\n    return params['speed']\n")
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
     page.get_by_text("seen 95.0").wait_for()  # what it printed when it was tried
-    page.get_by_text("least").get_by_text("1.00").wait_for()  # around the 1.5 m/s at which it is painted
+    page.get_by_text("least").get_by_text("1", exact=True).wait_for()  # around the 1.5 m/s at which it is painted
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
 

@@ -8,6 +8,7 @@ has no network, no signals and no programs. What a kernel lacks is left out and 
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +17,7 @@ from racecraft.reward.sandbox import find_confinement, make_plan
 
 PACKAGES: Final = ("racecraft", "numpy", "safetensors")
 MOST_MEMORY: Final = 1 << 32
-"""Bytes of address space; AWS's deepest network takes a quarter of it."""
+"""Bytes of address space beyond what the judge has loaded; AWS's deepest network takes a quarter of it."""
 
 
 def missing_walls() -> str:
@@ -38,7 +39,13 @@ def lock_in(*, entries: Sequence[Path], kept: tuple[int, ...], written: int) -> 
     from racecraft.reward.sandbox.inside import enter
 
     plan = _plan(written)
-    enter({**plan, "readable": [*plan["readable"], *map(str, entries)]}, kept)
+    memory = plan["memory_limit"] and plan["memory_limit"] + _taken()
+    enter({**plan, "memory_limit": memory, "readable": [*plan["readable"], *map(str, entries)]}, kept)
+
+
+def _taken() -> int:
+    """Bytes of address space that this process has already."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
 
 
 @functools.cache
