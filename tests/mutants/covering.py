@@ -41,7 +41,7 @@ GROUPS: Final[Tests] = (
     "not postgresql and (homes or names_can or code_has or new_cards)",
 )
 ENTRIES: Final[Tests] = ("tests/serve/test_submission_limits.py", "-k", "not postgresql")
-BOARD: Final = "tests/serve/test_league_races.py::test_the_board_places_by_the_rules_of_every_race"
+BOARD: Final = "tests/serve/test_boards.py::test_the_board_places_by_the_rules_of_every_race"
 TOKENS: Final[Tests] = (
     "tests/serve/test_token_workers.py",
     "-k",

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 from running_consoles import PATIENCE, RunningConsole
 
+from few_frames import FEW_FRAMES
+
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
@@ -26,25 +28,6 @@ SOFTWARE_3D = [
     "--disable-gpu-compositing",
     "--no-sandbox",
 ]
-# What moves on a page is drawn a few times a second: sixty would be most of a test's work, and show the same.
-FEW_FRAMES = """
-(() => {
-  const ask = window.requestAnimationFrame.bind(window), forget = window.cancelAnimationFrame.bind(window);
-  const asked = new Map();
-  let last = 0;
-  window.requestAnimationFrame = (draw) => {
-    const id = ++last;
-    asked.set(id, () => clearTimeout(timer));
-    const timer = setTimeout(() => {
-      const frame = ask((time) => (asked.delete(id), draw(time)));
-      asked.set(id, () => forget(frame));
-    }, 120);
-    return id;
-  };
-  window.cancelAnimationFrame = (id) => (asked.get(id)?.(), asked.delete(id));
-})()
-"""
-
 needs_pages = pytest.mark.skipif(
     not (ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html").exists(),
     reason="the pages are not built: make console builds them",

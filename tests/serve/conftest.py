@@ -7,6 +7,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from leagues import running_league
@@ -14,6 +15,9 @@ from postgres_servers import PostgresServer, binaries, postgres_server
 from running_consoles import RunningConsole, running_console
 from running_workers import processes_on
 from schools import School
+
+if TYPE_CHECKING:
+    from racecraft.serve.store.database import Database
 
 pytest.importorskip("fastapi")
 
@@ -42,6 +46,17 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
         return f"sqlite:///{tmp_path / 'console.db'}"
     server: PostgresServer = request.getfixturevalue("postgres")
     return server.new_database()
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Iterator[Database]:
+    """A new console's, on SQLite, in this process; files that ask more of it have one of their own."""
+    from racecraft.serve.store.database import Database
+
+    database = Database(f"sqlite:///{tmp_path / 'console.sqlite'}")
+    database.migrate()
+    yield database
+    database.close()
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from browsers import (
     CHROMIUM,
-    FEW_FRAMES,
     SOFTWARE_3D,
     THEMES,
     Visit,
@@ -21,6 +20,8 @@ from browsers import (
 )
 from leagues import RunningLeague, ok, running_league, untrained_run
 from running_consoles import PATIENCE
+
+from few_frames import FEW_FRAMES
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from few_frames import FEW_FRAMES
 from racecraft import evaluate
 from racecraft.importing import import_run
 from racecraft.limits import known_limit
@@ -70,6 +71,7 @@ def page() -> Iterator[Page]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.add_init_script(FEW_FRAMES)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
         page.goto(f"http://127.0.0.1:{host.server_port}/site/")
@@ -84,11 +86,28 @@ def page() -> Iterator[Page]:
 PAINTED = "What it pays along the track"
 
 
+HOLD = """(file) => {
+  const ask = window.fetch;
+  window.fetch = async (what, ...more) => {
+    if (String(what.url ?? what).includes(file)) await new Promise((go) => (window.goOn = go));
+    return ask(what, ...more);
+  };
+  window.letGo = () => ((window.fetch = ask), window.goOn());
+}"""  # until it is let go
+
+
 def test_what_a_preset_pays_is_painted_along_the_track(page: Page) -> None:
+    from playwright.sync_api import expect
+
     painted = page.get_by_role("img", name=PAINTED)
     painted.wait_for(timeout=PATIENCE)
     before = painted.get_attribute("viewBox")
+    train = page.get_by_role("button", name="Train", exact=True)
+    page.evaluate(HOLD, "hairpin")
     page.get_by_role("combobox", name="Track").select_option("hairpin")
+    expect(train).to_be_disabled()  # the road is not there yet
+    page.evaluate("letGo()")
+    expect(train).to_be_enabled()
     another = "before => document.querySelector('figure svg[role=img]').getAttribute('viewBox') !== before"
     page.wait_for_function(another, arg=before)
     page.get_by_label("What it is paid for").select_option("stay_inside")

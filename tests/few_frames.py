@@ -1,0 +1,22 @@
+"""What moves on a page is drawn a few times a second: sixty would be most of a test's work, and show the same."""
+
+from typing import Final
+
+FEW_FRAMES: Final = """
+(() => {
+  const ask = window.requestAnimationFrame.bind(window), forget = window.cancelAnimationFrame.bind(window);
+  const asked = new Map();
+  let last = 0;
+  window.requestAnimationFrame = (draw) => {
+    const id = ++last;
+    asked.set(id, () => clearTimeout(timer));
+    const timer = setTimeout(() => {
+      const frame = ask((time) => (asked.delete(id), draw(time)));
+      asked.set(id, () => forget(frame));
+    }, 120);
+    return id;
+  };
+  window.cancelAnimationFrame = (id) => (asked.get(id)?.(), asked.delete(id));
+})()
+"""
+"""A script for a page, before its own."""
