@@ -13,7 +13,7 @@ namespace {
 
 #if defined(__AVX512F__) || defined(__aarch64__)
 constexpr int kTileRows = 8;  // 16 of 32 registers hold sums
-#elif defined(RC_HAS_DOUBLED_SUMS)
+#elif defined(RC_HAS_DOUBLES)
 constexpr int kTileRows = 2;  // 8 of 16, as a double takes two lanes
 #else
 constexpr int kTileRows = 4;  // 8 of 16
@@ -30,7 +30,7 @@ constexpr size_t kSegment =
 template <int kRows, int kVectors, typename Add>
 [[gnu::always_inline]] inline void sum_up(FloatLanes (&sums)[kRows][kVectors],
                                           [[maybe_unused]] bool fits_doubled, const Add& add) {
-#if defined(RC_HAS_DOUBLED_SUMS)
+#if defined(RC_HAS_DOUBLES)
     if (fits_doubled) {
         DoubledSums doubled;
         DoubledSums::Lanes wide[kRows][kVectors];
@@ -266,7 +266,7 @@ struct Numbers {
 // false.
 bool fits_doubled_sums([[maybe_unused]] const Numbers& x, [[maybe_unused]] const Numbers& w,
                        [[maybe_unused]] const Numbers& beginnings) {
-#if defined(RC_HAS_DOUBLED_SUMS)
+#if defined(RC_HAS_DOUBLES)
     const auto look = [](const Numbers& numbers) {
         Magnitudes found;
         for (size_t row = 0; row < numbers.rows; ++row)

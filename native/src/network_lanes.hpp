@@ -7,7 +7,9 @@
 
 #include <cmath>
 
+#include "doubles.hpp"
 #include "racecraft/platform.hpp"
+#include "scalar_multiply_add.hpp"
 
 #if defined(RC_SCALAR)  // the reference alone
 #elif defined(__AVX2__)
@@ -125,46 +127,6 @@ RC_HD FloatLanes operator-(FloatLanes a, FloatLanes b) {
 RC_HD FloatLanes operator*(FloatLanes a, FloatLanes b) {
     return {_mm_mul_ps(a.v, b.v)};
 }
-
-// Floats in pairs as doubles, which hold the product of two floats exactly.
-struct DoubleLanes {
-    __m128d low, high;
-};
-
-RC_HD DoubleLanes widen(FloatLanes a) {
-    return {_mm_cvtps_pd(a.v), _mm_cvtps_pd(_mm_movehl_ps(a.v, a.v))};
-}
-RC_HD FloatLanes narrow(DoubleLanes a) {
-    return {_mm_movelh_ps(_mm_cvtpd_ps(a.low), _mm_cvtpd_ps(a.high))};
-}
-
-// a + b rounded to odd: where it is inexact, the neighbour whose last bit is 1. A double keeps more than two
-// bits beyond a float, so rounding that to float is as if the exact sum had been rounded once (Boldo and
-// Melquiond, "Emulation of a FMA and correctly rounded sums", 2008). The error of the sum is Knuth's TwoSum.
-RC_HD __m128d add_rounding_to_odd(__m128d a, __m128d b) {
-    const __m128d sum = _mm_add_pd(a, b);
-    const __m128d b_part = _mm_sub_pd(sum, a);
-    const __m128d error = _mm_add_pd(_mm_sub_pd(a, _mm_sub_pd(sum, b_part)), _mm_sub_pd(b, b_part));
-    const __m128d zero = _mm_setzero_pd();
-    // false for NaN, which is the error of an infinite sum
-    const __m128d inexact = _mm_or_pd(_mm_cmplt_pd(error, zero), _mm_cmplt_pd(zero, error));
-    const __m128i bits = _mm_castpd_si128(sum);
-    const __m128i one = _mm_set1_epi64x(1);
-    const __m128i even =
-        _mm_shuffle_epi32(_mm_cmpeq_epi32(_mm_and_si128(bits, one), _mm_setzero_si128()), 0xA0);
-    const __m128i signs = _mm_srai_epi32(_mm_xor_si128(bits, _mm_castpd_si128(error)), 31);
-    const __m128i step = _mm_or_si128(_mm_shuffle_epi32(signs, 0xF5), one);  // away from zero 1, else -1
-    return _mm_castsi128_pd(
-        _mm_add_epi64(bits, _mm_and_si128(step, _mm_and_si128(even, _mm_castpd_si128(inexact)))));
-}
-
-RC_HD FloatLanes fused_multiply_add(DoubleLanes a, DoubleLanes b, DoubleLanes c) {
-    return narrow({add_rounding_to_odd(_mm_mul_pd(a.low, b.low), c.low),
-                   add_rounding_to_odd(_mm_mul_pd(a.high, b.high), c.high)});
-}
-RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
-    return fused_multiply_add(widen(a), widen(b), widen(c));
-}
 RC_HD FloatLanes relu(FloatLanes a) {
     return {_mm_max_ps(_mm_setzero_ps(), a.v)};
 }
@@ -238,33 +200,6 @@ RC_HD FloatLanes operator*(FloatLanes a, FloatLanes b) {
 RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
     return {wasm_f32x4_relaxed_madd(a.v, b.v, c.v)};
 }
-#else
-// As add_rounding_to_odd() of SSE2, above.
-RC_HD v128_t add_rounding_to_odd(v128_t a, v128_t b) {
-    const v128_t sum = wasm_f64x2_add(a, b);
-    const v128_t b_part = wasm_f64x2_sub(sum, a);
-    const v128_t error =
-        wasm_f64x2_add(wasm_f64x2_sub(a, wasm_f64x2_sub(sum, b_part)), wasm_f64x2_sub(b, b_part));
-    const v128_t zero = wasm_f64x2_const_splat(0.0);
-    const v128_t one = wasm_i64x2_const_splat(1);
-    // false for NaN, which is the error of an infinite sum
-    const v128_t inexact = wasm_v128_or(wasm_f64x2_lt(error, zero), wasm_f64x2_lt(zero, error));
-    const v128_t even = wasm_i64x2_eq(wasm_v128_and(sum, one), wasm_i64x2_const_splat(0));
-    const v128_t step = wasm_v128_or(wasm_i64x2_shr(wasm_v128_xor(sum, error), 63), one);
-    return wasm_i64x2_add(sum, wasm_v128_and(step, wasm_v128_and(even, inexact)));
-}
-RC_HD v128_t fused_pair(v128_t a, v128_t b, v128_t c) {  // of the lower two lanes
-    const v128_t product = wasm_f64x2_mul(wasm_f64x2_promote_low_f32x4(a), wasm_f64x2_promote_low_f32x4(b));
-    return wasm_f32x4_demote_f64x2_zero(add_rounding_to_odd(product, wasm_f64x2_promote_low_f32x4(c)));
-}
-RC_HD v128_t upper_pair(v128_t a) {
-    return wasm_i64x2_shuffle(a, a, 1, 1);
-}
-RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
-    const v128_t lower = fused_pair(a.v, b.v, c.v);
-    const v128_t upper = fused_pair(upper_pair(a.v), upper_pair(b.v), upper_pair(c.v));
-    return {wasm_i64x2_shuffle(lower, upper, 0, 2)};
-}
 #endif
 RC_HD FloatLanes relu(FloatLanes a) {
     return {wasm_f32x4_pmax(a.v, wasm_f32x4_const_splat(0.0f))};
@@ -303,13 +238,38 @@ RC_HD FloatLanes operator*(FloatLanes a, FloatLanes b) {
     return each_lane([&](int i) { return a.v[i] * b.v[i]; });
 }
 RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
+#if defined(__wasm__)
+    return each_lane([&](int i) { return scalar_multiply_add(a.v[i], b.v[i], c.v[i]); });
+#else
     return each_lane([&](int i) { return std::fma(a.v[i], b.v[i], c.v[i]); });
+#endif
 }
 RC_HD FloatLanes relu(FloatLanes a) {
     return each_lane([&](int i) { return a.v[i] < 0.0f ? 0.0f : a.v[i]; });
 }
 RC_HD FloatLanes where_positive(FloatLanes a, FloatLanes b) {
     return each_lane([&](int i) { return a.v[i] > 0.0f ? b.v[i] : 0.0f; });
+}
+
+#endif
+
+#if defined(RC_HAS_DOUBLES)
+
+struct DoubleLanes {
+    Doubles low, high;
+};
+
+RC_HD DoubleLanes widen(FloatLanes a) {
+    return {widen_lower(a.v), widen_upper(a.v)};
+}
+RC_HD FloatLanes narrow(DoubleLanes a) {
+    return {narrow(a.low, a.high)};
+}
+RC_HD FloatLanes fused_multiply_add(DoubleLanes a, DoubleLanes b, DoubleLanes c) {
+    return {narrow(add_rounding_to_odd(a.low * b.low, c.low), add_rounding_to_odd(a.high * b.high, c.high))};
+}
+RC_HD FloatLanes fused_multiply_add(FloatLanes a, FloatLanes b, FloatLanes c) {
+    return fused_multiply_add(widen(a), widen(b), widen(c));
 }
 
 #endif

@@ -1,5 +1,5 @@
 // How kernels keep chains of fused multiply-adds: sum = round(x * w + sum), step after step. With the
-// instruction in hardware that is all there is to it. SSE2 has none; there DoubledSums do it in doubles, a
+// instruction in hardware that is all there is to it. Where there is none DoubledSums do it in doubles, a
 // product exactly and a sum rounded to a float's 24 bits by adding half of the last one and cutting off what
 // is below.
 //
@@ -28,16 +28,14 @@ struct FusedSums {
     }
 };
 
-#if defined(__SSE2__) && !defined(__FMA__) && !defined(RC_SCALAR)
-
-#define RC_HAS_DOUBLED_SUMS 1
+#if defined(RC_HAS_DOUBLES)
 
 struct DoubledSums {
     using Lanes = DoubleLanes;
     static constexpr bool kMayErr = true;
     RC_HD Lanes broadcast(float a) {
-        const __m128d both = _mm_set1_pd(static_cast<double>(a));
-        return {both, both};
+        const Doubles twice = both(static_cast<double>(a));
+        return {twice, twice};
     }
     RC_HD Lanes lanes(FloatLanes a) { return widen(a); }
     RC_HD FloatLanes floats(Lanes a) { return narrow(a); }
@@ -47,32 +45,29 @@ struct DoubledSums {
                                                     Lanes (&sums)[kVectors]) {
 #pragma GCC unroll 2
         for (int v = 0; v < kVectors; ++v) {
-            const __m128i low = add(x.low, w[v].low, sums[v].low);
-            const __m128i high = add(x.high, w[v].high, sums[v].high);
+            const Doubles low = add(x.low, w[v].low, sums[v].low);
+            const Doubles high = add(x.high, w[v].high, sums[v].high);
             // of the 29 bits that are cut off, none is set: the lower halves of the doubles hold them
-            const __m128 lower = _mm_shuffle_ps(_mm_castsi128_ps(low), _mm_castsi128_ps(high), 0x88);
-            const __m128 cut = _mm_and_ps(lower, _mm_castsi128_ps(_mm_set1_epi32((1 << 29) - 1)));
-            least_ = _mm_min_ps(cut, least_);  // as integers, which those that are no NaN are ordered like
+            const Floats cut = keep_bits(lower_halves(low, high), (1 << 29) - 1);
+            least_ = lesser(cut, least_);  // as integers, which those that are no NaN are ordered like
         }
     }
     // Whether a sum since the last call was, in doubles, between two floats, so that it may be the wrong one.
     [[gnu::always_inline]] inline bool has_erred() {
-        const bool found =
-            _mm_movemask_epi8(_mm_cmpeq_epi32(_mm_castps_si128(least_), _mm_setzero_si128())) != 0;
-        least_ = _mm_set1_ps(1.0f);
+        const bool found = has_zero_bits(least_);
+        least_ = four(1.0f);
         return found;
     }
 
   private:
     // Makes the sum of it rounded to 24 bits, middles away from zero, and gives it with the bits cut off.
-    RC_HD __m128i add(__m128d x, __m128d w, __m128d& sum) {
-        const __m128i raised =
-            _mm_add_epi64(_mm_castpd_si128(_mm_add_pd(_mm_mul_pd(x, w), sum)), _mm_set1_epi64x(1 << 28));
-        sum = _mm_castsi128_pd(_mm_and_si128(raised, _mm_set1_epi64x(-(int64_t{1} << 29))));
+    RC_HD Doubles add(Doubles x, Doubles w, Doubles& sum) {
+        const Doubles raised = add_to_bits(x * w + sum, 1 << 28);
+        sum = keep_bits(raised, -(int64_t{1} << 29));
         return raised;
     }
 
-    __m128 least_ = _mm_set1_ps(1.0f);
+    Floats least_ = four(1.0f);
 };
 
 // What DoubledSums ends in where it does not err, six times as slowly.
@@ -87,32 +82,30 @@ struct ExactSums : DoubledSums {
 // The least magnitude of numbers that are not 0, and the sum of all magnitudes: not finite where one of them
 // is not.
 struct Magnitudes {
-    __m128 least = _mm_set1_ps(__builtin_inff());
-    __m128 total = _mm_setzero_ps();
+    Floats least = four(__builtin_inff());
+    Floats total = four(0.0f);
 
     // `count` is a multiple of 4 but for the numbers that a network is given.
     void look_at(const float* values, size_t count) {
         size_t i = 0;
-        for (; i + 4 <= count; i += 4) look_at(_mm_loadu_ps(values + i));
-        for (; i < count; ++i) look_at(_mm_set_ss(values[i]));
+        for (; i + 4 <= count; i += 4) look_at(load_floats(values + i));
+        for (; i < count; ++i) look_at(only(values[i]));
     }
-    void look_at(__m128 values) {
-        const __m128 magnitude = _mm_andnot_ps(_mm_set1_ps(-0.0f), values);
-        total = _mm_add_ps(total, magnitude);
-        const __m128 is_zero = _mm_cmpeq_ps(magnitude, _mm_setzero_ps());
-        least =
-            _mm_min_ps(_mm_or_ps(magnitude, is_zero), least);  // the second where the first is not a number
+    void look_at(Floats values) {
+        const Floats magnitude = keep_bits(values, 0x7FFFFFFF);
+        total = added(total, magnitude);
+        least = lesser(nan_where_zero(magnitude), least);
     }
     double smallest() const {
-        alignas(16) float of[4];
-        _mm_store_ps(of, least);
+        float of[4];
+        store_floats(of, least);
         float result = of[0];
         for (const float value : of) result = value < result ? value : result;
         return static_cast<double>(result);
     }
     double sum() const {
-        alignas(16) float of[4];
-        _mm_store_ps(of, total);
+        float of[4];
+        store_floats(of, total);
         double result = 0.0;
         for (const float value : of) result += static_cast<double>(value);
         return result;
@@ -143,7 +136,7 @@ template <typename Sums, int kRows, int kVectors, typename Steps>
     if constexpr (!Sums::kMayErr) {
         steps(arithmetic, sums, size_t{0}, count);
     } else {
-#if defined(RC_HAS_DOUBLED_SUMS)
+#if defined(RC_HAS_DOUBLES)
         constexpr size_t kPiece = 64;
         for (size_t first = 0; first < count; first += kPiece) {
             const size_t last = first + kPiece < count ? first + kPiece : count;

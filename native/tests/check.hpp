@@ -101,11 +101,15 @@ int main(int argc, char** argv) {
         const bool is_without = argc > 1 && argv[1][0] == '~';
         if (argc > 1 && (std::strstr(name, argv[1] + is_without) == nullptr) != is_without) continue;
         const int before = racecraft::test::failures();
+#if defined(__cpp_exceptions)
         try {
             run();
         } catch (const std::exception& error) {
             racecraft::test::fail(name, 0, std::string("exception: ") + error.what());
         }
+#else
+        run();
+#endif
         std::printf("%s %s\n", racecraft::test::failures() == before ? "ok    " : "FAILED", name);
     }
     return racecraft::test::failures() == 0 ? 0 : 1;

@@ -20,7 +20,7 @@ export const en = {
   laps: "Laps",
   laps_of: "{laps} of {trials}",
   threads: "Threads",
-  slow: "This browser or machine has no fused multiply-add: learning gives the same numbers, but many times slower.",
+  slow: "This browser or machine has no fused multiply-add: learning gives the same numbers, but several times slower.",
   unable: "This browser cannot run the simulator: {why}",
   models: "Your models",
   models_lead:
