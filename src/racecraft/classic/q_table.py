@@ -72,6 +72,9 @@ def follow(
 
     ``values[states, actions] += steps`` would keep the last of them only, and their sum would go too far.
     """
+    if len(states) == 1:  # what follows would take a third of the time that learning in one world takes
+        values[states, actions] += steps
+        return
     cells, cell_of, visitors = np.unique(states * values.shape[1] + actions, return_inverse=True, return_counts=True)
     values.reshape(-1)[cells] += np.bincount(cell_of, steps) / visitors
 
