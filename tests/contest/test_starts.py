@@ -168,6 +168,44 @@ def test_a_network_that_gives_no_numbers_is_named() -> None:
         held(entry("good", Blind()), entry("broken", Blind((float("nan"), 1.0))))
 
 
+class Fading(Blind):
+    """A network that gives no numbers any more after a second."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.looks = 0
+
+    def __call__(self, sight: np.ndarray) -> np.ndarray:
+        self.looks += 1
+        if self.looks > 15:
+            self._commands = np.float32((float("nan"), 1.0))
+        return super().__call__(sight)
+
+
+class Braking(Fading):
+    """The same with the brakes on instead."""
+
+    def __call__(self, sight: np.ndarray) -> np.ndarray:
+        self.looks += 1
+        return np.tile(self._commands if self.looks <= 15 else np.zeros(2, np.float32), (len(sight), 1))
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_on_a_shared_road_a_network_that_gives_no_numbers_loses_alone(place: int) -> None:
+    rules = race_rules("drfc", {"laps": 1, "time_limit": 12.0, "max_resets": 1})
+    conditions = Conditions(track=OVAL, rules=rules, seed=3, cars_per_race=2)
+
+    def driven(other: Blind) -> list[np.ndarray]:
+        drivers = [other, Blind()] if place == 0 else [Blind(), other]
+        trials = race_together(drivers, conditions, num_threads=1)
+        assert trials[place].lap_times == ()
+        return [np.stack([*trial.recording.rows]) for trial in trials]
+
+    broken, braked = driven(Fading()), driven(Braking())
+    for ours, theirs in zip(broken, braked, strict=True):
+        assert np.array_equal(ours, theirs, equal_nan=True)
+
+
 @pytest.mark.costly
 def test_the_replay_of_a_car_with_another_lens_verifies(tmp_path: Path) -> None:
     """`object_in_camera` is seen through each entry's own lens; with another one honest replays would look forged."""

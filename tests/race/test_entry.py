@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from racecraft import train
-from racecraft.errors import CheckpointError, ConfigError, RacecraftError
+from racecraft.errors import CheckpointError, ConfigError, NonFiniteAction, RacecraftError
 from racecraft.judging.ladder import rate_models
 from racecraft.judging.race import race_models
 from racecraft.learn import PPOConfig
@@ -294,3 +294,32 @@ def test_nothing_of_a_refused_entry_is_driven(run: Path, tmp_path: Path) -> None
     with pytest.raises(RacecraftError):
         driven(run, tmp_path / "races")
     assert not (tmp_path / "races").exists()
+
+
+# ---- weights that are numbers and give none
+
+
+def overflow(arrays: Arrays, _: dict[str, Any]) -> None:
+    for name, array in arrays.items():
+        if name.startswith("weights/policy."):
+            array[:] = np.resize(np.float32([3e38, -3e38]), array.shape)
+
+
+def test_choices_among_no_numbers_are_no_choice(honest: Path, run: Path, tmp_path: Path) -> None:
+    resave(run, overflow)
+    with pytest.raises(NonFiniteAction, match=r"cheat cannot drive: Its network gives -?(nan|inf)"):
+        driven(run, tmp_path / "races")
+    races = race_models(
+        [honest, run],
+        track="oval",
+        kind="head-to-model",
+        laps=1,
+        changes=SOON,
+        video=False,
+        num_threads=1,
+        root=tmp_path / "races",
+    )
+    others, (own,) = races.contest.trials
+    assert own.recording.actions[:, 1].max() == 0.0
+    assert others[0].recording.actions[:, 1].max() > 0.0
+    assert races.contest.standings[0].car == 0

@@ -17,7 +17,7 @@ import numpy as np
 from racecraft.agent.sensor_suite import FRONT_CAMERA
 from racecraft.contest.classification import Standing, classify
 from racecraft.contest.terms import RaceTerms, check_kind
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, NonFiniteAction
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry import Entry
 from racecraft.race.evaluation import Driver, evaluate, race_simulation
@@ -111,7 +111,7 @@ def hold_race(entries: Sequence[Entry], terms: RaceTerms, *, num_threads: int = 
 
     Raises:
         ConfigError: The number of entries does not go with the race.
-        NonFiniteAction: An entry's network gives NaN; the message names it.
+        NonFiniteAction: The network of an entry that has a road for itself gives NaN; the message names it.
     """
     check_kind(terms.kind, len(entries))
     driven: tuple[tuple[Trial, ...], ...]
@@ -172,6 +172,9 @@ def race_together(drivers: Sequence[Driver], conditions: Conditions, *, num_thre
         conditions: With `cars_per_race` equal to the number of drivers.
         num_threads: 0 takes one per core.
 
+    A car whose driver gives NaN stands still from then on, until the rules have it out of the race: that is its own
+    loss, and none of the others'.
+
     Raises:
         ConfigError: The conditions are of another number of cars, or the road is no circuit and has several laps.
     """
@@ -197,10 +200,17 @@ def race_together(drivers: Sequence[Driver], conditions: Conditions, *, num_thre
     followers = [one for one in eyes.values() if one is not simulation]
     marshal = Marshal(simulation, conditions.rules, seed=conditions.seed, followers=followers)
     actions = np.zeros((len(drivers), 2), dtype=np.float32)
+    lost: set[int] = set()
     while marshal.is_racing:
         seen = {suite: suite.read(one) for suite, one in eyes.items()}
         for car, (driver, suite) in enumerate(zip(drivers, suites, strict=True)):
+            if car in lost:
+                continue
             sight = simulation.state if suite is None else seen[suite]
-            actions[car] = driver(sight[car : car + 1])[0]
+            try:
+                actions[car] = driver(sight[car : car + 1])[0]
+            except NonFiniteAction:
+                lost.add(car)
+                actions[car] = 0.0
         marshal.step(actions)
     return marshal.trials()

@@ -18,7 +18,7 @@ from racecraft.agent.action_space import ActionSpace
 from racecraft.agent.model_metadata import ModelMetadata
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.agent.sensors import FRAME_HEIGHT, FRAME_WIDTH
-from racecraft.errors import CheckpointError
+from racecraft.errors import CheckpointError, NonFiniteAction
 from racecraft.learn import Learner, NetworkSpec, distributions, make_learner, network_names
 from racecraft.learn.networks import weight_shapes
 from racecraft.run.checkpoint import StoredCheckpoint
@@ -45,9 +45,15 @@ class NetworkPolicy:
         self.sensors = sensors
 
     def __call__(self, frames: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Commands (N, 2), steering angle in rad and speed in m/s, for what `sensors` read  (N, ...)."""
+        """Commands (N, 2), steering angle in rad and speed in m/s, for what `sensors` read  (N, ...).
+
+        Raises:
+            NonFiniteAction: The network gives NaN or infinite numbers, as weights can that are themselves finite.
+        """
         spec = self.learner.spec
         outputs = self.learner.policy(self.learner.encode(frames))
+        if not np.isfinite(outputs).all():
+            raise NonFiniteAction(f"Its network gives {outputs[~np.isfinite(outputs)][0]}, which is no action.")
         actions = distributions.most_likely(outputs, is_discrete=spec.is_discrete, is_squashed=spec.is_squashed)
         return self.action_space.to_commands(actions if spec.is_discrete else actions.clip(-1.0, 1.0))
 
