@@ -18,6 +18,9 @@ NATIVE := CMakeLists.txt pyproject.toml $(wildcard native/include/racecraft/*.hp
 PAGES := src/racecraft/serve/pages/index.html
 NODE := web/node_modules/.package-lock.json
 IDENTITY := tests/serve/identity_provider/node_modules/.package-lock.json
+# What Vite runs on; Debian 12 and Ubuntu 24.04 bring an older one.
+NODE_OF_TODAY = node --version | awk -F'[v.]' '{ exit !($$2 == 20 && $$3 >= 19 || $$2 == 22 && $$3 >= 12 || $$2 > 22) }' \
+	|| { echo "Pages are built with Node 20.19, 22.12 or newer, and node on PATH is $$(node --version): nodejs.org has newer ones."; exit 1; }
 WEB := $(wildcard web/*.json web/*.ts web/*.js web/index.html web/src/* web/src/*/* web/src/*/*/*)
 
 # CMake and Ninja: the system's where it has both, otherwise PyPI's, in a folder of their own that only compiling needs.
@@ -167,12 +170,14 @@ build/mujoco: $(UV) requirements/transfer.txt  # for benchmarks/transfer.py alon
 
 $(NODE): web/package.json web/package-lock.json
 	@command -v npm >/dev/null || { echo "The console's pages are built with Node and npm; neither was found on PATH."; exit 1; }
+	@$(NODE_OF_TODAY)
 	@echo "Packages of the pages, from npm: half a minute ..."
 	@cd web && npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
 
 $(IDENTITY): tests/serve/identity_provider/package.json tests/serve/identity_provider/package-lock.json
 	@command -v npm >/dev/null || { echo "Sign-in is tested against a provider that runs on Node; npm was not found on PATH."; exit 1; }
+	@$(NODE_OF_TODAY)
 	@echo "A provider to sign in through, for tests, from npm ..."
 	@cd tests/serve/identity_provider && npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
