@@ -113,6 +113,7 @@ requirements: $(UV)  ## pin the newest allowed versions again
 
 $(VENV)/pyvenv.cfg:
 	@test -n "$(PYTHON)" || { echo "Racecraft needs Python 3.11 or newer; none was found on PATH."; exit 1; }
+	@$(PYTHON) tools/prerequisites.py
 	@echo "Set-up, once, in $(VENV): about a minute on two cores, three on slow ones."
 	@echo "1 of 3: an environment of its own for $$($(PYTHON) --version) ..."
 	@$(PYTHON) -m venv $(VENV)
