@@ -1,6 +1,8 @@
 // What happens to a finished frame on its way through lens and sensor.
 #pragma once
 
+#include <cstdint>
+
 #include "dispatch.hpp"
 
 namespace racecraft {

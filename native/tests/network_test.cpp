@@ -1,6 +1,7 @@
 // The learner against a slow reference in double: outputs, and gradients by finite differences, for networks
 // of odd sizes; the same bits for any number of threads and every instruction set. Run under ASan, UBSan and
 // TSan as well.
+#include <algorithm>
 #include <bit>
 #include <functional>
 #include <random>
