@@ -4,6 +4,9 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 
+#include <stdexcept>
+#include <string>
+
 #include "scene.hpp"
 
 namespace nb = nanobind;

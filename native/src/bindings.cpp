@@ -11,6 +11,9 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
+#include <stdexcept>
+#include <utility>
 
 #include "dispatch.hpp"
 #include "engine.hpp"

@@ -1,5 +1,7 @@
 #include "car_mesh.hpp"
 
+#include <utility>
+
 #include "racecraft/math.hpp"
 
 namespace racecraft {

@@ -1,6 +1,7 @@
 #include "dispatch.hpp"
 
 #include <atomic>
+#include <cstdint>
 
 #include "refuse.hpp"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "exposure_kernel.hpp"
 #include "lens_kernel.hpp"

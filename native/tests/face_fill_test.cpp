@@ -1,5 +1,8 @@
 #include "racecraft/face_fill.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "check.hpp"
 
 using namespace racecraft;

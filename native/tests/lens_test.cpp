@@ -1,5 +1,6 @@
 // What a real lens in a real hall makes of a picture: against a plain formula, on every instruction set.
 #include <algorithm>
+#include <utility>
 
 #include "../src/dispatch.hpp"
 #include "../src/lens_kernel.hpp"

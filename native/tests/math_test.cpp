@@ -1,6 +1,7 @@
 // The elementary functions against libm in double precision, with the error bounds that the header states.
 #include "racecraft/math.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <random>

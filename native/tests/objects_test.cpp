@@ -2,6 +2,8 @@
 // the other lane.
 #include "racecraft/objects.hpp"
 
+#include <utility>
+
 #include "check.hpp"
 #include "object_rule.hpp"
 #include "racecraft/collision.hpp"

@@ -1,6 +1,8 @@
 // What an episode draws, and what becomes of a car, a camera and the colours under it.
 #include "racecraft/randomization.hpp"
 
+#include <utility>
+
 #include "check.hpp"
 
 namespace racecraft {

@@ -1,6 +1,7 @@
 // The car: what physics forbids, what symmetry demands, and every corner of the parameters' allowed range.
 #include "racecraft/vehicle.hpp"
 
+#include <algorithm>
 #include <iterator>
 #include <random>
 #include <string>
