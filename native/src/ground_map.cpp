@@ -336,14 +336,15 @@ GroundMap::GroundMap(const TrackOutline& outline, const GroundOptions& options) 
     Painter painter(std::move(lines.borders), std::move(lines.dashes), {view_.min_x, view_.min_y}, texel,
                     base.columns, base.rows);
     Covered covered(base);
-    painter.paint(base.columns, base.rows, [&](int column, int row, uint32_t texel) {
-        texels_[index(base, column, row)] = texel;
-        covered.put(column, row, texel);
+    painter.paint(base.columns, base.rows, [&](int column, int row, uint32_t painted) {
+        texels_[index(base, column, row)] = painted;
+        covered.put(column, row, painted);
     });
     for (int l = 1; l < view_.num_levels; ++l) {
         const GroundLevel& level = view_.levels[l];
-        covered = covered.coarser(
-            level, [&](int column, int row, uint32_t texel) { texels_[index(level, column, row)] = texel; });
+        covered = covered.coarser(level, [&](int column, int row, uint32_t painted) {
+            texels_[index(level, column, row)] = painted;
+        });
     }
 }
 

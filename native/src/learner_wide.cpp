@@ -32,8 +32,8 @@ void Learner::forward_to_wide(const Minibatch& minibatch, const Groups& groups) 
     const size_t first = groups.begin(groups.first), samples = groups.begin(groups.last) - first;
     for_each_group_before_wide(
         minibatch, groups,
-        [&](size_t, const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at) {
-            forward(tower, in, samples, at, 0, tower.wide);
+        [&](size_t, const Tower& tower, const Inputs& in, size_t group_samples, const TowerPointers& at) {
+            forward(tower, in, group_samples, at, 0, tower.wide);
         });
     for_each_task(wide_forward_tasks_.size(), [&](Worker&, size_t task) {
         const auto& [tower, panel] = wide_forward_tasks_[task];
@@ -57,12 +57,12 @@ void Learner::backward_from_wide(const Minibatch& minibatch, const Groups& group
                     kept.grad[tower->wide].data() + first * layer.shape.out_size(), samples,
                     kept.grad[tower->wide - 1].data());
     });
-    for_each_group_before_wide(
-        minibatch, groups,
-        [&](size_t group, const Tower& tower, const Inputs& in, size_t samples, const TowerPointers& at) {
-            float* gradient = group_gradients_.data() + group * network_.num_grouped;
-            backward(tower, in, samples, at, gradient, 0, tower.wide);
-        });
+    for_each_group_before_wide(minibatch, groups,
+                               [&](size_t group, const Tower& tower, const Inputs& in, size_t group_samples,
+                                   const TowerPointers& at) {
+                                   float* gradient = group_gradients_.data() + group * network_.num_grouped;
+                                   backward(tower, in, group_samples, at, gradient, 0, tower.wide);
+                               });
 }
 
 }  // namespace racecraft

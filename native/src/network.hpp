@@ -47,13 +47,13 @@ struct NetworkSpec {
     std::vector<int> dense;
     int num_actions;
     bool is_discrete;
-    int state_size;                 // 0: the critic sees the camera
-    std::vector<int> critic_units;  // of the critic that sees the state
-    int top = 0;                    // rows of the image, from its top, that the network does not see
-    int lenses = 1;                 // images of one camera, 2 for a stereo pair
-    int lidar_size = 0;             // values of the LIDAR sensor, a byte each; 0 without one
-    std::vector<int> lidar_units;   // of the LIDAR's branch
-    std::vector<int> policy_units;  // of a policy that sees the state; then there is no image and no LIDAR
+    int state_size;                   // 0: the critic sees the camera
+    std::vector<int> critic_units;    // of the critic that sees the state
+    int top = 0;                      // rows of the image, from its top, that the network does not see
+    int lenses = 1;                   // images of one camera, 2 for a stereo pair
+    int lidar_size = 0;               // values of the LIDAR sensor, a byte each; 0 without one
+    std::vector<int> lidar_units{};   // of the LIDAR's branch
+    std::vector<int> policy_units{};  // of a policy that sees the state; then there is no image and no LIDAR
 
     bool is_blind() const { return !policy_units.empty(); }  // sees the state only
     int rows() const { return (height - top) / (pool * block); }

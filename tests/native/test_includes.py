@@ -1,6 +1,6 @@
 """What the core's sources use of the standard library they include, themselves or by a header of ours.
 
-A standard library includes more than it must, another less every few years: what compiles here by chance does not there.
+A standard library includes more than it must, and less every few years: what compiles here by chance does not there.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ USES = {
     "atomic": r"std::atomic\b",
     "bit": r"std::(?:bit_cast|popcount|countr_\w+|countl_\w+|bit_\w+|has_single_bit|endian)\b",
     "chrono": r"std::chrono",
-    "cmath": r"std::(?:sqrt|a?sin|a?cos|a?tan2?|exp2?|log2?|pow|floor|ceil|round|l?rint|lround|isfinite|isnan|hypot|fma|"
-    r"fmod|trunc|copysign|nextafter|remainder)\(",
+    "cmath": r"std::(?:sqrt|a?sin|a?cos|a?tan2?|exp2?|log2?|pow|floor|ceil|round|l?rint|lround|isfinite|isnan|hypot|"
+    r"fma|fmod|trunc|copysign|nextafter|remainder)\(",
     "condition_variable": r"std::condition_variable",
     "cstddef": r"std::(?:size_t|ptrdiff_t|byte)\b",
     "cstdint": r"\bu?int(?:8|16|32|64)_t\b",
