@@ -134,7 +134,7 @@ HOSTILE = {
     "speeds of three": ('{"speeds": [[1, 2, 3]]}', "pairs of slider"),
     "speeds that are a text": ('{"speeds": "fast"}', "pairs of slider"),
     "many speeds": (json.dumps({"speeds": [[i, i / 10] for i in range(1, 30)]}), "at most 20 pairs"),
-    "nested": ('{"speeds": ' + "[" * 5000 + "]" * 5000 + "}", "nested too deeply"),
+    "nested": ('{"speeds": ' + "[" * 25_000 + "]" * 25_000 + "}", "nested too deeply"),
     "large": (" " * 200_000 + "{}", "too large"),
 }
 

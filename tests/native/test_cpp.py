@@ -42,8 +42,8 @@ JOBS = max(1, (os.cpu_count() or 1) // int(os.environ.get("PYTEST_XDIST_WORKER_C
 @cache
 def release() -> Path:
     """The folder of the programs beside the installed core's own objects."""
-    python = f"cp{sys.version_info.major}{sys.version_info.minor}"
-    folders = [path.parent for path in (ROOT / "build").glob(f"{python}-*-*/build.ninja")]
+    python = "cp312-abi3" if sys.version_info >= (3, 12) else f"cp{sys.version_info.major}{sys.version_info.minor}-*"
+    folders = [path.parent for path in (ROOT / "build").glob(f"{python}-*/build.ninja")]
     assert folders, "make build compiles the core"
     return compiled(folders[0])
 

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,8 +120,10 @@ def _from_video(path: Path) -> Iterator[Picture]:
     with needed_for("Reading a video"):
         import av
 
+    # What labels it is nothing to us; newer ones of PyAV pass over what is not text by themselves.
+    unlabelled: dict[str, Any] = {"metadata_errors": "ignore"} if int(av.__version__.split(".")[0]) < 19 else {}
     try:
-        with av.open(str(path), metadata_errors="ignore") as container:
+        with av.open(str(path), **unlabelled) as container:
             if not container.streams.video:
                 raise ConfigError(f"There is no picture in the video {_named(path)}.")
             stream = container.streams.video[0]

@@ -163,7 +163,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         openapi_url="/api/openapi.json",
-        responses={422: {"model": ProblemReply}},
+        responses={422: {"model": ProblemReply, "description": "What is wrong with the request"}},
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.context = context
