@@ -26,6 +26,8 @@ export const shell: Record<keyof typeof english, string> = {
   close: "Schließen",
   offline: "Die Konsole antwortet nicht.",
   offline_lead: "Zu sehen ist der Stand von {time}. Sobald racecraft serve wieder läuft, geht es von selbst weiter.",
+  part_missing: "Ein Teil dieser Seite kam nicht an: Lade die Seite neu, sobald es ein Netz gibt. ({why})",
+  part_broken: "Ein Teil dieser Seite ist kaputt und bleibt weg: {why}",
   offline_refused: "Nichts geschehen: Die Konsole antwortet nicht.",
   stranger: "Dieser Browser ist hier nicht bekannt",
   stranger_lead: "Die Konsole öffnet sich nur für einen Browser, der mit ihrem Link kam.",

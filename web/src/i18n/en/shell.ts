@@ -24,6 +24,8 @@ export const shell = {
   close: "Close",
   offline: "The console does not answer.",
   offline_lead: "What you see is as it was at {time}. It goes on by itself as soon as racecraft serve runs again.",
+  part_missing: "A part of this page did not come: load the page again once there is a network. ({why})",
+  part_broken: "A part of this page is broken, and stays away: {why}",
   offline_refused: "Nothing was done: the console does not answer.",
   stranger: "This browser is not known here",
   stranger_lead: "The console opens only for a browser that came with its link.",
