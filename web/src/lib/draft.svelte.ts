@@ -1,4 +1,5 @@
 /** The track that is being drawn: it outlives a test drive and a reload of the page. */
+import { tab } from "./remembered";
 import type { Sketch } from "./sketch";
 
 const KEY = "racecraft-draft";
@@ -11,7 +12,7 @@ interface Draft {
 
 function read(): Draft | undefined {
   try {
-    const found = JSON.parse(sessionStorage.getItem(KEY) ?? "null") as Draft | null;
+    const found = JSON.parse(tab.read(KEY) ?? "null") as Draft | null;
     return found && Array.isArray(found.sketch?.points) ? found : undefined;
   } catch {
     return undefined;
@@ -22,6 +23,5 @@ export const draft = { now: read() };
 
 export function keep(now: Draft | undefined): void {
   draft.now = now;
-  if (now) sessionStorage.setItem(KEY, JSON.stringify(now));
-  else sessionStorage.removeItem(KEY);
+  tab.write(KEY, now ? JSON.stringify(now) : null);
 }

@@ -1,6 +1,7 @@
 /** What was typed for a new model: it outlives a look elsewhere and a reload, until the model is made. */
 import type { ActionPreset } from "../api/client";
 import type { Wishes } from "./newmodel";
+import { tab } from "./remembered";
 
 const KEY = "racecraft-new-model";
 
@@ -8,7 +9,7 @@ export type Typed = Omit<Wishes, "space"> & { space: ActionPreset | undefined };
 
 export function typed(): Partial<Typed> {
   try {
-    const found: unknown = JSON.parse(sessionStorage.getItem(KEY) ?? "{}");
+    const found: unknown = JSON.parse(tab.read(KEY) ?? "{}");
     return found !== null && typeof found === "object" ? (found as Partial<Typed>) : {};
   } catch {
     return {};
@@ -16,6 +17,5 @@ export function typed(): Partial<Typed> {
 }
 
 export function keepTyped(now: Typed | undefined): void {
-  if (now) sessionStorage.setItem(KEY, JSON.stringify(now));
-  else sessionStorage.removeItem(KEY);
+  tab.write(KEY, now ? JSON.stringify(now) : null);
 }

@@ -2,6 +2,7 @@
 import { SvelteMap } from "svelte/reactivity";
 import { api, type JobInfo } from "../api/client";
 import { t } from "../i18n/index.svelte";
+import { browser, tab } from "./remembered";
 import { go, route } from "./router.svelte";
 import { say } from "./toasts.svelte";
 
@@ -9,12 +10,10 @@ const [WATCHED, WANTED] = ["racecraft-watched", "racecraft-notify"];
 const PAUSE = 3000; // ms between two questions
 
 /** `mark`: what stands before the title until somebody looks; `isWanted`: the browser is to say it, too. */
-export const notice = $state({ mark: "", isWanted: localStorage.getItem(WANTED) === "yes" && isAllowed() });
+export const notice = $state({ mark: "", isWanted: browser.read(WANTED) === "yes" && isAllowed() });
 
 /** Run by job, of the trainings that somebody saw begin in this tab. */
-const watched = new SvelteMap<string, string>(
-  JSON.parse(sessionStorage.getItem(WATCHED) ?? "[]") as [string, string][],
-);
+const watched = new SvelteMap<string, string>(JSON.parse(tab.read(WATCHED) ?? "[]") as [string, string][]);
 let timer: ReturnType<typeof setTimeout> | undefined;
 
 function isAllowed(): boolean {
@@ -27,7 +26,7 @@ export const canNotify = (): boolean => "Notification" in globalThis && Notifica
 export async function want(isWanted: boolean): Promise<void> {
   const isGranted = isWanted && "Notification" in globalThis && (await Notification.requestPermission()) === "granted";
   notice.isWanted = isGranted;
-  localStorage.setItem(WANTED, isGranted ? "yes" : "no");
+  browser.write(WANTED, isGranted ? "yes" : "no");
 }
 
 /** A page shows these jobs: from now on the end of its training is said, wherever the person is then. */
@@ -41,7 +40,7 @@ export function watchJobs(jobs: JobInfo[]): void {
 }
 
 function remember(): void {
-  sessionStorage.setItem(WATCHED, JSON.stringify([...watched]));
+  tab.write(WATCHED, JSON.stringify([...watched]));
   clearTimeout(timer);
   if (watched.size) timer = setTimeout(() => void look(), PAUSE);
 }

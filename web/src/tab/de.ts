@@ -31,7 +31,10 @@ export const de: Record<TabKey, string> = {
   model_about: "{track}, {laps} von {trials} Runden, beste {lap}, {steps} Schritte",
   download: "Herunterladen",
   drop: "Löschen",
-  full: "Im Speicher dieses Browsers ist kein Platz mehr: Lösche ein Modell, oder lade dieses jetzt herunter.",
+  full: "Im Speicher dieses Browsers ist kein Platz mehr: Lade dieses Modell jetzt herunter, oder lösche ein anderes. Es ist hier, bis die Seite geschlossen wird.",
+  full_track:
+    "Im Speicher dieses Browsers ist kein Platz mehr, darum blieb diese Strecke nicht erhalten: Lösche ein Modell, und speichere sie dann noch einmal.",
+  full_lap: "Im Speicher dieses Browsers ist kein Platz mehr: Diese Runde bleibt deine beste, bis du aussteigst.",
   drop_here: "Loslassen, um dieses Modell zu holen oder dieses Replay zu prüfen",
   arrive: "Ein Modell holen",
   arrive_judging: "{name} fährt seine Auswertung …",

@@ -1,4 +1,6 @@
-/** The reward that is being written, which outlives the page. */
+/** The reward that is being written, which outlives the page: each tab goes on with its own, a new one with what was written last. */
+import { browser, tab } from "../lib/remembered";
+
 const KEY = "racecraft-tab-reward";
 
 const BEGINNING = `def reward_function(params):
@@ -7,18 +9,9 @@ const BEGINNING = `def reward_function(params):
     return max(1 - share, 0.001) * params["speed"]
 `;
 
-export function read(): string {
-  try {
-    return localStorage.getItem(KEY) ?? BEGINNING;
-  } catch {
-    return BEGINNING; // this browser keeps nothing
-  }
-}
+export const read = (): string => tab.read(KEY) ?? browser.read(KEY) ?? BEGINNING;
 
 export function keep(source: string): void {
-  try {
-    localStorage.setItem(KEY, source);
-  } catch {
-    // full: the page still has it
-  }
+  tab.write(KEY, source);
+  browser.write(KEY, source);
 }

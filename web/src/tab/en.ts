@@ -29,7 +29,10 @@ export const en = {
   model_about: "{track}, {laps} of {trials} laps, best {lap}, {steps} steps",
   download: "Download",
   drop: "Delete",
-  full: "There is no room left in this browser's storage: delete a model, or download this one now.",
+  full: "There is no room left in this browser's storage: download this model now, or delete another one. It is here until the page is closed.",
+  full_track:
+    "There is no room left in this browser's storage, so this track was not kept: delete a model, then save it again.",
+  full_lap: "There is no room left in this browser's storage: this lap stays your best until you leave the car.",
   drop_here: "Let go to bring this model, or to check this replay",
   arrive: "Bring a model",
   arrive_judging: "{name} drives its evaluation …",

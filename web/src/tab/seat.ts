@@ -4,7 +4,7 @@ import type { Trace } from "./drivencar";
 import type { Model } from "./model";
 import { openWorker } from "./open";
 import type { Plan, TrackFile } from "./plan";
-import { drivenLap, keepLap } from "./shelf";
+import { drivenLap, keepLap, type DrivenLap } from "./shelf";
 import type { DriveOn, Load, Report, SitDown } from "./worker";
 
 const YOU = "you";
@@ -16,12 +16,14 @@ export class TabSeat implements Seat {
   private readonly asked: { answer: (report: Report) => void; fail: (error: Error) => void }[] = [];
   private settings: Settings = { vehicle: "v5", direction: "forward" };
   private round = 0;
+  private unkept: DrivenLap | undefined; // a best lap for which the browser had no room
 
   constructor(
     site: string,
     private readonly plan: Plan,
     private readonly track: TrackFile,
     private readonly models: Model[],
+    /** Is told why a lap could not be kept. */ private readonly onUnkept: (error: unknown) => void,
   ) {
     this.worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data);
     this.worker.onerror = ({ message }) => this.hear({ kind: "failed", message: message || "worker", isReward: false });
@@ -48,7 +50,7 @@ export class TabSeat implements Seat {
     const { plan, track } = this;
     const id = String(++this.round);
     const report = await this.ask({ kind: "sit", id, plan, track, settings: this.settings });
-    const best = await drivenLap(this.key);
+    const best = await this.best();
     const { drive } = report as Extract<Report, { kind: "seated" }>;
     // the plan knows the medals of the car and the direction of the page's own trainings
     const isUsual = settings.vehicle === LEARNED.vehicle && settings.direction === LEARNED.direction;
@@ -60,9 +62,13 @@ export class TabSeat implements Seat {
     const { state, trace } = (await this.ask({ kind: "steer", controls })) as Extract<Report, { kind: "steered" }>;
     const { finished } = state;
     if (!finished || !trace.length) return state;
-    const best = await drivenLap(this.key);
+    const best = await this.best();
     if (best && best.seconds <= finished.seconds) return state;
-    await keepLap({ key: this.key, seconds: finished.seconds, trace });
+    const lap = { key: this.key, seconds: finished.seconds, trace };
+    await keepLap(lap).catch((error: unknown) => {
+      this.unkept = lap;
+      this.onUnkept(error);
+    });
     return { ...state, finished: { ...finished, is_best: true } };
   }
 
@@ -76,7 +82,7 @@ export class TabSeat implements Seat {
   }
 
   async ghosts(): Promise<GhostCard[]> {
-    const own = await drivenLap(this.key);
+    const own = await this.best();
     const cards = this.raced.map(({ name, bestLap }) => ({
       key: `model:${name}`,
       name,
@@ -89,11 +95,18 @@ export class TabSeat implements Seat {
 
   async ghost(key: string): Promise<Ghost> {
     if (key === YOU) {
-      const { seconds, trace } = (await drivenLap(this.key))!;
+      const { seconds, trace } = (await this.best())!;
       return { key, name: "", seconds, trace, ...this.settings };
     }
     const { name, bestLap, trace } = this.raced.find((one) => `model:${one.name}` === key)!;
     return { key, name, seconds: bestLap!, trace: trace as Trace, ...LEARNED };
+  }
+
+  /** One's own fastest lap so far. */
+  private async best(): Promise<DrivenLap | undefined> {
+    const stored = await drivenLap(this.key).catch(() => undefined);
+    const { unkept } = this;
+    return unkept?.key === this.key && !(stored && stored.seconds < unkept.seconds) ? unkept : stored;
   }
 
   /** Models that lapped this track. */

@@ -6,5 +6,11 @@ import { en, type TabKey } from "./en";
 
 const catalogues: Record<Language, Record<TabKey, string>> = { en, de };
 
+/** What went wrong, as a sentence; `full`: what is said where the browser has no room for it. */
+export function why(error: unknown, full: TabKey = "full"): string {
+  if (!(error instanceof Error)) return String(error);
+  return error.name === "QuotaExceededError" ? l(full) : error.message;
+}
+
 /** The text of a key, with {names} filled in. */
 export const l = (key: TabKey, values: Values = {}): string => fill(catalogues[language.choice][key], values);

@@ -1,4 +1,5 @@
 /** Which lessons were read in this browser, and how well their questions were answered. */
+import { browser } from "../../lib/remembered";
 import type { LessonProgress, Step } from "../desk";
 
 const STORE = "racecraft-lessons";
@@ -29,10 +30,6 @@ export function store(number: number, step: Step, share?: number): LessonProgres
   const quiz = share === undefined ? (before?.quiz ?? null) : Math.max(share, before?.quiz ?? 0);
   const now = { is_read: Boolean(step.is_read || before?.is_read), quiz, solved: [] };
   const all = { ...studies, [number]: now };
-  try {
-    localStorage.setItem(STORE, JSON.stringify(all));
-  } catch {
-    unkept = all;
-  }
+  if (!browser.write(STORE, JSON.stringify(all))) unkept = all;
   return now;
 }

@@ -1,0 +1,129 @@
+"""What the page in a tab keeps when another is open or it sleeps meanwhile, and when the browser has no room left.
+
+Needs `make site`, and skips where that was not run. Tests follow each other.
+"""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from test_tab_page import CHROMIUM, OPTIONS, PATIENCE, SITE, Files
+
+from few_frames import FEW_FRAMES
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (SITE / "data" / "plan.json").exists(), reason="the page is not built: make site"),
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
+]
+
+FULL = """() => {
+  const [stores, ended] = [IDBObjectStore.prototype, IDBTransaction.prototype];
+  const before = [stores.put, stores.add, Object.getOwnPropertyDescriptor(ended, "error"), Storage.prototype.setItem];
+  const full = new DOMException("full", "QuotaExceededError");
+  for (const name of ["put", "add"]) {
+    const ask = stores[name];
+    stores[name] = function (what) {
+      const asked = ask.call(this, what);
+      this.transaction.abort();
+      return asked;
+    };
+  }
+  Object.defineProperty(ended, "error", { get: () => full, configurable: true });
+  Storage.prototype.setItem = () => { throw full; };
+  window.makeRoom = () => {
+    [stores.put, stores.add, , Storage.prototype.setItem] = before;
+    Object.defineProperty(ended, "error", before[2]);
+  };
+}"""  # as a browser does it without room; the quota that DevTools would set is not one for what is kept
+
+
+@pytest.fixture(scope="module")
+def tabs() -> Iterator[list[Page]]:
+    from playwright.sync_api import sync_playwright
+
+    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE.parent)))
+    threading.Thread(target=host.serve_forever, daemon=True).start()
+    complaints: list[str] = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        context = browser.new_context()
+        context.add_init_script(FEW_FRAMES)
+        pages = [context.new_page(), context.new_page()]
+        for page in pages:
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.goto(f"http://127.0.0.1:{host.server_port}/site/")
+            page.get_by_role("combobox", name="Track").select_option("oval")
+            page.get_by_label("What it is paid for").select_option("centerline")
+        yield pages
+        browser.close()
+    host.shutdown()
+    host.server_close()
+    assert complaints == []
+
+
+def models(page: Page) -> list[str]:
+    return sorted(page.locator(".model strong").all_inner_texts())
+
+
+def test_two_tabs_train_at_once_and_one_that_slept_goes_on(tabs: list[Page]) -> None:
+    for page in tabs:
+        page.get_by_role("button", name="Train", exact=True).click()
+    sleeper = tabs[1].context.new_cdp_session(tabs[1])
+    tabs[1].get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    sleeper.send("Page.setWebLifecycleState", {"state": "frozen"})
+    tabs[0].get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    sleeper.send("Page.setWebLifecycleState", {"state": "active"})
+    tabs[1].get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    for page in tabs:  # both see both
+        page.get_by_text("oval-centerline-2", exact=True).wait_for()
+        assert models(page) == ["oval-centerline-1", "oval-centerline-2"]
+
+
+def test_what_a_full_browser_cannot_keep_is_told_and_stays_until_there_is_room(
+    tabs: list[Page], tmp_path: Path
+) -> None:
+    page, other = tabs
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Download: oval-centerline-1").click()
+    archive = tmp_path / download.value.suggested_filename
+    download.value.save_as(archive)
+    page.evaluate(FULL)
+    page.get_by_label("Bring a model", exact=True).and_(page.locator("input")).set_input_files(archive)
+    page.get_by_text("There is no room left in this browser's storage: download this model now").wait_for(
+        timeout=PATIENCE
+    )
+    page.get_by_role("button", name="Download: oval-centerline-1-1").wait_for()
+    page.get_by_label("Theme").select_option("dark")  # which is not remembered
+    page.get_by_role("button", name="Draw a track").click()
+    desk = page.get_by_role("dialog", name="Draw a track")
+    desk.get_by_text("It can be driven.").wait_for()
+    desk.get_by_label("Name of the track").fill("mine")
+    desk.get_by_role("button", name="Save").click()
+    desk.get_by_text("so this track was not kept").wait_for()
+    page.evaluate("makeRoom()")
+    desk.get_by_role("button", name="Save").click()
+    other.get_by_role("combobox", name="Track").get_by_role("option", name="mine").wait_for(state="attached")
+    page.get_by_role("button", name="Delete: oval-centerline-2").click()
+    other.get_by_text("oval-centerline-1-1", exact=True).wait_for()
+    page.reload()
+    page.get_by_text("oval-centerline-1-1", exact=True).wait_for()
+    assert models(page) == models(other) == ["oval-centerline-1", "oval-centerline-1-1"]
+
+
+def test_each_tab_goes_on_with_the_reward_that_was_written_in_it(tabs: list[Page]) -> None:
+    for page, pays in zip(tabs, ("1.0", "2.0"), strict=True):
+        page.get_by_label("What it is paid for").select_option("own")
+        page.get_by_label("The reward in Python").fill(f"def reward_function(params):\n    return {pays}\n")
+    tabs[0].reload()
+    tabs[0].get_by_label("What it is paid for").select_option("own")
+    tabs[0].get_by_text("return 1.0").wait_for()
