@@ -79,8 +79,9 @@ class Files(http.server.SimpleHTTPRequestHandler):
     more: dict[str, str] = {}  # noqa: RUF012  # headers
 
     def do_GET(self) -> None:
-        """Notes what was asked for."""
-        self.asked.append(self.path)
+        """Notes what the page asked for; what its service worker keeps for later is not needed before."""
+        if "Service-Worker" not in self.headers and not self.headers.get("Referer", "").endswith("/offline.js"):
+            self.asked.append(self.path)
         super().do_GET()
 
     def end_headers(self) -> None:

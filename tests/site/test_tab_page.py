@@ -12,6 +12,7 @@ import math
 import re
 import shutil
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -120,9 +121,10 @@ def test_a_car_that_has_learned_drives_until_somebody_trains(page: Page) -> None
         page.get_by_role("combobox", name="Track").select_option(track)
         page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)
         eye = page.locator(".eye canvas")
-        before = eye.screenshot()
-        page.wait_for_timeout(500)
-        assert eye.screenshot() != before
+        before, began = eye.screenshot(), time.monotonic()
+        while eye.screenshot() == before:
+            assert time.monotonic() - began < PATIENCE / 1000, f"the car on {track} does not move"
+            page.wait_for_timeout(100)
     still = page.context.browser.new_page(reduced_motion="reduce")
     still.goto(page.url)
     still.get_by_text("64 cars wait for you").wait_for()

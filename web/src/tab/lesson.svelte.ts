@@ -89,6 +89,7 @@ export class Lesson {
   constructor(
     private readonly site: string,
     private readonly plan: Plan,
+    private readonly onready: () => void,
   ) {
     this.load("plain");
   }
@@ -225,7 +226,7 @@ export class Lesson {
         if (kind === "python") {
           this.isPythonReady = true;
           if (!this.isTraining("python")) this.asked?.post();
-        }
+        } else this.onready();
         break;
       case "checked":
         if (report.question !== this.asked?.question) break; // of a text that has changed meanwhile
