@@ -16,6 +16,8 @@ import pytest
 from browsers import ROOT, THEMES, needs_axe, needs_browser, needs_pages, violations_by_theme, visiting
 from running_consoles import RunningConsole, running_console
 
+from until_true import until_true
+
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
@@ -157,7 +159,7 @@ def test_a_newcomers_path_to_a_lap_on_video(visited: tuple[RunningConsole, Any])
     for drawn in (".scene canvas", "[aria-label='What the car sees']"):
         assert len(_colours(page.locator(drawn).screenshot())) > 20
     page.get_by_role("button", name="From above").click()
-    page.wait_for_function(ONE_BEST_LAP)
+    until_true(page, ONE_BEST_LAP)
     page.locator(".badge.finished").wait_for()
     page.get_by_role("tab", name="Evaluation").click()
     page.get_by_role("spinbutton", name="Laps").fill("1")

@@ -12,6 +12,8 @@ from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
 from raced_models import write_raced
 from running_consoles import running_console
 
+from until_true import until_true
+
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 
@@ -210,9 +212,10 @@ def test_what_moves_fills_the_screen_and_gives_it_back(visit: Visit) -> None:
         part.locator("canvas").first.wait_for()
         part.get_by_role("button", name="Full screen").click()
         page.locator(":fullscreen canvas").wait_for()
-        page.wait_for_function(
+        until_true(
+            page,
             "() => { const {width, height} = document.querySelector(':fullscreen canvas').getBoundingClientRect();"
-            " return width === innerWidth && height === innerHeight; }"
+            " return width === innerWidth && height === innerHeight; }",
         )
         assert page.evaluate("document.activeElement === document.body"), "the keys are for what is shown"
         page.locator(":fullscreen").get_by_role("button", name="Full screen").click()

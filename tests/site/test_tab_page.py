@@ -12,7 +12,6 @@ import math
 import re
 import shutil
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,6 +31,7 @@ from racecraft.run.archive import archive_chunks
 from racecraft.sim.vehicle import PRESETS as VEHICLES
 from racecraft.track import load_track
 from racecraft.training.evaluator import SEED
+from until_true import until_true
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -85,6 +85,7 @@ def page() -> Iterator[Page]:
 
 
 PAINTED = "What it pays along the track"
+SEEN = "document.querySelector('.eye canvas').toDataURL()"
 
 
 HOLD = """(file) => {
@@ -110,7 +111,7 @@ def test_what_a_preset_pays_is_painted_along_the_track(page: Page) -> None:
     page.evaluate("letGo()")
     expect(train).to_be_enabled()
     another = "before => document.querySelector('figure svg[role=img]').getAttribute('viewBox') !== before"
-    page.wait_for_function(another, arg=before)
+    until_true(page, another, before)
     page.get_by_label("What it is paid for").select_option("stay_inside")
     page.get_by_text("least").get_by_text("0.001").wait_for()  # what it pays beside the road
     page.get_by_label("What it is paid for").select_option("racing")
@@ -120,11 +121,7 @@ def test_a_car_that_has_learned_drives_until_somebody_trains(page: Page) -> None
     for track in ("reinvent_2018", "hairpin"):
         page.get_by_role("combobox", name="Track").select_option(track)
         page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)
-        eye = page.locator(".eye canvas")
-        before, began = eye.screenshot(), time.monotonic()
-        while eye.screenshot() == before:
-            assert time.monotonic() - began < PATIENCE / 1000, f"the car on {track} does not move"
-            page.wait_for_timeout(100)
+        until_true(page, f"before => {SEEN} !== before", page.evaluate(SEEN))
     still = page.context.browser.new_page(reduced_motion="reduce")
     still.goto(page.url)
     still.get_by_text("64 cars wait for you").wait_for()
@@ -184,11 +181,11 @@ def test_a_models_laps_are_watched_again_corner_by_corner(page: Page) -> None:
     assert shown.get_by_role("region", name="Corners").locator("tbody tr").count() == 2
     eye = shown.get_by_label("What the car sees")
     pixels = "eye => eye.getContext('2d').getImageData(0, 0, eye.width, eye.height).data.join()"
-    page.wait_for_function(f"new Set(({pixels})(document.querySelector('dialog .eye canvas')).split(',')).size > 20")
+    until_true(page, f"new Set(({pixels})(document.querySelector('dialog .eye canvas')).split(',')).size > 20")
     first = eye.evaluate(pixels)
     slider = shown.get_by_role("slider", name="Moment of the lap")
     slider.fill("3")
-    page.wait_for_function(f"first => ({pixels})(document.querySelector('dialog .eye canvas')) !== first", arg=first)
+    until_true(page, f"first => ({pixels})(document.querySelector('dialog .eye canvas')) !== first", first)
     shown.get_by_text("What this model's own reward function pays along the lap").wait_for()
     shown.get_by_role("button", name="Back").click()
 
