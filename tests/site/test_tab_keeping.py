@@ -16,9 +16,10 @@ import pytest
 from test_tab_page import CHROMIUM, OPTIONS, PATIENCE, SITE, Files
 
 from few_frames import FEW_FRAMES
+from until_true import until_true
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Page, Route
 
 pytestmark = [
     pytest.mark.slow,
@@ -73,6 +74,27 @@ def tabs() -> Iterator[list[Page]]:
 
 def models(page: Page) -> list[str]:
     return sorted(page.locator(".model strong").all_inner_texts())
+
+
+def test_nothing_is_kept_for_later_before_the_first_car_has_what_it_needs(tabs: list[Page]) -> None:
+    context = tabs[0].context.browser.new_context()
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    context.route("**/core/*.wasm", hold)
+    page = context.new_page()
+    page.goto(tabs[0].url)
+    page.get_by_role("button", name="Train", exact=True).wait_for()
+    page.wait_for_timeout(4500)  # longer than the page waits once all is there
+    assert held, "the core was not asked for"
+    registered = "navigator.serviceWorker.getRegistration().then((one) => one !== undefined)"
+    assert not page.evaluate(registered)
+    for route in held:
+        route.continue_()
+    until_true(page, registered)
+    context.close()
 
 
 def test_two_tabs_train_at_once_and_one_that_slept_goes_on(tabs: list[Page]) -> None:
