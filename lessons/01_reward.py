@@ -106,7 +106,7 @@ def cliff(params):
 drives = {"a good reward": good_drives}
 for name, reward in {"inside": inside, "overwritten": overwritten, "zigzag": zigzag}.items():
     drives[name] = drive(teach(reward))
-drives["cliff"] = drive(teach(cliff, "fast"))  # with a car that may choose up to 4 m/s
+drives["cliff, up to 4 m/s"] = drive(teach(cliff, "fast"))
 
 show(
     drawn_lines(

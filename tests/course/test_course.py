@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from said_in_lessons import FIGURES, STATEMENTS
 from racecraft.course import check, checks_of, find_lesson, lessons, read_cells, read_progress, show, to_notebook
 from racecraft.course import progress as progress_file
 from racecraft.course.lesson import Facts
-from racecraft.course.phrases import Phrases
+from racecraft.course.phrases import Phrases, german_label
 from racecraft.course.pictures import bar_chart, line_chart
 from racecraft.course.quiz import LANGUAGES
 from racecraft.course.show import Picture
@@ -112,7 +113,7 @@ def test_answers_are_judged(number: int) -> None:
         exec(compile(asks[name], f"check of {name}", "exec"), names)
         verdict = names["verdict"]
         assert verdict.is_right == (kind == "right"), f"{answer.title}: {verdict}"
-        assert Phrases.of("de").translated(verdict.sentence), f"not in German: {verdict.sentence}"
+        assert Phrases.of("de", "verdicts").translated(verdict.sentence), f"not in German: {verdict.sentence}"
         if kind == "wrong":
             assert len(verdict.sentence) > 30
             refused[name].append(verdict.sentence)
@@ -223,12 +224,17 @@ def test_what_a_lesson_showed_is_of_the_code_that_it_has(number: int) -> None:
     assert read_shown(lesson) == shown, "a picture is missing"
     assert shown.digest == digest_of(lesson.cells()), f"run python -m racecraft.course.shown {number}"
     drawn = [one for outputs in shown.outputs.values() for one in outputs if one.kind == "picture"]
-    kept = {path.stem for path in shown_path(lesson).with_suffix("").iterdir()}
-    assert kept == {one.name for one in drawn}
     for one in drawn:
-        assert one.description
-        with Image.open(picture_path(lesson, one.name)) as image:
-            assert image.size == (one.width, one.height)
+        assert one.german, f"run python -m racecraft.course.shown {number} --language de"
+        assert one.german.description == german_label(one.description) != one.description
+        for language, sight in (("en", one), ("de", one.german)):
+            with Image.open(picture_path(lesson, one.name, language)) as image:
+                assert image.size == (sight.width, sight.height)
+    for language in ("en", "de"):
+        kept = {path.name for path in picture_path(lesson, "", language).parent.iterdir()}
+        assert kept == {f"{one.name}.webp" for one in drawn}
+    written = {picture_path(lesson, one.name, language).read_bytes() for one in drawn for language in ("en", "de")}
+    assert len(written) == 2 * len(drawn), "one with the words of the other language"
 
 
 @pytest.mark.parametrize("number", [lesson.number for lesson in lessons()])
@@ -257,3 +263,7 @@ def test_without_its_pictures_a_lesson_shows_its_words(tmp_path: Path) -> None:
     shown_path(here).write_bytes(shown_path(lesson).read_bytes())
     kinds = {one.kind for outputs in read_shown(here).outputs.values() for one in outputs}
     assert kinds == {"text"}
+    picture_path(here, "lake").parent.mkdir()
+    shutil.copyfile(picture_path(lesson, "lake"), picture_path(here, "lake"))  # and none with German words
+    drawn = [one for outputs in read_shown(here).outputs.values() for one in outputs if one.kind == "picture"]
+    assert [(one.name, one.german) for one in drawn] == [("lake", None)]

@@ -1,17 +1,21 @@
-"""What checks say in German: each of their sentences, nothing that none of them says, and in whose language."""
+"""What checks and pictures say in German: each of their sentences, nothing that none says, and in whose language."""
 
 from __future__ import annotations
 
 import ast
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from racecraft.course import check, exercises
-from racecraft.course.lesson import lessons_folder
-from racecraft.course.phrases import LANGUAGE, Phrases, said_in
+from racecraft.course.lesson import lessons, lessons_folder
+from racecraft.course.phrases import LANGUAGE, Phrases, german_label, label_in, said_in
+from racecraft.course.pictures import bar_chart
+from racecraft.course.pictures.sheet import spelled
+from racecraft.course.shown import read_shown
 from racecraft.course.verdict import MARKS, right, wrong
 
 GERMAN = json.loads((lessons_folder() / "de/verdicts.json").read_text(encoding="utf-8"))
@@ -57,7 +61,7 @@ def test_what_is_filled_in_is_filled_in_there_too(english: str) -> None:
     assert german.count("{}") == english.count("{}")
     assert german.endswith(" ") == english.endswith(" ")
     begun = english.endswith(" ")
-    told = Phrases.of("de").translated(filled(english) + "The original has 147." * begun)
+    told = Phrases.of("de", "verdicts").translated(filled(english) + "The original has 147." * begun)
     assert told == filled(german) + "Das Original hat 147." * begun
 
 
@@ -89,3 +93,69 @@ def test_what_stands_in_a_gap_is_german_too() -> None:
         told == "Jetzt bringt auch die richtige Richtung -0,25 je Sekunde: Es bleibt nichts, wofür man fahren könnte."
     )
     assert said_in("en", "The original has 147.") == "The original has 147."
+
+
+def test_every_word_on_a_picture_is_there_in_german_and_no_other() -> None:
+    labels = json.loads((lessons_folder() / "de/labels.json").read_text(encoding="utf-8"))
+    words = {word for lesson in lessons() for word in read_shown(lesson).words}
+    assert len(words) > 200
+    assert [word for word in words if german_label(word) is None] == []
+    gaps = {gap for word in words for label in labels for gap in found_in(label, word)}
+    unused = [label for label in labels if not any(matches(label, word) for word in words | gaps)]
+    # how a learner's own car fares may be any of these, and not how ours did
+    assert [label for label in unused if not label.startswith("{} of {} laps")] == []
+    for english, german in labels.items():
+        assert german.count("{}") == english.count("{}"), english
+
+
+def matches(label: str, word: str) -> re.Match[str] | None:
+    return re.fullmatch("(.*)".join(map(re.escape, label.split("{}"))), word)
+
+
+def found_in(label: str, word: str) -> tuple[str, ...]:
+    found = matches(label, word)
+    return found.groups() if found else ()
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        ("1,234.5", "1.234,5"),
+        ("-0.25", "-0,25"),
+        ("12,000", "12.000"),
+        ("74.0", "74,0"),
+        ("7", "7"),
+        ("12 of 12 laps, 8.4 s a lap", "12 von 12 Runden, 8,4 s die Runde"),
+        ("many tracks, as always", "viele Strecken, wie immer"),
+        ("λ = 0.95", "λ = 0,95"),
+        ("v1.2.3", "v1.2.3"),
+        ("what nobody has translated", "what nobody has translated"),
+    ],
+)
+def test_numbers_and_labels_are_written_as_germans_do(english: str, german: str) -> None:
+    assert label_in("de", english) == german
+    assert label_in("en", english) == english
+
+
+def test_a_picture_is_drawn_in_the_learners_language(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("JPY_SESSION_NAME", raising=False)
+    drawn = {}
+    for language in ("en", "de"):
+        monkeypatch.setenv(LANGUAGE, language)
+        drawn[language] = bar_chart("Your car", {"laps": 12.5, "reward": 3.0})
+    assert drawn["en"].encoded() != drawn["de"].encoded()
+    assert drawn["en"].words == drawn["de"].words == ["Your car", "laps", "12.5", "reward", "3.0"]
+    monkeypatch.setenv(LANGUAGE, "en")
+    assert bar_chart("Dein Auto", {"Runden": 12.5, "Belohnung": 3.0}).encoded() != drawn["de"].encoded(), "its numbers"
+    assert bar_chart("Your car", {"laps": 12.5, "reward": 3.0}).encoded() == drawn["en"].encoded()
+
+
+def test_there_is_a_letter_for_everything_that_is_written() -> None:
+    from PIL import ImageFont
+
+    font = ImageFont.load_default(size=40)
+    missing = bytes(font.getmask("\uffff"))
+    labels = json.loads((lessons_folder() / "de/labels.json").read_text(encoding="utf-8"))
+    words = [*(word for lesson in lessons() for word in read_shown(lesson).words), *labels.values()]
+    letters = set(spelled("".join(words))) - set("äöüÄÖÜ")  # which the canvas puts dots on
+    assert [letter for letter in letters if letter != " " and bytes(font.getmask(letter)) == missing] == []

@@ -11,6 +11,7 @@ from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
 from running_consoles import running_console
 
 from racecraft.course import find_lesson
+from racecraft.course.shown import picture_path
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
@@ -89,6 +90,16 @@ def test_a_learner_goes_through_three_lessons(visit: Visit) -> None:
     page = visit.open("/lessons/4", width=390)
     expect(page.get_by_text("Fragen 75 %")).to_be_visible()
     page.get_by_role("button", name="Laufen lassen").wait_for()
+    english, german = (
+        visit.console.client.get("/api/lessons/4/pictures/cliff", params={"language": one}).content
+        for one in ("en", "de")
+    )
+    assert german == picture_path(find_lesson(4), "cliff", "de").read_bytes() != english
+    picture = page.get_by_role("img", name="Dieselbe Klippe, zwei Charaktere")
+    picture.scroll_into_view_if_needed()
+    assert picture.evaluate("one => one.decode().then(() => one.naturalWidth)") > 300
+    assert page.get_by_role("img", name="The same cliff, two characters").count() == 0
+    assert visit.console.client.get("/api/lessons/4/pictures/cliff", params={"language": "fr"}).status_code == 422
     assert visit.violations() == []
     assert visit.overflow() <= 0
     page = visit.open("/lessons/1", width=390)

@@ -32,7 +32,8 @@ def test_every_lesson_is_written_with_its_pictures(tmp_path: Path) -> None:
         page = LessonPage.model_validate_json((tmp_path / f"{lesson.path.stem}.json").read_bytes())
         assert page == page_of(lesson)
         drawn = {f"{one.name}.webp" for cell in page.cells for one in cell.outputs if one.kind == "picture"}
-        assert drawn == {path.name for path in (tmp_path / page.name).iterdir()} != set()
+        for folder in (tmp_path, tmp_path / "de"):
+            assert drawn == {path.name for path in (folder / page.name).iterdir()} != set()
     write_lessons(tmp_path)  # over what is there
 
 
@@ -90,6 +91,9 @@ def test_a_reader_finds_the_way_and_what_was_read_stays_in_the_browser(page: Pag
     page.get_by_text("1 Fahrten;").wait_for()
     page.get_by_role("heading", name="Noch einmal eine Reihe Spielautomaten").wait_for()
     page.get_by_text("✗ Noch nicht. Der erste Schritt bekam 1,").wait_for()
+    picture = page.get_by_role("img", name="Wie lange der Stab steht")
+    picture.scroll_into_view_if_needed()
+    assert picture.evaluate("one => one.decode().then(() => one.naturalWidth)") > 300
     assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
     if AXE.exists():
         page.evaluate(AXE.read_text())

@@ -8,6 +8,7 @@ from PIL import Image
 
 from racecraft.errors import TrackError
 from racecraft.track import TrackPicture, draw_contact_sheet, draw_track, generate_track, load_track, track_names
+from racecraft.track.canvas import Canvas, text_width
 from racecraft.track.road_art import ROAD
 
 
@@ -69,6 +70,26 @@ def test_a_long_title_is_cut_to_fit(tmp_path: Path) -> None:
     picture = TrackPicture(load_track("oval"), width_px=400)
     picture.caption(title="A very long title " * 40, subtitle="", figures=[("ONE", "1")])
     picture.save(tmp_path / "long.png")
+
+
+@pytest.mark.parametrize("anchor", ["ls", "mm", "rt"])
+@pytest.mark.parametrize("spacing", [0.0, 0.2])
+@pytest.mark.parametrize(("letter", "base"), list(zip("äöüÄÖÜ", "aouAOU", strict=True)))
+def test_an_umlaut_is_its_letter_and_two_dots(letter: str, base: str, anchor: str, spacing: float) -> None:
+    inks = []
+    for words in (f"n{base}n", f"n{letter}n"):
+        canvas = Canvas((300, 200), scale=1.0, origin=(0.0, 0.0), background=(255, 255, 255))
+        width = canvas.text((150, 100), words, (0, 0, 0), size=60, anchor=anchor, spacing=spacing)
+        assert width == text_width(words, size=60, spacing=spacing) == text_width(f"n{base}n", size=60, spacing=spacing)
+        inks.append(np.asarray(canvas.finish().convert("L")) < 128)
+    plain, dotted = inks
+    assert not (plain & ~dotted).any(), "the letter itself is as it was"
+    rows, columns = np.nonzero(dotted & ~plain)
+    top = rows.max() + np.argmax(plain[rows.max() :, columns.min() : columns.max() + 1].any(axis=1))
+    assert 0 < top - rows.max() < 12, "just above it"
+    left, right = columns[columns < columns.mean()], columns[columns > columns.mean()]
+    assert left.max() + 2 < right.min(), "two of them"
+    assert len(left) == pytest.approx(len(right), rel=0.2)
 
 
 @pytest.mark.parametrize("name", ["track.txt", "track", "track.svg"])

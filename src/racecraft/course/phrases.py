@@ -1,9 +1,11 @@
-"""What the checks of exercises say, in a learner's language: `lessons/de/verdicts.json` has each sentence in German.
+"""What the checks of exercises say and what is written on pictures, in a learner's language.
+
+`lessons/de/verdicts.json` and `lessons/de/labels.json` have each sentence in German:
 
     "It finds {} of {}. ": "Sie findet {} von {}. "
 
 A sentence that ends in a space is one that others go on from. What stands in a gap is translated, too, where the file
-has it.
+has it; a number is written as German numbers are.
 """
 
 from __future__ import annotations
@@ -13,12 +15,15 @@ import os
 import re
 from collections.abc import Mapping
 from functools import cache
+from typing import Final, Literal
 
 from racecraft.course.lesson import lessons_folder
 from racecraft.course.quiz import Language
 
 LANGUAGE = "RACECRAFT_LANGUAGE"
 """Of a lesson that runs as a script: a variable of its environment."""
+
+_NUMBER: Final = re.compile(r"[-−]?\d+(,\d{3})*(\.\d+)?(e[-+]?\d+)?( ?%)?")
 
 
 def learner_language() -> Language:
@@ -30,7 +35,19 @@ def learner_language() -> Language:
 
 def said_in(language: Language, text: str) -> str:
     """A sentence of a check, in a language; as it is where nobody has translated it."""
-    return text if language == "en" else Phrases.of(language).translated(text) or text
+    return text if language == "en" else Phrases.of(language, "verdicts").translated(text) or text
+
+
+def label_in(language: Language, text: str) -> str:
+    """What is written on a picture, in a language; as it is where nobody has translated it."""
+    return text if language == "en" else german_label(text) or text
+
+
+def german_label(text: str) -> str | None:
+    """A number as Germans write it, or a phrase; None where there is no such phrase."""
+    if _NUMBER.fullmatch(text):
+        return _german_number(text)
+    return Phrases.of("de", "labels").translated(text)
 
 
 class Phrases:
@@ -43,9 +60,9 @@ class Phrases:
 
     @staticmethod
     @cache
-    def of(language: Language) -> Phrases:
+    def of(language: Language, kind: Literal["verdicts", "labels"]) -> Phrases:
         """Those of the lessons; none where nobody has written any."""
-        path = lessons_folder() / language / "verdicts.json"
+        path = lessons_folder() / language / f"{kind}.json"
         return Phrases(json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {})
 
     def translated(self, text: str) -> str | None:
@@ -65,9 +82,11 @@ class Phrases:
         )
 
     def _gap(self, text: str) -> str:
-        if re.fullmatch(r"-?\d+\.\d+", text):
-            return text.replace(".", ",")
-        return self.translated(text) or text
+        return _german_number(text) if _NUMBER.fullmatch(text) else self.translated(text) or text
+
+
+def _german_number(text: str) -> str:
+    return text.translate(str.maketrans(".,", ",."))
 
 
 def _pattern(sentence: str) -> re.Pattern[str]:

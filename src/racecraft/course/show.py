@@ -27,6 +27,8 @@ class Picture:
     """That each image of an animation stands."""
     description: str = ""
     """For those who cannot see it."""
+    words: Sequence[str] = ()
+    """What is written on it, in English."""
 
     @property
     def suffix(self) -> str:

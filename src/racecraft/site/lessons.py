@@ -11,7 +11,7 @@ from pathlib import Path
 
 from racecraft.course import lessons
 from racecraft.course.page import facts_of, page_of
-from racecraft.course.shown import picture_path
+from racecraft.course.shown import Drawn, picture_path
 
 
 def write_lessons(folder: Path) -> None:
@@ -22,11 +22,16 @@ def write_lessons(folder: Path) -> None:
     for lesson in found:
         page = page_of(lesson)
         _write(folder / f"{page.name}.json", page.model_dump())
-        pictures = folder / page.name
-        pictures.mkdir(exist_ok=True)
         for output in (one for cell in page.cells for one in cell.outputs):
-            if output.kind == "picture":
-                shutil.copyfile(picture_path(lesson, output.name), pictures / f"{output.name}.webp")
+            if isinstance(output, Drawn):
+                _copy(picture_path(lesson, output.name), folder / page.name)
+                if output.german:
+                    _copy(picture_path(lesson, output.name, "de"), folder / "de" / page.name)
+
+
+def _copy(picture: Path, folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(picture, folder / picture.name)
 
 
 def _write(path: Path, document: object) -> None:

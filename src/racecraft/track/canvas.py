@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 Color = tuple[int, int, int]
 
 OVERSAMPLING = 3
+_WITHOUT_DOTS = str.maketrans("äöüÄÖÜ", "aouAOU")
 
 
 class Canvas:
@@ -120,16 +121,32 @@ class Canvas:
             Width of the words, pixels.
         """
         font, stroke = _font(size), weight * size * OVERSAMPLING
-        width = text_width(words, size=size, spacing=spacing)
+        plain, width = words.translate(_WITHOUT_DOTS), text_width(words, size=size, spacing=spacing)
         x, y = place[0] * OVERSAMPLING, place[1] * OVERSAMPLING
-        if not spacing:
-            self._draw.text((x, y), words, fill=color, font=font, anchor=anchor, stroke_width=stroke, stroke_fill=color)
-            return width
-        x -= {"l": 0.0, "m": 0.5, "r": 1.0}[anchor[0]] * width * OVERSAMPLING
-        for letter in words:
-            self._draw.text((x, y), letter, fill=color, font=font, anchor="l" + anchor[1], stroke_width=stroke)
-            x += font.getlength(letter) + spacing * size * OVERSAMPLING
+        left = x - {"l": 0.0, "m": 0.5, "r": 1.0}[anchor[0]] * width * OVERSAMPLING
+        if spacing:
+            advances = [font.getlength(letter) + spacing * size * OVERSAMPLING for letter in plain]
+            places = [left + sum(advances[:index]) for index in range(len(plain))]
+            for letter, at in zip(plain, places, strict=True):
+                self._draw.text((at, y), letter, fill=color, font=font, anchor="l" + anchor[1], stroke_width=stroke)
+        else:
+            places = [left + font.getlength(plain[:index]) for index in range(len(plain))]
+            self._draw.text((x, y), plain, fill=color, font=font, anchor=anchor, stroke_width=stroke, stroke_fill=color)
+        for wanted, letter, at in zip(words, plain, places, strict=True):
+            if wanted != letter:
+                self._dots_above((at, y), letter, color, font, stroke, anchor[1])
         return width
+
+    def _dots_above(
+        self, place: tuple[float, float], letter: str, color: Color, font: ImageFont.FreeTypeFont, stroke: float,
+        anchor: str,
+    ) -> None:  # fmt: skip
+        """The two dots of ä, ö and ü, which Pillow's own font has no letters for."""
+        top = place[1] + font.getbbox(letter, anchor="l" + anchor)[1]
+        middle, radius = place[0] + font.getlength(letter) / 2, 0.055 * font.size + stroke / 2
+        for side in (-0.125, 0.125):
+            x, y = middle + side * font.size, top - 0.13 * font.size
+            self._draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=color)
 
     def box(self, corners: tuple[float, float, float, float], color: Color) -> None:
         """Fills the rectangle x0, y0, x1, y1, in pixels."""
@@ -150,7 +167,7 @@ class Canvas:
 
 def text_width(words: str, *, size: float, spacing: float = 0.0) -> float:
     """Width of words in Pillow's own font, pixels."""
-    font = _font(size)
+    font, words = _font(size), words.translate(_WITHOUT_DOTS)
     if not spacing:
         return font.getlength(words) / OVERSAMPLING
     return sum(font.getlength(letter) for letter in words) / OVERSAMPLING + spacing * size * max(0, len(words) - 1)

@@ -21,6 +21,7 @@ from racecraft.course.pictures.sheet import (
     Sheet,
     color_of,
     scale_color,
+    width_of,
 )
 from racecraft.course.show import Picture
 from racecraft.track import Track, find_corners
@@ -97,11 +98,12 @@ def film(
     for index, name in enumerate(drives):
         legend.disc((x, 24), color_of(index), radius=8)
         legend.text((x + 16, 24), name, size=17, anchor="lm")
-        x += 60 + legend.canvas.text((-1000, 0), name, INK, size=17)
+        x += 60 + width_of(name, 17)
     strip = legend.finish()
     for image in frames:
         image.paste(strip, (0, height - 56))
-    return Picture(frames, seconds=FILM_SPEED / STEPS_PER_SECOND / 2, description=title)
+    words = [*sheet.words, *legend.words]
+    return Picture(frames, seconds=FILM_SPEED / STEPS_PER_SECOND / 2, description=title, words=words)
 
 
 def road_canvas(track: Track, width: int, *, margin: float = 22.0, tallest: float = 0.62) -> Canvas:

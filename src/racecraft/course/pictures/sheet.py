@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
+from racecraft.course.phrases import label_in, learner_language
 from racecraft.course.show import Picture
 from racecraft.track.canvas import Canvas, Color, text_width
 from racecraft.track.road_art import GRID, INK, PAPER, SOFT_INK
@@ -41,7 +42,8 @@ _SPELLED: Final = str.maketrans(
     dict(zip("–−×→", ["-", "-", "x", "->"], strict=True))
     | dict(zip("²≥≤", ["^2", ">=", "<="], strict=True))
     | dict(zip("εγαλπ", ["epsilon", "gamma", "alpha", "lambda", "pi"], strict=True))
-    | dict(zip("äöüß", ["ae", "oe", "ue", "ss"], strict=True))
+    | {"ß": "ss"}
+    | dict.fromkeys("„“”", '"')
 )
 """What Pillow's own font has no letters for."""
 
@@ -51,6 +53,7 @@ class Sheet:
 
     Attributes:
         content: What is left for the content, pixels.
+        words: What is written so far, in English.
 
     Args:
         title: What is to be seen.
@@ -62,6 +65,7 @@ class Sheet:
     def __init__(self, title: str, subtitle: str = "", *, height: int = 680, width: int = WIDTH) -> None:
         self.size = (width, height)
         self.title = title
+        self.words: list[str] = []
         self.canvas = Canvas((width, height), scale=1.0, origin=(0.0, 0.0), background=PAPER)
         unit = min(width / WIDTH, 1.0)
         self.unit = unit
@@ -83,7 +87,9 @@ class Sheet:
         weight: float = 0.0,
         anchor: str = "ls",
     ) -> None:
-        """Write a line; `anchor` as Pillow's, such as ``mm`` for its middle."""
+        """Write an English line in the learner's language; `anchor` as Pillow's, such as ``mm`` for its middle."""
+        if words:
+            self.words.append(words)
         self.canvas.text(place, spelled(words), color, size=size, weight=weight, anchor=anchor)
 
     def line(
@@ -122,7 +128,7 @@ class Sheet:
 
     def picture(self, pastes: Sequence[tuple[Image.Image, tuple[int, int]]] = ()) -> Picture:
         """The finished picture."""
-        return Picture([self.finish(pastes)], description=self.title)
+        return Picture([self.finish(pastes)], description=self.title, words=self.words)
 
 
 def down(points: ArrayLike) -> Floats:
@@ -131,12 +137,12 @@ def down(points: ArrayLike) -> Floats:
 
 
 def spelled(words: str) -> str:
-    """Words in the letters that there are."""
-    return words.translate(_SPELLED)
+    """English words in the learner's language and in the letters that there are."""
+    return label_in(learner_language(), words).translate(_SPELLED)
 
 
 def width_of(words: str, size: float) -> float:
-    """Of a line, pixels."""
+    """Of a line that is given in English, pixels."""
     return text_width(spelled(words), size=size)
 
 

@@ -10,6 +10,7 @@ from fastapi.responses import FileResponse
 
 from racecraft.course.lesson import Lesson, lessons
 from racecraft.course.page import LessonPage, facts_of, page_of
+from racecraft.course.quiz import Language
 from racecraft.course.shown import picture_path
 from racecraft.serve.context import InConsoles, InPerson, InUser
 from racecraft.serve.lessons.schemas import LessonCard, LessonProgress, LessonStep, MemberLessons
@@ -44,9 +45,9 @@ def get_lesson(lesson: Number) -> LessonPage:
 
 
 @router.get("/lessons/{lesson}/pictures/{picture}", response_class=FileResponse)
-def get_lesson_picture(lesson: Number, picture: Name) -> Response:
-    """A picture that a lesson made when it ran last."""
-    path = picture_path(_find(lesson), picture)
+def get_lesson_picture(lesson: Number, picture: Name, language: Language = "en") -> Response:
+    """A picture that a lesson made when it ran last, with words of a language."""
+    path = picture_path(_find(lesson), picture, language)
     if not path.is_file():
         raise NotFound(f"Lesson {lesson} has no picture {picture!r}.")
     return FileResponse(path, media_type="image/webp", headers=A_DAY)

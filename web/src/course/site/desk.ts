@@ -21,7 +21,8 @@ export function siteDesk(site: string): Desk {
       return read<LessonPage>(`${facts.name}.json`);
     },
     record: (lesson, step, share) => Promise.resolve(store(lesson.number, step, share)),
-    picture: (lesson, name) => new URL(`lessons/${lesson.name}/${name}.webp`, site).href,
+    picture: (lesson, name, language) =>
+      new URL(`lessons/${language === "en" ? "" : `${language}/`}${lesson.name}/${name}.webp`, site).href,
     href: (number) => (number === undefined ? "#" : `#${number}`),
   };
 }
