@@ -61,7 +61,10 @@ build/wasm/%.wasm: $(ZIG) FORCE
 FORCE:
 
 wheel: $(UV) $(VENV)/.train $(TOOLS) $(PAGES)  ## build dist/: an sdist, and a wheel for this Python and machine with the console's pages inside
-	PATH="$(BUILD_PATH)" $(UV) build -q --sdist --wheel --python $(BIN)/python --no-build-isolation --out-dir dist
+	@mkdir -p build
+	@PATH="$(BUILD_PATH)" $(UV) build --sdist --wheel --python $(BIN)/python --no-build-isolation --out-dir dist >build/wheel.log 2>&1 \
+		|| { tail -n 60 build/wheel.log; exit 1; }
+	@grep "^Successfully built" build/wheel.log
 
 test: $(VENV)/.built $(VENV)/.dev $(PAGES) $(IDENTITY)  ## set up if needed, then run every test, on every core
 	$(PYTEST) --durations=40
