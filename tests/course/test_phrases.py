@@ -19,6 +19,7 @@ from racecraft.course.shown import read_shown
 from racecraft.course.verdict import MARKS, right, wrong
 
 GERMAN = json.loads((lessons_folder() / "de/verdicts.json").read_text(encoding="utf-8"))
+LABELS = json.loads((lessons_folder() / "de/labels.json").read_text(encoding="utf-8"))
 
 
 def sentence(node: ast.expr) -> str:
@@ -96,15 +97,14 @@ def test_what_stands_in_a_gap_is_german_too() -> None:
 
 
 def test_every_word_on_a_picture_is_there_in_german_and_no_other() -> None:
-    labels = json.loads((lessons_folder() / "de/labels.json").read_text(encoding="utf-8"))
     words = {word for lesson in lessons() for word in read_shown(lesson).words}
     assert len(words) > 200
     assert [word for word in words if german_label(word) is None] == []
-    gaps = {gap for word in words for label in labels for gap in found_in(label, word)}
-    unused = [label for label in labels if not any(matches(label, word) for word in words | gaps)]
+    gaps = {gap for word in words for label in LABELS for gap in found_in(label, word)}
+    unused = [label for label in LABELS if not any(matches(label, word) for word in words | gaps)]
     # how a learner's own car fares may be any of these, and not how ours did
     assert [label for label in unused if not label.startswith("{} of {} laps")] == []
-    for english, german in labels.items():
+    for english, german in LABELS.items():
         assert german.count("{}") == english.count("{}"), english
 
 
@@ -155,7 +155,6 @@ def test_there_is_a_letter_for_everything_that_is_written() -> None:
 
     font = ImageFont.load_default(size=40)
     missing = bytes(font.getmask("\uffff"))
-    labels = json.loads((lessons_folder() / "de/labels.json").read_text(encoding="utf-8"))
-    words = [*(word for lesson in lessons() for word in read_shown(lesson).words), *labels.values()]
+    words = [*(word for lesson in lessons() for word in read_shown(lesson).words), *LABELS.values()]
     letters = set(spelled("".join(words))) - set("äöüÄÖÜ")  # which the canvas puts dots on
     assert [letter for letter in letters if letter != " " and bytes(font.getmask(letter)) == missing] == []

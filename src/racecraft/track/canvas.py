@@ -124,17 +124,22 @@ class Canvas:
         plain, width = words.translate(_WITHOUT_DOTS), text_width(words, size=size, spacing=spacing)
         x, y = place[0] * OVERSAMPLING, place[1] * OVERSAMPLING
         left = x - {"l": 0.0, "m": 0.5, "r": 1.0}[anchor[0]] * width * OVERSAMPLING
+
+        def start(index: int) -> float:  # of a letter
+            before = plain[:index]
+            if not spacing:
+                return left + font.getlength(before)
+            return left + sum(font.getlength(letter) + spacing * size * OVERSAMPLING for letter in before)
+
         if spacing:
-            advances = [font.getlength(letter) + spacing * size * OVERSAMPLING for letter in plain]
-            places = [left + sum(advances[:index]) for index in range(len(plain))]
-            for letter, at in zip(plain, places, strict=True):
-                self._draw.text((at, y), letter, fill=color, font=font, anchor="l" + anchor[1], stroke_width=stroke)
+            for index, letter in enumerate(plain):
+                at = (start(index), y)
+                self._draw.text(at, letter, fill=color, font=font, anchor="l" + anchor[1], stroke_width=stroke)
         else:
-            places = [left + font.getlength(plain[:index]) for index in range(len(plain))]
             self._draw.text((x, y), plain, fill=color, font=font, anchor=anchor, stroke_width=stroke, stroke_fill=color)
-        for wanted, letter, at in zip(words, plain, places, strict=True):
+        for index, (wanted, letter) in enumerate(zip(words, plain, strict=True)):
             if wanted != letter:
-                self._dots_above((at, y), letter, color, font, stroke, anchor[1])
+                self._dots_above((start(index), y), letter, color, font, stroke, anchor[1])
         return width
 
     def _dots_above(

@@ -1,7 +1,7 @@
 import { mount } from "svelte";
+import { keepSoon } from "../lib/offline";
 import { applyTheme } from "../lib/theme.svelte";
 import "../style.css";
-import { keepSoon } from "./offline";
 import { read, type Plan } from "./plan";
 import Tab from "./Tab.svelte";
 

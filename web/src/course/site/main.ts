@@ -1,7 +1,7 @@
 import { mount } from "svelte";
+import { keepSoon } from "../../lib/offline";
 import { applyTheme } from "../../lib/theme.svelte";
 import "../../style.css";
-import { keepSoon } from "../../tab/offline";
 import Lessons from "./Lessons.svelte";
 
 applyTheme();
