@@ -10,8 +10,10 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from racecraft.classic import ALGORITHMS, RECIPES, Progress, job, learn, ppo, resume
+from racecraft.classic.evaluation import play
 from racecraft.classic.saved import load
 from racecraft.classic.settings import Settings
 from racecraft.classic.until import Goal
@@ -52,6 +54,30 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others(algorithm: st
     assert any((array != other.policy.arrays[name]).any() for name, array in first.policy.arrays.items())
     assert (first.returns, first.curve, first.mean_return) == (same.returns, same.curve, same.mean_return)
     assert first.steps >= 600
+
+
+def blas_threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_products_take_one_thread_while_it_learns_and_judges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # with two, CartPole's DQN took another course, and forty times the processor on a busy machine
+    seen = []
+
+    def judged(*worlds: Any) -> Any:
+        seen.append(blas_threads())
+        return play(*worlds)
+
+    monkeypatch.setattr(job, "play", judged)
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = blas_threads()
+        learned = short("ppo", root=tmp_path, on_progress=lambda _: seen.append(blas_threads()))
+        assert learned.run is not None
+        _ = learned.mean_return
+        resume(learned.run, until="900 steps")
+        assert blas_threads() == before
+    assert len(seen) > 4
+    assert seen == [{1}] * len(seen)
 
 
 @pytest.mark.costly

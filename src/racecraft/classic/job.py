@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from racecraft.checks import check_whole
 from racecraft.classic.algorithms import check_fit, find_algorithm
+from racecraft.classic.blas import one_blas_thread
 from racecraft.classic.evaluation import play
 from racecraft.classic.policy import Policy, restore
 from racecraft.classic.recipes import find_recipe
@@ -85,6 +86,7 @@ class Learned:
     """Steps, and mean return of greedy episodes then."""
 
     @cached_property
+    @one_blas_thread()
     def mean_return(self) -> float:
         """Of 100 greedy episodes in worlds of their own, played when somebody asks for it."""
         return _judged(self.lesson, self.policy, JUDGE, number=self.steps, episodes=JUDGED)
@@ -106,6 +108,7 @@ class Learned:
         }
 
 
+@one_blas_thread()
 def learn(
     environment: str,
     algorithm: str,
@@ -123,7 +126,7 @@ def learn(
     Args:
         environment: Any id of Gymnasium; ``module:Id`` imports the module first.
         algorithm: One of `ALGORITHMS`.
-        seed: The same seed repeats it on the same machine; not of ``a3c``, whose processes race.
+        seed: The same seed repeats it on the same kind of processor; not of ``a3c``, whose processes race.
         until: Such as ``"475 return or 60 s"``; replaces the recipe's end.
         settings: Of the algorithm, by name, instead of the recipe's.
         make: Further arguments of ``gymnasium.make``, beside the recipe's.
@@ -152,6 +155,7 @@ def learn(
         return room.learn(goal, recipe.evaluate_every, folder, on_progress)
 
 
+@one_blas_thread()
 def resume(run: str | Path, *, until: str = "", on_progress: Callable[[Progress], None] | None = None) -> Learned:
     """Go on with what a run has saved: its best policy, with a fresh optimiser and memory.
 
