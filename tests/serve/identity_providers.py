@@ -6,7 +6,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl, urljoin, urlsplit
@@ -40,9 +40,12 @@ def identity_provider() -> Iterator[str]:
         end(process)
 
 
-def sign_in_there(to: str, name: str) -> dict[str, str]:
-    """From the address that a league sends somebody to, through the provider's forms, to what a browser brings back."""
-    with httpx.Client(timeout=PATIENCE) as client:
+def sign_in_there(to: str, name: str, *, browser: httpx.Client | None = None) -> dict[str, str]:
+    """From the address that a league sends somebody to, through the provider's forms, to what a browser brings back.
+
+    The provider's cookies stay in a browser, if one is given.
+    """
+    with nullcontext(browser) if browser is not None else httpx.Client(timeout=PATIENCE) as client:
         reply = client.get(to)
         for _ in range(20):
             if reply.is_redirect:
@@ -58,3 +61,11 @@ def sign_in_there(to: str, name: str) -> dict[str, str]:
                 fields |= {"login": name, "password": "x"}
             reply = client.post(urljoin(str(reply.url), form[1]), data=fields)
     raise AssertionError("it leads nowhere")
+
+
+def sign_out_there(issuer: str, browser: httpx.Client) -> None:
+    """Of the provider, in a browser that is signed in there, and by its form."""
+    page = browser.get(f"{issuer}/session/end")
+    form = re.search(r'action="([^"]+)".*?name="xsrf" value="([^"]+)"', page.text, re.DOTALL)
+    assert form is not None, page.text
+    assert browser.post(form[1], data={"xsrf": form[2], "logout": "yes"}).status_code < 400

@@ -128,6 +128,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "POST /api/door/provider": ("provider", None),
     "POST /api/door/provider/arrival": ("provider", {"code": "x", "state": "x"}),
     "POST /api/door/provider/newcomer": ("provider", {"name": "x"}),
+    "POST /api/door/provider/sign-out": ("provider", None),
     "GET /api/account/provider": ("me", None),
     "POST /api/account/provider": ("own", None),
     "DELETE /api/account/provider": ("own", None),

@@ -8,7 +8,14 @@ from typing import Any
 
 import httpx
 import pytest
-from identity_providers import CLIENT, SECRET, identity_provider, needs_identity_provider, sign_in_there
+from identity_providers import (
+    CLIENT,
+    SECRET,
+    identity_provider,
+    needs_identity_provider,
+    sign_in_there,
+    sign_out_there,
+)
 from leagues import RunningLeague, ok, refused, running_league
 
 pytestmark = [pytest.mark.costly, needs_identity_provider]
@@ -33,9 +40,9 @@ def options(issuer: str, folder: Path) -> list[str]:
     return [str(part) for name, value in told.items() for part in (f"--provider{name}", value)]
 
 
-def come(client: httpx.Client, name: str) -> httpx.Response:
+def come(client: httpx.Client, name: str, *, browser: httpx.Client | None = None) -> httpx.Response:
     """There and back."""
-    answer = sign_in_there(ok(client.post("/api/door/provider"))["to"], name)
+    answer = sign_in_there(ok(client.post("/api/door/provider"))["to"], name, browser=browser)
     return client.post("/api/door/provider/arrival", json=answer)
 
 
@@ -103,6 +110,35 @@ def test_an_organiser_locks_out_and_lets_in_again(league: RunningLeague) -> None
     assert member(league, "Turbo")["is_locked"]
     ok(league.owner.post(f"/api/groups/1/members/{number}/admit"), 204)
     assert ok(come(pupil, "carl"))["me"]["id"] == number
+
+
+def test_who_signs_out_there_is_signed_out_here(league: RunningLeague) -> None:
+    pupil = newcomer(league, "hugo", "Comet 2")
+    ok(pupil.put("/api/account/password", json={"old": "", "new": "correct horse"}), 204)
+    with httpx.Client(timeout=60) as browser, league.stranger() as by_password, league.stranger() as elsewhere:
+        ok(come(pupil, "hugo", browser=browser))
+        ok(come(elsewhere, "hugo"))
+        ok(by_password.post("/api/door/sign-in", json={"name": "Comet 2", "password": "correct horse"}))
+        other = newcomer(league, "ida", "Comet 3")
+        issuer = sign_in_there(ok(league.stranger().post("/api/door/provider"))["to"], "hugo")["iss"]
+        sign_out_there(issuer, browser)
+        assert "not signed in" in refused(pupil.get("/api/account"), 401)
+        for still in (by_password, other, elsewhere):  # another way, somebody else, another sign-in there
+            ok(still.get("/api/account"))
+        assert ok(come(pupil, "hugo"))["me"]["name"] == "Comet 2", "and who signs in again is in again"
+    assert "sign_out_by_provider" in {line["what"] for line in ok(league.owner.get("/api/audit?count=500"))}
+
+
+@pytest.mark.parametrize("form", [{}, {"logout_token": "x.y.z"}, {"logout_token": "x" * 100_000}])
+def test_nobody_else_signs_people_out(league: RunningLeague, form: dict[str, str]) -> None:
+    stranger = league.stranger()
+    assert "logout token" in refused(stranger.post("/api/door/provider/sign-out", data=form), 400) or "x.y.z" in str(
+        form
+    )
+    twice = "logout_token=x&logout_token=y"
+    kind = {"content-type": "application/x-www-form-urlencoded"}
+    refused(stranger.post("/api/door/provider/sign-out", content=twice, headers=kind), 400)
+    refused(stranger.post("/api/door/provider/sign-out", content=b"\xff\0" * 9, headers=kind), 400)
 
 
 def test_an_account_is_linked_and_unlinked(league: RunningLeague) -> None:

@@ -37,7 +37,7 @@ LARGE: Final = {"/api/models/import": 1 << 30}
 """Addresses that take more, as much as an archive may have; they write to disk what comes, as it comes."""
 SAFE: Final = ("GET", "HEAD", "OPTIONS")
 DEVICES: Final = ("/api/door/devices", "/api/door/devices/token")
-PROVIDER: Final = ("/api/door/provider", "/api/door/provider/arrival", "/api/door/provider/newcomer")
+PROVIDER: Final = tuple(f"/api/door/provider{way}" for way in ("", "/arrival", "/newcomer", "/sign-out"))
 OPEN: Final = (
     *("/api/door", "/api/door/sign-in", "/api/door/card", "/api/door/join", "/api/door/reset"),
     *DEVICES,

@@ -128,12 +128,14 @@ def sign_out(request: Request, consoles: InConsoles, person: InPerson) -> Respon
     return response
 
 
-def let_in(request: Request, response: Response, consoles: Consoles, user: int) -> Me:
-    """Give a browser a session of somebody; what it had ends."""
+def let_in(
+    request: Request, response: Response, consoles: Consoles, user: int, *, provider_session: str | None = None
+) -> Me:
+    """Give a browser a session of somebody; what it had ends. Of who came through a provider: its name for that."""
     guard: Guard = request.app.state.guard
     write_down(request, consoles, user)
     consoles.keys.close_session(request.cookies.get(COOKIE, ""))  # whoever was here before is so no longer
-    guard.give_cookie(response, consoles.keys.open_session(user))
+    guard.give_cookie(response, consoles.keys.open_session(user, provider_session=provider_session))
     return me_of(consoles.people.get(user))
 
 

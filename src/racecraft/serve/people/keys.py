@@ -77,12 +77,16 @@ class Keys:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def open_session(self, user_id: int, *, days: int | None = SESSION_DAYS) -> str:
-        """Let a browser in; its cookie."""
+    def open_session(
+        self, user_id: int, *, days: int | None = SESSION_DAYS, provider_session: str | None = None
+    ) -> str:
+        """Let a browser in; its cookie. Of one that came through a provider, its name for the sign-in, or empty."""
         secret = secrets.token_urlsafe(32)
         expires = None if days is None else now() + timedelta(days=days)
         with self._database.transaction() as session:
-            session.add(Session(digest=digest_of(secret), user_id=user_id, expires=expires))
+            mine = Session(digest=digest_of(secret), user_id=user_id, expires=expires)
+            mine.provider_session = provider_session
+            session.add(mine)
             session.execute(sa.delete(Session).where(Session.expires < now()))
             session.flush()
             if days is not None:
@@ -128,6 +132,32 @@ class Keys:
         with self._database.transaction() as session:
             if session.execute(sa.delete(Session).where(is_it)).rowcount == 0:  # type: ignore[attr-defined]
                 raise NotFound("There is no such session.")
+
+    def end_provider_sessions(self, issuer: str, *, subject: str, provider_session: str, before: datetime) -> list[int]:
+        """A provider has signed somebody out: so are the browsers that came through it, with what it still goes by.
+
+        Args:
+            issuer: The provider.
+            subject: Its name for somebody; empty if it names the sign-in alone.
+            provider_session: Its name for the sign-in; empty for all of theirs.
+            before: What began later is another sign-in.
+
+        Returns:
+            Whose they were.
+        """
+        theirs = sa.select(Identity.user_id).where(Identity.issuer == issuer)
+        if subject:
+            theirs = theirs.where(Identity.subject == subject)
+        names = (provider_session, "") if subject else (provider_session,)
+        is_it = sa.and_(
+            Session.user_id.in_(theirs),
+            Session.provider_session.in_(names) if provider_session else Session.provider_session.is_not(None),
+            Session.created <= before,
+        )
+        with self._database.transaction() as session:
+            found = session.scalars(sa.select(Session.user_id).where(is_it).distinct()).all()
+            session.execute(sa.delete(Session).where(is_it))
+        return list(found)
 
     def close_sessions(self, user_id: int) -> None:
         """Sign somebody out everywhere."""

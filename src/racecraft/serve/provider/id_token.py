@@ -6,23 +6,12 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from authlib.oidc.core import CodeIDToken
-from joserfc import jwt
-from joserfc.errors import (
-    BadSignatureError,
-    ClaimError,
-    ExpiredTokenError,
-    InvalidKeyIdError,
-    JoseError,
-)
+from joserfc.errors import ClaimError, ExpiredTokenError, JoseError
 from joserfc.jwk import KeySet
-from joserfc.jws import JWSRegistry
 
 from racecraft.serve.problems import NotLetIn
+from racecraft.serve.provider.signature import LEEWAY, MAX_NAMED, decoded_of
 
-ALGORITHMS: Final = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512")
-"""Signatures by a key that only the provider has: neither ``none`` nor by a secret that is shared."""
-LEEWAY: Final = 60  # s by which two clocks may differ
-MAX_SUBJECT: Final = 255
 TIMES: Final = ("exp", "iat", "nbf")
 
 
@@ -52,7 +41,7 @@ def verified(
     """
     if not isinstance(token, str) or not token.isascii():
         raise NotLetIn(f"{label} did not say who you are.")
-    decoded = _decode(token, keys, label)
+    decoded = decoded_of(token, keys, label)
     options: dict[str, Any] = {
         "iss": {"essential": True, "value": issuer},
         "aud": {"essential": True, "value": client},
@@ -70,22 +59,9 @@ def verified(
     except (JoseError, ValueError, TypeError, AttributeError) as error:
         raise NotLetIn(f"What {label} says of you cannot be read.") from error
     subject = claims["sub"]
-    if not isinstance(subject, str) or not 0 < len(subject) <= MAX_SUBJECT or not subject.isprintable():
+    if not isinstance(subject, str) or not 0 < len(subject) <= MAX_NAMED or not subject.isprintable():
         raise NotLetIn(f"What {label} says of you cannot be read.")
     return dict(claims)
-
-
-def _decode(token: str, keys: Callable[[bool], KeySet], label: str) -> jwt.Token:
-    registry = JWSRegistry(algorithms=ALGORITHMS, strict_check_header=False)
-    try:
-        try:
-            return jwt.decode(token, keys(False), algorithms=ALGORITHMS, registry=registry)
-        except InvalidKeyIdError:  # it may have begun to sign with another one
-            return jwt.decode(token, keys(True), algorithms=ALGORITHMS, registry=registry)
-    except (BadSignatureError, InvalidKeyIdError) as error:
-        raise NotLetIn(f"What came back is not signed by {label}.") from error
-    except (JoseError, ValueError, TypeError, KeyError) as error:
-        raise NotLetIn(f"What came back is not signed in a way that proves anything of {label}.") from error
 
 
 def _untrue(error: ClaimError, label: str) -> NotLetIn:

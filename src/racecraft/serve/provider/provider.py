@@ -1,6 +1,7 @@
 """A provider, as a league uses it: sends people there, and finds out who came back.
 
     begin ──▶ the provider's page ──code──▶ arrive ──code, proof──▶ ID token, verified ──▶ who it is
+    the provider itself, later ──logout token, verified──▶ whom it has signed out
 
 OpenID Connect's authorization code flow with PKCE, a state and a nonce. Nothing of what it answers is kept but its name
 for somebody; e-mail addresses are looked at and forgotten.
@@ -19,11 +20,14 @@ from urllib.parse import quote
 from authlib.oauth2.auth import ClientAuth
 from authlib.oauth2.rfc6749.parameters import prepare_grant_uri, prepare_token_request
 from authlib.oauth2.rfc7636 import create_s256_code_challenge
+from joserfc.jwk import KeySet
 
 from racecraft.serve.problems import NotLetIn, TooMany, Unreachable
 from racecraft.serve.provider.discovery import Discovery, Endpoints
 from racecraft.serve.provider.fetch import ERROR, NoAnswer, Refused, fetch
 from racecraft.serve.provider.id_token import verified
+from racecraft.serve.provider.logout_token import SignedOut, signed_out
+from racecraft.serve.provider.signature import MAX_NAMED
 from racecraft.serve.provider.visits import Newcomers, Visit, Visits, Whom
 from racecraft.serve.provider_settings import ProviderSettings
 
@@ -121,7 +125,19 @@ class Provider:
         self._require_wanted(claims)
         name = claims.get("name")
         real_name = " ".join(name.split())[:MAX_NAME] if isinstance(name, str) and name.isprintable() else ""
-        return Whom(self.issuer, claims["sub"], real_name), visit.user_id is not None
+        told = claims.get("sid")
+        session = told if isinstance(told, str) and told.isprintable() and len(told) <= MAX_NAMED else ""
+        return Whom(self.issuer, claims["sub"], real_name, session), visit.user_id is not None
+
+    def signed_out(self, token: object) -> SignedOut:
+        """Whom the provider has signed out, by what it sent itself.
+
+        Raises:
+            NotLetIn: It is not what it should be, with a sentence.
+            Unreachable: The provider does not answer when asked for its keys.
+        """
+        with self._asking():
+            return signed_out(token, self._keys, label=self.label, issuer=self.issuer, client=self.settings.client)
 
     def _scope(self) -> str:
         """No more than is needed."""
@@ -147,7 +163,7 @@ class Provider:
         access_token = access_token if isinstance(access_token, str) and access_token.isascii() else ""
         claims = verified(
             told.get("id_token"),
-            lambda anew: self._discovery.keys(anew=anew),
+            self._keys,
             label=self.label,
             issuer=self.issuer,
             client=self.settings.client,
@@ -162,6 +178,9 @@ class Provider:
         if more.get("sub") != claims["sub"]:
             raise NotLetIn(f"What {self.label} says of you cannot be read.")
         return {**more, **claims}
+
+    def _keys(self, anew: bool) -> KeySet:
+        return self._discovery.keys(anew=anew)
 
     def _exchange(self, endpoints: Endpoints, visit: Visit, code: str) -> dict[str, Any]:
         body = prepare_token_request(

@@ -6,16 +6,24 @@ anybody, so nobody is led elsewhere.
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from typing import Final
+from urllib.parse import parse_qsl
 
-from racecraft.serve.context import InLeague
+from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from racecraft.serve.context import Consoles, InLeague
 from racecraft.serve.door.guard import Guard, caller
-from racecraft.serve.door.routes import fail, let_in
+from racecraft.serve.door.routes import fail, let_in, write_down
 from racecraft.serve.people.links import address_of
 from racecraft.serve.people.schemas import Arrived, FromProvider, Me, Newcomer, ToProvider, me_of
 from racecraft.serve.problems import NotLetIn
 from racecraft.serve.provider.visits import SECONDS
+from racecraft.serve.replies import problem
 from racecraft.serve.settings import PROVIDER_COOKIE, PROVIDER_PAGE
+
+MAX_FORM: Final = 1 << 16
+"""Bytes of what a provider sends."""
 
 router = APIRouter(prefix="/api/door/provider", tags=["door"])
 
@@ -52,7 +60,8 @@ def sign_in_by_provider(request: Request, body: FromProvider, response: Response
     if user is None:
         provider.newcomers.meet(browser, whom)
         return Arrived(me=None, is_linked=False)
-    return Arrived(me=let_in(request, response, consoles, user), is_linked=False)
+    me = let_in(request, response, consoles, user, provider_session=whom.session)
+    return Arrived(me=me, is_linked=False)
 
 
 @router.post("/newcomer", status_code=201)
@@ -69,4 +78,53 @@ def join_by_provider(request: Request, body: Newcomer, response: Response, conso
         body.name, (whom.issuer, whom.subject), group_id=provider.settings.group, real_name=whom.real_name
     )
     provider.newcomers.forget(browser)
-    return let_in(request, response, consoles, user)
+    return let_in(request, response, consoles, user, provider_session=whom.session)
+
+
+@router.post(
+    "/sign-out",
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {
+                "application/x-www-form-urlencoded": {
+                    "schema": {
+                        "type": "object",
+                        "required": ["logout_token"],
+                        "properties": {"logout_token": {"type": "string", "title": "Logout Token"}},
+                    }
+                }
+            },
+        }
+    },
+)
+async def sign_out_by_provider(request: Request, consoles: InLeague) -> Response:
+    """From the provider itself: it has signed somebody out, and so does the league (*back-channel logout*)."""
+    body = await request.body()
+    return await run_in_threadpool(_sign_out, request, consoles, body)
+
+
+def _sign_out(request: Request, consoles: Consoles, body: bytes) -> Response:
+    provider = consoles.provider
+    try:
+        out = provider.signed_out(_logout_token(body))
+    except NotLetIn as error:
+        fail(request, consoles)
+        return problem(400, "NotLetIn", str(error), error.hint)  # as the standard has it
+    ended = consoles.keys.end_provider_sessions(
+        provider.issuer, subject=out.subject, provider_session=out.session, before=out.before
+    )
+    for user in ended:
+        write_down(request, consoles, user)
+    return Response(status_code=200)
+
+
+def _logout_token(body: bytes) -> str | None:
+    """What a form has in that field, once."""
+    if len(body) > MAX_FORM:
+        return None
+    try:
+        found = [value for name, value in parse_qsl(body.decode("ascii"), max_num_fields=20) if name == "logout_token"]
+    except ValueError:
+        return None
+    return found[0] if len(found) == 1 else None

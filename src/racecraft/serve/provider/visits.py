@@ -49,6 +49,8 @@ class Whom:
     subject: str
     """Its name for them, which never changes; e-mail addresses do, and are given to others."""
     real_name: str
+    session: str = ""
+    """Its name for this sign-in, by which it can end it; empty if it has none."""
 
 
 class Visits:

@@ -72,6 +72,8 @@ class Session(Table):
     created: Mapped[datetime] = mapped_column(default=now)
     expires: Mapped[datetime | None]
     """None of a console that has no accounts."""
+    provider_session: Mapped[str | None] = mapped_column(String(255))
+    """Of one that came through a provider, that one's name for the sign-in there, empty if it has none; else None."""
 
 
 class Card(Table):
