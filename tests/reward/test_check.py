@@ -194,6 +194,7 @@ FINE = [
     body("return params.get('speed')"),
     "def reward_function(p, /):\n    return p['speed']",
     body("global last", "last = 1.0", "return last"),
+    body("return float(np.sqrt(4.0))", top="def load():\n    global np\n    import numpy as np\nload()\n"),
     body("return (lambda a, *b, **c: a)(1.0)"),
     body("return sum(x for x in range(3) if x)"),
     body("if __name__ == '__main__': return 1.0", "return 2.0"),

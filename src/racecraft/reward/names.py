@@ -51,7 +51,7 @@ def undefined_names(source: str, tree: ast.Module) -> Iterator[tuple[ast.Name, s
         symbol.get_name()
         for scope in inner
         for symbol in scope.get_symbols()
-        if symbol.is_declared_global() and symbol.is_assigned()
+        if symbol.is_declared_global() and (symbol.is_assigned() or symbol.is_imported())
     }
     missing = {
         symbol.get_name()
