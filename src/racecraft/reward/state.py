@@ -39,7 +39,8 @@ MAKERS: Final = frozenset(  # builtins that make something new
         *("abs", "round", "iter", "map", "filter", "zip", "enumerate", "reversed"),
     )
 )
-IMMUTABLE: Final = (ast.Constant, ast.JoinedStr, ast.UnaryOp, ast.BinOp, ast.Compare, ast.Lambda)
+IMMUTABLE: Final = (ast.Constant, ast.JoinedStr, ast.Lambda)
+ASSIGNMENTS: Final = (ast.Assign, ast.AnnAssign, ast.NamedExpr)
 
 
 def keeps_state(source: str) -> bool:
@@ -65,6 +66,7 @@ class _Reader:
             if isinstance(node, (ast.Import, ast.ImportFrom))
             for alias in node.names
         }
+        self._assigned = _assigned(tree)
         self._classes = {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
         functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
         self._functions = set(functions)
@@ -99,13 +101,39 @@ class _Reader:
         for chain in chains:
             function = chain[-1]
             defaults = [*function.args.defaults, *filter(None, function.args.kw_defaults)]
-            if any(not isinstance(default, (*IMMUTABLE, ast.Name)) for default in defaults):
+            if not all(isinstance(default, ast.Name) or self._is_immutable(default) for default in defaults):
                 return True
             if not isinstance(function, ast.Lambda) and function.decorator_list:
                 return True
-        assignments = (ast.Assign, ast.AnnAssign, ast.NamedExpr)
-        values = [node.value for node in _own(self._tree) if isinstance(node, assignments)]
-        return any(value is not None and not _is_immutable(value) for value in values)
+        values = [node.value for node in _own(self._tree) if isinstance(node, ASSIGNMENTS)]
+        return any(value is not None and not self._is_immutable(value) for value in values)
+
+    def _is_immutable(self, node: ast.expr) -> bool:
+        """Whether the value of an assignment, or what a parameter is by default, surely cannot be changed in place.
+
+        What operators make of numbers and texts cannot; of a list they make a list: ``[None] * 2``.
+        """
+        waiting: list[tuple[ast.expr, bool]] = [(node, False)]
+        while waiting:
+            part, is_operand = waiting.pop()
+            match part:
+                case ast.Tuple(elts=parts):
+                    waiting += [(inner, is_operand) for inner in parts]
+                case ast.BinOp(left=left, right=right):
+                    waiting += [(left, True), (right, True)]
+                case ast.UnaryOp(operand=operand):
+                    waiting.append((operand, True))
+                case ast.Compare(left=left, comparators=others):
+                    waiting += [(inner, True) for inner in (left, *others)]
+                case ast.Name() | ast.Attribute() if is_operand:
+                    root = _root(part)
+                    is_imported = isinstance(root, ast.Name) and root.id in self._imported
+                    if not (is_imported or (isinstance(part, ast.Name) and part.id in self._assigned)):
+                        return False
+                case _:
+                    if not isinstance(part, IMMUTABLE):
+                        return False
+        return True
 
     def _is_new(self, node: ast.expr, chain: tuple[Function, ...], depth: int = 0) -> bool:
         """Whether the expression's value was made in this call of the function, or is the caller's own params dict."""
@@ -205,6 +233,18 @@ def _bindings(name: str, function: Function) -> Iterator[ast.expr | None]:
             yield None
 
 
+def _assigned(tree: ast.Module) -> set[str]:
+    """Names of the file that get their values by assignments alone: those say what they hold."""
+    names, targets = list[ast.Name](), set[int]()
+    for node in _own(tree):
+        if isinstance(node, ast.Name) and _binds(node):
+            names.append(node)
+        elif isinstance(node, (*ASSIGNMENTS, ast.AugAssign)):
+            goals = node.targets if isinstance(node, ast.Assign) else [node.target]
+            targets |= {id(inner) for goal in goals for inner in ast.walk(goal)}
+    return {node.id for node in names} - {node.id for node in names if id(node) not in targets}
+
+
 def _parameters(function: Function) -> list[str]:
     arguments = function.args
     named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
@@ -224,9 +264,3 @@ def _root(node: ast.expr) -> ast.expr:
 def _name(node: ast.expr) -> str:
     """The last part of a function's name: ``heappush`` of ``heapq.heappush``."""
     return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
-
-
-def _is_immutable(node: ast.expr) -> bool:
-    if isinstance(node, ast.Tuple):
-        return all(map(_is_immutable, node.elts))
-    return isinstance(node, IMMUTABLE)
