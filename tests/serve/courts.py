@@ -42,7 +42,7 @@ class HereBench(Bench):
         if status != judge.DROVE:
             return {"status": status, "said": words}
         said = json.loads(words)
-        lied = self._lie(Path(told["folder"]), said)
+        lied = self._lie(Path(told["results"]), said)
         return {"status": status, "said": lied if isinstance(lied, str) else json.dumps(said)}
 
 

@@ -42,10 +42,11 @@ def told(tmp_path: Path, entry: bytes) -> Told:
         conditions, kind="time-trial", ranking="total", minimum_laps=1, num_trials=1, secret=draw_secret()
     )
     folder = tmp_path / "state" / "submissions" / "mine"
-    folder.mkdir(parents=True)
+    results = folder / "judging"
+    results.mkdir(parents=True)
     (folder / ENTRY).write_bytes(entry)
     about = {"document": dict(announced.document), "commitment": announced.commitment, "track": "oval", "name": "x"}
-    return {**about, "seed": 1, "frames": 2, "folder": str(folder)}
+    return {**about, "seed": 1, "frames": 2, "folder": str(folder), "results": str(results)}
 
 
 # ---- walls
@@ -55,7 +56,7 @@ class Prey:
     """A server's things, of which none is the judge's: each attack says whether it got at one."""
 
     def __init__(self, root: Path, entry: Path) -> None:
-        self.root, self.entry = root, entry
+        self.root, self.entry, self.result = root, entry, entry.with_name("judging") / JUDGED
         self.others = root / "state" / "submissions" / "yours" / ENTRY
         self.others.parent.mkdir()
         shutil.copy(entry, self.others)
@@ -99,7 +100,7 @@ class Prey:
             "change the database": write(self.database),
             "change its own entry": write(self.entry),
             "make a file beside it": write(self.entry.with_name("more")),
-            "change its own result by name": write(self.entry.with_name(JUDGED)),
+            "change its own result by name": write(self.result),
             "write where all may": write(Path("/dev/shm") / f"racecraft-{os.getpid()}"),
             "remove its entry": lambda: self.entry.unlink(),
             "rename another's": lambda: self.others.rename(self.others.with_name("gone")),
@@ -147,9 +148,10 @@ def test_a_child_that_was_got_the_better_of_reaches_nothing(
 ) -> None:
     found = tried(prey, told, monkeypatch)
     assert [name for name, refused in found.items() if not refused] == []
-    assert (prey.entry.with_name(JUDGED)).read_bytes() == b"the result", "the one thing that it may write"
+    assert prey.result.read_bytes() == b"the result", "the one thing that it may write"
     assert prey.database.read_text() == "of the server"
-    assert sorted(path.name for path in prey.entry.parent.iterdir()) == sorted([ENTRY, JUDGED])
+    left = sorted(path.name for folder in (prey.entry, prey.result) for path in folder.parent.iterdir())
+    assert left == sorted([ENTRY, "judging", JUDGED])
 
 
 @locked
@@ -181,4 +183,4 @@ def test_where_the_kernel_has_no_walls_it_judges_all_the_same_and_says_so(
     finally:
         walls._plan.cache_clear()
     assert (status, json.loads(said)["step"]) == (DROVE, 64)
-    assert not (Path(told["folder"]) / AGAIN).exists()
+    assert not (Path(told["results"]) / AGAIN).exists()

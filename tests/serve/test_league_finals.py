@@ -231,11 +231,13 @@ def test_until_a_final_is_over_its_films_are_coarse_and_a_job_that_is_begun_agai
 
     (first,) = (season.league.console.runs / ".racecraft" / "finals").glob("*/0/heat-0.replay")
     before = first.stat().st_mtime_ns
+    (first.parent / "driven-before").mkdir()  # of a worker that was killed
     with rows_of(season) as session:
         job = session.get_one(Job, session.get_one(Race, bracket).final_job_id)
         job.state, job.finished, job.result = "queued", None, None
     season.league.console.wait_for(lambda: season.page(bracket)["state"] == "done")
     assert first.stat().st_mtime_ns == before
+    assert list(first.parents[1].glob("*/driven*")) == []
     assert [one["place"] is None for one in season.page(bracket)["finalists"]] == [False] * 3
     assert ok(season.teacher.get(f"/api/boards/{bracket}"))["race"]["state"] == "closed"
 

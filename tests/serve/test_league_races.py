@@ -90,16 +90,22 @@ def test_a_judge_that_fails_is_there_for_the_next_entry(run: RunFolder, tmp_path
         "name": "x",
     }
     told |= {"seed": 1, "frames": 2}
+
+    def asked(folder: Path) -> dict[str, Any]:
+        with bench.asked(told, folder=folder) as (said, _):
+            return said
+
+    (tmp_path / "nowhere").mkdir()
     try:
         with pytest.raises(RunError, match="judge's process failed"):
-            bench.ask(told, folder=tmp_path / "nowhere")
+            asked(tmp_path / "nowhere")
         judge = bench._process
         assert judge is not None
         (tmp_path / "entry.safetensors").write_bytes(b"no weights")
         with pytest.raises(RunError, match="no safetensors file"):
-            bench.ask(told, folder=tmp_path)
+            asked(tmp_path)
         (tmp_path / "entry.safetensors").write_bytes(pack_entry(run))
-        answer = bench.ask(told, folder=tmp_path)
+        answer = asked(tmp_path)
         assert answer["step"] == 64
         assert np.shape(answer["choices"]) == (FRAMES, 2)
         assert bench._process is judge

@@ -224,7 +224,7 @@ def test_a_driver_that_never_arrives_is_over_in_simulated_time(entry: bytes, tmp
     (tmp_path / judge.ENTRY).write_bytes(with_weights(entry, (0.0,), tmp_path))
     told = {"document": dict(terms.document), "commitment": terms.commitment, "track": "oval", "name": "x"}
     began = time.process_time()
-    status, _ = judge.judge({**told, "seed": 1, "frames": 2, "folder": str(tmp_path)})
+    status, _ = judge.judge({**told, "seed": 1, "frames": 2, "folder": str(tmp_path), "results": str(tmp_path)})
     assert status == judge.DROVE
     assert time.process_time() - began < 60
     ends = {(trial.status, round(trial.time)) for trial in read_replay(tmp_path / JUDGED).cars}

@@ -12,6 +12,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
@@ -25,7 +26,7 @@ from racecraft.serve.races.races import announcement_of
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.tables import Duel, Finalist, Race, now
 from racecraft.serve.submissions.finalists import duels_of, finalists_of
-from racecraft.serve.submissions.judge import ENTRY, JUDGED
+from racecraft.serve.submissions.judge import ENTRY
 from racecraft.serve.submissions.stages import final_of
 from racecraft.serve.submissions.tasks import BENCH, BUG, submission_folder
 
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 FOLDER: Final = "finals"
 DRIVEN: Final = "driven"
-"""Folder of a heat while it is judged."""
+"""How the folder of a heat begins while it is judged."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +61,8 @@ def heat_file(folder: Path, number: int, heat: int) -> Path:
 
 def final(task: Task) -> dict[str, Any]:
     """Drive a final; everybody's place by seed."""
+    for left in final_folder(task.home / STATE_FOLDER, task.job.id).glob(f"*/{DRIVEN}*"):
+        shutil.rmtree(left, ignore_errors=True)  # of a worker that was killed
     field, winners = _field(task)
     plan = plan_final(field.terms.form, len(field.drivers))
     for planned in plan:
@@ -122,14 +125,6 @@ def _heat(task: Task, field: _Field, number: int, heat: int, grid: tuple[int, in
     from racecraft.replay.verification import verify
 
     announced, path = field.announcement, heat_file(final_folder(task.home / STATE_FOLDER, task.job.id), number, heat)
-    folder = path.with_name(DRIVEN)
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    for seed in grid:
-        try:
-            shutil.copyfile(field.drivers[seed], folder / f"{seed}.safetensors")
-        except OSError as error:
-            raise RunError(f"The file of seed {seed} is gone.", hint="Hold the final once more without it.") from error
     names = tuple(f"seed {seed}" for seed in grid)
     told = {
         "document": dict(announced.document),
@@ -138,14 +133,22 @@ def _heat(task: Task, field: _Field, number: int, heat: int, grid: tuple[int, in
         "track": task.job.payload["track"],
         "grid": [{"file": f"{seed}.safetensors", "name": name} for seed, name in zip(grid, names, strict=True)],
     }
-    BENCH.ask(told, folder=folder)
-    replay = read_replay(folder / JUDGED)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix=DRIVEN, dir=path.parent, ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        for seed in grid:
+            try:
+                shutil.copyfile(field.drivers[seed], folder / f"{seed}.safetensors")
+            except OSError as error:
+                hint = "Hold the final once more without it."
+                raise RunError(f"The file of seed {seed} is gone.", hint=hint) from error
+        with BENCH.asked(told, folder=folder) as (_, judged):
+            replay = read_replay(judged)
     found = verify(replay, race=announced)
     if not found.is_genuine:
         raise RunError(f"The judge's result does not hold: {found.sentence}", hint=BUG)
     if replay.conditions.seed != announced.duel_seed(number):
         raise RunError("The judge's result does not hold: it is of another duel.", hint=BUG)
-    shutil.rmtree(folder)
     public = Announcement(document=announced.document, commitment=announced.commitment)
     replay = replace(replay, names=names, race=public)
     write_replay(replay, path)

@@ -5,18 +5,23 @@ from __future__ import annotations
 import json
 import os
 import select
+import shutil
 import subprocess
 import sys
 import threading
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any, Final
 
 from racecraft import system
 from racecraft.errors import RunError
-from racecraft.serve.submissions.judge import DIFFERED, DROVE, REFUSED
+from racecraft.serve.submissions.judge import DIFFERED, DROVE, JUDGED, REFUSED
 
+RESULTS: Final = "judging-"
+"""How the folders begin that judgings have for themselves."""
 PATIENCE: Final = 600.0  # s
 MOST: Final = 1 << 23  # bytes of an answer
 BUG: Final = "This is a bug in Racecraft; please report it."
@@ -36,17 +41,28 @@ class Bench:
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
 
-    def ask(self, told: dict[str, Any], *, folder: Path) -> dict[str, Any]:
-        """What the judge says of a submission; it has nothing but the folder and what it is told.
+    @contextmanager
+    def asked(self, told: dict[str, Any], *, folder: Path) -> Iterator[tuple[dict[str, Any], Path]]:
+        """What the judge says of a submission, and the file of what was driven, until the block ends.
 
-        A child of the judge that was got the better of says what it likes: what is not as it has to be is no verdict.
+        It has nothing but the folder and what it is told. What it writes lies in a folder of this judging alone: a
+        worker that was taken for dead may still have the same submission judged.
 
         Raises:
             DriverFailed: It cannot drive, or did not end; the message says why.
-            RunError: It drove differently the second time, or the judge failed.
+            RunError: It drove differently the second time, the judge failed, or there is no room.
         """
+        try:
+            results = TemporaryDirectory(prefix=RESULTS, dir=folder.resolve(), ignore_cleanup_errors=True)
+        except OSError as error:
+            raise RunError(f"The file cannot be kept: {error.strerror or error}.") from error
+        with results as name:
+            yield self._ask({**told, "folder": str(folder.resolve()), "results": name}), Path(name) / JUDGED
+
+    def _ask(self, told: dict[str, Any]) -> dict[str, Any]:
+        """A child that was got the better of says what it likes: what is not as it has to be is no verdict."""
         with self._lock:
-            answer = self._answer({**told, "folder": str(folder.resolve())})
+            answer = self._answer(told)
         if answer["status"] == DIFFERED:
             raise RunError("It drove differently the second time.", hint=BUG)
         try:
@@ -94,6 +110,12 @@ class Bench:
                 with suppress(OSError):
                     pipe.close()
             self._process = None
+
+
+def clear(folder: Path) -> None:
+    """Remove what judgings in a folder have left whose workers were killed; for whoever has their job now."""
+    for left in folder.glob(f"{RESULTS}*"):
+        shutil.rmtree(left, ignore_errors=True)
 
 
 def _line(pipe: IO[bytes]) -> bytes:

@@ -1,17 +1,18 @@
 """The judge's process: ``python -m racecraft.serve.submissions.judge``; every entry is driven by children of its own.
 
-    standard input    a line of JSON: a submission's folder, the race's document, its commitment, the seeds of its
-                      starts and of its hidden frames, its track; no secret, no address
+    standard input    a line of JSON: a submission's folder, that of its results, the race's document, its commitment,
+                      the seeds of its starts and of its hidden frames, its track; no secret, no address
     FOLDER/entry      what drives, read by the children
-    FOLDER/judged     what was driven
                       of a heat of a final instead the files of both who drive, and their names, who is in front first
+    RESULTS/judged    what was driven
     standard output   a line of JSON: how the judging ended, and what was said: how far the model was trained and what
                       it chooses on hidden frames, or why it cannot drive
 
 It has no environment, no database and no key, and never reads an entry itself. Two children drive it, one with one
 thread and one with two, each within walls (`racecraft.serve.submissions.walls`): a file that got the better of one
 would find nothing, and die with it. The judge compares what they drove, to the bit. What all of them need is loaded
-once; the process ends when nobody is at the other end of its standard input any more.
+once. When nobody is at the other end of its standard input any more, the process ends, and the child that drives with
+it: whoever asked is gone, and another worker may have the same entry judged by now.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from __future__ import annotations
 import filecmp
 import json
 import os
+import select
 import sys
 import traceback
 from dataclasses import replace
@@ -37,6 +39,7 @@ MOST_SAID: Final = 1 << 20  # bytes
 MOST_LOGGED: Final = 2000  # characters of a child's last words
 MOST_WRITTEN: Final = 1 << 28  # bytes of a file
 MOST_CPU: Final = 1200  # s
+LEAVING: Final = 5  # ms between two looks at a child that has said all, and ends at once as a rule
 
 
 def main() -> int:
@@ -57,27 +60,32 @@ def main() -> int:
     if lacks := missing_walls():
         _log(f"Entries are judged behind fewer walls: the system has no {lacks}.")
     for line in sys.stdin:
-        status, said = judge(json.loads(line))
+        status, said = judge(json.loads(line), asker=sys.stdin.fileno())
         sys.stdout.write(json.dumps({"status": status, "said": said}) + "\n")
         sys.stdout.flush()
     return 0
 
 
-def judge(told: dict[str, Any]) -> tuple[int, str]:
-    """How the judging of a submission ended, and what its first child said."""
-    folder = Path(told["folder"])
-    status, said = _by_a_child(told, number=1)
+def judge(told: dict[str, Any], *, asker: int | None = None) -> tuple[int, str]:
+    """How the judging of a submission ended, and what its first child said.
+
+    Args:
+        told: The line of standard input.
+        asker: A pipe whose other end is closed when nobody waits for this any more; the process then ends.
+    """
+    results = Path(told["results"])
+    status, said = _by_a_child(told, number=1, asker=asker)
     if status != DROVE:
         return status, said
-    status, _ = _by_a_child(told, number=2)
+    status, _ = _by_a_child(told, number=2, asker=asker)
     if status == FAILED:
         return FAILED, ""
-    is_same = status == DROVE and filecmp.cmp(folder / JUDGED, folder / AGAIN, shallow=False)
-    (folder / AGAIN).unlink(missing_ok=True)
+    is_same = status == DROVE and filecmp.cmp(results / JUDGED, results / AGAIN, shallow=False)
+    (results / AGAIN).unlink(missing_ok=True)
     return (DROVE, said) if is_same else (DIFFERED, "")
 
 
-def _by_a_child(told: dict[str, Any], *, number: int) -> tuple[int, str]:
+def _by_a_child(told: dict[str, Any], *, number: int, asker: int | None = None) -> tuple[int, str]:
     """How the first or second child ended, which drives a submission, and what it said; `FAILED` where it was ended."""
     mouth, pen = os.pipe()
     if (child := os.fork()) == 0:
@@ -87,10 +95,16 @@ def _by_a_child(told: dict[str, Any], *, number: int) -> tuple[int, str]:
         finally:
             os._exit(status)
     os.close(pen)
-    with open(mouth, "rb") as pipe:
-        said = pipe.read(MOST_SAID).decode(errors="replace")
-    _, ended = os.waitpid(child, 0)
-    status = os.waitstatus_to_exitcode(ended)
+    heard = b""
+    with open(mouth, "rb", buffering=0) as pipe:
+        while len(heard) < MOST_SAID:
+            _wait(child, asker, mouth=mouth)
+            if not (part := pipe.read(MOST_SAID - len(heard))):
+                break
+            heard += part
+    while not (gone := os.waitpid(child, os.WNOHANG))[0]:  # it may drive on, having closed its pipe
+        _wait(child, asker)
+    said, status = heard.decode(errors="replace"), os.waitstatus_to_exitcode(gone[1])
     if status not in (DROVE, REFUSED):
         why = system.end_of(status) or "an error"
         _log(f"A judge's child was ended by {why}. {said[-MOST_LOGGED:]}")
@@ -98,14 +112,26 @@ def _by_a_child(told: dict[str, Any], *, number: int) -> tuple[int, str]:
     return status, said
 
 
+def _wait(child: int, asker: int | None, *, mouth: int | None = None) -> None:
+    """Until a child says something, or for a moment; where nobody asks any more, it ends and this process, too."""
+    watch = select.poll()
+    if mouth is not None:
+        watch.register(mouth, select.POLLIN)
+    if asker is not None:
+        watch.register(asker, select.POLLHUP)
+    if any(file == asker for file, _ in watch.poll(LEAVING if mouth is None else None)):
+        system.end(child)
+        os.waitpid(child, 0)
+        sys.exit(FAILED)
+
+
 def _drive_alone(told: dict[str, Any], pen: int, *, number: int) -> int:
     """In the child: nothing is open to it but its way to answer, the entry to read, and a file for what it drove."""
     from racecraft.errors import RacecraftError
     from racecraft.serve.submissions.walls import lock_in
 
-    folder = Path(told["folder"])
     try:
-        result = folder / (JUDGED if number == 1 else AGAIN)
+        result = Path(told["results"]) / (JUDGED if number == 1 else AGAIN)
         written = os.open(result, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o644)
         nothing = os.open(os.devnull, os.O_RDWR)
         for file in (0, 1, 2):

@@ -24,9 +24,8 @@ from racecraft.serve.jobs.task import Task
 from racecraft.serve.races.races import announcement_of
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.tables import Race, Submission, now
-from racecraft.serve.submissions.bench import Bench
+from racecraft.serve.submissions.bench import Bench, clear
 from racecraft.serve.submissions.copies import keep_choices, mark_copies, packed
-from racecraft.serve.submissions.judge import JUDGED
 
 FOLDER: Final = "submissions"
 REPLAY: Final = "entry.replay"
@@ -58,20 +57,20 @@ def judge(task: Task) -> dict[str, Any]:
         "track": payload["track"],
         "name": payload["name"],
     }
-    result = BENCH.ask(told, folder=folder)
+    clear(folder)
+    with BENCH.asked(told, folder=folder) as (result, judged):
+        replay = read_replay(judged)
     try:
         choices, step = packed(result["choices"]), result["step"]
         if type(step) is not int or not 0 <= step < MOST_STEPS:
             raise ValueError("no step")
     except (KeyError, ValueError) as error:
         raise RunError("The judge's result does not hold: it says neither choices nor steps.", hint=BUG) from error
-    replay = read_replay(folder / JUDGED)
     found = verify(replay, race=announcement)
     if not found.is_genuine:
         raise RunError(f"The judge's result does not hold: {found.sentence}", hint=BUG)
     public = Announcement(document=announcement.document, commitment=announcement.commitment)
     write_replay(replace(replay, race=public), folder / REPLAY)
-    (folder / JUDGED).unlink()
     terms = announcement.document
     (standing,) = classify([replay.cars], ranking=terms["ranking"], minimum_laps=terms["minimum_laps"])
     with task.own_database.transaction() as session:
