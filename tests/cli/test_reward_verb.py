@@ -59,6 +59,12 @@ def test_a_reward_that_fails_in_a_situation_says_in_which(racecraft: Run, tmp_pa
     assert failed == ["off track"]
 
 
+def test_a_failure_of_numpys_is_told_with_what_to_write_instead(racecraft: Run, tmp_path: Path) -> None:
+    raised = "TypeError('only 0-dimensional arrays can be converted to Python scalars')"
+    (tmp_path / "reward_function.py").write_text(f"def reward_function(params):\n    raise {raised}\n")
+    assert "hint: NumPy makes a number only of" in racecraft("reward", "check", "reward_function.py").out
+
+
 def test_presets_are_listed_shown_and_fit(racecraft: Run) -> None:
     listed = racecraft("reward", "list", "--json").document["rewards"]
     assert {"centerline", "racing"} <= listed.keys()

@@ -38,7 +38,11 @@ def test_numbers_are_taken_as_floats(track, rows, expression, expected):
 
 
 @pytest.mark.parametrize(
-    "expression", ["np.float32(0.5)", "np.float64(0.5)", "np.array(0.5)", "Decimal('0.5')", "Fraction(1, 2)"]
+    "expression",
+    [
+        *("np.float32(0.5)", "np.float64(0.5)", "np.array(0.5)", "np.array([0.5])", "np.array([[0.5]], np.float32)"),
+        *("np.ones(1, bool) / 2", "Decimal('0.5')", "Fraction(1, 2)"),
+    ],
 )
 def test_scalars_of_other_libraries_are_taken_as_floats(track, rows, expression):
     top = "import numpy as np\nfrom decimal import Decimal\nfrom fractions import Fraction\n"

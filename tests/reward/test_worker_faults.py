@@ -30,6 +30,10 @@ FAULTS = [
     (function("return '1.0'"), 2, "returned the text '1.0'"),
     (function("return [1.0]"), 2, "type list"),
     (function("return 1j"), 2, "type complex"),
+    (function("return numpy.array(['1.0'])", top="import numpy\n"), 3, "returned the text '1.0'"),
+    (function("return numpy.array([None])", top="import numpy\n"), 3, "returned None"),
+    (function("return numpy.zeros(2)", top="import numpy\n"), 3, "type ndarray"),
+    (function("class Odd:", "    size, item = 1, 2", "return Odd()"), 4, "type Odd"),
     (function("return lambda: 1"), 2, "type function"),
     (function("yield 1.0"), -1, "type generator"),
     ("async def reward_function(params):\n    return 1.0", -1, "type coroutine"),
@@ -78,6 +82,18 @@ def test_errors_name_line_and_params(track, rows, source, line, text):
             assert source.splitlines()[line - 1].strip() in str(error)
         with pytest.raises(RewardError, match="cannot be called again"):
             worker(rows)
+
+
+@pytest.mark.skipif(np.lib.NumpyVersion(np.__version__) < "2.4.0", reason="this NumPy still makes a number of it")
+def test_what_numpy_no_longer_makes_a_number_of_is_told_with_what_to_write_instead(track, rows):
+    source = function("return float(numpy.array([params['x']]))", top="import numpy\n")
+    with running(source, track) as worker, pytest.raises(RewardError) as caught:
+        worker(rows)
+    assert "since 2.4" in caught.value.hint
+    assert "array.item()" in caught.value.hint
+    with running(function("return 1 / 0"), track) as worker, pytest.raises(RewardError) as caught:
+        worker(rows)
+    assert caught.value.hint == ""
 
 
 def test_the_row_at_fault_is_named(track, rows):

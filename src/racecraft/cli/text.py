@@ -308,6 +308,8 @@ def say_checked(problems: list[Problem], outcomes: list[Outcome], *, failed: boo
     error = next((outcome.error for outcome in outcomes if outcome.error is not None), None)
     if error is not None:
         _say(console, ("error: ", "bold red"), str(error))
+        if error.hint:
+            _say(console, ("hint: ", "bold"), error.hint)
     _say(console, ("Not fit for training.", "bold red") if failed else ("Fit for training.", "bold green"))
 
 

@@ -15,6 +15,17 @@ SHOWN_LINES: Final = 5  # of what was printed, in an error
 SHOWN_WIDTH: Final = 200  # characters of such a line
 SHOWN_BYTES: Final = 4 * SHOWN_LINES * SHOWN_WIDTH  # that hold them
 
+HINTS: Final = {
+    "only 0-dimensional arrays can": "NumPy makes a number only of an array without dimensions, since 2.4. "
+    "Write array[0] or array.item() where it has one element.",
+}
+"""What to do about it, by a part of what an exception says."""
+
+
+def hint_about(text: str) -> str:
+    """What to do about a failure, where its text does not say it."""
+    return next((hint for part, hint in HINTS.items() if part in text), "")
+
 
 def told(text: str, source: str, *, line: int, is_loading: bool, params: dict[str, Any] | None, printed: str) -> str:
     """A failure in full.

@@ -31,7 +31,7 @@ from racecraft.checks import require
 from racecraft.errors import ConfigError, RewardError, RewardTimeout, ShapeError, printable
 from racecraft.reward import launch
 from racecraft.reward import worker_process as protocol
-from racecraft.reward.failure import SHOWN_BYTES, SHOWN_WIDTH, kept_prints, told
+from racecraft.reward.failure import SHOWN_BYTES, SHOWN_WIDTH, hint_about, kept_prints, told
 from racecraft.reward.modules import needed_modules, used_words
 from racecraft.reward.numeric import NotNumeric, numeric_source
 from racecraft.reward.params import make_params
@@ -333,6 +333,7 @@ class RewardWorker:
         message = told(text, self._source, line=line, is_loading=rows is None, params=params, printed=printed)
         return RewardError(
             message,
+            hint=hint_about(text),
             line=line if line > 0 else None,
             row_index=None if rows is None else first + row,
             params=params,

@@ -368,7 +368,12 @@ def guard(event: str, arguments: tuple[object, ...]) -> None:
 
 
 def to_float(reward: Any) -> float:
-    """What AWS's ``float()`` makes of a bool, an int or a numpy scalar; a text is no number here."""
+    """What AWS's ``float()`` makes of a bool, an int, or numpy's scalar or array of one; a text is no number here."""
+    try:
+        if getattr(reward, "size", None) == 1 and hasattr(reward, "item"):
+            reward = reward.item()  # numpy's own float() refuses an array that has dimensions, since 2.4
+    except Exception:
+        pass  # it is told below what it is
     if reward is None:
         raise BadRewardError("returned None; every path through the function must return a number")
     if isinstance(reward, (str, bytes, bytearray)):

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from racecraft.errors import printable
 from racecraft.reward.check import check_reward
-from racecraft.reward.failure import SHOWN_BYTES, kept_prints, told
+from racecraft.reward.failure import SHOWN_BYTES, hint_about, kept_prints, told
 from racecraft.reward.params import make_params
 from racecraft.reward.state import keeps_state
 from racecraft.reward.worker_process import (
@@ -131,9 +131,9 @@ def check(question: str) -> str:
             calls = Calls(source, asked["waypoints"], num_cars=1, seed=0)
             situations.extend(_try(calls, situation) for situation in asked["situations"])
     except Failed as failed:
-        problems.append(
-            {"line": max(failed.line, 1), "column": 1, "severity": "error", "message": str(failed), "hint": ""}
-        )
+        text = str(failed)
+        about = {"severity": "error", "message": text, "hint": hint_about(text)}
+        problems.append({"line": max(failed.line, 1), "column": 1, **about})
     is_ok = not any(problem["severity"] == "error" for problem in problems)
     return json.dumps({"ok": is_ok, "problems": problems, "situations": situations, "painting": None, "laps": []})
 
