@@ -13,6 +13,7 @@ import pytest
 
 from racecraft import load_track, train
 from racecraft.contest.ladder import hold_ladder
+from racecraft.contest.terms import race_terms
 from racecraft.errors import ConfigError, RunError
 from racecraft.judging.ladder import rate_models
 from racecraft.judging.race import race_models
@@ -87,6 +88,24 @@ def test_a_race_is_filmed_with_ghosts(models: list[Path], tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
+    ("settings", "needed"),
+    [
+        ({}, 3),
+        ({"minimum_laps": 3}, 3),
+        ({"ranking": "best"}, 1),
+        ({"ranking": "best", "minimum_laps": 2}, 2),
+        ({"ranking": "average"}, 3),
+        ({"ranking": "average", "minimum_laps": 1}, 1),
+    ],
+)
+def test_a_total_needs_all_laps_and_the_other_rankings_as_many_as_are_asked_for(
+    settings: dict[str, Any], needed: int
+) -> None:
+    conditions = Conditions(track=load_track("oval"), rules=RaceRules(laps=3))
+    assert race_terms(conditions, **settings).minimum_laps == needed
+
+
+@pytest.mark.parametrize(
     ("settings", "words"),
     [
         ({"kind": "time-trail"}, "time-trial"),
@@ -94,6 +113,7 @@ def test_a_race_is_filmed_with_ghosts(models: list[Path], tmp_path: Path) -> Non
         ({"kind": "grid", "models": 9}, "2 to 8"),
         ({"ranking": "luck"}, "ranking"),
         ({"minimum_laps": 2}, "1 to 1"),
+        ({"laps": 3, "minimum_laps": 1}, "needs all 3 laps"),  # who gives up after one would be the fastest
         ({"num_trials": 0}, "1 to 99"),
         ({"num_trials": 100}, "1 to 99"),
         ({"num_trials": 2, "kind": "grid"}, "all are on one road"),

@@ -208,6 +208,7 @@ def test_what_cannot_be_driven_is_refused(console: RunningConsole, cars: list[di
         (422, {"models": cars, "objects": "boxes", "positions": [[0.5, 0]]}),
         (422, {"models": cars, "objects": "boxes", "positions": [[1.5, 1]]}),
         (422, {"models": cars, "ranking": "best", "minimum_laps": 2}),  # of one lap
+        (422, {"models": cars, "laps": 3, "minimum_laps": 1}),  # of which the total is ranked by
     ]
     for status, body in heats:
         reply = client.post("/api/contests/heats", json=body)

@@ -35,7 +35,7 @@ def race(
     rules: Rules = "drfc",
     ranking: Annotated[str, typer.Option("--ranking", help="total, best or average.")] = "total",
     minimum_laps: Annotated[
-        int | None, typer.Option("--minimum-laps", help="Laps that a trial must have for a score.")
+        int | None, typer.Option("--minimum-laps", help="Laps that a trial must have for a score; all with total.")
     ] = None,
     trials: Annotated[
         int | None,

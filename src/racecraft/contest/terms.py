@@ -70,8 +70,8 @@ def race_terms(
         kind: Of `RACE_KINDS`.
         num_cars: Entries; where each drives alone their number means nothing.
         ranking: ``total`` time, ``best`` lap or ``average`` of the best `minimum_laps` laps in a row.
-        minimum_laps: Completed laps that a trial must have for a score; by default all for ``total``, three for
-            ``average``, one for ``best``.
+        minimum_laps: Completed laps that a trial must have for a score: all for ``total``, which would else be won by
+            who gave up first; by default three for ``average`` and one for ``best``.
         num_trials: Of each entry that drives alone, 5 by default; cars on one road have one.
         secret: 32 bytes that the seed is drawn from, or None for one that everybody may know.
         final: What else is announced of a race of duels, from `racecraft.contest.finals.FinalTerms`.
@@ -84,6 +84,11 @@ def race_terms(
     needed = {"total": laps, "average": min(3, laps)}.get(ranking, 1) if minimum_laps is None else minimum_laps
     check_choice("ranking", ranking, RANKINGS)
     require("minimum_laps", needed, 1 <= needed <= laps, f"1 to {laps}, the laps of the race")
+    if ranking == "total" and needed < laps:
+        raise ConfigError(
+            f"A race ranked by the total time needs all {laps} laps, as fewer take less; minimum_laps is {needed}.",
+            hint="Leave minimum_laps out, or rank by the best lap or the best average.",
+        )
     if kind in TOGETHER:
         conditions = replace(shared_road(conditions, num_cars), camera=conditions.camera or CameraSpec())
     announcement = Announcement.of(

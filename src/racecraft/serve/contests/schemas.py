@@ -32,8 +32,8 @@ class NewHeat(RaceSettings):
     laps: int = Field(1, ge=1, le=20)
     ranking: Ranking = "total"
     minimum_laps: int | None = Field(None, ge=1, le=20)
-    """That a car must have for a score; by default all for the total, three in a row for the average, one for the
-    best."""
+    """That a car must have for a score; always all for the total, by default three in a row for the average, one for
+    the best."""
     objects: Among = "none"
     """What else is on the road."""
     count: int = Field(3, ge=1, le=20)
