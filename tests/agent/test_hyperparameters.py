@@ -57,17 +57,56 @@ def test_unknown_fields_are_reported_and_kept():
     ("field", "value", "allowed"),
     [
         ("batch_size", 100, "32, 64, 128, 256 or 512"),
+        ("batch_size", 1024, "32, 64, 128, 256 or 512"),
         ("num_epochs", 2, "3 to 10"),
-        ("num_epochs", 3.5, "3 to 10"),
-        ("lr", 0.1, "1e-08 to 0.001"),
-        ("lr", "nan", "1e-08 to 0.001"),
-        ("lr", True, "1e-08 to 0.001"),
-        ("lr", None, "1e-08 to 0.001"),
-        ("lr", [0.1], "1e-08 to 0.001"),
-        ("beta_entropy", -0.1, "0 to 1"),
+        ("num_epochs", 12, "3 to 10"),
+        ("lr", 0.01, "1e-08 to 0.001"),
+        ("lr", 1e-9, "1e-08 to 0.001"),
+        ("beta_entropy", 1.5, "0 to 1"),
+        ("num_episodes_between_training", 200, "1 to 100"),
+    ],
+)
+def test_what_only_awss_console_refused_is_taken_with_a_note(field, value, allowed):
+    settings = Hyperparameters.from_dict({field: value}, name="h.json")
+    assert getattr(settings, field) == value
+    assert settings.to_dict()[field] == value
+    assert settings.notes == (f"h.json: {field} is {value:g}, and AWS's console allowed {allowed}.",)
+
+
+def test_nothing_is_noted_of_what_the_console_allowed():
+    ends = [
+        {"batch_size": 32, "num_epochs": 3, "lr": 1e-8, "beta_entropy": 0, "num_episodes_between_training": 1},
+        {"batch_size": 512, "num_epochs": 10, "lr": 1e-3, "beta_entropy": 1, "num_episodes_between_training": 100},
+    ]
+    assert [Hyperparameters.from_dict(document).notes for document in ({}, *ends)] == [(), (), ()]
+
+
+def test_names_may_have_capital_letters():
+    settings = Hyperparameters.from_dict({"loss_type": "Huber", "exploration_type": " Categorical"})
+    assert (settings.loss_type, settings.exploration_type, settings.notes) == ("huber", "categorical", ())
+    assert Hyperparameters(loss_type="Mean Squared Error").loss_type == "mean squared error"
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "allowed"),
+    [
+        ("batch_size", 0, "1 to 2048"),
+        ("batch_size", 4096, "1 to 2048"),
+        ("num_epochs", 0, "1 to 100"),
+        ("num_epochs", 101, "1 to 100"),
+        ("num_epochs", 3.5, "1 to 100"),
+        ("lr", 0, "above 0, to 1"),
+        ("lr", 1.1, "above 0, to 1"),
+        ("lr", "nan", "above 0, to 1"),
+        ("lr", True, "above 0, to 1"),
+        ("lr", None, "above 0, to 1"),
+        ("lr", [0.1], "above 0, to 1"),
+        ("beta_entropy", -0.1, "0 to 100"),
+        ("beta_entropy", 101, "0 to 100"),
         ("discount_factor", 1.01, "0 to 1"),
         ("loss_type", "hubert", "'huber' or 'mean squared error' (Did you mean 'huber'?)"),
-        ("num_episodes_between_training", 0, "1 to 100"),
+        ("num_episodes_between_training", 0, "1 to 10000"),
+        ("num_episodes_between_training", 10_001, "1 to 10000"),
         ("exploration_type", "greedy", "'categorical' or 'e-greedy'"),
         ("e_greedy_value", 2, "0 to 1"),
         ("epsilon_steps", 0, "1 or more"),
@@ -106,6 +145,16 @@ def test_sac_is_that_of_aws_with_an_update_a_step_and_nothing_of_ours():
     assert (found["learning_rate"], found["minibatch_size"], found["alpha"], found["gamma"]) == (1e-4, 128, 0.3, 0.999)
     assert (found["tau"], found["updates_per_step"], found["policy_frequency"]) == (1.0, 1.0, 1)
     assert (found["learns_alpha"], found["normalize_rewards"]) == (False, False)
+
+
+def test_continuous_actions_are_drawn_by_chance_whatever_the_file_says():
+    greedy = Hyperparameters.from_dict({"exploration_type": "e-greedy", "num_epochs": 2})
+    assert greedy.to_ppo(is_continuous=True) == {**greedy.to_ppo(), "exploration": "categorical"}
+    assert greedy.to_ppo()["exploration"] == "e-greedy"
+    assert greedy.notes_for("discrete") == greedy.notes
+    told = "exploration_type 'e-greedy' has no effect: continuous actions are always drawn by chance."
+    assert greedy.notes_for("continuous") == (*greedy.notes, told)
+    assert Hyperparameters().notes_for("continuous") == ()
 
 
 def test_ppo_settings_are_named_as_the_learner_names_them():

@@ -69,6 +69,27 @@ def test_a_drfc_folder(tmp_path: Path) -> None:
     assert report["used"] == found.used
 
 
+def test_what_only_awss_console_refused_comes_along_with_a_note(tmp_path: Path) -> None:
+    limits = {"steering_angle": {"low": -20, "high": 20}, "speed": {"low": 1, "high": 2}}
+    wide = {"num_epochs": 2, "batch_size": 1024, "lr": 0.01, "loss_type": "Huber", "exploration_type": "e-greedy"}
+    changed = {
+        "model_metadata.json": json.dumps({**json.loads(models.METADATA), "action_space": limits}),
+        "hyperparameters.json": json.dumps({**wide, "num_episodes_between_training": 200}),
+    }
+    found = import_run(models.as_folder({**models.MODEL, **changed}, tmp_path / "m"), network="RACECRAFT_SMALL")
+    told = [note.split(", and")[0].split(" has")[0] for note in found.notes if "hyperp" in note or "e-greedy" in note]
+    assert told == [
+        "hyperparameters.json: batch_size is 1024",
+        "hyperparameters.json: num_epochs is 2",
+        "hyperparameters.json: lr is 0.01",
+        "hyperparameters.json: num_episodes_between_training is 200",
+        "exploration_type 'e-greedy'",
+    ]
+    ppo = read_settings(RunFolder.open(found.run)).ppo
+    assert (ppo.update_epochs, ppo.minibatch_size, ppo.learning_rate, ppo.value_loss) == (2, 1024, 0.01, "huber")
+    assert (ppo.episodes_per_iteration, ppo.num_envs, ppo.exploration) == (200, 64, "categorical")
+
+
 def test_a_reward_function_alone_and_with_files_beside_it(tmp_path: Path) -> None:
     models.as_folder({"mine.py": models.REWARD, "other.py": "import os"}, tmp_path / "a")
     found = import_run(tmp_path / "a" / "mine.py")

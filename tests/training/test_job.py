@@ -188,11 +188,28 @@ def test_e_greedy_exploration(tiny: Train, tmp_path: Path) -> None:
     assert tiny(hyperparameters=save(parameters, tmp_path), until="200 steps").reason == "steps"
 
 
-def test_e_greedy_with_continuous_actions_is_refused_before_anything_is_written(tiny: Train, tmp_path: Path) -> None:
+def test_e_greedy_is_nothing_to_continuous_actions(tiny: Train, tmp_path: Path) -> None:
+    recorder = Recorder()
     parameters = save(replace(AWS_LIKE, exploration_type="e-greedy"), tmp_path)
+    result = tiny(hyperparameters=parameters, actions="continuous", until="64 steps", reporter=recorder)
+    assert any("'e-greedy' has no effect" in note for note in recorder.notes)
+    assert json.loads((result.run / "hyperparameters.json").read_text())["exploration_type"] == "e-greedy"
+
+
+def test_our_e_greedy_with_continuous_actions_is_refused_before_anything_is_written(
+    tiny: Train, tmp_path: Path
+) -> None:
     with pytest.raises(ConfigError, match="e-greedy"):
-        tiny(hyperparameters=parameters, actions="continuous")
+        tiny(ppo=replace(TINY, exploration="e-greedy"), actions="continuous")
     assert not (tmp_path / "runs").exists()
+
+
+def test_what_only_awss_console_refused_trains(tiny: Train, tmp_path: Path) -> None:
+    recorder = Recorder()
+    wide = replace(AWS_LIKE, num_epochs=1, batch_size=1000, lr=0.01, num_episodes_between_training=200)
+    tiny(hyperparameters=save(wide, tmp_path), until="100 steps", reporter=recorder)
+    assert all(report.stats.episodes == 200 for report in recorder.iterations)
+    assert len([note for note in recorder.notes if "AWS's console allowed" in note]) == 4
 
 
 def test_continuous_actions(tiny: Train) -> None:

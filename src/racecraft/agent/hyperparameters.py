@@ -6,53 +6,73 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import BeforeValidator, Field
 
 from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, unknown_fields, validate
 from racecraft.errors import ConfigError
 from racecraft.json_file import read_json_object, write_json_object
 
-BATCH_SIZES = (32, 64, 128, 256, 512)
+BATCH_SIZES = (32, 64, 128, 256, 512)  # those of AWS's console
 GAE_LAMBDA = 0.95  # AWS's, fixed
 CLIP_COEF = 0.2  # AWS's, fixed
 
+CONSOLE: Final[Mapping[str, tuple[float, ...]]] = {
+    "batch_size": BATCH_SIZES,
+    "num_epochs": (3, 10),
+    "lr": (1e-8, 1e-3),
+    "beta_entropy": (0, 1),
+    "num_episodes_between_training": (1, 100),
+}
+"""What AWS's console allowed, two ends or every value, where its training code takes more."""
 
-def _batch_size(value: int) -> int:
-    if value not in BATCH_SIZES:
-        raise ValueError("not a batch size")
-    return value
+
+def _words(allowed: tuple[float, ...]) -> str:
+    *others, last = (f"{value:g}" for value in allowed)
+    return f"{', '.join(others)} or {last}" if len(others) > 1 else f"{others[0]} to {last}"
+
+
+def _plain(value: object) -> object:
+    """A name in small letters, as AWS's code reads it."""
+    return value.strip().lower() if isinstance(value, str) else value
 
 
 @dataclass(frozen=True)
 class Hyperparameters:
-    """How AWS would train; the ranges are its console's, the defaults those of its training code.
+    """How AWS would train; the defaults are those of its training code.
+
+    That code only casts its values, so the ranges here are wider than its console's: all that can train at all.
 
     Raises:
         ConfigError: A value is outside its range.
     """
 
-    batch_size: Annotated[Whole, AfterValidator(_batch_size), Field(description="32, 64, 128, 256 or 512 samples")] = 64
-    """Samples in a minibatch."""
-    num_epochs: Annotated[Whole, Field(ge=3, le=10, description="3 to 10")] = 10
+    batch_size: Annotated[Whole, Field(ge=1, le=2048, description="1 to 2048 samples")] = 64
+    """Samples in a minibatch; the largest of AWS's networks keeps some MB for each."""
+    num_epochs: Annotated[Whole, Field(ge=1, le=100, description="1 to 100")] = 10
     """Passes over each rollout."""
-    lr: Annotated[Number, Field(ge=1e-8, le=1e-3, description="1e-08 to 0.001")] = 3e-4
+    lr: Annotated[Number, Field(gt=0, le=1, description="above 0, to 1")] = 3e-4
     """Learning rate of Adam."""
-    beta_entropy: Annotated[Number, Field(ge=0, le=1, description="0 to 1")] = 0.01
+    beta_entropy: Annotated[Number, Field(ge=0, le=100, description="0 to 100")] = 0.01
     """Weight of the entropy bonus."""
     discount_factor: Annotated[Number, Field(ge=0, le=1, description="0 to 1")] = 0.999
     """What a reward one step later is worth now."""
     loss_type: Annotated[
-        Literal["huber", "mean squared error"], Field(description="'huber' or 'mean squared error'")
+        Literal["huber", "mean squared error"],
+        BeforeValidator(_plain),
+        Field(description="'huber' or 'mean squared error'"),
     ] = "mean squared error"
     """Loss of the value head."""
-    num_episodes_between_training: Annotated[Whole, Field(ge=1, le=100, description="1 to 100")] = 20
-    """Episodes of a rollout."""
+    num_episodes_between_training: Annotated[Whole, Field(ge=1, le=10_000, description="1 to 10000")] = 20
+    """Episodes of a rollout, which ends after 10,000 steps at the latest."""
     exploration_type: Annotated[
-        Literal["categorical", "e-greedy"], Field(description="'categorical' or 'e-greedy'")
+        Literal["categorical", "e-greedy"],
+        BeforeValidator(_plain),
+        Field(description="'categorical' or 'e-greedy'"),
     ] = "categorical"
-    """Sample the policy, or take its best action except for a share of random ones."""
+    """Sample the policy, or take its best action except for a share of random ones; continuous actions are sampled
+    always."""
     e_greedy_value: Annotated[Number, Field(ge=0, le=1, description="0 to 1")] = 0.05
     """Share of random actions at the end of the schedule; only for e-greedy."""
     epsilon_steps: Annotated[Whole, Field(ge=1, description="1 or more steps")] = 10_000
@@ -69,7 +89,7 @@ class Hyperparameters:
     extra: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Fields of the file that mean nothing here; kept and written back."""
     notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
-    """Sentences for the user about what in the file has no effect."""
+    """Sentences for the user about what in the file has no effect or is unusual."""
 
     def __post_init__(self) -> None:
         given = {name: getattr(self, name) for name in _file().model_fields}
@@ -94,6 +114,11 @@ class Hyperparameters:
         if "stack_size" in document and document["stack_size"] not in (1, "1"):
             notes.append(f"{name}: stack_size {document['stack_size']} has no effect, the network sees one frame.")
         values = {field: getattr(checked, field) for field in _file().model_fields}
+        for setting, allowed in CONSOLE.items():
+            value = values[setting]
+            is_usual = value in allowed if len(allowed) > 2 else allowed[0] <= value <= allowed[1]
+            if not is_usual:
+                notes.append(f"{name}: {setting} is {value:g}, and AWS's console allowed {_words(allowed)}.")
         return cls(**values, extra=dict(checked.model_extra or {}), notes=tuple(notes))
 
     def save(self, path: str | Path) -> None:
@@ -120,12 +145,20 @@ class Hyperparameters:
             episodes = self.num_episodes_between_training
             raise ConfigError(f"num_episodes_between_training is {episodes}; allowed is 1 with 'sac'.")
 
-    def to_ppo(self, *, is_exact: bool = False) -> dict[str, float | int | str]:
+    def notes_for(self, actions: str) -> tuple[str, ...]:
+        """Sentences for the user: `notes`, and what has no effect with ``discrete`` or ``continuous`` actions."""
+        notes = list(self.notes)
+        if actions == "continuous" and self.exploration_type == "e-greedy":
+            notes.append("exploration_type 'e-greedy' has no effect: continuous actions are always drawn by chance.")
+        return tuple(notes)
+
+    def to_ppo(self, *, is_exact: bool = False, is_continuous: bool = False) -> dict[str, float | int | str]:
         """The same settings under the names of our PPO.
 
         AWS's PPO does not clip gradients, hence the norm of 0, which means never.
 
         Args:
+            is_continuous: The policy's actions are; AWS draws such ones whatever the exploration is to be.
             is_exact: Also what AWS's learner does less well than ours: its networks begin with Glorot's weights, its
                 critic predicts in units of reward and its squared error is not halved, its Adam is TensorFlow's.
         """
@@ -148,7 +181,7 @@ class Hyperparameters:
             "minibatch_size": self.batch_size,
             "episodes_per_iteration": self.num_episodes_between_training,
             "value_loss": "huber" if self.loss_type == "huber" else "mse",
-            "exploration": self.exploration_type,
+            "exploration": "categorical" if is_continuous else self.exploration_type,
             "epsilon_start": 1.0,
             "epsilon_end": self.e_greedy_value,
             "epsilon_steps": self.epsilon_steps,

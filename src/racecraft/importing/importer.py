@@ -124,7 +124,9 @@ def import_run(
         text = _read_reward(model, reward)
         metadata = _read_metadata(model)
         own = None if reward or network else read_own(source, model.root, track=track)
-        hyperparameters = None if own is not None and not own.has_hyperparameters else _read_hyperparameters(model)
+        hyperparameters = (
+            None if own is not None and not own.has_hyperparameters else _read_hyperparameters(model, metadata)
+        )
         if hyperparameters is not None:
             hyperparameters.check_algorithm(metadata.training_algorithm)
         if own is not None:
@@ -298,7 +300,7 @@ def _actions(metadata: ModelMetadata) -> str:
     return f"{space.size} actions" if space.kind == "discrete" else "continuous actions"
 
 
-def _read_hyperparameters(model: _Model) -> Hyperparameters | None:
+def _read_hyperparameters(model: _Model, metadata: ModelMetadata) -> Hyperparameters | None:
     name = model.find(HYPERPARAMETERS)
     if model.root + RUN in model.source.files and name != model.root + HYPERPARAMETERS:
         name = ""  # what a run of ours leaves for AWS's tools is never read back: ours may lie outside of AWS's ranges
@@ -309,7 +311,7 @@ def _read_hyperparameters(model: _Model) -> Hyperparameters | None:
     hyperparameters = Hyperparameters.from_dict(parse_json_object(model.source.text(name), name=shown), name=shown)
     episodes = hyperparameters.num_episodes_between_training
     model.used[shown] = f"PPO as AWS's, {episodes} episodes to an iteration"
-    model.notes += hyperparameters.notes
+    model.notes += hyperparameters.notes_for(metadata.action_space.kind)
     return hyperparameters
 
 

@@ -37,7 +37,9 @@ class Plan:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences for the user about the files and the parent."""
-        files = (*self.metadata.notes, *(self.hyperparameters.notes if self.hyperparameters is not None else ()))
+        files, actions = self.metadata.notes, self.metadata.action_space.kind
+        if self.hyperparameters is not None:
+            files = (*files, *self.hyperparameters.notes_for(actions))
         if self.parent is None:
             return files
         anew = self.parent.check(self.settings.network_spec(self.metadata), self.metadata)

@@ -273,7 +273,7 @@ def make_settings(
     if hyperparameters is not None:
         if ppo is not None:
             raise ConfigError("ppo and hyperparameters both say how the policy improves; give one of them.")
-        learning: dict[str, Any] = hyperparameters.to_ppo(is_exact=critic == "camera")
+        learning: dict[str, Any] = hyperparameters.to_ppo(is_exact=critic == "camera", is_continuous=is_continuous)
         ppo = PPOConfig(**learning, num_envs=num_envs or min(hyperparameters.num_episodes_between_training, 64))
     elif ppo is None:
         assert regime.ppo is not None

@@ -189,7 +189,7 @@ def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:
     ):
         raise ConfigError(
             "exploration is 'e-greedy', which needs a discrete action space; this one is continuous.",
-            hint="Set exploration_type to 'categorical' in hyperparameters.json.",
+            hint="Set exploration to 'categorical'.",
         )
 
 
