@@ -193,6 +193,37 @@ def test_the_trial_that_counts_is_that_with_the_score(
     assert league.counted_trial(number) == 1
 
 
+def test_nobody_enters_a_final_before_all_of_its_qualifying_is_judged(
+    league: League, database: Database, files: list[bytes]
+) -> None:
+    qualifying = race_of(database)
+    number = enter(league, database)(files[0])
+    with database.transaction() as session:
+        session.get_one(Submission, number).judged = now()
+        terms = {"track": "oval", "ranking": "total", "commitment": "0" * 64, "attempts_per_day": 0}
+        final = Race(owner_id=1, group_id=1, title="Final", after_id=qualifying, best_of_it=1, **terms)
+        session.add(final)
+        session.flush()
+        after = final.id
+
+    def refusal() -> str:
+        with pytest.raises(Conflict) as refused:
+            league.submit(after, files[1], model="novice", user_id=ADA)
+        return str(refused.value)
+
+    assert refusal() == "Who drives here is decided by 'Cup', which is not over yet."
+    with database.transaction() as session:
+        session.get_one(Race, qualifying).closes = now()
+    for state in ("queued", "running"):
+        end(database, number, state)
+        assert refusal() == "Not all submissions to 'Cup' are judged yet."
+    end(database, number, "done")
+    assert refusal() == "The first 1 of 'Cup' drive here.", "without a score she has no place"
+    with database.transaction() as session:
+        session.get_one(Submission, number).score_ms = 20_000
+    league.submit(after, files[1], model="novice", user_id=ADA)
+
+
 def test_judging_again_leaves_one_copy_of_the_file(
     league: League, database: Database, files: list[bytes], tmp_path: Path
 ) -> None:

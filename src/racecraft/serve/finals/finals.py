@@ -23,11 +23,11 @@ from racecraft.serve.jobs.queue import new_job
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import hold, state_of
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Duel, Finalist, Job, Race, Submission
+from racecraft.serve.store.tables import Duel, Finalist, Job, Race
 from racecraft.serve.submissions.finalists import board_of, duels_of, finalists_of
 from racecraft.serve.submissions.infos import seconds_of
 from racecraft.serve.submissions.league import League
-from racecraft.serve.submissions.stages import final_of
+from racecraft.serve.submissions.stages import final_of, is_decided, require_decided
 from racecraft.serve.tracks.courses import Courses
 
 KIND: Final = "final"
@@ -62,10 +62,7 @@ class Finals:
             before = session.get_one(Race, race.after_id)
             if state_of(race) == "upcoming":
                 raise Conflict("The race is not open yet.")
-            if state_of(before) != "closed":
-                raise Conflict(f"Who drives here is decided by {before.title!r}, which is not over yet.")
-            if _waiting(session, before.id):
-                raise Conflict(f"Not all submissions to {before.title!r} are judged yet.", hint="Wait for them.")
+            require_decided(session, before)
             old = None if race.final_job_id is None else session.get_one(Job, race.final_job_id)
             if old is not None and old.state in UNDER_WAY:
                 raise Conflict("It is being driven.")
@@ -96,7 +93,7 @@ class Finals:
             before = session.get_one(Race, race.after_id)
             job = None if race.final_job_id is None else session.get_one(Job, race.final_job_id)
             finalists, driven = finalists_of(session, race_id), duels_of(session, race_id)
-            is_qualified = state_of(before) == "closed" and not _waiting(session, before.id)
+            is_qualified = is_decided(session, before)
         return FinalPage.model_validate(
             {
                 "race": race_id,
@@ -150,12 +147,6 @@ class Finals:
         if terms is None or race.after_id is None:
             raise NotFound(f"Race {race_id} is no final in which two meet at a time.")
         return race, terms
-
-
-def _waiting(session: Session, race_id: int) -> bool:
-    query = sa.select(Submission.id).join(Job, Job.id == Submission.job_id)
-    query = query.where(Submission.race_id == race_id, Job.state.in_(UNDER_WAY))
-    return session.scalar(query.limit(1)) is not None
 
 
 def _duels(terms: FinalTerms, num_finalists: int, driven: dict[int, Duel]) -> list[DuelInfo]:

@@ -10,11 +10,10 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from racecraft.serve.problems import Conflict
-from racecraft.serve.races.races import state_of
 from racecraft.serve.store.tables import Job, Race, Submission, now
 from racecraft.serve.submissions.bench import DriverFailed
 from racecraft.serve.submissions.finalists import board_of
-from racecraft.serve.submissions.stages import final_of
+from racecraft.serve.submissions.stages import final_of, require_decided
 
 KIND: Final = "judge"
 """Of a submission's job."""
@@ -73,8 +72,7 @@ def require_place(session: Session, race: Race, user_id: int) -> None:
     if race.after_id is None:
         return
     before = session.get_one(Race, race.after_id)
-    if state_of(before) != "closed":
-        raise Conflict(f"Who drives here is decided by {before.title!r}, which is not over yet.")
+    require_decided(session, before)
     rows = board_of(session, before, user_id=user_id, top=1).rows
     place = next((row.place for row in rows if row.user == user_id), None)
     if place is None or place > race.best_of_it:

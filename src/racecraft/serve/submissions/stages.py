@@ -8,7 +8,8 @@ from sqlalchemy.orm import Session
 from racecraft.contest.finals import FinalTerms
 from racecraft.errors import ConfigError
 from racecraft.serve.problems import Conflict, NotFound
-from racecraft.serve.store.tables import Race, Submission
+from racecraft.serve.races.races import state_of
+from racecraft.serve.store.tables import Job, Race, Submission
 from racecraft.serve.submissions.schemas import NewLeagueRace
 
 
@@ -53,6 +54,25 @@ def let_follow(session: Session, race_id: int, before_id: int, *, best: int) -> 
         one = session.get_one(Race, one).after_id
     row = session.get_one(Race, race_id)
     row.after_id, row.best_of_it = before_id, best
+
+
+def is_decided(session: Session, before: Race) -> bool:
+    """Whether a race that another takes its drivers from is over, and all of its submissions are judged."""
+    waiting = sa.select(Submission.id).join(Job, Job.id == Submission.job_id)
+    waiting = waiting.where(Submission.race_id == before.id, Job.state.in_(("queued", "running")))
+    return state_of(before) == "closed" and session.scalar(waiting.limit(1)) is None
+
+
+def require_decided(session: Session, before: Race) -> None:
+    """Refuse to say who qualified as long as that may change.
+
+    Raises:
+        Conflict: The race is not over, or not judged.
+    """
+    if state_of(before) != "closed":
+        raise Conflict(f"Who drives here is decided by {before.title!r}, which is not over yet.")
+    if not is_decided(session, before):
+        raise Conflict(f"Not all submissions to {before.title!r} are judged yet.", hint="Wait for them.")
 
 
 def require_alone(race: Race) -> None:
