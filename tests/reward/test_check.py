@@ -85,6 +85,32 @@ ERRORS = [
         19,
         "'progress'",
     ),
+    (
+        "def inner(p):\n    return p['progres']\ndef outer(a, *, q):\n    return inner(q)\n"
+        + body("return outer(1, q=params)"),
+        2,
+        14,
+        "p has no key 'progres'.",
+    ),
+    (
+        body("def near():", "    return params['progres']", "return near()"),
+        3,
+        23,
+        "'progress'",
+    ),
+    (
+        body("w = max([{'k': 1}], key=lambda params: params['k'])", "return params['progres'] + w['k']"),
+        3,
+        19,
+        "'progress'",
+    ),
+    (
+        "def count(params, n):\n    return count(params, n - 1) if n else params['progres']\n"
+        + body("return count(params, 3)"),
+        2,
+        50,
+        "'progress'",
+    ),
     (body("reward = 1.0", "return rewrad"), 3, 12, "'rewrad' is not defined. Did you mean 'reward'?"),
     (body("return math.pi"), 2, 12, "'math' is not defined"),
     (body("return [y for x in range(3)][0]"), 2, 13, "'y' is not defined"),
@@ -127,6 +153,33 @@ WARNINGS = [
     (body("match params['x']:", "    case 1: return 1.0"), 1, "can reach its end"),
     (body("return params.get('speeed', 1.0)"), 2, "Did you mean 'speed'?"),
     (body("try:", "    return params['speeed']", "except KeyError:", "    return 1.0"), 3, "no key 'speeed'"),
+    (
+        "def weight(params):\n    return params.get('w', 1) + params['v']\n"
+        + body("weight(params)", "return weight({'w': 1, 'v': 2})"),
+        2,
+        "no key 'w'",
+    ),
+    ("class R:\n    def pay(self, p):\n        return p['w']\n" + body("return R().pay(params)"), 3, "no key 'w'"),
+    (
+        "def pay(params):\n    return params['w']\n"
+        + body("try:", "    return pay(params)", "except KeyError:", "    return 1.0"),
+        2,
+        "no key 'w'",
+    ),
+    (
+        "def outer(params):\n    return inner(params)\ndef inner(params):\n    return params['w']\n"
+        + body("outer({})", "return outer(params)"),
+        4,
+        "no key 'w'",
+    ),
+    (
+        "@cached\ndef pay(params):\n    return params['w']\n".replace("cached", "staticmethod")
+        + body("return pay(params)"),
+        3,
+        "no key 'w'",
+    ),
+    (body("same = params", "same['w'] = 1", "return params['w']"), 4, "no key 'w'"),
+    ("add = lambda p: p.update(w=1)\n" + body("add(params)", "return params['w']"), 4, "no key 'w'"),
     (body("import time", "return time.time()"), 3, "clock on the wall"),
     ("import numpy as np\nrng = np.random.default_rng()\n" + body(RETURN), 2, "without a seed"),
     (body("import logging", "logging.info('x')", RETURN), 2, "'import logging' is refused by AWS; here it is allowed."),
@@ -142,7 +195,7 @@ WARNINGS = [
 @pytest.mark.parametrize(("source", "line", "text"), WARNINGS, ids=range(len(WARNINGS)))
 def test_warnings_pass_validation(source, line, text):
     problems = check_reward(source)
-    assert [problem.severity for problem in problems] == ["warning"]
+    assert {problem.severity for problem in problems} == {"warning"}
     assert problems[0].line == line
     assert text in str(problems[0])
     validate_reward(source)
@@ -192,6 +245,17 @@ FINE = [
     body("params.update(a=1)", "return params['a']"),
     body("return params['sim_time'] if 'on_track' not in params else params['on_track']"),
     body("return params.get('speed')"),
+    "def weight(params):\n    return params['w']\n" + body("return weight({'w': 2.0})"),
+    body("w = max([{'k': 1}], key=lambda params: params['k'])", "return w['k']"),
+    "class Car:\n    def opt(self, params):\n        return params['w']\n" + body("return Car().opt({'w': 2.0})"),
+    body("def weight(params):", "    return params['w']", "return weight({'w': 2.0})"),
+    "def add(p):\n    p['mine'] = 1.0\n" + body("add(params)", "return params['mine']"),
+    "def add(p):\n    p.update(mine=1.0)\n" + body("add(params)", "return params['mine']"),
+    "class Car:\n    @staticmethod\n    def add(p, q):\n        q['w'] = p\n"
+    + body("Car.add(1, params)", "return params['w']"),
+    "def where(params):\n    params = {'a': params['x']}\n    return params['a']\n" + body("return where(params)"),
+    "def one(p):\n    p = {'w': 1}\n    return two(p)\ndef two(p):\n    return p['w']\n" + body("return one(params)"),
+    body("def weight(params, other=params['x']):", "    return params['w'] + other", "return weight({'w': 2.0})"),
     "def reward_function(p, /):\n    return p['speed']",
     body("global last", "last = 1.0", "return last"),
     body("return float(np.sqrt(4.0))", top="def load():\n    global np\n    import numpy as np\nload()\n"),
@@ -276,9 +340,20 @@ def test_any_text_gives_problems_and_never_an_exception(text):
     [
         body(RETURN) + "".join(f"speedname{i} = 0\nspeednome{i}\n" for i in range(800)),
         body(RETURN) + "a" * 30_000 + "b = 0\n" + "a" * 30_000 + "c\n",
+        "".join(f"def f{i}(p):\n return f{i + 1}(p, p)['k{i}']\n" for i in range(1200)) + body("return f0(params)"),
+        "def f("
+        + ", ".join(f"p{i}" for i in range(5000))
+        + "):\n    return p0['k']\n"
+        + body("return f(" + "params, " * 5000 + ")"),
         body(RETURN) + "import " + "os.\\\n" * 20_000 + "path\n",
     ],
-    ids=["names that resemble others", "long names that resemble each other", "a name of 20,000 parts"],
+    ids=[
+        "names that resemble others",
+        "long names that resemble each other",
+        "helpers of helpers",
+        "a long call",
+        "a name of 20,000 parts",
+    ],
 )
 def test_a_strangers_source_is_looked_at_soon(source: str) -> None:
     """A server looks at it while others wait."""

@@ -17,6 +17,7 @@ from typing import Final, Literal
 
 from racecraft.errors import RewardError, did_you_mean, printable
 from racecraft.reward.imports import ImportRules
+from racecraft.reward.keys import missing_keys
 from racecraft.reward.names import bound_names, undefined_names
 from racecraft.reward.params import TEMPLATE
 from racecraft.reward.source import MAX_CHARACTERS
@@ -192,34 +193,9 @@ def _check_returns(function: Function) -> Iterator[Problem]:
 
 
 def _check_keys(tree: ast.Module, function: Function) -> Iterator[Problem]:
-    """Keys that the params dict does not have. A function that changes or replaces the dict is left alone."""
-    arguments = [*function.args.posonlyargs, *function.args.args]
-    if not arguments:
-        return
-    name = arguments[0].arg
-    reads: list[tuple[ast.expr, str, bool]] = []  # where, key, does it raise
-    written, tested = set[str](), set[str]()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and node.id == name and not isinstance(node.ctx, ast.Load):
-            return
-        if isinstance(node, ast.Subscript) and _is_name(node.value, name) and (key := _text(node.slice)) is not None:
-            if isinstance(node.ctx, ast.Load):
-                reads.append((node.slice, key, True))
-            else:
-                written.add(key)
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and _is_name(node.func.value, name):
-            if node.func.attr in ("get", "pop") and node.args and (key := _text(node.args[0])) is not None:
-                reads.append((node.args[0], key, False))
-            elif node.func.attr in ("update", "setdefault"):
-                return
-        elif isinstance(node, ast.Compare) and (key := _text(node.left)) is not None:
-            tested.add(key)
-    guarded = {id(inner) for node in ast.walk(tree) if isinstance(node, ast.Try) for inner in ast.walk(node)}
-    for where, key, raises in reads:
-        if key not in TEMPLATE and key not in written and key not in tested:
-            is_error = raises and id(where) not in guarded
-            hint = did_you_mean(key, TEMPLATE) or f"The keys are {', '.join(TEMPLATE)}."
-            yield _at(where, f"{name} has no key '{key}'.", hint, "error" if is_error else "warning")
+    for where, name, key, is_sure in missing_keys(tree, function, set(TEMPLATE)):
+        hint = did_you_mean(key, TEMPLATE) or f"The keys are {', '.join(TEMPLATE)}."
+        yield _at(where, f"{name} has no key '{key}'.", hint, "error" if is_sure else "warning")
 
 
 def _completes(body: list[ast.stmt]) -> bool:
@@ -268,13 +244,5 @@ def _at(
     return Problem(node.lineno, node.col_offset + 1, message, hint, severity)
 
 
-def _is_name(node: ast.expr, name: str) -> bool:
-    return isinstance(node, ast.Name) and node.id == name
-
-
 def _is_constant(node: ast.expr, value: object) -> bool:
     return isinstance(node, ast.Constant) and node.value is value
-
-
-def _text(node: ast.expr) -> str | None:
-    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None

@@ -35,7 +35,7 @@ from racecraft.reward.worker_process import (
 
 SHIPPED: Final = (
     "errors.py",
-    *(f"reward/{name}.py" for name in ("check", "failure", "imports", "names", "params", "source", "state")),
+    *(f"reward/{name}.py" for name in ("check", "failure", "imports", "keys", "names", "params", "source", "state")),
     "reward/worker_process.py",
     "site/calls.py",
 )
