@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +15,8 @@ from leagues import untrained_run
 
 from racecraft.errors import ConfigError
 from racecraft.race.entry_file import pack_entry
+from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.routes import cancel_job
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
@@ -235,6 +238,39 @@ def test_judging_again_leaves_one_copy_of_the_file(
     league.judge_again(race_of(database), submission, user_id=ADA)
     (after,) = folders(tmp_path)
     assert after != before
+
+
+def test_what_an_organiser_has_judged_again_its_racer_does_not_cancel(
+    league: League, database: Database, files: list[bytes]
+) -> None:
+    teacher, race, submit = 1, race_of(database), enter(league, database)
+    with database.transaction() as session:
+        session.add(Member(group_id=1, user_id=teacher, role="organiser"))
+    seen = SimpleNamespace(see=lambda job: job)
+    context: Any = SimpleNamespace(queue=JobQueue(database, user_id=ADA), follower=seen)
+
+    def job_of(submission: int) -> Job:
+        with database.transaction() as session:
+            return session.get_one(Job, session.get_one(Submission, submission).job_id)
+
+    def cancel(submission: int) -> str:
+        return cancel_job(job_of(submission).id, context).state
+
+    first = submit(files[0])
+    assert cancel(first) == "cancelled", "what she has sent in herself"
+    first = submit(files[0])
+    end(database, first, "done")
+    league.judge_again(race, first, user_id=teacher)
+    with pytest.raises(Conflict, match="An organiser has this judged again"):
+        cancel(first)
+    assert job_of(first).state == "queued"
+    with pytest.raises(Conflict, match="takes 1 a day"):
+        submit(files[1])
+    with database.transaction() as session:
+        session.get_one(Member, (1, ADA)).role = "organiser"
+    end(database, first, "done")
+    league.judge_again(race, first, user_id=ADA)
+    assert cancel(first) == "cancelled", "what she has judged again herself"
 
 
 def test_who_leaves_takes_the_files_along(

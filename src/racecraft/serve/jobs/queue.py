@@ -104,6 +104,8 @@ MAX_LOSSES: Final = 5
 """How often a job's process may die before it is given up: it may be what kills it. Progress makes up for losses."""
 MAX_DEATHS: Final = 20
 """The same where all else on its machine died with it: rarely the job's doing."""
+ORGANISER: Final = "organiser"
+"""Of a job's payload: who has it done again for whoever it belongs to, who therefore does not cancel it."""
 ENDED: Final = ("done", "failed", "cancelled")
 RESTING: Final = tuple(name for name, kind in KINDS.items() if kind.rests)
 WATCHED: Final = timedelta(seconds=5)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from racecraft.serve.context import InContext
+from racecraft.serve.jobs.queue import ORGANISER
 from racecraft.serve.jobs.schemas import JobInfo, job_info
-from racecraft.serve.problems import NotFound
+from racecraft.serve.problems import Conflict, NotFound
 
 router = APIRouter(prefix="/api/jobs", tags=["jobs"])
 __all__ = ["job_info", "router"]
@@ -30,7 +31,10 @@ def get_job(job_id: str, context: InContext) -> JobInfo:
 @router.post("/{job_id}/cancel", status_code=202)
 def cancel_job(job_id: str, context: InContext) -> JobInfo:
     """End a job early."""
-    if context.queue.get(job_id) is None:
+    job = context.queue.get(job_id)
+    if job is None:
         raise NotFound(f"There is no job {job_id[:40]!r}.")
+    if job.payload.get(ORGANISER, job.user_id) != job.user_id:  # else it gave back an attempt that has counted
+        raise Conflict("An organiser has this judged again, so it is not yours to cancel.")
     context.queue.cancel(job_id)
     return get_job(job_id, context)

@@ -25,7 +25,7 @@ from racecraft.limits import Medals
 from racecraft.limits.limit import known_limit
 from racecraft.race.announcement import Announcement
 from racecraft.race.entry_file import read_entry_file
-from racecraft.serve.jobs.queue import KINDS, kinds_of, new_job
+from racecraft.serve.jobs.queue import KINDS, ORGANISER, kinds_of, new_job
 from racecraft.serve.jobs.turns import waiting_line
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, hold, is_withheld, state_of
@@ -317,7 +317,7 @@ class League:
             row.after_id, row.best_of_it = None, 0
 
     def judge_again(self, race_id: int, submission_id: int, *, user_id: int) -> None:
-        """Have a submission driven once more; it is off the board until that is done.
+        """Have a submission driven once more, which its racer cannot cancel; it is off the board until that is done.
 
         Raises:
             NotFound: They do not organise the race, or it has no such submission.
@@ -334,7 +334,7 @@ class League:
                 raise Conflict("It is not judged yet.")
             if not source.is_file():
                 raise Conflict("Its file is gone.")
-            job = new_job(KIND, "", old.payload, user_id=submission.user_id)
+            job = new_job(KIND, "", {**old.payload, ORGANISER: user_id}, user_id=submission.user_id)
             folder = submission_folder(self._state, job.id)
             folder.mkdir(parents=True)
             _write(folder / ENTRY, source.read_bytes())
