@@ -32,7 +32,7 @@ def database(database_url: str) -> Iterator[Database]:
             session.add(User(id=number, name=name, handle=name, role=role))
         session.add_all([Group(id=CLASS, title="class"), Group(id=CLUB, title="club")])
         session.flush()
-        session.add_all([Member(group_id=CLASS, user_id=user) for user in (ADA, BOB)])
+        session.add_all([Member(group_id=CLASS, user_id=user, is_home=True) for user in (ADA, BOB)])
     yield database
     database.close()
 
@@ -52,7 +52,12 @@ def trained(database: Database, user: int, minutes: float, **values: Any) -> str
     return job.id
 
 
-def test_the_nearest_word_counts_and_of_several_groups_the_most_generous(database: Database, quotas: Quotas) -> None:
+def leave_home(database: Database, user: int) -> None:
+    with database.transaction() as session:
+        session.get_one(Member, (CLASS, user)).is_home = False
+
+
+def test_the_nearest_word_counts_and_no_other_group_gives_or_takes_any(database: Database, quotas: Quotas) -> None:
     assert quotas.limits(ADA) == DEFAULT
     quotas.say("everybody", Limits(minutes=60, models=20))
     assert quotas.limits(ADA) == Limits(minutes=60, models=20, places=DEFAULT.places)
@@ -61,8 +66,12 @@ def test_the_nearest_word_counts_and_of_several_groups_the_most_generous(databas
     with database.transaction() as session:
         session.add(Member(group_id=CLUB, user_id=ADA))
     assert quotas.limits(ADA).minutes == 10, "the club says nothing"
+    for minutes in (30, 0):
+        quotas.say("each", Limits(minutes=minutes), CLUB)
+        assert quotas.limits(ADA).minutes == 10, "who organises the club is nobody to Ada"
     quotas.say("each", Limits(minutes=30), CLUB)
-    assert (quotas.limits(ADA).minutes, quotas.limits(BOB).minutes) == (30, 10)
+    leave_home(database, ADA)
+    assert (quotas.limits(ADA).minutes, quotas.limits(BOB).minutes) == (30, 10), "who has no home has all of them"
     quotas.say("person", Limits(minutes=5), ADA)
     assert quotas.limits(ADA) == Limits(minutes=5, models=20, places=DEFAULT.places)
     assert quotas.limits(TEACHER) == quotas.limits(1) == Limits()
@@ -102,7 +111,25 @@ def test_what_a_group_has_together_ends_for_all_of_it(database: Database, quotas
         quotas.require(ADA, "minutes")
     with database.transaction() as session:
         session.add(Member(group_id=CLUB, user_id=ADA))
-    quotas.require(ADA, "minutes")  # the club has some
+    with pytest.raises(Conflict, match="of your group are used up"):
+        quotas.require(ADA, "minutes")  # the club has some, which are not for who came in by another group
+    leave_home(database, ADA)
+    quotas.require(ADA, "minutes")
+
+
+def test_guests_use_nothing_of_what_a_group_has_together(database: Database, quotas: Quotas) -> None:
+    with database.transaction() as session:
+        session.add_all([Member(group_id=CLUB, user_id=user) for user in (ADA, BOB)])
+    quotas.say("group", Limits(minutes=20), CLUB)
+    trained(database, BOB, 20.0)
+    assert quotas.usage_together(CLUB).minutes == 0.0
+    leave_home(database, ADA)
+    quotas.require(ADA, "minutes")
+    leave_home(database, BOB)
+    assert quotas.usage_together(CLUB).minutes == pytest.approx(20.0)
+    quotas.say("group", Limits(minutes=10), CLASS)
+    with pytest.raises(Conflict, match="of your group are used up"):
+        quotas.require(ADA, "minutes")
 
 
 def test_of_two_who_share_what_their_groups_may_use_one_comes_first(database: Database, quotas: Quotas) -> None:

@@ -1,7 +1,10 @@
 """How much of the machine a racer may use, and all racers of a group together.
 
-    person ──▶ each racer of their groups ──▶ everybody ──▶ DEFAULT     the first of these that has a number counts
-    group, together                                                     besides; used up where all their groups are
+    person ──▶ each racer of their group ──▶ everybody ──▶ DEFAULT      the first of these that has a number counts
+    group, together                                                     besides
+
+Their group is the one by which they came in: whoever organises another one gives and takes nothing. Of who belongs to
+none, all groups that they are in count, of which the most generous one is enough.
 
 Minutes are of training, in the last 24 hours; models are those in the garage; places are jobs that wait or run, without
 submissions, which races limit. Organisers and admins are not limited. Being over a limit takes nothing away but time:
@@ -11,7 +14,7 @@ what is trained is saved, and goes on when there are minutes again.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Collection, Iterable
+from collections.abc import AsyncIterator, Collection, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, fields, replace
 from datetime import datetime, timedelta
@@ -20,7 +23,7 @@ from typing import Final, Literal
 from weakref import WeakValueDictionary
 
 import sqlalchemy as sa
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from racecraft.run import list_runs
 from racecraft.serve.jobs.queue import KINDS, kinds_of
@@ -100,9 +103,9 @@ class Quotas:
     def _shared(self, user_id: int) -> list[int]:
         """The groups of somebody that are limited together."""
         limited = sa.select(Quota.number).where(Quota.scope == "group")
-        groups = sa.select(Member.group_id).where(Member.user_id == user_id, Member.group_id.in_(limited))
         with self._database.transaction() as session:
-            return list(session.scalars(groups.order_by(Member.group_id)))
+            together = set(session.scalars(limited))
+            return [group for group in _groups(session, user_id) if group in together]
 
     def said(self, scope: Scope, number: int = WHOLE) -> Limits:
         """What was said of a scope itself."""
@@ -123,6 +126,11 @@ class Quotas:
         """What some people use together."""
         with self._database.transaction() as session:
             return self._usage(session, people)
+
+    def usage_together(self, group: int) -> Usage:
+        """What those use whom a group's limit is for."""
+        with self._database.transaction() as session:
+            return self._usage(session, _racers(session, group))
 
     def require(self, user_id: int, *what: Literal["minutes", "models", "places"], count: int = 1) -> None:
         """Refuse what would be more than somebody, or their groups, may use.
@@ -157,8 +165,7 @@ class Quotas:
         own = _limits(session, user_id)
         if own == Limits():
             return None
-        groups = session.scalars(sa.select(Member.group_id).where(Member.user_id == user_id)).all()
-        together = [(group, _said(session, "group", group)) for group in groups]
+        together = [(group, _said(session, "group", group)) for group in _groups(session, user_id)]
         for name in what:
             limit, more = getattr(own, name), count - 1 if name != "minutes" else 0
             if limit is not None and getattr(self._usage(session, [user_id]), name) + more >= limit:
@@ -172,8 +179,7 @@ class Quotas:
         limit = getattr(limits, name)
         if limit is None:
             return False
-        racers = sa.select(Member.user_id).where(Member.group_id == group, Member.role == "racer")
-        return bool(getattr(self._usage(session, session.scalars(racers).all()), name) + more >= limit)
+        return bool(getattr(self._usage(session, _racers(session, group)), name) + more >= limit)
 
     def _usage(self, session: Session, people: Collection[int]) -> Usage:
         moment = self._database.moment(session)
@@ -192,13 +198,27 @@ def _limits(session: Session, user_id: int) -> Limits:
     user = session.get(User, user_id)
     if user_id == OWNER or user is None or user.role != "racer":
         return Limits()
-    groups = sa.select(Member.group_id).where(Member.user_id == user_id)
-    each = [_said(session, "each", group) for group in session.scalars(groups).all()]
+    each = [_said(session, "each", group) for group in _groups(session, user_id)]
     found = _said(session, "person", user_id)
     for more in (_most(each), _said(session, "everybody", WHOLE), DEFAULT):
         blanks = [field.name for field in fields(Limits) if getattr(found, field.name) is None]
         found = replace(found, **{name: getattr(more, name) for name in blanks})
     return found
+
+
+def _groups(session: Session, user_id: int) -> list[int]:
+    """The groups whose word counts for somebody, by number."""
+    theirs = sa.select(Member.group_id, Member.is_home).where(Member.user_id == user_id).order_by(Member.group_id)
+    found = session.execute(theirs).all()
+    return [group for group, is_home in found if is_home] or [group for group, _ in found]
+
+
+def _racers(session: Session, group: int) -> Sequence[int]:
+    """Those of a group for whom its word counts."""
+    anywhere = aliased(Member)
+    has_home = sa.exists().where(anywhere.user_id == Member.user_id, anywhere.is_home)
+    racers = sa.select(Member.user_id).where(Member.group_id == group, Member.role == "racer")
+    return session.scalars(racers.where(Member.is_home | ~has_home)).all()
 
 
 def _said(session: Session, scope: Scope, number: int) -> Limits:
@@ -207,7 +227,7 @@ def _said(session: Session, scope: Scope, number: int) -> Limits:
 
 
 def _most(several: list[Limits]) -> Limits:
-    """Of somebody in several groups: what the most generous one gives."""
+    """Of several groups: what the most generous one gives."""
     values = {
         field.name: max((n for one in several if (n := getattr(one, field.name)) is not None), default=None)
         for field in fields(Limits)

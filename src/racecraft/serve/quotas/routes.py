@@ -52,7 +52,7 @@ def get_group_quota(group_id: Id, consoles: InConsoles, person: InPerson) -> Gro
     return GroupQuota(
         each=QuotaInfo(**vars(consoles.quotas.said("each", group_id))),
         together=QuotaInfo(**vars(consoles.quotas.said("group", group_id))),
-        used=UsageInfo(**vars(consoles.quotas.usage(racers))),
+        used=UsageInfo(**vars(consoles.quotas.usage_together(group_id))),
         racers=[_member(consoles, racer) for racer in racers],
     )
 
