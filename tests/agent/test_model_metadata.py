@@ -78,6 +78,69 @@ def test_continuous_and_lidar_round_trip():
     assert metadata.to_dict() == {**document, "lidar_config": {**document["lidar_config"], "num_sectors": 16}}
 
 
+LIDAR = [*CAMERA, "DISCRETIZED_SECTOR_LIDAR"]
+CARS = {"num_values": 64, "min_angle": -150, "max_angle": 150, "min_distance": 0.15, "max_distance": 1}
+
+
+def test_unknown_fields_are_told_at_any_depth():
+    document = {
+        "action_space": [{**TWO[0], "note": 1}, {**TWO[1], "note": 2, "spede": 2}],
+        "lidar_config": {"num_sectors": 4, "num_value_per_sector": 2},
+        "sensor": LIDAR,
+        "sensors": CAMERA,
+    }
+    assert ModelMetadata.from_dict(document, name="m.json").notes == (
+        "m.json: unknown field 'sensors' has no effect. Did you mean 'sensor'?",
+        "m.json: unknown field 'lidar_config.num_value_per_sector' has no effect. "
+        "Did you mean 'num_values_per_sector'?",
+        "m.json: unknown field 'action_space[].note' has no effect.",
+        "m.json: unknown field 'action_space[1].spede' has no effect. Did you mean 'speed'?",
+    )
+    speed = {**LIMITS, "speed": {"low": 1, "high": 2, "hihg": 3}}
+    assert ModelMetadata.from_dict({"action_space": speed}, name="m.json").notes == (
+        "m.json: unknown field 'action_space.speed.hihg' has no effect. Did you mean 'high'?",
+    )
+
+
+def test_what_is_unknown_of_the_lidar_is_kept_and_written_back():
+    config = {"num_sectors": 4, "clipping_distance": 0.5, "num_value_per_sector": 2}
+    metadata = ModelMetadata.from_dict({"action_space": TWO, "sensor": LIDAR, "lidar_config": config})
+    assert metadata.lidar == LidarConfig(4, 8, 0.5)
+    assert metadata.to_dict()["lidar_config"] == {**config, "num_values_per_sector": 8, "clipping_dist": 0.5}
+    again = ModelMetadata.from_dict(metadata.to_dict())
+    assert (again, again.notes) == (metadata, metadata.notes)
+
+
+def test_clipping_distance_is_what_a_car_calls_clipping_dist():
+    def read(**config):
+        return ModelMetadata.from_dict({"action_space": TWO, "sensor": LIDAR, "lidar_config": config}, name="m.json")
+
+    metadata = read(clipping_distance="0.5")
+    assert metadata.lidar == LidarConfig(clipping_dist=0.5)
+    assert metadata.notes == (
+        "m.json: lidar_config.clipping_distance 0.5 is taken as clipping_dist, which a car calls so.",
+    )
+    metadata = read(clipping_distance=0.5, clipping_dist=1.5)
+    assert metadata.lidar == LidarConfig(clipping_dist=1.5)
+    assert metadata.notes == (
+        "m.json: lidar_config.clipping_distance 0.5 has no effect, as clipping_dist is given too.",
+    )
+    with pytest.raises(ConfigError, match=r"lidar_config\.clipping_dist is 20; allowed is above 0\.15"):
+        read(clipping_distance=20)
+
+
+def test_a_cars_own_file_is_no_mistake_but_a_part_of_it_is():
+    def notes(**config):
+        document = {"action_space": TWO, "sensor": [*CAMERA, "LIDAR"], "lidar_config": config}
+        return ModelMetadata.from_dict(document, name="m.json").notes
+
+    assert notes(**CARS, clipping_distance=1, num_sectors=64) == ()
+    assert notes(num_values=64, num_sectors=64) == (
+        "m.json: unknown field 'lidar_config.num_values' has no effect. Did you mean 'num_values_per_sector'?",
+        "m.json: lidar_config has no effect without the sensor DISCRETIZED_SECTOR_LIDAR.",
+    )
+
+
 def test_continuous_is_inferred_where_the_type_is_missing():
     assert ModelMetadata.from_dict({"action_space": LIMITS}).action_space.kind == "continuous"
 

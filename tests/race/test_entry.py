@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from racecraft import train
+from racecraft.agent import ModelMetadata
 from racecraft.errors import CheckpointError, ConfigError, NonFiniteAction, RacecraftError
 from racecraft.judging.ladder import rate_models
 from racecraft.judging.race import race_models
-from racecraft.learn import PPOConfig
+from racecraft.learn import NetworkSpec, PPOConfig
 from racecraft.race.conditions import STANDARD_CAR
 from racecraft.race.entry import load_entries, load_entry
+from racecraft.race.entry_file import _digest
 from racecraft.replay import read_replay
 from racecraft.run import CheckpointStore
 from racecraft.sim.camera import CameraSpec
@@ -159,6 +161,19 @@ def test_the_wheels_of_an_old_file_turn_no_further_than_everybodys(run: Path) ->
 def test_no_file_says_where_the_lens_is(run: Path) -> None:
     metadata(lambda document: document.update(camera={"pitch": 0.0}, horizontal_fov=2.8, palette="2020"))(run)
     assert load_entry(run).policy.sensors.camera() == CameraSpec()
+
+
+def test_what_a_lidar_config_only_says_makes_no_other_entry() -> None:
+    def digest(sensor: str, **config: Any) -> str:
+        document = {"action_space": actions((-10, 1), (10, 1)), "sensor": ["FRONT_FACING_CAMERA", sensor]}
+        given = {**document, "lidar_config": config} if config else document
+        return _digest(NetworkSpec(num_actions=2), ModelMetadata.from_dict(given), {})
+
+    sectors = digest("DISCRETIZED_SECTOR_LIDAR", num_sectors=4)
+    assert digest("DISCRETIZED_SECTOR_LIDAR", num_sectors=4, note="mine") == sectors
+    assert digest("DISCRETIZED_SECTOR_LIDAR", clipping_distance=0.5) != digest("DISCRETIZED_SECTOR_LIDAR")
+    assert sectors != digest("DISCRETIZED_SECTOR_LIDAR", num_sectors=8) == digest("DISCRETIZED_SECTOR_LIDAR")
+    assert digest("LIDAR", num_sectors=4) == digest("LIDAR")
 
 
 # ---- the checkpoint

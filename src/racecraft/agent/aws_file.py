@@ -7,7 +7,7 @@ missing.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
@@ -41,6 +41,11 @@ class AwsModel(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Fields that the file has and nobody here knows."""
+        return tuple(self.model_extra or ())
+
 
 def file_model(settings: type[Any], *, rename: Callable[[str], str] = str) -> type[AwsModel]:
     """The file model of a dataclass: its ``Annotated`` fields, which say what a file may hold.
@@ -72,13 +77,35 @@ def validate(model: type[_Model], document: Mapping[str, Any], *, name: str) -> 
         raise ConfigError(f"{name}: {message}{more}.") from error
 
 
-def unknown_fields(model: BaseModel, *, name: str) -> tuple[str, ...]:
-    """A sentence for every field the file has and the model does not; such fields have no effect."""
-    known = list(type(model).model_fields)
+def unknown_fields(model: AwsModel, *, name: str) -> tuple[str, ...]:
+    """A sentence for every field the file has and the model does not, at any depth; such fields have no effect."""
     return tuple(
-        f"{name}: unknown field {show(field)} has no effect. {did_you_mean(field, known)}".rstrip()
-        for field in model.model_extra or {}
+        f"{name}: unknown field {show(place)} has no effect. {did_you_mean(field, known)}".rstrip()
+        for place, field, known in _unknown(model)
     )
+
+
+def _unknown(model: AwsModel) -> Iterator[tuple[str, str, list[str]]]:
+    """Where unknown fields are, their names, and those that are known there.
+
+    What several entries of a list have is told once, as ``list[].field``: a habit of who wrote the file, not a slip.
+    """
+    known = list(type(model).model_fields)
+    for field in model.unknown:
+        yield field, field, known
+    for outer in known:
+        value = getattr(model, outer)
+        if isinstance(value, AwsModel):
+            for place, field, others in _unknown(value):
+                yield f"{outer}.{place}", field, others
+        elif isinstance(value, list):
+            found: dict[str, list[tuple[int, str, list[str]]]] = {}
+            for index, entry in enumerate(value):
+                for place, field, others in _unknown(entry) if isinstance(entry, AwsModel) else ():
+                    found.setdefault(place, []).append((index, field, others))
+            for place, (first, *more) in found.items():
+                index, field, others = first
+                yield f"{outer}[{'' if more else index}].{place}", field, others
 
 
 def show(value: object) -> str:

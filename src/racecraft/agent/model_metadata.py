@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from racecraft.agent.action_space import (
     MAX_ACTIONS,
@@ -37,6 +37,10 @@ NeuralNetwork = Literal[
 NEURAL_NETWORKS: tuple[NeuralNetwork, ...] = get_args(NeuralNetwork)
 VERSIONS = ("1", "2", "3", "4", "5", "6")
 DROA_MIN_SPEED = 0.5  # m/s; below it "DeepRacer on AWS" refuses a continuous action space
+CONFIGURED: Final = "DISCRETIZED_SECTOR_LIDAR"
+"""The one sensor that ``lidar_config`` is for."""
+OF_THE_CAR: Final = frozenset(("num_values", "min_angle", "max_angle", "min_distance", "max_distance"))
+"""What a physical car demands in ``lidar_config``, too: of its own LIDAR, and the simulated one does not follow it."""
 
 
 class _Action(AwsModel):
@@ -68,6 +72,22 @@ class _Lidar(AwsModel):
     num_sectors: Whole = Field(8, description=f"a divisor of {LIDAR_RAYS}")
     num_values_per_sector: Whole = Field(8, ge=1, le=LIDAR_RAYS, description=f"1 to {LIDAR_RAYS}")
     clipping_dist: Number = Field(2.0, gt=0.15, le=12, description="above 0.15, to 12 metres")
+    clipping_distance: Number | None = Field(None, description="above 0.15, to 12 metres")
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """None of a car's file, which has all seven keys that it demands."""
+        names = super().unknown
+        is_of_a_car = self.clipping_distance is not None and set(names) >= OF_THE_CAR
+        return tuple(name for name in names if not is_of_a_car or name not in OF_THE_CAR)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_the_cars_name(cls, value: Any) -> Any:
+        """The car's software calls the same distance otherwise than the trainer."""
+        if isinstance(value, dict) and "clipping_distance" in value and "clipping_dist" not in value:
+            return {**value, "clipping_dist": value["clipping_distance"]}
+        return value
 
     @field_validator("num_sectors")
     @classmethod
@@ -130,6 +150,8 @@ class ModelMetadata:
     """Only for ``DISCRETIZED_SECTOR_LIDAR``; the default sizes when None."""
     extra: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Fields of the file that mean nothing here; kept and written back."""
+    lidar_extra: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Such fields of ``lidar_config``."""
     notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
     """Sentences for the user about what in the file has no effect or is read in a special way."""
 
@@ -190,7 +212,8 @@ class ModelMetadata:
                 if lidar
                 else None,
                 extra=dict(file.model_extra or {}),
-                notes=(*unknown_fields(file, name=name), *notes),
+                lidar_extra=_lidar_extra(lidar),
+                notes=(*unknown_fields(file, name=name), *_lidar_notes(file, name=name), *notes),
             )
         except ConfigError as error:
             message = str(error)
@@ -211,8 +234,33 @@ class ModelMetadata:
             "action_space_type": self.action_space.kind,
         }
         if self.lidar is not None:
-            document["lidar_config"] = vars(self.lidar)
+            document["lidar_config"] = {**vars(self.lidar), **self.lidar_extra}
         return {**document, **self.extra}
+
+
+def _lidar_extra(lidar: _Lidar | None) -> dict[str, Any]:
+    """What ``lidar_config`` holds beside the fields of `LidarConfig`."""
+    if lidar is None:
+        return {}
+    cars = {} if lidar.clipping_distance is None else {"clipping_distance": lidar.clipping_distance}
+    return {**cars, **(lidar.model_extra or {})}
+
+
+def _lidar_notes(file: _Common, *, name: str) -> list[str]:
+    """What is special about ``lidar_config``."""
+    lidar, notes = file.lidar_config, list[str]()
+    if lidar is None:
+        return notes
+    if CONFIGURED not in file.sensor:
+        if not _lidar_extra(lidar).keys() >= OF_THE_CAR:
+            notes.append(f"{name}: lidar_config has no effect without the sensor {CONFIGURED}.")
+    elif lidar.clipping_distance is not None:
+        distance = f"{name}: lidar_config.clipping_distance {lidar.clipping_distance:g}"
+        if lidar.clipping_distance == lidar.clipping_dist:
+            notes.append(f"{distance} is taken as clipping_dist, which a car calls so.")
+        else:
+            notes.append(f"{distance} has no effect, as clipping_dist is given too.")
+    return notes
 
 
 def _action_notes(actions: list[_Action], version: str, *, name: str) -> list[str]:

@@ -17,7 +17,8 @@ from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from racecraft.agent.model_metadata import ModelMetadata
+from racecraft.agent.model_metadata import CONFIGURED, ModelMetadata
+from racecraft.agent.sensors import LidarConfig
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import NetworkSpec
 from racecraft.race.entry import Entry
@@ -115,11 +116,11 @@ def _read(path: Path) -> EntryFile:
 
 def _digest(spec: NetworkSpec, metadata: ModelMetadata, weights: dict[str, NDArray[Any]]) -> str:
     """What does not change a choice is not in it, so that nobody has a second try by renaming the first."""
-    said = metadata.to_dict()
+    sizes = metadata.lidar if CONFIGURED in metadata.sensors else None
     driving = {
         "network": [spec.name, spec.is_squashed],
-        "action_space": [metadata.action_space.kind, said["action_space"]],
-        "sensors": [sorted(metadata.sensors), said.get("lidar_config")],
+        "action_space": [metadata.action_space.kind, metadata.action_space.to_aws()],
+        "sensors": [sorted(metadata.sensors), None if sizes is None or sizes == LidarConfig() else vars(sizes)],
     }
     digest = hashlib.sha256(json.dumps(driving, sort_keys=True).encode())
     for name in sorted(weights):
