@@ -26,6 +26,21 @@ def test_train_ends_with_one_json_object(racecraft: Run) -> None:
     assert json.loads(Path("runs/mine/run.json").read_text())["seed"] == 3
 
 
+def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None:
+    Path("hyperparameters.json").write_text(json.dumps({"num_epochs": 1, "num_epoch": 3, "batch_size": 32}))
+    command = ("train", *SMALL, "--hyperparameters", "hyperparameters.json", "--until", "1 steps")
+    notes = [
+        "hyperparameters.json: unknown field 'num_epoch' has no effect. Did you mean 'num_epochs'?",
+        "hyperparameters.json: num_epochs is 1, and AWS's console allowed 3 to 10.",
+    ]
+    told = racecraft(*command, "--json")
+    assert (told.status, told.err, told.document["notes"]) == (0, "", notes)
+    logged = racecraft(*command, "--aws-log", "-")
+    assert (logged.status, [note in " ".join(logged.err.split()) for note in notes]) == (0, [True, True])
+    assert "no effect" not in logged.out
+    assert racecraft("train", *SMALL, "--until", "1 steps", "--json").document["notes"] == []
+
+
 @pytest.mark.costly
 def test_train_against_itself_and_against_the_run_that_came_of_it(racecraft: Run) -> None:
     race = ("--race", "head-to-head", "--cars", "3", "--until", "512 steps", "--json")

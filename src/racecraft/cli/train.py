@@ -128,7 +128,7 @@ def train(
         _refuse_beside_resume(context)
     from racecraft import training
     from racecraft.sim import slower_than_could_be
-    from racecraft.training.progress import SilentReporter
+    from racecraft.training.progress import NotingReporter
     from racecraft.training.regimes import regime_of
 
     if not is_quiet and (slower := slower_than_could_be()):
@@ -141,7 +141,8 @@ def train(
     title = f"Racecraft · {resume}" if resume else f"Racecraft · {recipe or where + ' · ' + Path(reward).stem}"
     if parent is not None:
         title = f"Racecraft · from {parent}"
-    with SilentReporter() if is_quiet else _terminal(title) as reporter:
+    silent = NotingReporter() if is_quiet else None
+    with silent or _terminal(title) as reporter:
         if resume is not None:
             result = training.resume(
                 resume,
@@ -200,8 +201,13 @@ def train(
         outcome = evaluate_run(result.run)
         if not is_quiet:
             text().say_evaluated(outcome)
+    notes = silent.notes if silent is not None else []
     if as_json:
-        print_json({**result.to_dict(), **({"evaluation": outcome.to_dict()} if outcome is not None else {})})
+        judged = {} if outcome is None else {"evaluation": outcome.to_dict()}
+        print_json({**result.to_dict(), "notes": notes, **judged})
+    else:
+        for note in notes:  # stdout is the log's
+            text().say_progress(note)
     if result.reason == "interrupted":
         raise typer.Exit(INTERRUPTED)
 

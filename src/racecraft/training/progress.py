@@ -193,3 +193,14 @@ class SilentReporter:
 
     def evaluation(self, report: EvaluationReport) -> None:
         """Nothing."""
+
+
+class NotingReporter(SilentReporter):
+    """Shows nothing, but keeps the notes for who says in the end how it went."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        """Kept, in order."""
+        self.notes.append(text)
