@@ -138,7 +138,7 @@ def test_rewards(lines, tmp_path):
     assert replay(path, track="oval", reward=right).to_dict()["reward_agreement"] == 1.0
     result = replay(path, track="oval", reward=wrong)
     assert result.to_dict()["reward_agreement"] == 0.0
-    assert str(result.differences.kept[0]).startswith("a.csv, line 3: reward 1.76152933, here 2.76152933")
+    assert str(result.differences.kept[0]).startswith("a.csv, line 3: reward 1.76152933, here 2.761529")
 
 
 @pytest.mark.costly

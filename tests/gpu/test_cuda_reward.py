@@ -15,7 +15,9 @@ from racecraft.reward import RewardWorker
 from racecraft.reward.cuda import CudaReward
 from racecraft.reward.cuda_source import cuda_source
 from racecraft.reward.numeric import NotNumeric
+from racecraft.reward.params import make_params
 from racecraft.sim import Simulation, Start
+from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.cuda_simulation import SOURCES
 from racecraft.track import load_track
 
@@ -92,6 +94,25 @@ def test_translation_and_interpreter_agree(source, device, rows):
     with RewardWorker(text, list(TRACKS)) as worker:
         reward_of(text, device).prove(worker, rows)
         assert len(set(worker(rows).tolist())) > 1
+
+
+@pytest.mark.costly
+@pytest.mark.parametrize("key", ["steering_angle", "speed", "progress"])
+def test_commands_and_progress_are_those_of_python_to_the_bit(key, device):
+    """The action space's own numbers, and 100 at the most."""
+    angles, speeds = np.arange(-300, 301) / 10, (np.arange(601) % 391 + 10) / 100
+    rows = np.zeros((601, _native_width()))
+    rows[:, ROW_COLUMNS.index("steering_angle")] = np.radians(angles).astype(np.float32)
+    rows[:, ROW_COLUMNS.index("speed")] = speeds.astype(np.float32)
+    rows[:, ROW_COLUMNS.index("progress")] = np.linspace(-0.1, 1.1, len(rows))
+    reward = reward_of(f"def reward_function(params):\n    return params['{key}']", device)
+    address, rewards = device.allocate(rows.nbytes), device.allocate(8 * len(rows))
+    device.write(address, rows)
+    reward.pay(address, rewards, count=len(rows))
+    paid = device.read(rewards, 8 * len(rows)).view(np.float64)
+    assert paid.tolist() == [make_params(row, [[(0.0, 0.0)]])[key] for row in rows.tolist()]
+    expected = {"steering_angle": angles, "speed": speeds, "progress": np.minimum(paid, 100.0)}
+    assert paid.tolist() == expected[key].tolist()
 
 
 @pytest.mark.costly

@@ -104,7 +104,7 @@ class Moment:
         here = self.projection_distance() / self.track_length() - self.start
         if self.road.is_closed:  # of all that differ by whole laps, the one next to the call before
             here = min((here + lap for lap in range(-2, 3)), key=lambda p: abs(p - self.progress_before))
-        return 100.0 * here
+        return min(100.0 * here, 100.0)
 
     def steps(self) -> float:
         return 2.0 + self.call

@@ -41,8 +41,8 @@ def batches(make_row) -> list[np.ndarray]:
     fill("closest_prev", behind)
     fill("closest_next", behind + 1)
     fill("steps", rng.integers(1, 400, count).astype(float))
-    fill("progress", rng.uniform(-0.1, 1.0, count))
-    fill("steering_angle", rng.uniform(-0.5, 0.5, count))
+    fill("progress", rng.uniform(-0.1, 1.1, count))
+    fill("steering_angle", rng.uniform(-0.8, 0.8, count))
     return np.split(rows, 16)
 
 
@@ -115,6 +115,25 @@ def test_a_compiled_reward_is_the_interpreted_one_to_the_bit(track, batches):
         assert worker.read_log() == ""
     assert rewards.tobytes() == interpreted(source, track, batches).tobytes()
     assert len(np.unique(rewards)) > 500
+
+
+@pytest.mark.costly
+def test_compiled_commands_are_the_numbers_of_the_action_space(track, make_row):
+    """And progress is 100 at the most; a number that tells all three."""
+    pytest.importorskip("numba")
+    angles, speeds = np.arange(-300, 301) / 10, (np.arange(601) % 391 + 10) / 100
+    rows = np.tile(make_row(), (601, 1))
+    rows[:, ROW_COLUMNS.index("steering_angle")] = np.radians(angles).astype(np.float32)
+    rows[:, ROW_COLUMNS.index("speed")] = speeds.astype(np.float32)
+    rows[:, ROW_COLUMNS.index("progress")] = np.linspace(0.9, 1.1, 601)
+    source = body("return (params['steering_angle'] * 100.0 + params['speed']) * 10.0 + params['progress']")
+    with RewardWorker(source, track, compiled=True, start_timeout_s=START_S) as worker:
+        assert len(rows) >= PROVING_ROWS
+        worker(rows)
+        rewards = worker(rows)  # compiled by now
+        assert worker.read_log() == worker.interpreted_because == ""
+    progress = np.minimum(np.linspace(0.9, 1.1, 601) * 100.0, 100.0)
+    assert rewards.tolist() == ((angles * 100.0 + speeds) * 10.0 + progress).tolist()
 
 
 @pytest.mark.slow

@@ -76,7 +76,7 @@ def test_the_drive_goes_where_keys_differ():
     assert {p["is_offtrack"] for p in params} == {p["is_reversed"] for p in params} == {True, False}
     assert any(not p["is_offtrack"] and not p["all_wheels_on_track"] for p in params)
     assert min(p["progress"] for p in params) < 0.0
-    assert max(p["progress"] for p in params) >= 100.0
+    assert max(p["progress"] for p in params) == 100.0
     assert min(p["heading"] for p in params) < -170.0
     assert max(p["heading"] for p in params) > 170.0
     laps = {p["projection_distance"] > p["track_length"] * START for p in params}

@@ -11,6 +11,7 @@ from racecraft.reward import params as layout
 from racecraft.reward.params import format_params, make_params
 from racecraft.reward.worker import waypoints_of
 from racecraft.sim import OBJECT_COLUMNS, OBJECT_HEADER, Bots, Objects, Obstacles, Simulation, Start
+from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.objects import OBJECT_KINDS
 from racecraft.track import load_track
 
@@ -31,6 +32,7 @@ def simulation() -> Simulation:
 
 
 def test_the_layout_is_the_simulations():
+    assert len(ROW_COLUMNS) == layout.ROW_SIZE
     assert len(OBJECT_HEADER) == layout.OBJECT_HEADER_SIZE
     assert len(OBJECT_COLUMNS) == layout.OBJECT_SIZE
     assert OBJECT_KINDS.index("bot_car") == layout.FIRST_MOVING_KIND

@@ -6,9 +6,16 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from racecraft.agent import PRESETS, DiscreteActionSpace, action_space
+from racecraft.race.autopilot import Autopilot
 from racecraft.reward.params import TEMPLATE, format_params, make_params
+from racecraft.reward.worker import waypoints_of
+from racecraft.sim import Simulation, Start
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.track import load_track
 
 WAYPOINTS = [[(0.0, 0.0), (1.0, 0.0), (0.0, 0.0)], [(5.0, 5.0), (6.0, 5.0), (5.0, 5.0)]]
 
@@ -30,13 +37,14 @@ CASES = [
     ("projection_distance", {"projection_distance": 7.5}, 7.5),
     ("progress", {"progress": 0.5}, 50.0),
     ("progress", {"progress": -0.001}, -0.1),
+    ("progress", {"progress": math.nextafter(1.0, 0.0)}, math.nextafter(100.0, 0.0)),
+    ("progress", {"progress": 1.0}, 100.0),
+    ("progress", {"progress": 1.00567}, 100.0),
     ("steps", {"steps": 2.0}, 2.0),
     ("speed", {"speed": 3.5, "actual_speed": 1.0}, 3.5),
-    (
-        "steering_angle",
-        {"steering_angle": math.radians(-30), "actual_steering_angle": 0.0},
-        pytest.approx(-30.0),
-    ),
+    ("speed", {"speed": float(np.float32(1.3))}, 1.3),
+    ("steering_angle", {"steering_angle": math.radians(-30), "actual_steering_angle": 0.0}, -30.0),
+    ("steering_angle", {"steering_angle": float(np.float32(math.radians(-15)))}, -15.0),
     ("track_width", {"track_width": 0.762}, 0.762),
     ("track_length", {"track_length": 17.7}, 17.7),
     ("waypoints", {"track_index": 0.0}, WAYPOINTS[0]),
@@ -68,6 +76,79 @@ def test_value_of_every_key(make_row, key, columns, expected):
     value = make_params(make_row(**columns).tolist(), WAYPOINTS)[key]
     assert value == expected
     assert type(value) is type(TEMPLATE[key])
+
+
+angles = st.integers(-300, 300).map(lambda tenths: tenths / 10)
+speeds = st.integers(10, 400).map(lambda hundredths: hundredths / 100)
+
+
+@given(table=st.lists(st.tuples(angles, speeds), min_size=2, max_size=30))
+def test_commands_are_the_numbers_of_the_action_space(cars, table):
+    """To the bit, so that `speed >= 1.3` and `abs(steering_angle) > 15` mean what they say."""
+    space = DiscreteActionSpace.from_aws([{"steering_angle": angle, "speed": speed} for angle, speed in table])
+    assert commands_seen(cars, space) == table
+
+
+@pytest.mark.parametrize("name", [name for name in PRESETS if name not in ("continuous", "fast")])
+def test_commands_are_the_numbers_of_the_preset(cars, name):
+    space = action_space(name)
+    assert commands_seen(cars, space) == space.to_degrees()
+
+
+def test_commands_that_no_decimal_says_are_close(cars):
+    """A third of 4 m/s, and what a continuous policy likes."""
+    space = action_space("fast")
+    np.testing.assert_allclose(commands_seen(cars, space), space.to_degrees(), rtol=0.0, atol=6e-7)
+    rng = np.random.default_rng(1)
+    actions = action_space("continuous").to_commands(rng.uniform(-1.0, 1.0, (cars.num_envs, 2)))
+    cars.reset()
+    cars.step(actions)
+    seen = [(params["steering_angle"], params["speed"]) for params in params_of(cars)]
+    error = np.abs(seen - np.column_stack([np.degrees(actions[:, 0].astype(float)), actions[:, 1]]))
+    assert (error.max(axis=0) <= (5.1e-6, 5.1e-7)).all()
+
+
+def test_every_speed_and_angle_of_three_decimals_is_exact(make_row):
+    row = make_row().tolist()
+    at_angle, at_speed = ROW_COLUMNS.index("steering_angle"), ROW_COLUMNS.index("speed")
+    for thousandths in range(-45_000, 45_001):
+        angle, speed = thousandths / 1000, abs(thousandths) % 4001 / 1000
+        row[at_angle], row[at_speed] = float(np.float32(math.radians(angle))), float(np.float32(speed))
+        params = make_params(row, WAYPOINTS)
+        assert (params["steering_angle"], params["speed"]) == (angle, speed)
+
+
+@pytest.mark.parametrize("name", ["reinvent_2018", "hairpin"])
+def test_progress_ends_at_100_exactly(name):
+    track = load_track(name)
+    start = Start(mode="fixed", offset=0.37)
+    cars = Simulation(track, num_envs=1, camera=None, start=start, num_threads=1)
+    autopilot, waypoints = Autopilot(speed=3.0, lateral_acceleration=2.0), waypoints_of([track])
+    seen = []
+    while not (cars.terminated[0] or cars.truncated[0]):
+        cars.step(autopilot(cars.state))
+        seen.append(make_params(cars.rows[0].tolist(), waypoints)["progress"])
+    assert STATUS_NAMES[int(cars.column("status")[0])] == "lap_complete"
+    assert cars.column("progress")[0] > 1.0  # the row knows how far the step led
+    assert seen[-1] == 100.0
+    assert max(seen[:-1]) < 100.0
+
+
+@pytest.fixture(scope="module")
+def cars():
+    return Simulation(load_track("oval"), num_envs=30, camera=None, num_threads=1)
+
+
+def commands_seen(cars, space):
+    """What a reward function is told of every action, degrees and m/s."""
+    cars.reset()
+    cars.step(space.to_commands(np.arange(cars.num_envs) % space.size))
+    return [(params["steering_angle"], params["speed"]) for params in params_of(cars)][: space.size]
+
+
+def params_of(cars):
+    waypoints = waypoints_of(cars.tracks)
+    return [make_params(row, waypoints) for row in cars.rows.tolist()]
 
 
 def test_every_key_has_a_case_and_no_other_key_exists(make_row):

@@ -13,6 +13,7 @@ import pytest
 
 from racecraft.reward import load_preset, make_params, preset_names
 from racecraft.sim import Bots, Objects, Obstacles, Simulation
+from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.site.javascript import NotTranslated, javascript
 from racecraft.track import load_track
@@ -98,6 +99,32 @@ def test_rewards_in_a_tab_pay_what_they_pay_in_python(tmp_path: Path, objects: O
         np.testing.assert_allclose(found[name], paid, rtol=1e-13, atol=1e-15, err_msg=name)
         assert len(set(paid)) > 1 or name == "progress_pace", name
     assert all((paid is None) == (row[1] != 1.0) for paid, row in zip(found["broken"], rows, strict=True))
+
+
+def test_commands_and_progress_in_a_tab_are_those_of_python_to_the_bit(tmp_path: Path) -> None:
+    """The action space's own numbers, and 100 at the most."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("Node is not installed")
+    keys = ("steering_angle", "speed", "progress")
+    angles, speeds = np.arange(-300, 301) / 10, (np.arange(601) % 391 + 10) / 100
+    rows = np.zeros((601, len(ROW_COLUMNS)))
+    rows[:, ROW_COLUMNS.index("steering_angle")] = np.radians(angles).astype(np.float32)
+    rows[:, ROW_COLUMNS.index("speed")] = speeds.astype(np.float32)
+    rows[:, ROW_COLUMNS.index("progress")] = np.linspace(-0.1, 1.1, 601)
+    lines = [[(0.0, 0.0)]]
+    module = tmp_path / "rewards.mjs"
+    sources = {key: f"def reward_function(params):\n    return params['{key}']\n" for key in keys}
+    module.write_text(javascript(sources), encoding="utf-8")
+    command = [node, "-e", f"(async () => {{ {RUN} }})()", str(module)]
+    told = json.dumps({"rows": rows.tolist(), "waypoints": lines})
+    done = subprocess.run(command, input=told, capture_output=True, text=True, check=True)
+    found = json.loads(done.stdout)
+    params = [make_params(row, lines) for row in rows.tolist()]
+    assert found == {key: [one[key] for one in params] for key in keys}
+    assert found["steering_angle"] == angles.tolist()
+    assert found["speed"] == speeds.tolist()
+    assert max(found["progress"]) == 100.0
 
 
 @pytest.mark.parametrize(

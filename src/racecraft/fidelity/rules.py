@@ -62,6 +62,8 @@ class TrackRules:
             is_paused=log.is_paused,
         )
         rows[:, _COLUMN["track_index"]] = float(judge.reversed)
+        progress = rows[:, _COLUMN["progress"]]
+        np.minimum(progress, 1.0, out=progress)  # as logs and params say it, however far a lap's last step leads
         return rows
 
     def closest_waypoints(self, rows: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -99,9 +101,7 @@ class RulesAgreement:
     def add(self, rules: TrackRules, log: Log, rows: NDArray[np.float64], differences: Differences) -> None:
         """Compare some episodes with what `TrackRules.judge` made of them."""
         progress = rows[:, _COLUMN["progress"]]
-        # a lap's end prints 100 for whatever lies beyond
-        logged = np.where(log.progress >= 1.0, np.maximum(log.progress, progress), log.progress)
-        good = np.abs(progress - logged) <= PROGRESS_TOLERANCE
+        good = np.abs(progress - log.progress) <= PROGRESS_TOLERANCE
         self.rows += len(log)
         self.progress += int(good.sum())
         if len(bad := np.flatnonzero(~good)):

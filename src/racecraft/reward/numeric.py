@@ -13,6 +13,7 @@ from __future__ import annotations
 import ast
 from typing import Final
 
+from racecraft.reward.params import ANGLE_PARTS, ANGLE_PARTS_OF_RADIAN, SPEED_PARTS, WHOLE
 from racecraft.reward.state import keeps_state
 from racecraft.sim.columns import ROW_COLUMNS
 
@@ -90,11 +91,12 @@ def _at(column: str) -> str:
 
 
 VALUES: Final = {  # of every key that is a number or made of numbers, as `make_params` computes it
-    **{key: _at(key) for key in ("x", "y", "steps", "speed", "projection_distance", "track_width", "track_length")},
+    **{key: _at(key) for key in ("x", "y", "steps", "projection_distance", "track_width", "track_length")},
     **{key: f"{_at(key)} != 0.0" for key in ("all_wheels_on_track", "is_crashed", "is_offtrack", "is_reversed")},
     "heading": f"_degrees({_at('heading')})",
-    "steering_angle": f"{_at('steering_angle')} * 57.29577951308232",
-    "progress": f"{_at('progress')} * 100.0",
+    "speed": f"({_at('speed')} * {SPEED_PARTS} + {WHOLE} - {WHOLE}) / {SPEED_PARTS}",
+    "steering_angle": f"({_at('steering_angle')} * {ANGLE_PARTS_OF_RADIAN} + {WHOLE} - {WHOLE}) / {ANGLE_PARTS}",
+    "progress": f"{_at('progress')} * 100.0 if {_at('progress')} < 1.0 else 100.0",
     "distance_from_center": f"abs({_at('offset')})",
     "is_left_of_center": f"{_at('offset')} > 0.0",
     "closest_waypoints": f"(int({_at('closest_prev')}), int({_at('closest_next')}))",

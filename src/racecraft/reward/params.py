@@ -16,7 +16,16 @@ if TYPE_CHECKING:
 
 DEGREES = 57.29577951308232  # degrees in one radian; the same product as math.degrees
 
-# Layout of the columns about objects, see racecraft.sim.columns; a test compares them.
+# A row has commands in float32, and angles in radians: 1.2999999523162842 where the action space says 1.3. The function
+# gets the nearest decimal of as many digits as float32 holds there: the action space's own number, to the bit.
+# `numeric.py` and `site/javascript.py` compute the same; tests compare them.
+SPEED_PARTS = 1e6  # of 1 m/s
+ANGLE_PARTS = 1e5  # of a degree
+ANGLE_PARTS_OF_RADIAN = 5729577.951308232
+WHOLE = 6755399441055744.0  # 1.5 * 2**52: added and taken off again it leaves a whole number, sooner than round()
+
+# Layout of the columns, see racecraft.sim.columns; a test compares them.
+ROW_SIZE = 24  # and behind it what is about objects
 OBJECT_HEADER_SIZE = 4
 OBJECT_SIZE = 7
 FIRST_MOVING_KIND = 2.0  # boxes and parked cars have the heading 0 at AWS, whichever way they stand
@@ -28,7 +37,7 @@ TEMPLATE: dict[str, Any] = {
     "heading": 0.0,  # float, degrees: -180 to 180, 0 is +x, counter-clockwise positive
     "distance_from_center": 0.0,  # float, m: at least 0
     "projection_distance": 0.0,  # float, m along the centre line
-    "progress": 0.0,  # float, percent of the lap since the start of the episode
+    "progress": 0.0,  # float, percent of the lap since the start of the episode; 100 exactly where it is complete
     "steps": 0.0,  # float: the first call of an episode sees 2.0
     "speed": 0.0,  # float, m/s: commanded
     "steering_angle": 0.0,  # float, degrees: commanded, left positive
@@ -88,8 +97,7 @@ def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[st
         _actual_speed,
         _actual_steering_angle,
         _lap,
-        *objects,
-    ) = row
+    ) = row if len(row) == ROW_SIZE else row[:ROW_SIZE]  # a starred name at the end is slower
     heading_deg = heading * DEGREES
     if not -180.0 <= heading_deg <= 180.0:
         heading_deg = (heading_deg + 180.0) % 360.0 - 180.0
@@ -101,10 +109,10 @@ def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[st
     params["heading"] = heading_deg
     params["distance_from_center"] = abs(offset)
     params["projection_distance"] = projection_distance
-    params["progress"] = progress * 100.0
+    params["progress"] = progress * 100.0 if progress < 1.0 else 100.0  # however far a lap's last step leads
     params["steps"] = steps
-    params["speed"] = speed
-    params["steering_angle"] = steering_angle * DEGREES
+    params["speed"] = (speed * SPEED_PARTS + WHOLE - WHOLE) / SPEED_PARTS
+    params["steering_angle"] = (steering_angle * ANGLE_PARTS_OF_RADIAN + WHOLE - WHOLE) / ANGLE_PARTS
     params["track_width"] = track_width
     params["track_length"] = track_length
     params["waypoints"] = waypoints[int(track_index)].copy()
@@ -121,8 +129,8 @@ def make_params(row: Sequence[float], waypoints: Sequence[Waypoints]) -> dict[st
     params["is_crashed"] = is_crashed != 0.0
     params["is_offtrack"] = is_offtrack != 0.0
     params["sim_time"] = time
-    if objects:
-        tell_objects(params, objects)
+    if len(row) > ROW_SIZE:
+        tell_objects(params, row[ROW_SIZE:])
     return params
 
 

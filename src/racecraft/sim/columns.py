@@ -16,7 +16,7 @@ ROW_COLUMNS: Final = (
     "heading",  # rad, counter-clockwise from +x
     "steering_angle",  # rad, commanded, left positive
     "speed",  # m/s, commanded
-    "progress",  # fraction of the lap since the start, 0 to 1; may be slightly negative
+    "progress",  # fraction of the lap since the start, 0 to 1; slightly negative at first, beyond 1 after its last step
     "offset",  # m, signed distance from the centre line, left of the driving direction positive
     "projection_distance",  # m along the centre line
     "track_width",  # m, from border to border where both are nearest to the car's projection on the centre line

@@ -14,7 +14,16 @@ import ast
 import math
 from typing import Final
 
-from racecraft.reward.params import FIRST_MOVING_KIND, OBJECT_HEADER_SIZE, OBJECT_SIZE, TEMPLATE
+from racecraft.reward.params import (
+    ANGLE_PARTS,
+    ANGLE_PARTS_OF_RADIAN,
+    FIRST_MOVING_KIND,
+    OBJECT_HEADER_SIZE,
+    OBJECT_SIZE,
+    SPEED_PARTS,
+    TEMPLATE,
+    WHOLE,
+)
 from racecraft.reward.state import keeps_state
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 
@@ -45,11 +54,12 @@ def _each(value: str, *columns: str) -> str:
 
 
 PARAMS: Final = {  # of every key, as `make_params` computes it
-    **{key: _row(key) for key in ("x", "y", "steps", "speed", "projection_distance", "track_width", "track_length")},
+    **{key: _row(key) for key in ("x", "y", "steps", "projection_distance", "track_width", "track_length")},
     **{key: f"{_row(key)} !== 0" for key in ("all_wheels_on_track", "is_crashed", "is_offtrack", "is_reversed")},
     "heading": f"turned({_row('heading')} * 57.29577951308232)",
-    "steering_angle": f"{_row('steering_angle')} * 57.29577951308232",
-    "progress": f"{_row('progress')} * 100",
+    "speed": f"({_row('speed')} * {SPEED_PARTS} + {WHOLE} - {WHOLE}) / {SPEED_PARTS}",
+    "steering_angle": f"({_row('steering_angle')} * {ANGLE_PARTS_OF_RADIAN} + {WHOLE} - {WHOLE}) / {ANGLE_PARTS}",
+    "progress": f"{_row('progress')} < 1 ? {_row('progress')} * 100 : 100",
     "distance_from_center": f"Math.abs({_row('offset')})",
     "is_left_of_center": f"{_row('offset')} > 0",
     "closest_waypoints": f"[{_row('closest_prev')}, {_row('closest_next')}]",
