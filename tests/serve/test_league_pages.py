@@ -279,6 +279,10 @@ def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
     page = visit.open("/me")
     assert [one for one in visit.complaints if "401" not in one] == []
     page.get_by_label("Type your nickname").fill("Turbo")
+    page.get_by_label("Your password").fill("a wrong password")
+    page.get_by_role("button", name="Delete my account").click()
+    page.get_by_text("That is not your password.").wait_for()
+    page.get_by_label("Your password").fill("correct horse")
     page.get_by_role("button", name="Delete my account").click()
     page.get_by_role("heading", name="Come in").wait_for()
     visit.complaints.clear()  # what a page had asked when she signed out, and when there was no account any more

@@ -153,7 +153,21 @@ def test_names_that_look_alike_are_one() -> None:
     assert handle_of("Ada") == handle_of("ＡＤＡ") == handle_of("a d-a") == handle_of("Ädà")
     assert handle_of("Ada") != handle_of("Adam")
     assert checked_name("  Zoë   B. ") == "Zoë B."
-    for name in ("", "  ", "a\nb\u0007", "\u200bx", "x" * 33, "...", "\ud800"):
+    assert checked_name("Вера 7") == "Вера 7"
+    unseen = [f"Ada{filler}" for filler in "\u115f\u1160\u3164\uffa0"]
+    for name in (
+        "",
+        "  ",
+        "a\nb\u0007",
+        "\u200bx",
+        "x" * 33,
+        "...",
+        "\ud800",
+        "\u3164",
+        *unseen,
+        "Ad\u0430",
+        "\u0391da",
+    ):
         with pytest.raises(ConfigError):
             checked_name(name)
 
@@ -265,7 +279,7 @@ def test_a_program_waits_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = time.monotonic()
     monkeypatch.setattr(time, "monotonic", lambda: clock + 601)
     with pytest.raises(NotFound):
-        devices.confirm(code, 2)
+        devices.confirm(code, 2, session="s")
     with pytest.raises(NotLetIn):
         devices.take(secret)
     begun = [devices.begin() for _ in range(MOST)]
@@ -273,8 +287,8 @@ def test_a_program_waits_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
         devices.begin()
     assert str(caught.value) == "Too many programs wait to be let in."
     assert caught.value.hint == "Try again in ten minutes."
-    devices.confirm(begun[0][1], 2)
-    assert devices.take(begun[0][0]) == 2
+    devices.confirm(begun[0][1], 2, session="s")
+    assert devices.take(begun[0][0]) == (2, "s")
     devices.begin()  # in the place of the one that was let in
     with pytest.raises(TooMany):
         devices.begin()
@@ -395,7 +409,7 @@ def test_who_leaves_takes_everything_along(league: RunningLeague, school: dict[s
     assert not folder.exists()
     assert "Gone" not in school["teacher"].get(f"/api/groups/{school['group']}").text
     league.join(school["code"], "Gone")
-    refused(league.owner.delete("/api/account"), 409)
+    refused(league.owner.request("DELETE", "/api/account", json={"password": "correct horse"}), 409)
 
 
 @pytest.mark.costly

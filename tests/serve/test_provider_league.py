@@ -129,7 +129,7 @@ def test_who_signs_out_there_is_signed_out_here(league: RunningLeague) -> None:
     assert "sign_out_by_provider" in {line["what"] for line in ok(league.owner.get("/api/audit?count=500"))}
 
 
-@pytest.mark.parametrize("form", [{}, {"logout_token": "x.y.z"}, {"logout_token": "x" * 100_000}])
+@pytest.mark.parametrize("form", [{}, {"logout_token": "x.y.z"}, {"logout_token": "x" * 20_000}])
 def test_nobody_else_signs_people_out(league: RunningLeague, form: dict[str, str]) -> None:
     stranger = league.stranger()
     assert "logout token" in refused(stranger.post("/api/door/provider/sign-out", data=form), 400) or "x.y.z" in str(

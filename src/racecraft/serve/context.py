@@ -112,6 +112,11 @@ class Consoles:
         """Where requests that compute take a place."""
         return Desks()
 
+    @cached_property
+    def uploads(self) -> Desks:
+        """Where large files arrive."""
+        return Desks()
+
     @property
     def provider(self) -> Provider:
         """Through whom people sign in.

@@ -126,5 +126,5 @@ export const leagueApi = {
       scopes: isWorker ? ["worker"] : ["read", "submit"],
     }),
   removeToken: (id: number) => ask<void>("DELETE", `/account/tokens/${id}`),
-  removeAccount: () => ask<void>("DELETE", "/account"),
+  removeAccount: (password: string) => ask<void>("DELETE", "/account", { password }),
 };

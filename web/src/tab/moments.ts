@@ -57,7 +57,7 @@ export function momentsOf(track: TrackFile, words: Words): TrackFile["situations
   const { length } = road;
   const [on, back] = [momentOn(track, false, words), momentOn(track, true, words)];
   const curvature = curvatureOf(road);
-  const places = Array.from({ length: 400 }, (_, at) => at * (length / 400));
+  const places = Array.from({ length: 400 }, (_, at) => (0.1 + (at * 0.8) / 399) * length);
   const bends = places.map(curvature);
   const first = (best: (a: number, b: number) => boolean, of = bends) =>
     places[of.reduce((found, bend, at) => (best(bend, of[found]!) ? at : found), 0)]!;

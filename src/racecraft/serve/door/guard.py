@@ -30,6 +30,8 @@ from racecraft.serve.replies import problem
 from racecraft.serve.settings import COOKIE, LOOPBACK, OWNER, PROVIDER_COOKIE, ServeSettings
 
 MAX_BODY: Final = 8 << 20  # bytes
+MAX_AT_DOOR: Final = 1 << 16
+"""What strangers say, who are many: a hundred that never finish hold no more than one request of somebody known."""
 MAX_SUBMISSION: Final = 32 << 20
 MAX_TOLD: Final = 1 << 20
 """What a worker says in words."""
@@ -76,7 +78,16 @@ def most_bytes(path: str) -> int:
     """How much a request to an address may hold."""
     if path.startswith(f"{ROOM}/"):
         return MAX_OBJECT if PARCEL.match(path) else MAX_TOLD
+    if path in OPEN:
+        return MAX_AT_DOOR
     return MAX_SUBMISSION if SUBMIT.fullmatch(path) else LARGE.get(path, MAX_BODY)
+
+
+def too_large(most: int) -> str:
+    """What to say of a request that holds more."""
+    return (
+        f"A request may have at most {most >> 20} MB." if most >= 1 << 20 else f"It may have at most {most >> 10} kB."
+    )
 
 
 class Guard:
@@ -133,7 +144,7 @@ class Guard:
                 message = await receive()
                 taken += len(message.get("body", b""))
                 if taken > most:
-                    raise HTTPException(413, f"A request may have at most {most >> 20} MB.")
+                    raise HTTPException(413, too_large(most))
                 return message
 
             answer = self._refuse(Request(scope)) or app
@@ -161,7 +172,7 @@ class Guard:
         length = request.headers.get("content-length") or "0"
         most = most_bytes(request.url.path)
         if not (length.isascii() and length.isdigit() and len(length) < 16) or int(length) > most:
-            return problem(413, "TooLarge", f"A request may have at most {most >> 20} MB.")
+            return problem(413, "TooLarge", too_large(most))
         if request.url.path == "/" and (ticket := request.query_params.get("ticket")):
             return self._let_in(request, ticket)
         if request.url.path.startswith("/api/"):

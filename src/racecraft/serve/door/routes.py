@@ -107,15 +107,16 @@ def begin_device(request: Request, consoles: InLeague) -> Device:
 def take_token(request: Request, body: TakeToken, consoles: InLeague) -> TakenToken:
     """The token of a program that was let in; empty while it waits."""
     try:
-        user = consoles.devices.take(body.secret)
+        taken = consoles.devices.take(body.secret)
+        if taken is not None and not consoles.keys.is_open(taken[1]):
+            raise NotLetIn("Whoever typed the code has signed out.", hint="Begin again.")
     except NotLetIn:
         fail(request, consoles)
         raise
-    if user is None:
+    if taken is None:
         return TakenToken(token="")
-    return TakenToken(
-        token=consoles.keys.make_token(user, title="racecraft login", scopes=["read", "submit"], days=90)[1]
-    )
+    made = consoles.keys.make_token(taken[0], title="racecraft login", scopes=["read", "submit"], days=90)
+    return TakenToken(token=made[1])
 
 
 @router.post("/sign-out", status_code=204)

@@ -43,9 +43,10 @@ class GroupMember:
     has_card: bool
     comes_by_provider: bool
     is_locked: bool
-    """Whether they did, and were locked out."""
+    """Whether they were locked out, and neither password nor provider lets them in."""
     is_home: bool
     """Whether they came in here."""
+    has_password: bool
 
 
 @dataclass(frozen=True)
@@ -141,16 +142,26 @@ class Groups:
     def members(self, group_id: int) -> list[GroupMember]:
         """Everybody in a group, organisers first, by name."""
         has_card = sa.exists().where(Card.user_id == User.id)
-        query = sa.select(
-            User.id, User.name, Member.role, Member.real_name, has_card, Identity.is_locked, Member.is_home
-        )
+        has_password = User.password != ""
+        columns = (Member.role, Member.real_name, has_card, Identity.is_locked, Member.is_home, has_password)
+        query = sa.select(User.id, User.name, *columns, User.is_locked)
         query = query.join(Member, Member.user_id == User.id).where(Member.group_id == group_id)
         mine = sa.and_(Identity.user_id == User.id, Identity.issuer == self._issuer)
         query = query.outerjoin(Identity, mine)
         with self._database.transaction() as session:
             rows = session.execute(query.order_by(Member.role, User.name)).all()
         return [
-            GroupMember(row[0], row[1], _part(row[2]), row[3], bool(row[4]), row[5] is not None, bool(row[5]), row[6])
+            GroupMember(
+                id=row[0],
+                name=row[1],
+                role=_part(row[2]),
+                real_name=row[3],
+                has_card=bool(row[4]),
+                comes_by_provider=row[5] is not None,
+                is_locked=bool(row[5]) or row[8],
+                is_home=row[6],
+                has_password=bool(row[7]),
+            )
             for row in rows
         ]
 
@@ -195,6 +206,20 @@ class Groups:
         """What only the organisers see."""
         with self._database.transaction() as session:
             session.get_one(Member, (group_id, user_id)).real_name = real_name.strip()
+
+    def leave(self, group_id: int, user_id: int) -> None:
+        """Somebody leaves a group by themselves.
+
+        Raises:
+            Conflict: They came in by it and have no password: whoever held their card could take them out of its hands.
+        """
+        with self._database.transaction() as session:
+            is_home = session.get_one(Member, (group_id, user_id)).is_home
+            if is_home and not session.get_one(User, user_id).password:
+                raise Conflict(
+                    "You came in by this group.", hint="Ask who organises it, or give yourself a password first."
+                )
+        self.remove(group_id, user_id)
 
     def remove(self, group_id: int, user_id: int) -> None:
         """Somebody leaves a group."""
@@ -285,6 +310,8 @@ class Groups:
                 _require_room(session, invitation.group_id, 1)
                 member = Member(group_id=invitation.group_id, user_id=user_id, role="racer")
                 session.add(member)
+            else:  # who is in already takes nobody's place
+                invitation.uses_left += 1
             if member.role == "racer" and _needs_home(session, user_id):
                 member.is_home = True
             return invitation.group_id

@@ -34,7 +34,8 @@ from racecraft.serve.problems import NotFound, NotLetIn
 
 router = APIRouter(prefix="/api", tags=["groups"])
 
-HIDDEN: Final = {"real_name": "", "has_card": False, "comes_by_provider": False, "is_locked": False, "is_home": False}
+KEYS: Final = ("has_card", "has_password", "comes_by_provider", "is_locked", "is_home")
+HIDDEN: Final = {"real_name": "", **dict.fromkeys(KEYS, False)}
 """What racers see of a member that only organisers know."""
 Id = Annotated[int, Path(ge=0, lt=2**31)]
 
@@ -113,7 +114,7 @@ def change_member(group_id: Id, member: Id, body: MemberChange, consoles: InCons
     consoles.groups.require(group_id, person.id, organiser=True)
     consoles.groups.racer(group_id, member)
     if body.name is not None:
-        _require_own_racer(consoles, group_id, member)
+        _require_own_racer(consoles, group_id, member, person.id)
         consoles.people.rename(member, body.name, by_organiser=True)
     if body.real_name is not None:
         consoles.groups.set_real_name(group_id, member, body.real_name)
@@ -126,24 +127,26 @@ def remove_member(group_id: Id, member: Id, consoles: InConsoles, person: InPers
     if member != person.id:
         consoles.groups.require(group_id, person.id, organiser=True)
         consoles.groups.racer(group_id, member)
-    elif consoles.groups.require(group_id, person.id) == "organiser":
+        consoles.groups.remove(group_id, member)
+        return Response(status_code=204)
+    if consoles.groups.require(group_id, person.id) == "organiser":
         raise NotFound("An organiser does not leave the group.")
-    consoles.groups.remove(group_id, member)
+    consoles.groups.leave(group_id, member)
     return Response(status_code=204)
 
 
 @router.post("/groups/{group_id}/members/{member}/revoke", status_code=204)
 def revoke_member(group_id: Id, member: Id, consoles: InConsoles, person: InPerson) -> Response:
-    """A lost card: it, all sessions and all tokens of its owner are worth nothing; no provider lets them in."""
-    _require_ward(consoles, group_id, member, person.id)
+    """A lost card: it, all sessions and tokens of its owner are worth nothing; no password or provider lets them in."""
+    _require_own_racer(consoles, group_id, member, person.id)
     consoles.keys.revoke(member)
     return Response(status_code=204)
 
 
 @router.post("/groups/{group_id}/members/{member}/admit", status_code=204)
 def admit_member(group_id: Id, member: Id, consoles: InConsoles, person: InPerson) -> Response:
-    """Who comes through a provider and was locked out is let in by it again."""
-    _require_ward(consoles, group_id, member, person.id)
+    """Who was locked out is let in again, by the password or the provider that there was."""
+    _require_own_racer(consoles, group_id, member, person.id)
     consoles.keys.admit(member)
     return Response(status_code=204)
 
@@ -234,7 +237,7 @@ def _cards(request: Request, consoles: Consoles, members: list[int]) -> list[Log
 
 
 def _require_ward(consoles: Consoles, group_id: int, member: int, user_id: int) -> None:
-    """Make sure that somebody organises a group and a member is theirs to name and to let in.
+    """Make sure that somebody organises a group and a member is theirs to let in.
 
     Who has a password or makes groups is not, wherever they race, nor who came in by another group: a card would be a
     way to be them.
@@ -250,12 +253,15 @@ def _require_ward(consoles: Consoles, group_id: int, member: int, user_id: int) 
     consoles.groups.ward(group_id, member)
 
 
-def _require_own_racer(consoles: Consoles, group_id: int, member: int) -> None:
-    """Make sure that a racer came in by a group: its organisers name them, also with a password, which a name is not.
+def _require_own_racer(consoles: Consoles, group_id: int, member: int, user_id: int) -> None:
+    """Make sure that somebody organises a group and a racer came in by it.
+
+    Its organisers name them and lock them out, also with a password: neither is a way to be them.
 
     Raises:
-        NotFound: They did not, or have power themselves.
+        NotFound: They do not, or the racer did not, or has power.
     """
+    consoles.groups.require(group_id, user_id, organiser=True)
     consoles.groups.ward(group_id, member)
     if (one := consoles.people.get(member)).may_organise:
         raise NotFound(f"{one.name} organises groups.")

@@ -43,6 +43,7 @@ class MemberInfo(Message):
     comes_by_provider: bool
     """These two are for organisers only as well."""
     is_locked: bool
+    has_password: bool
     is_home: bool
     """Whether they came in by this group, so that its organisers print their cards; for organisers only."""
 

@@ -31,6 +31,8 @@ class Waiting:
     """By the clock that never goes back."""
     user_id: int | None = None
     """Who let it in."""
+    session: str = ""
+    """The digest of the session that they did it in."""
 
 
 class Devices:
@@ -55,8 +57,8 @@ class Devices:
             self._waiting[digest_of(secret)] = Waiting(code, time.monotonic() + SECONDS)
         return secret, code
 
-    def confirm(self, code: str, user_id: int) -> None:
-        """Somebody lets the program in that shows this code.
+    def confirm(self, code: str, user_id: int, *, session: str) -> None:
+        """Somebody lets the program in that shows this code, in a session of that digest.
 
         Raises:
             NotFound: None does.
@@ -67,10 +69,12 @@ class Devices:
             found = next((one for one in self._waiting.values() if one.code == typed and one.user_id is None), None)
             if found is None:
                 raise NotFound("No program shows this code now.", hint="Codes are good for ten minutes.")
-            found.user_id = user_id
+            found.user_id, found.session = user_id, session
 
-    def take(self, secret: str) -> int | None:
-        """Who let a program in, once; None while nobody has.
+    def take(self, secret: str) -> tuple[int, str] | None:
+        """Who let a program in, and the digest of the session, once; None while nobody has.
+
+        A session that is over by then lets nobody in: else who was locked out would have a key in hand.
 
         Raises:
             NotLetIn: It does not wait, or waited too long.
@@ -81,9 +85,10 @@ class Devices:
             found = self._waiting.get(digest)
             if found is None:
                 raise NotLetIn("Nobody typed the code in time.", hint="Begin again.")
-            if found.user_id is not None:
-                del self._waiting[digest]
-            return found.user_id
+            if found.user_id is None:
+                return None
+            del self._waiting[digest]
+            return found.user_id, found.session
 
     def _forget(self) -> None:
         now = time.monotonic()

@@ -100,6 +100,11 @@ class Keys:
         is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
         return self._user(sa.select(Session.user_id).where(Session.digest == digest_of(secret), is_valid))
 
+    def is_open(self, digest: str) -> bool:
+        """Whether a session is good of which only the digest is known."""
+        is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
+        return self._user(sa.select(Session.user_id).where(Session.digest == digest, is_valid)) is not None
+
     def open_sessions(self, secrets: Collection[str]) -> set[str]:
         """Those of some cookies that are somebody's, by one question."""
         by_digest = {digest_of(secret): secret for secret in secrets}
@@ -197,20 +202,24 @@ class Keys:
             if user_id is None or session.execute(sa.delete(Reset).where(is_it)).rowcount != 1:  # type: ignore[attr-defined]
                 return None
             revoke_all(session, user_id)
-            session.get_one(User, user_id).password = password
+            user = session.get_one(User, user_id)
+            user.password, user.is_locked = password, False
         return user_id
 
     def revoke(self, user_id: int) -> None:
-        """Everything that opens the door to somebody: cards, sessions, tokens; a provider does so no longer."""
+        """All that opens the door to somebody: cards, sessions, tokens; provider and password do so no longer."""
         with self._database.transaction() as session:
             for table in OPENERS:
                 session.execute(sa.delete(table).where(table.user_id == user_id))
             session.execute(sa.update(Identity).where(Identity.user_id == user_id).values(is_locked=True))
+            user = session.get_one(User, user_id)
+            user.is_locked = bool(user.password)  # who has none is let in again by a new card
 
     def admit(self, user_id: int) -> None:
-        """Somebody who was locked out comes in through a provider again."""
+        """Somebody who was locked out comes in by password and through a provider again."""
         with self._database.transaction() as session:
             session.execute(sa.update(Identity).where(Identity.user_id == user_id).values(is_locked=False))
+            session.get_one(User, user_id).is_locked = False
 
     def make_token(self, user_id: int, *, title: str, scopes: list[Scope], days: int) -> tuple[int, str]:
         """A token's number and secret, which is shown once.

@@ -12,10 +12,21 @@ from sqlalchemy.orm import Session
 from racecraft.serve.people.keys import revoke_all
 from racecraft.serve.people.names import checked_name, handle_of
 from racecraft.serve.people.passwords import hash_password, is_password
-from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.problems import Conflict, NotFound, NotLetIn
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Comment, Invitation, Job, Member, Quota, StudiedLesson, Submission, User, now
+from racecraft.serve.store.tables import (
+    Card,
+    Comment,
+    Invitation,
+    Job,
+    Member,
+    Quota,
+    StudiedLesson,
+    Submission,
+    User,
+    now,
+)
 
 Role = Literal["admin", "organiser", "racer"]
 
@@ -81,7 +92,7 @@ class People:
             _flush(session, user.name)
 
     def set_password(self, user_id: int, password: str, *, old: str) -> bool:
-        """A first password, or another one; False where `old` is not the one there is.
+        """A first password, or another one, which makes a card worthless; False where `old` is not the one there is.
 
         Raises:
             ConfigError: It is too short.
@@ -92,13 +103,29 @@ class People:
         hashed = hash_password(password)
         with self._database.transaction() as session:
             session.get_one(User, user_id).password = hashed
+            if kept:  # who changes it fears that others can come in
+                session.execute(sa.delete(Card).where(Card.user_id == user_id))
         return True
 
     def by_password(self, name: str, password: str) -> int | None:
-        """Whose name and password these are; takes as long where there is nobody of that name."""
+        """Whose name and password these are; takes as long where there is nobody of that name.
+
+        Raises:
+            NotLetIn: They are right, and of somebody who was locked out.
+        """
         found = self.kept(name)
         is_right = is_password(password, found[1] if found is not None else "")
-        return found[0] if found is not None and is_right else None
+        if found is None or not is_right:
+            return None
+        with self._database.transaction() as session:
+            if session.get_one(User, found[0]).is_locked:
+                raise NotLetIn("You are locked out.", hint="Ask whoever holds your group.")
+        return found[0]
+
+    def confirms(self, user_id: int, password: str) -> bool:
+        """Whether it is somebody's password, or they have none."""
+        kept = self.kept_password(user_id)
+        return not kept or is_password(password, kept)
 
     def kept(self, name: str) -> tuple[int, str] | None:
         """Number, and what is kept of the password, of who has a name; None where nobody has."""

@@ -11,10 +11,11 @@ from racecraft.errors import ConfigError
 from racecraft.serve.context import InConsoles, InPerson
 from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.door.known_browsers import remember
-from racecraft.serve.people.keys import SESSION_ID
+from racecraft.serve.people.keys import SESSION_ID, digest_of
 from racecraft.serve.people.links import address_of
 from racecraft.serve.people.schemas import (
     AccountChange,
+    Farewell,
     LetIn,
     MadeToken,
     Me,
@@ -48,7 +49,7 @@ def change_account(request: AccountChange, consoles: InConsoles, person: InPerso
 
 @router.put("/password", status_code=204)
 def set_password(body: NewPassword, request: Request, consoles: InConsoles, person: InPerson) -> Response:
-    """A first password, or another one; wrong old ones count like wrong ones at the door."""
+    """A first password, or another one, which ends a card; wrong old ones count like wrong ones at the door."""
     with consoles.tries.attempt(account=f"password {person.id}") as attempt:
         if not consoles.people.set_password(person.id, body.new, old=body.old):
             attempt.fail()
@@ -82,11 +83,11 @@ def end_sessions(consoles: InConsoles, person: InPerson) -> Response:
 
 
 @router.post("/devices", status_code=204)
-def let_device_in(body: LetIn, consoles: InConsoles, person: InPerson) -> Response:
+def let_device_in(body: LetIn, request: Request, consoles: InConsoles, person: InPerson) -> Response:
     """A program that shows this code gets a token of one's own."""
     with consoles.tries.attempt(account=f"device {person.id}") as attempt:
         try:
-            consoles.devices.confirm(body.code, person.id)
+            consoles.devices.confirm(body.code, person.id, session=digest_of(request.cookies.get(COOKIE, "")))
         except NotFound:
             attempt.fail()
             raise
@@ -145,8 +146,12 @@ def remove_token(token_id: Annotated[int, Path(ge=0, lt=2**31)], consoles: InCon
 
 
 @router.delete("", status_code=204)
-def remove_account(consoles: InConsoles, person: InPerson) -> Response:
-    """Forget somebody with all that is theirs; download it first."""
+def remove_account(consoles: InConsoles, person: InPerson, body: Farewell | None = None) -> Response:
+    """Forget somebody with all that is theirs; download it first. Who has a password gives it."""
+    with consoles.tries.attempt(account=f"password {person.id}") as attempt:
+        if not consoles.people.confirms(person.id, body.password if body is not None else ""):
+            attempt.fail()
+            raise ConfigError("That is not your password.")
     console = consoles.of(person.id)
     consoles.people.remove(person.id)
     consoles.league.forget(person.id)

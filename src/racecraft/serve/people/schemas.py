@@ -176,6 +176,12 @@ class NewPassword(Message):
     new: Password
 
 
+class Farewell(Message):
+    """Of who removes their account: that it is they."""
+
+    password: Password = ""
+
+
 class NewToken(Message):
     """A token for a program."""
 

@@ -58,6 +58,8 @@ class User(Table):
     """``admin``, ``organiser`` or ``racer``."""
     password: Mapped[str] = mapped_column(String(200), default="")
     """Its hash; empty for who comes by card."""
+    is_locked: Mapped[bool] = mapped_column(default=False)
+    """Whether they were locked out, and are not let in by their password."""
     created: Mapped[datetime] = mapped_column(default=now)
     deleted: Mapped[datetime | None]
 

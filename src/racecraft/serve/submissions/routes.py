@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from typing import Annotated, Final
 
@@ -9,7 +10,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, RunError
 from racecraft.judging.race import FORMAT
 from racecraft.limits import Medals
 from racecraft.race.entry_file import pack_entry
@@ -39,6 +40,8 @@ from racecraft.serve.submissions.season import read_season
 router = APIRouter(prefix="/api", tags=["league"])
 
 Id = Annotated[int, Path(ge=0, lt=2**31)]
+ARRIVES_S: Final = 120.0
+"""32 MB at 2 Mbit/s; who sends a byte now and then holds nobody's place for longer."""
 OPEN_GRAIN: Final = 50
 """mm and mrad that films of an open race are rounded to: in a step of 1/15 s that is 0.75 m/s, so that nobody reads a
 driver's choices off them and trains another one by those."""
@@ -188,7 +191,11 @@ async def submit(
 ) -> SubmissionInfo:
     """A model's file, as `racecraft submit` packs it; judged as a job. The same file again is the same submission."""
     await run_in_threadpool(consoles.league.get, race_id, person.id, member=True)  # before 32 MB are read for nothing
-    data = await request.body()
+    async with consoles.uploads.place(person.id):  # a few of 32 MB at a time, of each and of all
+        try:
+            data = await asyncio.wait_for(request.body(), ARRIVES_S)
+        except TimeoutError as error:
+            raise RunError(f"The file took more than {ARRIVES_S:.0f} s to arrive.", hint="Send it again.") from error
     return await run_in_threadpool(_submit, consoles, race_id, data, model, person.id)
 
 
