@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from racecraft.errors import ConfigError, RewardError, RunError
@@ -184,6 +185,21 @@ def test_trials_begin_with_a_parents_weights_and_awss_numbers(tmp_path: Path, mo
     shutil.rmtree(tmp_path / "first")
     with pytest.raises(RunError, match="trial-0000"):
         Tuning(folder)
+
+
+def test_who_has_a_search_made_says_whose_it_is_and_where_its_parent_lies(tmp_path: Path) -> None:
+    folder = begin(tmp_path, name="first")
+    assert not Tuning(folder).plan.foreign
+    assert Tuning(folder, foreign=True).plan.foreign
+    document = json.loads((folder / "tuning.json").read_text())
+    (folder / "tuning.json").write_text(json.dumps({**document, "foreign": True}))
+    assert Tuning(folder, foreign=False).plan.foreign
+    parent = Tuning(folder).plan.start(root=tmp_path / "theirs", name="run")
+    parent.checkpoints.save(64, {"weights/x": np.zeros(1, dtype=np.float32)}, metadata={})
+    (folder / "tuning.json").write_text(json.dumps({**document, "parent": f"{parent.path}@64"}))
+    assert Tuning(folder, parents=tmp_path / "theirs").plan.parent is not None
+    with pytest.raises(RunError, match="does not lie in"):
+        Tuning(folder, parents=tmp_path)
 
 
 @pytest.mark.costly

@@ -138,6 +138,17 @@ def recorded_stretches(folder: RunFolder) -> list[Stretch]:
     return found
 
 
+def stretches_as_it_is(folder: RunFolder) -> set[int]:
+    """The numbers of those that say what the run's files say now, as one that begins now does.
+
+    Raises:
+        RacecraftError: A file is missing or damaged.
+    """
+    recorded = recorded_stretches(folder)
+    now = _as_it_is(folder, number=1, step=0)
+    return {stretch.number for stretch in recorded if not now.changes(stretch)}
+
+
 def change_reward(folder: RunFolder, source: str) -> None:
     """Give a run another reward function, from its next step on; the one it learned with so far is kept.
 

@@ -55,13 +55,23 @@ class Tuning:
     Args:
         folder: Made by `start_tuning`.
         on_trial: Is told every trial that ended.
+        foreign: The reward function is somebody else's, whatever the folder says.
+        parents: Folder in which the run that trials begin from has to lie; by default any.
 
     Raises:
-        RunError: There is no such folder, its files are not what they were, or the run that trials begin from is gone.
+        RunError: There is no such folder, its files are not what they were, or the run that trials begin from is gone
+            or lies elsewhere.
         ConfigError: Optuna is not installed.
     """
 
-    def __init__(self, folder: str | Path, *, on_trial: Callable[[TrialOutcome], None] | None = None) -> None:
+    def __init__(
+        self,
+        folder: str | Path,
+        *,
+        on_trial: Callable[[TrialOutcome], None] | None = None,
+        foreign: bool = False,
+        parents: Path | None = None,
+    ) -> None:
         self.folder = Path(folder)
         if not (self.folder / "tuning.json").is_file():
             raise RunError(f"{self.folder} holds no tuning: tuning.json is missing.")
@@ -75,17 +85,20 @@ class Tuning:
             settings = TrainSettings.from_dict(dict(document["settings"]))
             reward = (self.folder / "reward_function.py").read_text(encoding="utf-8")
             metadata = ModelMetadata.load(self.folder / "model_metadata.json")
-            parent, foreign = document.get("parent"), bool(document.get("foreign", False))
+            name, is_foreign = document.get("parent"), foreign or bool(document.get("foreign", False))
         except (ConfigError, KeyError, TypeError, ValueError, OSError) as error:
             raise RunError(f"{self.folder} cannot be opened: {error}") from error
         check_installed("optuna", "racecraft tune")
+        parent = None if name is None else open_parent(str(name))
+        if parent is not None and parents is not None and parent.folder.path.resolve().parent != parents.resolve():
+            raise RunError(f"{self.folder} begins from {parent.name}, which does not lie in {parents}.")
         self.plan = Plan(
             settings=settings,
             reward=reward,
             metadata=metadata,
             hyperparameters=None,  # they are in the settings, where trials change them
-            parent=None if parent is None else open_parent(str(parent)),
-            foreign=foreign,
+            parent=parent,
+            foreign=is_foreign,
         )
         self._on_trial = on_trial
         self._stop = threading.Event()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from racecraft.serve.jobs.task import Task
-from racecraft.serve.settings import STATE_FOLDER
+from racecraft.serve.settings import OWNER, STATE_FOLDER
 from racecraft.serve.tuning.tunings import FOLDER
 
 
@@ -19,7 +19,8 @@ def tune(task: Task) -> dict[str, Any]:
 
     payload = task.job.payload
     folder = task.runs / STATE_FOLDER / FOLDER / payload["tuning"]
-    tuning = Tuning(folder)
+    # the folder may come from another machine, which is not believed whose reward function it is
+    tuning = Tuning(folder, foreign=task.job.user_id != OWNER, parents=task.runs)
     task.on_stop(tuning.stop)
     past = [trial for trial in tuning.past() if trial.state in ("complete", "pruned", "fail")]
     minutes = payload["minutes"] - tuning.seconds() / 60.0

@@ -16,9 +16,12 @@ import threading
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final
 
-from racecraft.errors import RunError
+from racecraft.errors import RacecraftError, RunError
+from racecraft.run import RunFolder
+from racecraft.run.stretches import MAX_BYTES, stretches_as_it_is
 from racecraft.serve.jobs.cargo import Cargo
 from racecraft.serve.jobs.line import MAX_OBJECT
 from racecraft.serve.jobs.queue import folder_of
@@ -35,9 +38,12 @@ MAX_FOLDER: Final = 1 << 32
 MAX_WAITING: Final = 1 << 30
 """Bytes of content that no list names yet."""
 FIXED: Final = re.compile(
-    r"(run|model_metadata|hyperparameters|race_rules)\.json|reward_function\.py|training_params\.yaml|parent/.*"
+    r"(run|tuning|model_metadata|hyperparameters|race_rules)\.json"
+    r"|reward_function\.py|training_params\.yaml|parent/.*"
 )
 """Files that say what is to be done: a job reads them and never changes them."""
+STRETCH: Final = re.compile(r"stretches/([1-9]\d{0,3})\.json")
+"""What was learned with; the newest one begins with the training, also when that begins again at the same step."""
 _NAME: Final = r"[A-Za-z0-9_][A-Za-z0-9._-]{0,63}"
 _KEY: Final = re.compile(
     rf"(?P<shelf>[a-z]{{1,16}})/(?:(?P<list>{_NAME})\.json|(?P<name>{_NAME})/(?P<digest>[0-9a-f]{{64}})|(?P<one>{_NAME}))"
@@ -183,8 +189,9 @@ class Parcels:
             raise Conflict(f"Run {name!r} was changed by another machine.")
         if sum(line["size"] for line in after.files.values()) > MAX_FOLDER:
             raise RunError(f"All files together may have at most {MAX_FOLDER >> 30} GB.")
-        for path in sorted(before.files.keys() | after.files.keys()) if key.shelf == RUNS else ():
-            if FIXED.fullmatch(path) and _what(before, path) != _what(after, path):
+        for path in sorted(before.files.keys() | after.files.keys()):
+            is_settled = key.shelf == RUNS or path in before.files
+            if is_settled and FIXED.fullmatch(path) and _what(before, path) != _what(after, path):
                 raise RunError(f"A job does not change {path}.")
         there = {line["sha256"]: line["size"] for line in before.files.values()}
         with self._lock:
@@ -199,12 +206,44 @@ class Parcels:
                     raise RunError(f"{path} is in the list of files, and its content is not there.") from error
             if line["size"] != there[digest]:
                 raise RunError(f"{path} has another size than the list of files says.")
+        if key.shelf == RUNS:
+            self._check_stretches(store, name, before, after)
         with lease.holding(job):
             store.objects.put(store.key(f"{name}.json"), data)
         with self._lock:
             self._waiting.pop(job.id, None)
         named = {line["sha256"] for line in after.files.values()}
         store.objects.delete(store.key(name, digest) for digest in there.keys() - named)
+
+    def _check_stretches(self, store: Artifacts, name: str, before: Copy, after: Copy) -> None:
+        """Refuse stretches that change what was, or say something else of the training than the files do."""
+        last = max(_stretches(before), default=0)
+        changed = {
+            number: path
+            for number, path in (_stretches(before) | _stretches(after)).items()
+            if _what(before, path) != _what(after, path)
+        }
+        for number, path in sorted(changed.items()):
+            if number < last:
+                raise RunError(f"A job does not change {path}.")
+        if not changed:
+            return
+        with TemporaryDirectory() as place:
+            folder = RunFolder(Path(place))
+            for path, line in after.files.items():
+                if STRETCH.fullmatch(path) or (FIXED.fullmatch(path) and "/" not in path):
+                    if line["size"] > MAX_BYTES:
+                        raise RunError(f"This may have at most {MAX_BYTES >> 20} MB.")
+                    file = folder.path / path
+                    file.parent.mkdir(exist_ok=True)
+                    file.write_bytes(store.objects.get(store.key(name, line["sha256"])).read())
+            try:
+                honest = stretches_as_it_is(folder)
+            except RacecraftError as error:
+                raise RunError(f"What run {name!r} learned with cannot be read.") from error
+        for number, path in sorted(changed.items()):
+            if path in after.files and number not in honest:
+                raise RunError(f"{path} says something else than the files that a job does not change.")
 
     def _store(self, job: Job) -> Artifacts:
         if self._artifacts is None:
@@ -222,6 +261,11 @@ def _ending(key: Key) -> tuple[str, ...]:
 
 def _what(copy: Copy, path: str) -> str:
     return str(copy.files[path]["sha256"]) if path in copy.files else ""
+
+
+def _stretches(copy: Copy) -> dict[int, str]:
+    """The paths of a run's stretches by their numbers."""
+    return {int(found[1]): path for path in copy.files if (found := STRETCH.fullmatch(path))}
 
 
 def _no_answer() -> Unreachable:
