@@ -6,13 +6,34 @@ import numpy as np
 import pytest
 
 from racecraft.errors import RewardError, RewardTimeout
+from racecraft.reward import rehearsal
 from racecraft.reward.dry_run import dry_run, moment, situations
+from racecraft.reward.rehearsal import drive_to
 from racecraft.reward.source import load_preset, preset_names
-from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.reward.worker import waypoints_of
+from racecraft.sim.columns import OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
+from racecraft.track import load_track
 
 
 def column(situation, name):
     return situation.row[ROW_COLUMNS.index(name)]
+
+
+def test_the_layout_of_a_drive_is_the_simulations():
+    columns = (*ROW_COLUMNS, *OBJECT_HEADER)
+    names = (
+        *("steps", "x", "y", "heading", "steering_angle", "progress", "offset", "projection_distance"),
+        *("track_length", "closest_prev", "closest_next", "all_wheels_on_track", "is_offtrack", "is_crashed"),
+        *("status", "time", "track_index", "actual_steering_angle", "lap", "crashed_object"),
+    )
+    constants = (
+        *("STEPS", "X", "Y", "HEADING", "STEERING", "PROGRESS", "OFFSET", "PROJECTION"),
+        *("LENGTH", "PREV", "NEXT", "ON_TRACK", "OFFTRACK", "CRASHED"),
+        *("STATUS", "TIME", "TRACK", "STEERED", "LAP", "CRASHED_INTO"),
+    )
+    for name, constant in zip(names, constants, strict=True):
+        assert columns[getattr(rehearsal, constant)] == name
+    assert STATUS_NAMES[int(rehearsal.IN_PROGRESS)] == "in_progress"
 
 
 def test_situations_cover_what_training_meets(track):
@@ -79,6 +100,101 @@ def test_racing_prefers_what_is_right(track):
     assert reward["fast"] > reward["straight"] > reward["slow"] > 0.0 > reward["backwards"]
     assert reward["straight"] > reward["left edge"] > reward["sideways"] > reward["off track"] == -1.0
     assert reward["other way"] == pytest.approx(reward["straight"])
+
+
+@pytest.mark.parametrize("name", ["reinvent_2018", "oval", "bowtie", "straight"])
+def test_only_a_start_is_near_the_start(name):
+    first, *others = situations(load_track(name))
+    assert 0.0 < column(first, "progress") < 0.02
+    for situation in others:
+        assert 0.1 <= column(situation, "progress") <= 1.0, situation.name
+        is_done = column(situation, "progress") > 0.99
+        assert is_done == (column(situation, "lap") == 1.0) == (situation.name == "finish")
+
+
+@pytest.mark.parametrize("reward", ["1.0 / params['progress']", "math.log(params['progress'])"])
+def test_progress_may_be_divided_by(reward):
+    source = f"import math\ndef reward_function(params):\n    return {reward}\n"
+    assert all(outcome.error is None for outcome in dry_run(source, load_track("oval")))
+
+
+REMEMBERING = {
+    "between steps": """
+p = s = 0.0
+def reward_function(params):
+    global p, s
+    if params['steps'] <= 2:
+        p = s = 0.0
+    r = (params['progress'] - p) / (params['steps'] - s)
+    p, s = params['progress'], params['steps']
+    return r
+""",
+    "since the start": """
+import math
+def reward_function(params):
+    global before
+    if params['steps'] <= 2:
+        before = params['progress']
+    r = math.sqrt(params['progress'] - before + 1)
+    before = params['progress']
+    return r
+""",
+    "every step": """
+last = {}
+def reward_function(params):
+    if params['steps'] == 2.0:
+        last.clear()
+    assert params['steps'] - last.get('steps', 1.0) == 1.0, 'a step is missing'
+    x, y = last.get('place', (params['x'], params['y']))
+    assert abs(params['x'] - x) + abs(params['y'] - y) < 1.0, 'a jump'
+    print(params['steps'])
+    last.update(steps=params['steps'], place=(params['x'], params['y']))
+    return params['progress']
+""",
+}
+
+
+@pytest.mark.parametrize("source", REMEMBERING.values(), ids=REMEMBERING)
+@pytest.mark.parametrize("name", ["reinvent_2018", "oval", "straight"])
+def test_what_a_function_remembers_of_another_situation_is_no_mistake_of_its_own(name, source):
+    outcomes = dry_run(source, load_track(name))
+    assert [str(outcome.error) for outcome in outcomes if outcome.error is not None] == []
+    if "print" in source:
+        assert [outcome.printed for outcome in outcomes] == [f"{outcome.params['steps']}\n" for outcome in outcomes]
+
+
+def test_a_mistake_is_found_in_a_function_that_remembers(track):
+    mistake = "    last['n'] = last.get('n', 0) + 1\n    1 / (last['n'] - 2)\n    return"
+    broken = REMEMBERING["every step"].replace("    return", mistake)
+    outcomes = dry_run(broken, track)
+    assert outcomes[0].error is None
+    assert all("ZeroDivisionError" in str(outcome.error) for outcome in outcomes[1:])
+
+
+@pytest.mark.parametrize("name", ["oval", "straight"])
+def test_a_drive_leads_to_a_situation_step_by_step(name):
+    track = load_track(name)
+    for situation in situations(track):
+        drive = np.array(drive_to(situation.row.tolist(), waypoints_of([track])))
+        assert len(drive) == column(situation, "steps") - 2
+        if not len(drive):
+            continue
+        values = dict(zip(ROW_COLUMNS, drive.T, strict=True))
+        assert values["steps"].tolist() == list(range(2, 2 + len(drive)))
+        road = track.reversed() if column(situation, "track_index") else track
+        step = column(situation, "progress") * track.length / len(drive)
+        assert np.hypot(np.diff(values["x"]), np.diff(values["y"])) == pytest.approx(step, rel=0.1)
+        assert values["progress"][0] == pytest.approx(0.14 / track.length)
+        assert np.diff(values["progress"]).min() > 0.0
+        assert column(situation, "progress") - values["progress"][-1] < 0.05
+        for name in ("is_offtrack", "is_crashed", "lap", "offset"):
+            assert not values[name].any()
+        assert set(values["status"]) == {STATUS_NAMES.index("in_progress")}
+        for x, y, place, before, after in zip(
+            *(values[name] for name in ("x", "y", "projection_distance", "closest_prev", "closest_next")), strict=True
+        ):
+            assert road.project([x, y])[0] == pytest.approx(place, abs=0.01)
+            assert road.arc_length[int(before)] <= place <= road.arc_length[int(after)]
 
 
 def test_one_failing_situation_does_not_hide_the_others(track):

@@ -56,6 +56,16 @@ BROKEN = {
 }
 CHECKED = {
     "good": "def reward_function(params):\n    return params['speed']\n",
+    "remembers": """import math
+
+def reward_function(params):
+    global before
+    if params["steps"] <= 2:
+        before = params["progress"]
+    gained = math.sqrt(params["progress"] - before + 1)
+    before = params["progress"]
+    return gained
+""",
     "syntax": "def reward_function(params)\n    return 1\n",
     "key": "def reward_function(params):\n    return params['sped']\n",
     "module": "import socket\nimport js\ndef reward_function(params):\n    return 1.0\n",
@@ -133,12 +143,13 @@ def test_a_check_finds_the_same_problems(found: Any, name: str) -> None:
     ours = [[p.line, p.column, p.severity, p.message, p.hint] for p in check_reward(CHECKED[name])]
     theirs = found["checked"][name]
     assert [[p["line"], p["column"], p["severity"], p["message"], p["hint"]] for p in theirs["problems"]] == ours
-    assert theirs["ok"] == (name == "good")
+    assert theirs["ok"] == (name in ("good", "remembers"))
 
 
-def test_situations_are_paid_as_in_a_dry_run(found: Any) -> None:
-    tried = dry_run(CHECKED["good"], load_track(TRACK))
-    theirs = found["checked"]["good"]["situations"]
+@pytest.mark.parametrize("name", ["good", "remembers"])
+def test_situations_are_paid_as_in_a_dry_run(found: Any, name: str) -> None:
+    tried = dry_run(CHECKED[name], load_track(TRACK))
+    theirs = found["checked"][name]["situations"]
     assert [[one["name"], one["reward"]] for one in theirs] == [[one.situation.name, one.reward] for one in tried]
 
 

@@ -1,7 +1,8 @@
 """Try a reward function on situations of a real track before training, a row each, start to finish.
 
 `dry_run` calls the function once per situation and hands back its reward, or the error with line and
-params. After an error the situations that follow are tried all the same, in a new worker.
+params. After an error the situations that follow are tried all the same, in a new worker. A function that remembers
+may fail only because no car gets from one situation to the next: its error counts if it fails after a drive, too.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import numpy.typing as npt
 
 from racecraft.errors import RewardError, RewardTimeout
 from racecraft.reward.params import make_params
+from racecraft.reward.rehearsal import FRONT, drive_to
+from racecraft.reward.state import keeps_state
 from racecraft.reward.worker import RewardWorker, waypoints_of
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 
@@ -22,7 +25,6 @@ if TYPE_CHECKING:
     from racecraft.track.track import Track
 
 STEP_SECONDS = 1.0 / 15.0  # between two calls for the same car
-FRONT = 0.14  # m from the car's origin to the point that x, y and progress mean
 TYPICAL_SPEED = 1.5  # m/s
 HALF_CAR = 0.08  # m from the car's middle line to its wheels
 
@@ -75,20 +77,30 @@ def dry_run(
     worker: RewardWorker | None = None
     try:
         for situation in situations(track):
-            if worker is None:
-                worker = RewardWorker(source, track, seed=seed, timeout_s=timeout_s, foreign=foreign)
-            reward, error = None, None
-            try:
-                reward = float(worker(situation.row[None])[0])
-            except RewardError as caught:
-                error = caught
-            params = make_params(situation.row.tolist(), waypoints)
-            outcomes.append(Outcome(situation, params, reward, error, worker.read_log()))
-            if isinstance(error, RewardTimeout):
-                break  # the others would most likely take as long
-            if error is not None:
+            is_led = worker is None and bool(outcomes) and keeps_state(source)
+            while True:
+                if worker is None:
+                    worker = RewardWorker(source, track, seed=seed, timeout_s=timeout_s, foreign=foreign)
+                reward, error = None, None
+                try:
+                    if is_led and (drive := drive_to(situation.row.tolist(), waypoints)):
+                        worker(np.array(drive))
+                        worker.read_log()
+                    reward = float(worker(situation.row[None])[0])
+                except RewardError as caught:
+                    error = caught
+                printed = worker.read_log()
+                if error is None:
+                    break
                 worker.close()
                 worker = None
+                if is_led or isinstance(error, RewardTimeout) or not keeps_state(source):
+                    break
+                is_led = True
+            params = make_params(situation.row.tolist(), waypoints)
+            outcomes.append(Outcome(situation, params, reward, error, printed))
+            if isinstance(error, RewardTimeout):
+                break  # the others would most likely take as long
     finally:
         if worker is not None:
             worker.close()
@@ -97,7 +109,8 @@ def dry_run(
 
 def situations(track: Track) -> list[Situation]:
     """The moments to try, all on the given track."""
-    places = np.linspace(0.0, track.length, 400, endpoint=False)
+    # Well inside the lap, in either direction: only an episode's first steps are near its start.
+    places = np.linspace(0.1, 0.9, 400) * track.length
     curvature = track.curvature_at(places)
     straight = float(places[np.abs(curvature).argmin()])
     left, right = float(places[curvature.argmax()]), float(places[curvature.argmin()])
