@@ -47,6 +47,7 @@ def test_it_says_what_it_did_and_how_to_go_on(
     assert Path(document["run"]).parent == Path("other")
     assert RunFolder.open(document["run"]).name in document["next"]
     assert document["unknown"] == {"DR_WORLD_NAM": "Did you mean 'DR_WORLD_NAME'?"}
+    assert any("its critic begins anew" in note for note in document["notes"])
 
 
 def test_a_refusal_is_one_json_object(

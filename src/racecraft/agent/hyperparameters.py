@@ -49,7 +49,7 @@ class Hyperparameters:
     """
 
     batch_size: Annotated[Whole, Field(ge=1, le=2048, description="1 to 2048 samples")] = 64
-    """Samples in a minibatch; the largest of AWS's networks keeps some MB for each."""
+    """Samples in a minibatch; PPO of the largest of AWS's networks keeps about 1 MB for each."""
     num_epochs: Annotated[Whole, Field(ge=1, le=100, description="1 to 100")] = 10
     """Passes over each rollout."""
     lr: Annotated[Number, Field(gt=0, le=1, description="above 0, to 1")] = 3e-4
