@@ -238,3 +238,12 @@ def test_somebody_elses_reward_stays_somebody_elses(console: RunningConsole) -> 
     assert marks == [True, True, True, False]
     verdict = console.client.post("/api/rewards/check", json={"source": REWARD, "track": "oval"}).json()
     assert verdict["ok"]
+
+    mine = console.create(reward=REWARD + "# mine\n", track="oval", until="512 steps")
+    (job,) = console.client.get("/api/jobs", params={"run": mine, "kind": "train"}).json()
+    console.wait_for(console.job_ended(job["id"]))
+    stretch = RunFolder.open(console.runs / mine).stretches / "1.json"
+    stretch.write_text(json.dumps(json.loads(stretch.read_text()) | {"reward_function": REWARD}))
+    (point, *_) = console.client.get(f"/api/models/{mine}").json()["checkpoints"]
+    branch = console.client.post(f"/api/models/{mine}/clone", json={"step": point["step"]}).json()
+    assert RunFolder.open(console.runs / branch["name"]).read_info().foreign

@@ -16,7 +16,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -26,7 +26,6 @@ from racecraft.checks import check_whole, require
 from racecraft.errors import ConfigError, RacecraftError, RunError
 from racecraft.extras import check_installed
 from racecraft.json_file import read_json_object
-from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
 from racecraft.run.lock import exclusive_lock
 from racecraft.system import num_cores
@@ -188,7 +187,7 @@ class Tuning:
         number, values, bars = call.record.begin(place)
         call.busy[seat] = number, place
         try:
-            run = self._start(values, name_of(number))
+            run = self.plan_of_trial(values).start(root=self.folder, name=name_of(number))
         except RacecraftError as error:
             self._news.put((seat, error))
             return
@@ -235,20 +234,24 @@ class Tuning:
             self._on_trial(trial)
         self._write(record)
 
-    def _start(self, values: dict[str, float | int], name: str) -> RunFolder:
-        """The run folder of a trial."""
+    def plan_of_trial(self, values: Mapping[str, float | int]) -> Plan:
+        """What a trial with such numbers is made of.
+
+        Raises:
+            RacecraftError: They are not of this search.
+        """
         plan, kinds = self.plan, {parameter.name: parameter.kind for parameter in self.space}
+        require("numbers", sorted(values), values.keys() <= kinds.keys(), f"those of {', '.join(kinds)}")
         constants = {name: value for name, value in values.items() if kinds[name] == "constant"}
         learning: dict[str, Any] = {name: value for name, value in values.items() if kinds[name] == "hyperparameter"}
         ppo = replace(plan.settings.ppo, **learning)
         ppo = replace(ppo, minibatch_size=min(ppo.minibatch_size, ppo.num_envs * ppo.num_steps))
         until = Until(laps=plan.settings.evaluation_trials if self.goal == "laps" else 0, steps=self.trial_steps)
-        plan = replace(
+        return replace(
             plan,
             settings=replace(plan.settings, ppo=ppo, until=until),
             reward=rewrite_constants(plan.reward, constants),
         )
-        return plan.start(root=self.folder, name=name)
 
     # ---- the study
 

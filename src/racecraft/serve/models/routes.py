@@ -204,7 +204,7 @@ def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard
         parent=parent,
         root=context.garage.runs,
         name=request.name or context.garage.name_beside(name),
-        foreign=folder.read_info().foreign,
+        foreign=folder.read_info().foreign or context.garage.is_foreign(reward),
     )
     context.mirror.copy(copy.name)
     return context.garage.card(copy.name)

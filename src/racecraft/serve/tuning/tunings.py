@@ -9,12 +9,13 @@ import re
 import secrets
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from racecraft.errors import ConfigError, RunError
+from racecraft.errors import ConfigError, RacecraftError, RunError
 from racecraft.json_file import read_json_object
-from racecraft.run import RunFolder
+from racecraft.run import RunFolder, RunInfo
 from racecraft.run.folder import sanitize_name
 from racecraft.run.history import read_history
 from racecraft.serve.jobs.cargo import rivals_of
@@ -25,6 +26,7 @@ from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.tables import Job
 from racecraft.serve.tuning.schemas import KeepTrial, NewTuning, TunableNumber, TuningCard, TuningTrial
+from racecraft.training.start import read_settings
 
 if TYPE_CHECKING:
     from racecraft.tuning import Parameter
@@ -104,7 +106,7 @@ class Tunings:
 
         Raises:
             NotFound: There is no such trial, or it has no policy.
-            Conflict: There is a model of that name.
+            Conflict: There is a model of that name, or the trial is none of this search.
         """
         card, _ = self._find(name, tuning)
         number = card.best if request.trial is None else request.trial
@@ -117,9 +119,16 @@ class Tunings:
             fresh = next(one for one in (stem, *(f"{stem}-{n}" for n in range(2, 10_000))) if one not in taken)
         self._garage.require_new(fresh)
         source = self._folder / tuning / f"trial-{number:04d}"
+        info = self._honest(tuning, number)
         copy = self._folder / f"{tuning}-{secrets.token_hex(4)}"
         try:
             shutil.copytree(source, copy, ignore=shutil.ignore_patterns(".lock", f"{LIVE}*"))
+            kept = RunFolder(copy)
+            kept.write_info(info)
+            # one stretch says what the other files say, and of these a search makes none
+            shutil.rmtree(kept.stretches, ignore_errors=True)
+            for file in (kept.hyperparameters, kept.race_rules):
+                file.unlink(missing_ok=True)
             copy.rename(self._garage.runs / fresh)
         except OSError as error:
             shutil.rmtree(copy, ignore_errors=True)
@@ -127,6 +136,28 @@ class Tunings:
                 f"The trial cannot be copied: {error.strerror or error}.", hint="Free disk space."
             ) from error
         return fresh
+
+    def _honest(self, tuning: str, number: int) -> RunInfo:
+        """The ``run.json`` of a model that is made of a trial, which may come from another machine.
+
+        Raises:
+            Conflict: The trial is not what the search would have made with its numbers.
+        """
+        from racecraft.tuning import Tuning
+
+        run = RunFolder(self._folder / tuning / f"trial-{number:04d}")
+        try:
+            search = Tuning(self._folder / tuning, parents=self._garage.runs)
+            trials = read_json_object(search.folder / "result.json")["trials"]
+            plan = search.plan_of_trial(next(trial["params"] for trial in trials if trial["number"] == number))
+            info, parent = run.read_info(), None if plan.parent is None else plan.parent.record()
+            made = (read_settings(run), run.read_reward_function(), run.read_model_metadata(), info.parent)
+            is_honest = made == (plan.settings, plan.reward, plan.metadata, parent)
+        except (RacecraftError, KeyError, TypeError, ValueError, AttributeError) as error:
+            raise Conflict("The trial's files cannot be read.", hint="Keep another one.") from error
+        if not is_honest:
+            raise Conflict("The trial is not what the search asked for.", hint="Keep another one.")
+        return replace(info, foreign=plan.foreign or self._garage.is_foreign(plan.reward))
 
     def remove(self, name: str, tuning: str) -> None:
         """Remove a search with its trials.
