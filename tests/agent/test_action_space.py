@@ -7,6 +7,10 @@ from hypothesis import strategies as st
 
 from racecraft.agent import PRESETS, ContinuousActionSpace, DiscreteActionSpace, action_space
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
+from racecraft.reward import make_params
+from racecraft.reward.worker import waypoints_of
+from racecraft.sim import Simulation
+from racecraft.track import load_track
 
 angles = st.floats(-30, 30).map(lambda value: round(value, 3))
 speeds = st.floats(0.1, 4).map(lambda value: round(value, 3))
@@ -37,10 +41,18 @@ def test_equal_tables_are_one_space():
     assert hash(action_space("default")) == hash(DiscreteActionSpace.from_aws(action_space("default").to_aws()))
 
 
-def test_steering_of_45_degrees_drives_as_30():
-    space = DiscreteActionSpace.from_aws([{"steering_angle": 45, "speed": 0.8}, {"steering_angle": -45, "speed": 0.8}])
-    np.testing.assert_allclose(space.to_commands([0, 1])[:, 0], np.radians([30, -30]), rtol=1e-6)
+def test_steering_of_45_degrees_is_commanded_and_drives_as_30():
+    space = DiscreteActionSpace.from_aws([{"steering_angle": angle, "speed": 0.8} for angle in (45, -45, 30, -30)])
     assert space.to_aws()[0]["steering_angle"] == 45
+    cars = Simulation(load_track("oval"), num_envs=4, camera=None, num_threads=1)
+    waypoints = waypoints_of(cars.tracks)
+    for _ in range(5):
+        cars.step(space.to_commands(np.arange(4)))
+        seen = [make_params(row, waypoints) for row in cars.rows.tolist()]
+        assert [params["steering_angle"] for params in seen] == [45.0, -45.0, 30.0, -30.0]
+    wheels = cars.column("actual_steering_angle")
+    np.testing.assert_allclose(np.abs(wheels), math.radians(30), atol=0.03)  # the car pulls to the left
+    np.testing.assert_array_equal(cars.vehicles[:, :2], cars.vehicles[:, 2:])
 
 
 def test_grid_is_the_console_generator():

@@ -246,6 +246,14 @@ def sealed(body: bytes, *, version: int = VERSION, size: int | None = None) -> b
     return prefix + zlib.compress(body)
 
 
+def is_same_stream(data: bytes, other: bytes) -> bool:
+    """Whether both say the same: a few bits of what zlib writes mean nothing, and which depends on the content."""
+    try:
+        return unpack(data, name="one") == unpack(other, name="other")
+    except ReplayError:
+        return False
+
+
 def test_every_cut_and_every_flipped_byte_is_noticed(clean: Path, tmp_path: Path) -> None:
     data, path = clean.read_bytes(), tmp_path / "bad.replay"
     for end in [*range(64), *range(64, len(data), max(1, len(data) // 40))]:
@@ -253,7 +261,8 @@ def test_every_cut_and_every_flipped_byte_is_noticed(clean: Path, tmp_path: Path
     for place in [*range(64), *range(64, len(data), max(1, len(data) // 40))]:
         changed = bytearray(data)
         changed[place] ^= 0x40
-        refused(path, bytes(changed), "damaged|does not begin|version|says it holds")
+        if not is_same_stream(bytes(changed), data):
+            refused(path, bytes(changed), "damaged|does not begin|version|says it holds")
     refused(path, data + b"more", "damaged")
 
 

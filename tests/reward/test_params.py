@@ -78,7 +78,7 @@ def test_value_of_every_key(make_row, key, columns, expected):
     assert type(value) is type(TEMPLATE[key])
 
 
-angles = st.integers(-300, 300).map(lambda tenths: tenths / 10)
+angles = st.integers(-450, 450).map(lambda tenths: tenths / 10)
 speeds = st.integers(10, 400).map(lambda hundredths: hundredths / 100)
 
 

@@ -19,7 +19,7 @@ CARS = 24  # in all, whatever the batch
 STEPS = 60
 
 # Judged rows, states, scans and vehicles of six races of four cars. Only a change on purpose changes it.
-GOLDEN = "d44d49e7184c934fa7d66bbf434e474b7fd395f600039da2cee8f62d60a861df"
+GOLDEN = "551306e0226e2b25fa05d79c44b31a1425979630342a210a4af6234e9e8ffe98"
 
 
 def drive(races: int, num_threads: int, choose, *, camera: CameraSpec | None = None) -> str:

@@ -23,12 +23,13 @@
 
 namespace racecraft {
 
-constexpr float kControlDt = 1.0f / 15.0f;    // seconds per control step: one camera image at 15 Hz
-constexpr float kGravity = 9.8f;              // m/s^2, as in the original's physics settings
-constexpr float kMaxSteering = 0.523598776f;  // rad, 30 degrees: hard clip of the steering command
-constexpr float kMostSteering = 0.9f;         // rad, more than any command and bias turn the wheels
-constexpr float kMinSpeedCommand = 0.1f;      // m/s; a command of exactly 0 (stop) is allowed below it
-constexpr float kMaxSpeedCommand = 4.0f;      // m/s
+constexpr float kControlDt = 1.0f / 15.0f;           // seconds per control step: one camera image at 15 Hz
+constexpr float kGravity = 9.8f;                     // m/s^2, as in the original's physics settings
+constexpr float kMaxSteering = 0.523598776f;         // rad, 30 degrees: no command turns the wheels further
+constexpr float kMaxSteeringCommand = 0.785398163f;  // rad, 45 degrees: commands of 2018, which rows tell
+constexpr float kMostSteering = 0.9f;                // rad, more than any command and bias turn the wheels
+constexpr float kMinSpeedCommand = 0.1f;             // m/s; a command of exactly 0 (stop) is allowed below it
+constexpr float kMaxSpeedCommand = 4.0f;             // m/s
 // Drive and brakes give at most this many times what the slipperier axle gives across: a car that is pushed
 // harder than it can be held gains speed sideways.
 constexpr float kMaxDriveOverFriction = 3.0f;

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import gymnasium
 
 MAX_STEERING = 30.0  # degrees; the car's front wheels turn no further
-MAX_FILE_STEERING = 45.0  # degrees; files of 2018 have it, and the car drives it as 30
+MAX_FILE_STEERING = 45.0  # degrees; files of 2018 have it: rewards and logs say so, the wheels stop at 30
 MIN_SPEED, MAX_SPEED = 0.1, 4.0  # m/s
 MIN_ACTIONS, MAX_ACTIONS = 2, 30
 STEERING_GRANULARITIES = (3, 5, 7)
@@ -53,8 +53,7 @@ class DiscreteActionSpace:
                 "degrees",
             )
             _check(f"action_space[{index}].speed", speed, MIN_SPEED, MAX_SPEED, "m/s")
-        limit = math.radians(MAX_STEERING)
-        self._commands = np.clip(self.table, [-limit, 0.0], [limit, MAX_SPEED]).astype(np.float32)
+        self._commands = self.table.astype(np.float32)
 
     @classmethod
     def grid(
@@ -95,7 +94,7 @@ class DiscreteActionSpace:
         ]
 
     def to_commands(self, actions: ArrayLike) -> NDArray[np.float32]:
-        """Commands for ``Simulation.step``   (N, 2) from action indices   (N,); steering is within ±30°."""
+        """Commands for ``Simulation.step``   (N, 2) from action indices   (N,)."""
         indices = np.asarray(actions)
         if indices.ndim != 1 or indices.dtype.kind not in "iu":
             raise ShapeError(

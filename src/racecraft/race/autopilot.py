@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from racecraft.checks import check_number
 from racecraft.sim.columns import CURVATURE_AHEAD, STATE_COLUMNS
+from racecraft.sim.simulation import MAX_STEERING
 
 PATH_SPACING: Final = 0.05
 """m between the points of the path ahead."""
@@ -76,7 +77,7 @@ class Autopilot:
         # the same point as the car sees it, and the arc that leads there
         target_x, target_y = cosine * ahead + sine * left, cosine * left - sine * ahead
         bend = 2.0 * target_y / (target_x**2 + target_y**2)
-        steering = np.arctan(bend * (WHEELBASE + UNDERSTEER * speed**2))
+        steering = np.arctan(bend * (WHEELBASE + UNDERSTEER * speed**2)).clip(-MAX_STEERING, MAX_STEERING)
 
         reach = np.abs(curvature[:, : int(_BRAKING_VIEW / PATH_SPACING)]).max(axis=1)
         pace = np.sqrt(self.lateral_acceleration / np.maximum(reach, 1e-6)).clip(0.1, self.speed)

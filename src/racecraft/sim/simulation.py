@@ -31,7 +31,7 @@ from racecraft.track.track import Track
 CONTROL_DT: Final = 1.0 / 15.0
 """Seconds per control step: one camera image at 15 Hz."""
 MAX_STEERING: Final = np.pi / 6
-"""rad, hard clip of the steering command."""
+"""rad, no command turns the wheels further."""
 TABLE_SPACING: Final = 0.05
 """m between samples of width and curvature along the centre line."""
 
@@ -305,8 +305,8 @@ class Simulation:
         """Judge, move and look: one control step of 1/15 s for every car.
 
         Args:
-            actions: Steering angle in radians (left positive, clipped to ±30°) and speed in m/s (clipped to 0.1 to 4;
-                exactly 0 asks the car to stop), (N, 2).
+            actions: Steering angle in radians (left positive; the wheels stop at ±30°, rows tell up to ±45°) and speed
+                in m/s (clipped to 0.1 to 4; exactly 0 asks the car to stop), (N, 2).
 
         Raises:
             ShapeError: Wrong shape.
