@@ -133,11 +133,11 @@ def test_every_field_has_a_range_in_words():
     assert len(_file().model_fields) == 14
 
 
-def test_sac_trains_after_every_episode():
-    Hyperparameters(num_episodes_between_training=1).check_algorithm("sac")
-    Hyperparameters().check_algorithm("clipped_ppo")
-    with pytest.raises(ConfigError, match="num_episodes_between_training is 20; allowed is 1 with 'sac'"):
-        Hyperparameters().check_algorithm("sac")
+def test_sac_trains_after_every_step_whatever_the_file_says():
+    one = Hyperparameters(num_episodes_between_training=1)
+    assert one.notes_for("continuous", "sac") == Hyperparameters().notes_for("continuous", "clipped_ppo") == ()
+    told = "num_episodes_between_training 20 has no effect: SAC learns after every step."
+    assert Hyperparameters().notes_for("continuous", "sac") == (told,)
 
 
 def test_sac_is_that_of_aws_with_an_update_a_step_and_nothing_of_ours():
@@ -151,10 +151,10 @@ def test_continuous_actions_are_drawn_by_chance_whatever_the_file_says():
     greedy = Hyperparameters.from_dict({"exploration_type": "e-greedy", "num_epochs": 2})
     assert greedy.to_ppo(is_continuous=True) == {**greedy.to_ppo(), "exploration": "categorical"}
     assert greedy.to_ppo()["exploration"] == "e-greedy"
-    assert greedy.notes_for("discrete") == greedy.notes
+    assert greedy.notes_for("discrete", "clipped_ppo") == greedy.notes
     told = "exploration_type 'e-greedy' has no effect: continuous actions are always drawn by chance."
-    assert greedy.notes_for("continuous") == (*greedy.notes, told)
-    assert Hyperparameters().notes_for("continuous") == ()
+    assert greedy.notes_for("continuous", "clipped_ppo") == (*greedy.notes, told)
+    assert Hyperparameters().notes_for("continuous", "clipped_ppo") == ()
 
 
 def test_ppo_settings_are_named_as_the_learner_names_them():

@@ -80,8 +80,8 @@ def test_awss_files_choose_sac_and_its_settings(tmp_path: Path) -> None:
     assert (sac.tau, sac.updates_per_step, sac.policy_frequency) == (1.0, 1.0, 1)
 
     Hyperparameters().save(hyperparameters)
-    with pytest.raises(ConfigError, match="num_episodes_between_training is 20; allowed is 1 with 'sac'"):
-        make_plan("oval", model_metadata=metadata, hyperparameters=hyperparameters)
+    told = "num_episodes_between_training 20 has no effect: SAC learns after every step."
+    assert told in make_plan("oval", model_metadata=metadata, hyperparameters=hyperparameters).notes
     assert make_plan("oval", model_metadata=metadata, algorithm="ppo").metadata.training_algorithm == "clipped_ppo"
 
 

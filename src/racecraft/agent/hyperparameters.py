@@ -11,7 +11,6 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BeforeValidator, Field
 
 from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, unknown_fields, validate
-from racecraft.errors import ConfigError
 from racecraft.json_file import read_json_object, write_json_object
 
 BATCH_SIZES = (32, 64, 128, 256, 512)  # those of AWS's console
@@ -135,19 +134,16 @@ class Hyperparameters:
             del document["sac_alpha"]
         return dict(sorted(document.items()))
 
-    def check_algorithm(self, algorithm: str) -> None:
-        """Refuse what does not go with a training algorithm: SAC learns after every episode.
+    def notes_for(self, actions: str, algorithm: str) -> tuple[str, ...]:
+        """Sentences for the user: `notes`, and what has no effect with such actions and such an algorithm.
 
-        Raises:
-            ConfigError: SAC with more than one episode between training.
+        Args:
+            actions: ``discrete`` or ``continuous``.
+            algorithm: As model_metadata.json calls it.
         """
-        if algorithm == "sac" and self.num_episodes_between_training != 1:
-            episodes = self.num_episodes_between_training
-            raise ConfigError(f"num_episodes_between_training is {episodes}; allowed is 1 with 'sac'.")
-
-    def notes_for(self, actions: str) -> tuple[str, ...]:
-        """Sentences for the user: `notes`, and what has no effect with ``discrete`` or ``continuous`` actions."""
         notes = list(self.notes)
+        if algorithm == "sac" and (episodes := self.num_episodes_between_training) != 1:
+            notes.append(f"num_episodes_between_training {episodes} has no effect: SAC learns after every step.")
         if actions == "continuous" and self.exploration_type == "e-greedy":
             notes.append("exploration_type 'e-greedy' has no effect: continuous actions are always drawn by chance.")
         return tuple(notes)

@@ -127,8 +127,6 @@ def import_run(
         hyperparameters = (
             None if own is not None and not own.has_hyperparameters else _read_hyperparameters(model, metadata)
         )
-        if hyperparameters is not None:
-            hyperparameters.check_algorithm(metadata.training_algorithm)
         if own is not None:
             tracks, label = list(own.tracks), own.settings.track
             model.kind, model.used["run.json"] = "archive of Racecraft", f"every setting, track {label}"
@@ -311,7 +309,7 @@ def _read_hyperparameters(model: _Model, metadata: ModelMetadata) -> Hyperparame
     hyperparameters = Hyperparameters.from_dict(parse_json_object(model.source.text(name), name=shown), name=shown)
     episodes = hyperparameters.num_episodes_between_training
     model.used[shown] = f"PPO as AWS's, {episodes} episodes to an iteration"
-    model.notes += hyperparameters.notes_for(metadata.action_space.kind)
+    model.notes += hyperparameters.notes_for(metadata.action_space.kind, metadata.training_algorithm)
     return hyperparameters
 
 

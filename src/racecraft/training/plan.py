@@ -37,9 +37,9 @@ class Plan:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences for the user about the files and the parent."""
-        files, actions = self.metadata.notes, self.metadata.action_space.kind
+        files, metadata = self.metadata.notes, self.metadata
         if self.hyperparameters is not None:
-            files = (*files, *self.hyperparameters.notes_for(actions))
+            files = (*files, *self.hyperparameters.notes_for(metadata.action_space.kind, metadata.training_algorithm))
         if self.parent is None:
             return files
         anew = self.parent.check(self.settings.network_spec(self.metadata), self.metadata)

@@ -263,8 +263,6 @@ def make_settings(
             f"hyperparameters.json is for AWS's algorithms, {algorithm} is none of them.", hint="Leave it out."
         )
     if algorithm == "sac" and "sac" not in settings:
-        if hyperparameters is not None:
-            hyperparameters.check_algorithm("sac")
         theirs: dict[str, Any] = {} if hyperparameters is None else hyperparameters.to_sac()
         settings["sac"] = SACConfig(**theirs)
     if num_envs and method.settings != "ppo":
