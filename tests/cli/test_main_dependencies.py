@@ -103,7 +103,7 @@ COMMANDS: dict[str, list[str]] = {
         "tracks show oval -o T.png --width 400 --json",
         "tracks --json",
     ],
-    "reward": ["reward list --json", "reward show racing --json", "reward check W -t oval --json"],
+    "reward": ["reward list --json", "reward show racing --json", "reward check W -t oval --objects 2 --bots 1 --json"],
     "learn": [
         "learn --json",
         "learn CliffWalking-v1 --algorithm sarsa --until 200steps --seed 1 --set gamma=0.9 --name w --runs R --json",

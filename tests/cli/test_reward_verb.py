@@ -65,6 +65,18 @@ def test_a_failure_of_numpys_is_told_with_what_to_write_instead(racecraft: Run, 
     assert "hint: NumPy makes a number only of" in racecraft("reward", "check", "reward_function.py").out
 
 
+def test_a_reward_is_tried_among_as_many_objects_as_are_asked_for(racecraft: Run, tmp_path: Path) -> None:
+    source = "def reward_function(params):\n    return len(params['objects_speed']) / any(params['objects_speed'])\n"
+    (tmp_path / "reward_function.py").write_text(source)
+    assert racecraft("reward", "check", "reward_function.py").status == 1
+    checked = racecraft("reward", "check", "reward_function.py", "--objects", "2", "--bots", "1", "--json").document
+    assert checked["ok"]
+    assert {situation["reward"] for situation in checked["situations"]} == {3.0}
+    assert {"near an object", "crash"} <= {situation["name"] for situation in checked["situations"]}
+    outcome = racecraft("reward", "check", "reward_function.py", "--objects", "33")
+    assert outcome.status != 0
+
+
 def test_presets_are_listed_shown_and_fit(racecraft: Run) -> None:
     listed = racecraft("reward", "list", "--json").document["rewards"]
     assert {"centerline", "racing"} <= listed.keys()

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from racecraft.errors import RewardError, RewardTimeout
 from racecraft.reward import rehearsal
 from racecraft.reward.dry_run import dry_run, moment, situations
+from racecraft.reward.params import make_params
 from racecraft.reward.rehearsal import drive_to
 from racecraft.reward.source import load_preset, preset_names
 from racecraft.reward.worker import waypoints_of
-from racecraft.sim.columns import OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim import NO_OBJECTS, Bots, Objects, Obstacles, Simulation, Start
+from racecraft.sim.columns import OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES, row_width
 from racecraft.track import load_track
 
 
@@ -195,6 +199,65 @@ def test_a_drive_leads_to_a_situation_step_by_step(name):
         ):
             assert road.project([x, y])[0] == pytest.approx(place, abs=0.01)
             assert road.arc_length[int(before)] <= place <= road.arc_length[int(after)]
+
+
+AMONG = {
+    "boxes": {"objects": Objects(obstacles=Obstacles(count=6))},
+    "bots": {"objects": Objects(bots=Bots(count=2, placement="random"))},
+    "both": {"objects": Objects(obstacles=Obstacles(count=1, kind="car"), bots=Bots(count=1)), "cars_per_race": 2},
+    "another car": {"cars_per_race": 2},
+}
+
+
+@pytest.mark.parametrize("name", ["reinvent_2018", "straight"])
+@pytest.mark.parametrize("among", AMONG)
+def test_objects_are_told_as_the_simulation_tells_them(name, among):
+    track, settings = load_track(name), AMONG[among]
+    cars = settings.get("cars_per_race", 1)
+    count = settings.get("objects", NO_OBJECTS).count + cars - 1
+    found = situations(track, **settings)
+    assert [one.name for one in found if one.name not in {plain.name for plain in situations(track)}] == [
+        "near an object",
+        "crash",
+    ]
+    for direction in ("forward", "reverse"):
+        start = Start(mode="fixed")
+        simulation = Simulation(
+            track, num_envs=cars, camera=None, direction=direction, start=start, num_threads=1, **settings
+        )
+        for situation in found:
+            if column(situation, "track_index") != (direction == "reverse"):
+                continue
+            assert situation.row.shape == (row_width(count),)
+            params = make_params(situation.row.tolist(), waypoints_of([track]))
+            if "objects" in settings or situation.name not in ("near an object", "crash"):
+                assert params["objects_distance"] == simulation.object_column("object_distance")[0].tolist()
+                assert params["objects_location"][0] == tuple(simulation.judged[0, [29, 30]])
+            behind, ahead = params["closest_objects"]
+            place, distances = params["projection_distance"], params["objects_distance"]
+            later = [distance for distance in distances if distance > place] or distances
+            assert distances[ahead] == min(later)
+            sooner = [distance for distance in distances if distance <= place] or distances
+            assert distances[behind] == max(sooner)
+    near, crash = (one for one in found if one.name in ("near an object", "crash"))
+    crashed = crash.row[len(ROW_COLUMNS) + OBJECT_HEADER.index("crashed_object")]
+    assert 0 <= crashed < count
+    assert near.row[len(ROW_COLUMNS) + OBJECT_HEADER.index("crashed_object")] == -1.0
+    assert near.row[len(ROW_COLUMNS) + OBJECT_HEADER.index("object_in_camera")] == 1.0
+    crash_params = make_params(crash.row.tolist(), waypoints_of([track]))
+    assert crash_params["is_crashed"]
+    x, y = crash_params["objects_location"][int(crashed)]
+    assert math.dist((x, y), (crash_params["x"], crash_params["y"])) < 0.5
+
+
+@pytest.mark.parametrize("among", AMONG)
+def test_a_function_may_rely_on_objects(track, among):
+    source = "def reward_function(params):\n    return params['objects_location'][params['closest_objects'][1]][0]\n"
+    assert all(outcome.error is None for outcome in dry_run(source, track, **AMONG[among]))
+    assert all("IndexError" in str(outcome.error) for outcome in dry_run(source, track))
+    remembering = REMEMBERING["every step"] + "    params['objects_location'][0]\n"
+    outcomes = dry_run(source + remembering, track, **AMONG[among])
+    assert [str(outcome.error) for outcome in outcomes if outcome.error is not None] == []
 
 
 def test_one_failing_situation_does_not_hide_the_others(track):

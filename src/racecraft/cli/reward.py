@@ -8,6 +8,8 @@ import typer
 
 from racecraft.cli.app import Json, TrackOption, app, print_json, text
 
+NumObjects = Annotated[int, typer.Option("--objects", help="Boxes on the track, as in object avoidance.")]
+NumBots = Annotated[int, typer.Option("--bots", help="Bot cars on the track, as in head-to-bot.")]
 reward_app = typer.Typer(help="Look at reward functions.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(reward_app, name="reward")
 
@@ -16,16 +18,20 @@ app.add_typer(reward_app, name="reward")
 def check(
     file: Annotated[str, typer.Argument(help="Path of a reward_function.py, or a preset.")],
     track: TrackOption = "reinvent_2018",
+    objects: NumObjects = 0,
+    bots: NumBots = 0,
     as_json: Json = False,
 ) -> None:
     """Check a reward function and try it in a car's situations."""
     from racecraft.reward import check_reward, dry_run, load_reward
+    from racecraft.sim import Bots, Objects, Obstacles
     from racecraft.track import load_track
 
+    around = Objects(obstacles=Obstacles(count=objects) if objects else None, bots=Bots(count=bots) if bots else None)
     source = load_reward(file)
     problems = check_reward(source)
     has_errors = any(problem.severity == "error" for problem in problems)
-    outcomes = [] if has_errors else dry_run(source, load_track(track))
+    outcomes = [] if has_errors else dry_run(source, load_track(track), objects=around)
     failed = has_errors or any(outcome.error is not None for outcome in outcomes)
     if as_json:
         print_json(

@@ -8,7 +8,7 @@ may fail only because no car gets from one situation to the next: its error coun
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,8 @@ from racecraft.reward.params import make_params
 from racecraft.reward.rehearsal import FRONT, drive_to
 from racecraft.reward.state import keeps_state
 from racecraft.reward.worker import RewardWorker, waypoints_of
-from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim import NO_OBJECTS, Objects, Simulation, Start
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES, row_width
 
 if TYPE_CHECKING:
     from racecraft.track.track import Track
@@ -27,6 +28,11 @@ if TYPE_CHECKING:
 STEP_SECONDS = 1.0 / 15.0  # between two calls for the same car
 TYPICAL_SPEED = 1.5  # m/s
 HALF_CAR = 0.08  # m from the car's middle line to its wheels
+HALF_VIEW = math.radians(60.0)  # of the camera, to each side
+NEAR = 0.6  # m from an object's middle to the point that x and y mean
+_X, _Y, _HEADING, _OFFSET, _DISTANCE = (
+    OBJECT_COLUMNS.index(f"object_{name}") for name in ("x", "y", "heading", "offset", "distance")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +44,7 @@ class Situation:
     description: str
     """What the car is doing, in one sentence."""
     row: npt.NDArray[np.float64]
-    """The moment, (columns,) in the order of ``ROW_COLUMNS``."""
+    """The moment, (columns,) in the order of ``ROW_COLUMNS``; among objects their columns follow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +64,22 @@ class Outcome:
 
 
 def dry_run(
-    source: str, track: Track, *, timeout_s: float = 1.0, seed: int = 0, foreign: bool = False
+    source: str,
+    track: Track,
+    *,
+    objects: Objects = NO_OBJECTS,
+    cars_per_race: int = 1,
+    timeout_s: float = 1.0,
+    seed: int = 0,
+    foreign: bool = False,
 ) -> list[Outcome]:
     """Call a reward function once in every situation; the rest is left out when a call did not return in its time.
 
     Args:
         source: Text of the user's ``reward_function.py``.
         track: The track that the situations lie on.
+        objects: What stands and drives there: the run's own, as a function may rely on them.
+        cars_per_race: Cars that share the track; the others are objects, too.
         timeout_s: How long one call may run, s of a core; see `RewardWorker`.
         seed: Seeds ``random`` and ``numpy.random``.
         foreign: The source is somebody else's; see `RewardWorker`.
@@ -73,14 +88,16 @@ def dry_run(
         RewardError: The source cannot be loaded at all, or is foreign and cannot be locked in.
     """
     waypoints = waypoints_of([track])
+    options: dict[str, Any] = {"seed": seed, "timeout_s": timeout_s, "foreign": foreign}
+    options["num_objects"] = objects.count + cars_per_race - 1
     outcomes: list[Outcome] = []
     worker: RewardWorker | None = None
     try:
-        for situation in situations(track):
+        for situation in situations(track, objects=objects, cars_per_race=cars_per_race):
             is_led = worker is None and bool(outcomes) and keeps_state(source)
             while True:
                 if worker is None:
-                    worker = RewardWorker(source, track, seed=seed, timeout_s=timeout_s, foreign=foreign)
+                    worker = RewardWorker(source, track, **options)
                 reward, error = None, None
                 try:
                     if is_led and (drive := drive_to(situation.row.tolist(), waypoints)):
@@ -107,8 +124,18 @@ def dry_run(
     return outcomes
 
 
-def situations(track: Track) -> list[Situation]:
-    """The moments to try, all on the given track."""
+def situations(track: Track, *, objects: Objects = NO_OBJECTS, cars_per_race: int = 1) -> list[Situation]:
+    """The moments to try, all on the given track, with these objects and so many cars of a race on it."""
+    found = _situations(track)
+    if not objects.count + cars_per_race - 1:
+        return found
+    placed = [_place_objects(track, objects, cars_per_race, direction) for direction in ("forward", "reverse")]
+    track_index = ROW_COLUMNS.index("track_index")
+    found = [replace(one, row=_among(one.row, placed[int(one.row[track_index])])) for one in found]
+    return [*found[:-1], *_beside_objects(track, placed[0]), found[-1]]
+
+
+def _situations(track: Track) -> list[Situation]:
     # Well inside the lap, in either direction: only an episode's first steps are near its start.
     places = np.linspace(0.1, 0.9, 400) * track.length
     curvature = track.curvature_at(places)
@@ -176,6 +203,55 @@ def situations(track: Track) -> list[Situation]:
             moment(track, track.length, steps=200, progress=1.0, status="lap_complete"),
         ),
     ]
+
+
+def _place_objects(track: Track, objects: Objects, cars_per_race: int, direction: str) -> npt.NDArray[np.float64]:
+    """Where the simulation puts objects and other cars at the beginning of an episode  (objects, columns)."""
+    simulation = Simulation(
+        track,
+        num_envs=cars_per_race,
+        camera=None,
+        start=Start(mode="fixed"),
+        direction=direction,
+        objects=objects,
+        cars_per_race=cars_per_race,
+        num_threads=1,
+    )
+    return simulation.judged[0, row_width(0) + len(OBJECT_HEADER) :].reshape(-1, len(OBJECT_COLUMNS)).copy()
+
+
+def _beside_objects(track: Track, objects: npt.NDArray[np.float64]) -> list[Situation]:
+    """Moments that only a track with objects has, at the one that is nearest to half a lap."""
+    objects = objects.copy()
+    one = objects[np.abs(objects[:, _DISTANCE] - 0.5 * track.length).argmin()]
+    if not 0.1 < one[_DISTANCE] / track.length < 0.9:  # another car, at its start: it has driven on
+        place = 0.5 * track.length
+        there = moment(track, place, offset=float(one[_OFFSET]))
+        one[[_X, _Y, _HEADING, _DISTANCE]] = *there[[ROW_COLUMNS.index(name) for name in ("x", "y", "heading")]], place
+    place, offset = float(one[_DISTANCE]), float(one[_OFFSET])
+    near = moment(track, place - NEAR, steps=110, offset=offset)
+    crash = moment(track, place - 0.5 * NEAR, steps=112, offset=offset, status="crashed")
+    return [
+        Situation("near an object", "Straight towards an object.", _among(near, objects)),
+        Situation("crash", "Into an object, end of the episode.", _among(crash, objects)),
+    ]
+
+
+def _among(row: npt.NDArray[np.float64], objects: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The row of a car among objects."""
+    values = dict(zip(ROW_COLUMNS, row.tolist(), strict=True))
+    ahead = (objects[:, _DISTANCE] - values["projection_distance"]) % values["track_length"]
+    x, y = objects[:, _X] - values["x"], objects[:, _Y] - values["y"]
+    angle = np.arctan2(y, x) - values["heading"]
+    is_seen = (np.cos(angle) > math.cos(HALF_VIEW)).any()
+    header = {
+        "closest_object_prev": ahead.argmax(),
+        "closest_object_next": ahead.argmin(),
+        "object_in_camera": is_seen,
+        "crashed_object": np.hypot(x, y).argmin() if values["is_crashed"] else -1,
+    }
+    told = [float(header[name]) for name in OBJECT_HEADER]
+    return np.concatenate((row, told, objects.ravel()))
 
 
 def moment(

@@ -194,7 +194,7 @@ def open_session(
             open_cars = partial(open_simulation, settings, run.tracks, metadata.suite)
             cars_to_be = pool.submit(open_cars) if settings.device == "cpu" else None  # a GPU stays with its thread
             if not is_checked:
-                require_valid_reward(run.source, run.tracks[0], foreign=run.is_foreign)
+                require_valid_reward(run.source, settings, run.tracks, foreign=run.is_foreign)
             worker = _open_worker(run, stack)
             simulation = open_cars() if cars_to_be is None else cars_to_be.result()
             learner = learner_to_be.result()

@@ -56,7 +56,7 @@ def start_run(
         parent.check(settings.network_spec(metadata), metadata)
     tracks = load_tracks(settings.track)
     track = tracks[0]
-    require_valid_reward(reward, track, foreign=foreign)
+    require_valid_reward(reward, settings, tracks, foreign=foreign)
     prefix = track.name if len(tracks) == 1 else f"{len(tracks)}-tracks"
     folder = RunFolder.create(root, name=name, prefix=prefix)
     params = TrainingParams(
@@ -163,7 +163,7 @@ def replace_reward(folder: RunFolder, source: str, *, foreign: bool = False) -> 
     """
     info = folder.read_info()
     is_foreign = foreign or info.foreign
-    require_valid_reward(source, load_tracks(info.track)[0], foreign=is_foreign)
+    require_valid_reward(source, read_settings(folder), load_tracks(info.track), foreign=is_foreign)
     with folder.lock():
         if is_foreign != info.foreign:
             folder.write_info(replace(info, foreign=True))
@@ -193,7 +193,9 @@ def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:
         )
 
 
-def require_valid_reward(source: str, track: Track, *, foreign: bool = False) -> None:
+def require_valid_reward(
+    source: str, settings: TrainSettings, tracks: Sequence[Track], *, foreign: bool = False
+) -> None:
     """Refuse a reward function that cannot be right, before anything is trained with it.
 
     A preset, to the letter, was tried when Racecraft was tested, and is not made to wait.
@@ -205,6 +207,8 @@ def require_valid_reward(source: str, track: Track, *, foreign: bool = False) ->
     if not foreign and source in map(load_preset, preset_names()):
         return
     validate_reward(source)
-    for outcome in dry_run(source, track, foreign=foreign):
+    for outcome in dry_run(
+        source, tracks[0], objects=settings.objects, cars_per_race=settings.cars_per_race, foreign=foreign
+    ):
         if outcome.error is not None:
             raise outcome.error
