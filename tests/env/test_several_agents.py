@@ -13,6 +13,7 @@ from racecraft.env import RacecraftEnv, RacecraftParallelEnv
 from racecraft.errors import ConfigError, ResetNeeded, ShapeError
 from racecraft.race import Autopilot
 from racecraft.sim import Bots, Objects, Start
+from racecraft.sim.simulation import MAX_STEERING
 
 with warnings.catch_warnings():  # it imports a game of its own, in a way that it has deprecated
     warnings.simplefilter("ignore", DeprecationWarning)
@@ -149,6 +150,28 @@ def test_opponents_come_back_and_the_car_runs_into_one_that_stands():
         statuses.add(info["status"])
     assert "crashed" in statuses
     assert "in_progress" in statuses or "off_track" in statuses  # where it started in front
+    env.close()
+
+
+def test_a_lap_of_an_opponent_gives_the_car_no_lap_time():
+    env = RacecraftEnv(
+        track="oval",
+        observation="state",
+        action_space="continuous",
+        start=Start(mode="fixed"),
+        laps=2,
+        opponents=[Autopilot(speed=1.5)],
+    )
+    driver, lap_times, is_over = Autopilot(speed=2.0), [], False
+    state, _ = env.reset(seed=1)
+    while not is_over:
+        ((steering, speed),) = driver(state[None])
+        state, _, terminated, truncated, info = env.step(np.float32([steering / MAX_STEERING, (speed - 2.25) / 1.75]))
+        is_over = terminated or truncated
+        lap_times += [info["lap_time"]] if "lap_time" in info else []
+    assert info["status"] == "lap_complete"
+    assert len(lap_times) == 2  # the opponent has completed one, too
+    assert min(lap_times) > 5
     env.close()
 
 

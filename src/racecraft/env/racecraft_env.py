@@ -227,7 +227,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
         self._is_running = not (terminated or truncated)
         info = single_info(task.simulation.rows[0])
         laps = task.lap_times()
-        if laps is not None:
+        if laps is not None and laps[0][0]:
             info["lap_time"] = float(laps[1][0])
         return task.observer.one(0), reward, terminated, truncated, info
 
