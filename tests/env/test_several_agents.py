@@ -85,6 +85,42 @@ def test_the_reward_of_an_agent_sees_the_others_as_objects():
     env.close()
 
 
+def test_no_reward_is_asked_for_cars_that_have_left_the_race():
+    asked = []
+    env = RacecraftParallelEnv(
+        track="oval",
+        num_cars=3,
+        observation="state",
+        action_space="continuous",
+        reward=lambda params: asked.append(params["y"]) or 1.0,
+    )
+    env.reset(seed=1)
+    left = 0
+    while env.agents:
+        racing, _ = list(env.agents), asked.clear()
+        rewards = env.step({agent: np.float32([agent == "car_1", -1.0]) for agent in racing})[1]
+        assert rewards == dict.fromkeys(racing, 1.0)
+        assert len(asked) == len(racing)
+        left = max(left, 3 - len(racing))
+    assert left
+    env.close()
+
+
+def test_every_agent_keeps_its_own_memory_of_a_reward_when_others_leave():
+    source = "calls = []\n\ndef reward_function(params):\n    calls.append(1)\n    return float(len(calls))\n"
+    env = RacecraftParallelEnv(
+        track="oval", num_cars=3, observation="state", action_space="continuous", reward=source, max_episode_steps=60
+    )
+    env.reset(seed=1)
+    steps = 0
+    while env.agents:
+        steps += 1
+        racing = list(env.agents)
+        rewards = env.step({agent: np.float32([agent == "car_0", -1.0]) for agent in racing})[1]
+        assert rewards == dict.fromkeys(racing, float(steps))
+    env.close()
+
+
 def test_mistakes_of_a_caller_are_said():
     for settings in ({"num_cars": 0}, {"num_cars": 9}, {"num_cars": "2"}, {"render_mode": "human"}):
         with pytest.raises(ConfigError):
@@ -150,6 +186,23 @@ def test_opponents_come_back_and_the_car_runs_into_one_that_stands():
         statuses.add(info["status"])
     assert "crashed" in statuses
     assert "in_progress" in statuses or "off_track" in statuses  # where it started in front
+    env.close()
+
+
+FAST_IS_A_MISTAKE = "def reward_function(params):\n    return 1.0 / (params['speed'] < 3)\n"
+
+
+@pytest.mark.parametrize("reward", [FAST_IS_A_MISTAKE, lambda params: 1.0 / (params["speed"] < 3)])
+def test_no_reward_is_asked_for_opponents(reward):
+    class Hurries:
+        sees = "state"
+
+        def __call__(self, state):
+            return np.tile(np.float32([0.0, 4.0]), (len(state), 1))
+
+    env = RacecraftEnv(track="oval", observation="state", reward=reward, opponents=[Hurries()])
+    env.reset(seed=1)
+    assert [env.step(4)[1] for _ in range(5)] == [1.0] * 5
     env.close()
 
 

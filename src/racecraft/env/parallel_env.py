@@ -133,7 +133,7 @@ class RacecraftParallelEnv(ParallelEnv[str, Observation, Any]):  # type: ignore[
         task, racing = self._task, self.agents
         idle = next(iter(actions.values()))  # whoever has left the race stands, whatever it is told
         commands = np.stack([actions.get(agent, idle) for agent in self.possible_agents])
-        rewards = task.step(commands)
+        rewards = task.step(commands, paid=np.array([agent in racing for agent in self.possible_agents]))
         simulation = task.simulation
         laps = task.lap_times()
         results: StepResult = (self._observe(racing), {}, {}, {}, {})

@@ -175,6 +175,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
         self._task = DrivingTask(track, num_envs=cars, cars_per_race=cars, num_threads=1, **settings)
         self._opponents = Opponents(self._task.simulation, drivers) if drivers else None
         self._everyone = np.ones(cars, dtype=np.bool_)
+        self._learns = np.arange(cars) == 0
         self._renderer = Renderer(self._task.simulation) if render_mode else None
         self.observation_space = self._task.observer.space
         self.action_space = self._task.action_space.space
@@ -222,7 +223,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
             reward = float(task.step(np.asarray(action)[None])[0])
         else:
             commands = self._opponents.commands(task.action_space.to_commands(np.asarray(action)[None]))
-            reward = float(task.drive(commands, reset=task.done)[0])
+            reward = float(task.drive(commands, reset=task.done, paid=self._learns)[0])
         terminated, truncated = bool(task.simulation.terminated[0]), bool(task.simulation.truncated[0])
         self._is_running = not (terminated or truncated)
         info = single_info(task.simulation.rows[0])

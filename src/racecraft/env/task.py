@@ -18,8 +18,11 @@ from racecraft.env.observation import ObservationKind, Observer, check_kind
 from racecraft.env.rewards import RewardFunction, open_reward
 from racecraft.env.sensor_observation import SensorObserver
 from racecraft.sim import CameraSpec, Objects, Simulation, Start, Vehicle
+from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.track import Track, load_track
+
+_STEPS = ROW_COLUMNS.index("steps")
 
 
 class TaskSettings(TypedDict, total=False):
@@ -122,21 +125,38 @@ class DrivingTask:
         if seeds is not None and mask.all():
             self._reward.restart(int(seeds[0]))
 
-    def step(self, actions: ArrayLike, *, reset: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+    def step(
+        self,
+        actions: ArrayLike,
+        *,
+        reset: NDArray[np.bool_] | None = None,
+        paid: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.float64]:
         """One step of every car, and its reward (N,).
 
         Args:
             actions: In the form of the action space.
             reset: Cars whose episode is over; they begin the next one instead of acting, with reward 0.
+            paid: Cars that the reward function is called for; the others have reward 0. All without it.
         """
-        return self.drive(self.action_space.to_commands(actions), reset=reset)
+        return self.drive(self.action_space.to_commands(actions), reset=reset, paid=paid)
 
-    def drive(self, commands: NDArray[np.float32], *, reset: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+    def drive(
+        self,
+        commands: NDArray[np.float32],
+        *,
+        reset: NDArray[np.bool_] | None = None,
+        paid: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.float64]:
         """The same by commands (N, 2): steering angle in rad and speed in m/s."""
         self.simulation.step(commands)
         if reset is not None and reset.any():
             self.reset(reset)
-        return self._reward(self.simulation.judged)
+        rows = self.simulation.judged
+        if paid is not None and not paid.all():
+            rows = rows.copy()
+            rows[~paid, _STEPS] = 1.0  # a prepare step, for which no source calls its function
+        return self._reward(rows)
 
     def lap_times(self) -> tuple[NDArray[np.bool_], NDArray[np.float64]] | None:
         """Which cars completed a lap in this step and their times in s; to be asked once per step."""
