@@ -12,7 +12,7 @@ from racecraft.agent import ContinuousActionSpace, ModelMetadata
 from racecraft.env import RacecraftEnv
 from racecraft.env.info import INFO_NAMES
 from racecraft.errors import ConfigError, NonFiniteAction, ResetNeeded, RewardError, ShapeError, TrackNotFound
-from racecraft.sim import STATUS_NAMES, CameraSpec, Start
+from racecraft.sim import STATUS_NAMES, CameraSpec, Randomization, Start
 
 STRAIGHT_AHEAD = 5  # of the default table: 0 degrees, 2 m/s
 
@@ -48,7 +48,7 @@ def episodes(env, *, seed, steps=120):
     return said
 
 
-@pytest.mark.parametrize("settings", [{}, {"start": Start(mode="random", lateral_jitter=0.1)}])
+@pytest.mark.parametrize("settings", [{}, {"start": Start(mode="random", lateral_jitter=0.1)}, {"randomize": "strong"}])
 def test_a_seed_repeats_every_bit_of_all_its_episodes(settings):
     with (
         RacecraftEnv("oval", observation="both", **settings) as env,
@@ -75,6 +75,16 @@ def test_advance_moves_the_start_by_a_twentieth_of_a_lap():
         ]
         length = env.reset()[1]["track_length"]
     assert np.diff(places) / length == pytest.approx(np.full(5, 0.05), abs=1e-3)
+
+
+def test_every_episode_has_its_own_conditions(tmp_path):
+    file = tmp_path / "light.json"
+    file.write_text('{"light": [0.3, 1.0]}')
+    for randomize in ("strong", file, str(file), Randomization(light=(0.3, 1.0))):
+        with RacecraftEnv("oval", start="fixed", randomize=randomize) as env:
+            pictures = [env.reset(seed=3)[0], env.reset()[0], env.reset(seed=3)[0]]
+        assert not np.array_equal(pictures[0], pictures[1])
+        assert np.array_equal(pictures[0], pictures[2])
 
 
 def test_driving_off_terminates_and_stepping_on_is_refused():
@@ -188,6 +198,8 @@ def test_rendering_gives_a_picture_whatever_is_observed():
         ({"start": "anywhere"}, ConfigError, "random"),
         ({"direction": "backwards"}, ConfigError, "reverse"),
         ({"vehicle": "v9"}, ConfigError, "v9"),
+        ({"randomize": "storng"}, ConfigError, "strong"),
+        ({"randomize": 3}, ConfigError, "randomize"),
         ({"laps": 0}, ConfigError, "laps"),
         ({"max_episode_steps": 0}, ConfigError, "max_episode_steps"),
         ({"max_episode_steps": 1.5}, ConfigError, "max_episode_steps"),

@@ -121,6 +121,20 @@ def test_every_agent_keeps_its_own_memory_of_a_reward_when_others_leave():
     env.close()
 
 
+def test_every_race_draws_its_conditions_from_the_seed():
+    def first_pictures(seed, **settings):
+        env = RacecraftParallelEnv(track="oval", num_cars=2, start="fixed", **settings)
+        pictures = [env.reset(seed=seed)[0]["car_1"], env.reset()[0]["car_1"]]
+        env.close()
+        return np.stack(pictures)
+
+    plain, drawn = first_pictures(1), first_pictures(1, randomize="strong")
+    assert np.array_equal(*plain)
+    assert not np.array_equal(*drawn)
+    assert np.array_equal(drawn, first_pictures(1, randomize="strong"))
+    assert not np.array_equal(drawn, first_pictures(2, randomize="strong"))
+
+
 def test_mistakes_of_a_caller_are_said():
     for settings in ({"num_cars": 0}, {"num_cars": 9}, {"num_cars": "2"}, {"render_mode": "human"}):
         with pytest.raises(ConfigError):

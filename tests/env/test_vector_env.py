@@ -45,8 +45,9 @@ def actions_for(envs, *, steps, seed=0):
         {"observation": "both"},
         {"observation": "state", "action_space": "continuous", "direction": "alternate", "start": "advance"},
         {"observation": "state", "reward": COUNTING_REWARD},
+        {"observation": "both", "randomize": "strong"},
     ],
-    ids=["both", "continuous", "stateful reward"],
+    ids=["both", "continuous", "stateful reward", "randomized"],
 )
 def test_a_batch_equals_single_environments_to_the_bit(mode, settings):
     batch, singles = pair(mode, **settings)
@@ -188,6 +189,17 @@ def test_lap_times_come_with_a_mask():
     assert final["lap_time"].tolist() == final["time"].tolist()
     assert final["status"].tolist() == ["lap_complete", None, "lap_complete"]
     assert "lap_time" not in infos  # that belongs to the episode that ended
+    envs.close()
+
+
+def test_every_car_draws_its_own_conditions_and_a_seed_repeats_them():
+    envs = RacecraftVectorEnv("oval", num_envs=2, start="fixed", randomize="strong")
+    first, second, again = (envs.reset(seed=seed)[0] for seed in (3, None, 3))
+    assert not np.array_equal(*first)
+    assert not np.array_equal(first, second)
+    assert np.array_equal(first, again)
+    with RacecraftEnv("oval", start="fixed", randomize="strong") as env:
+        assert np.array_equal(env.reset(seed=4)[0], first[1])
     envs.close()
 
 

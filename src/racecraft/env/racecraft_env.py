@@ -133,6 +133,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
     | `observation`       | `camera`        | `camera`, `state` (many times faster) or `both`                |
     | `camera`            | `CameraSpec()`  | size, lens and place of the driver's camera                    |
     | `vehicle`           | `v5`            | preset, file, or `Vehicle`                                     |
+    | `randomize`         | `none`          | preset, file, or `racecraft.Randomization` of every episode    |
     | `sensors`           | None            | AWS's sensor names, for a `Dict` of what each of them sees     |
     | `lidar`             | None            | `LidarConfig` of `DISCRETIZED_SECTOR_LIDAR`                    |
     | `objects`           | None            | boxes and bot cars: `racecraft.sim.Objects`                    |

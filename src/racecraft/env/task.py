@@ -17,7 +17,7 @@ from racecraft.env.info import LapClock
 from racecraft.env.observation import ObservationKind, Observer, check_kind
 from racecraft.env.rewards import RewardFunction, open_reward
 from racecraft.env.sensor_observation import SensorObserver
-from racecraft.sim import CameraSpec, Objects, Simulation, Start, Vehicle
+from racecraft.sim import CameraSpec, Objects, Randomization, Simulation, Start, Vehicle
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.track import Track, load_track
@@ -38,6 +38,8 @@ class TaskSettings(TypedDict, total=False):
     """The driver's camera."""
     vehicle: str | Vehicle
     """Preset, vehicle file, or vehicle."""
+    randomize: str | Path | Randomization
+    """Preset, file, or ranges of what differs from episode to episode."""
     sensors: Sequence[str] | None
     """AWS's sensor names, for a dict of what each sees instead of `observation`: one camera, at most one LIDAR."""
     lidar: LidarConfig | None
@@ -78,6 +80,7 @@ class DrivingTask:
         lidar: LidarConfig | None = None,
         objects: Objects | None = None,
         vehicle: str | Vehicle = "v5",
+        randomize: str | Path | Randomization = "none",
         start: str | Start = "random",
         direction: str = "forward",
         laps: int = 1,
@@ -93,6 +96,7 @@ class DrivingTask:
             [item if isinstance(item, Track) else load_track(item) for item in tracks],
             num_envs=num_envs,
             vehicle=vehicle,
+            randomize=randomize,
             camera=camera_of(sensors, camera=camera) if sensors else None if observation == "state" else camera,
             objects=objects,
             lidar=any(name in LIDARS for name in sensors or ()),
