@@ -136,6 +136,33 @@ def test_who_is_ready_first_does_not_matter(tmp_path: Path, monkeypatch: pytest.
     assert len(set(found[0])) == 7
 
 
+@pytest.mark.parametrize("window", [1, 3])
+def test_numbers_of_now_that_lie_outside_the_bounds_are_the_first_trial_and_teach_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recwarn: pytest.WarningsRecorder, window: int
+) -> None:
+    monkeypatch.setattr(drawing, "BEGINNERS", 2)
+    space = [
+        Parameter("gamma", "hyperparameter", 0.9, 0.99, False, False, 0.5),
+        Parameter("minibatch_size", "hyperparameter", 1, 30, True, True, 128),
+    ]
+    book = record.Record(tmp_path, space, seed=3, window=window)
+    found = []
+    under_way: dict[int, int] = {}
+    for _ in range(6):
+        while (place := book.next_place(list(under_way))) is not None:
+            under_way[place], values, _ = book.begin(place)
+            found.append(values["gamma"])
+        value = abs(found[-1] - 0.95)
+        report = Report(reason="steps", value=value, marks=(), completion=1.0, best_lap=None, steps=1, seconds=1.0)
+        book.tell(under_way.pop(min(under_way)), report)
+        book = record.Record(tmp_path, space, seed=3, window=window)  # as one that goes on
+    assert found[0] == 0.5
+    assert all(0.9 <= gamma <= 0.99 for gamma in found[1:])
+    assert len(set(found)) == len(found) >= 6
+    assert not recwarn.list
+    assert set(book.importances()) == {"gamma", "minibatch_size"}
+
+
 def test_what_kills_its_process_again_and_again_has_failed(tmp_path: Path) -> None:
     book = Tuning(begin(tmp_path))._record()
     for _ in range(record.MAX_LOSSES):

@@ -7,7 +7,7 @@ trials, whatever runs them and whoever is ready first.
 from __future__ import annotations
 
 import statistics
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -39,9 +39,14 @@ def draw(
         seed: Of this trial.
         known: Trials with their results.
         pending: Numbers of trials whose results are not known; they are taken for bad, so that others are tried.
+
+    The first trial may lie outside the space, as the numbers of now may; the estimator knows nothing of such ones.
     """
     states = library.trial.TrialState
-    ended = [trial for trial in known if trial.state in (states.COMPLETE, states.PRUNED)]
+    pending = [params for params in pending if _is_inside(params, space)]
+    ended = [
+        trial for trial in known if trial.state in (states.COMPLETE, states.PRUNED) and _is_inside(trial.params, space)
+    ]
     values = [trial.value for trial in ended if trial.state == states.COMPLETE and trial.value is not None]
     sampler = library.samplers.TPESampler(seed=seed, n_startup_trials=BEGINNERS + len(pending))
     study = library.create_study(direction="minimize", sampler=sampler)
@@ -72,6 +77,11 @@ def suggest(trial: optuna.Trial, parameter: Parameter) -> float | int:
     if parameter.is_whole:
         return trial.suggest_int(parameter.name, int(parameter.low), int(parameter.high), log=parameter.is_log)
     return trial.suggest_float(parameter.name, parameter.low, parameter.high, log=parameter.is_log)
+
+
+def _is_inside(params: Mapping[str, Any], space: Sequence[Parameter]) -> bool:
+    """Whether all numbers of a trial lie between the bounds."""
+    return all(one.low <= params[one.name] <= one.high for one in space if one.name in params)
 
 
 def _distribution(library: Any, parameter: Parameter) -> Any:

@@ -6,6 +6,7 @@ it does not depend on how often anything was killed.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -201,4 +202,5 @@ def _optuna() -> Any:
     with needed_for("racecraft tune"):
         import optuna
     optuna.logging.set_verbosity(optuna.logging.ERROR)
+    warnings.filterwarnings("ignore", "Fixed parameter .* is out of range")  # the numbers of now may be
     return optuna

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal, Self
 
 from racecraft.errors import ConfigError, RunError, did_you_mean
@@ -82,7 +82,7 @@ def make_space(searches: Iterable[str], *, ppo: PPOConfig, constants: dict[str, 
         constants: Of the reward function, from `racecraft.tuning.constants.find_constants`.
 
     Raises:
-        ConfigError: A name means nothing, is said twice, or bounds are no bounds.
+        ConfigError: A name means nothing, is said twice, or bounds are none or not for PPO.
     """
     texts = list(searches)
     if not texts:
@@ -135,6 +135,13 @@ def _parameter(
         raise ConfigError(f"{name} is searched from {low:g} to {high:g}, but it is a whole number.")
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise ConfigError(f"{name} is searched from {low:g} to {high:g}; allowed is a lower and a higher bound.")
+    if kind == "hyperparameter":
+        for bound in (low, high):
+            change: dict[str, Any] = {name: int(bound) if is_whole else bound}
+            try:
+                replace(ppo, **change)
+            except ConfigError as error:
+                raise ConfigError(f"{name} is searched from {low:g} to {high:g}, but {error}") from error
     return Parameter(name, kind, low, high, is_log, is_whole, default)
 
 
