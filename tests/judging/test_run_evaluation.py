@@ -77,7 +77,7 @@ def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path:
     traces = [found.files["sim-trace"].read_text() for found in (first, again)]
     assert traces[0] == traces[1]
     expected = {**first.evaluation.summary(), "step": first.step, "video": None, "driven": first.to_dict()["driven"]}
-    expected["vehicle"] = "v5"
+    expected |= {"vehicle": "v5", "track_digest": first.evaluation.track.digest}
     assert json.loads(first.files["summary"].read_text()) == expected
 
 

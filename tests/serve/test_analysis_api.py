@@ -183,6 +183,61 @@ def test_maps_of_a_training(raced: tuple[RunningConsole, str, str]) -> None:
     assert console.client.get(f"/api/models/{fresh}/maps").json()["iterations"] == []
 
 
+def test_a_track_that_was_redrawn_is_not_shown_under_older_laps(console: RunningConsole) -> None:
+    client, stranger = console.client, untrained_run(console.runs, "stranger").name
+    drawings = [client.get(f"/api/tracks/{name}/sketch").json() for name in ("oval", "hairpin")]
+
+    def draw(drawing: Any) -> None:
+        reply = client.put("/api/tracks/mine", params={"replace": True}, json=drawing)
+        assert reply.status_code == 200, reply.text
+
+    def race(name: str) -> str:
+        request = {"laps": 1, "num_trials": 1, "rules": "first_lap", "track": "mine"}
+        job = client.post(f"/api/models/{name}/evaluations", json=request).json()
+        assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+        return str(client.get(f"/api/models/{name}/evaluations").json()[0]["stamp"])
+
+    def shown(name: str, stamp: str) -> list[httpx.Response]:
+        moment = {"lap": 1, "row": 3}
+        of_laps = [f"evaluations/{stamp}/{part}" for part in ("laps", "saliency", "belief")]
+        return [client.get(f"/api/models/{name}/{route}", params=moment) for route in of_laps]
+
+    def of_training(name: str) -> list[httpx.Response]:
+        return [client.get(f"/api/models/{name}/{route}") for route in ("maps", "report")]
+
+    draw(drawings[0])
+    name = console.create(name="homebody", track="mine", until="1500 steps", seed=1)
+    job = client.get("/api/jobs", params={"run": name}).json()[0]
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    stamps = {name: race(name), stranger: race(stranger)}
+    draw(drawings[0])  # the same again
+    for model, stamp in stamps.items():
+        assert [reply.status_code for reply in shown(model, stamp) + of_training(model)] == [200] * 5
+    summary = console.runs / name / f"evaluation-{stamps[name]}" / "evaluation.json"
+    document = json.loads(summary.read_text())
+    older = json.dumps({key: value for key, value in document.items() if key != "track_digest"})
+    summary.write_text(older)
+    assert [reply.status_code for reply in shown(name, stamps[name])] == [200] * 3
+
+    draw(drawings[1])
+    evaluated = "The track 'mine' was changed since this model was evaluated on it."
+    trained = "The track 'mine' was changed since this model was trained on it."
+    replies = [(reply, evaluated) for model, stamp in stamps.items() for reply in shown(model, stamp)]
+    replies += [(reply, trained) for reply in of_training(name)]
+    summary.write_text(json.dumps(document))
+    replies += [(reply, evaluated) for reply in shown(name, stamps[name])]
+    for reply, text in replies:
+        assert reply.status_code == 409, reply.text
+        assert reply.json()["error"]["message"] == text
+        assert reply.json()["error"]["hint"] == "Train a new model on it."
+    assert client.get(f"/api/models/{stranger}/maps").status_code == 200
+    assert client.get(f"/api/models/{name}/evaluations/{stamps[name]}/share.png").status_code == 200
+
+    draw(drawings[0])
+    for model, stamp in stamps.items():
+        assert [reply.status_code for reply in shown(model, stamp) + of_training(model)] == [200] * 5
+
+
 def test_the_report_is_a_file_to_keep(raced: tuple[RunningConsole, str, str]) -> None:
     console, name, _ = raced
     reply = console.client.get(f"/api/models/{name}/report")

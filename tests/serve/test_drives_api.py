@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -169,6 +170,36 @@ def test_a_ghost_says_which_way_round_and_in_what_it_was_driven(console: Running
     start = begin(console, **params)["start"]
     assert math.dist(start[:2], ghost["trace"][0][:2]) < 10
     assert math.cos((start[2] - ghost["trace"][0][2]) / 1000) > 0.99
+
+
+@pytest.mark.parametrize("tells_its_road", [True, False])
+def test_no_ghost_drives_on_a_track_that_was_redrawn(console: RunningConsole, *, tells_its_road: bool) -> None:
+    drawings = [console.client.get(f"/api/tracks/{name}/sketch").json() for name in ("oval", "hairpin")]
+
+    def draw(drawing: Any) -> None:
+        reply = console.client.put("/api/tracks/mine", params={"replace": True}, json=drawing)
+        assert reply.status_code == 200, reply.text
+
+    def ghosts() -> list[str]:
+        listed = console.client.get("/api/ghosts", params={"track": "mine"}).json()
+        return [one["key"] for one in listed if one["name"] == name]
+
+    draw(drawings[0])
+    name = console.create(track="mine", train=False)
+    info = json.loads((console.runs / name / "run.json").read_text())
+    evaluation = write_raced(console.runs / name, 9.0)
+    about = {"track": "mine", "best_lap_seconds": 9.0}
+    about |= {"track_digest": info["track_digest"]} if tells_its_road else {}
+    (evaluation / "evaluation.json").write_text(json.dumps(about))
+    ghost = f"/api/ghosts/model:{name}"
+    assert ghosts() == [f"model:{name}"]
+    assert console.client.get(ghost, params={"track": "mine"}).status_code == 200
+
+    draw(drawings[1])
+    assert ghosts() == []
+    refused(console.client.get(ghost, params={"track": "mine"}), 404)
+    draw(drawings[0])
+    assert ghosts() == [f"model:{name}"]
 
 
 @pytest.mark.parametrize(

@@ -282,7 +282,7 @@ def _write(
     video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
     driven = provenance(evaluation.conditions).to_dict()
     vehicle = vehicle_note(evaluation.conditions.vehicle)
-    told = {"vehicle": vehicle, "driven": driven, "step": step, "video": video}
+    told = {"track_digest": evaluation.track.digest, "vehicle": vehicle, "driven": driven, "step": step, "video": video}
     summary = {**evaluation.summary(), **told, **about}
     write_json(inside / "evaluation.json", summary)
     return files

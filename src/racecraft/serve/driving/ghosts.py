@@ -13,6 +13,7 @@ import sqlalchemy as sa
 
 from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
+from racecraft.judging.trained import is_road_of
 from racecraft.race.provenance import vehicle_note
 from racecraft.run import RunFolder, list_runs
 from racecraft.serve.driving.drives import DrivenCar
@@ -73,7 +74,7 @@ class Ghosts:
         models = []
         for folder in list_runs(self._runs):
             other = None
-            for lap in sorted(_raced(folder, track.name), key=lambda lap: lap.seconds):
+            for lap in sorted(_raced(folder, track), key=lambda lap: lap.seconds):
                 driven = _direction(read_start(lap.path), track)
                 if driven == direction:
                     models.append(lap.card(driven))
@@ -97,7 +98,7 @@ class Ghosts:
                 return Ghost(**_own(record).model_dump(), trace=record.trace)
         name = key.removeprefix("model:")
         if key.startswith("model:") and name in {run.name for run in list_runs(self._runs)}:
-            for lap in sorted(_raced(RunFolder(self._runs / name), track.name), key=lambda lap: lap.seconds):
+            for lap in sorted(_raced(RunFolder(self._runs / name), track), key=lambda lap: lap.seconds):
                 trace = _best_lap(lap)
                 if trace and _direction(trace[0], track) == direction:
                     return Ghost(**lap.card(direction).model_dump(), trace=trace)
@@ -134,8 +135,8 @@ def _own(record: DrivenRecord) -> GhostCard:
     return GhostCard(key=YOU, name="", seconds=record.seconds, direction=direction, vehicle=vehicle)
 
 
-def _raced(folder: RunFolder, track: str) -> Iterator[_Raced]:
-    """The best laps of a model's newest evaluations on a track."""
+def _raced(folder: RunFolder, track: Track) -> Iterator[_Raced]:
+    """The best laps of a model's newest evaluations on a track, as long as it is the road that it was."""
     for path in sorted(folder.path.glob("evaluation-*/evaluation.json"), reverse=True)[:NEWEST]:
         try:
             summary: dict[str, Any] = read_json_object(path)
@@ -143,9 +144,20 @@ def _raced(folder: RunFolder, track: str) -> Iterator[_Raced]:
             continue
         best = summary.get("best_lap_seconds")
         trace = path.parent / "evaluation-simtrace" / "0-iteration.csv"
-        if summary.get("track") == track and isinstance(best, int | float) and trace.is_file():
+        if summary.get("track") != track.name or not _is_its_road(summary, folder, track):
+            continue
+        if isinstance(best, int | float) and trace.is_file():
             vehicle = _vehicle(summary.get("vehicle"), folder)
             yield _Raced(name=folder.name, seconds=float(best), path=trace, vehicle=vehicle)
+
+
+def _is_its_road(summary: dict[str, Any], folder: RunFolder, track: Track) -> bool:
+    """Whether an evaluation on a track of this name was driven on this very road, as far as its files say."""
+    if (told := summary.get("track_digest")) is not None:
+        return bool(told == track.digest)
+    with suppress(RacecraftError, KeyError, TypeError):
+        return is_road_of(summary, folder.read_info(), track)
+    return True
 
 
 def _vehicle(told: object, folder: RunFolder) -> Vehicles | None:

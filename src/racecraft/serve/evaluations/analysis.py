@@ -23,9 +23,9 @@ from racecraft.analysis import (
     sectors_of,
     start_place,
 )
-from racecraft.errors import RacecraftError
+from racecraft.errors import ConfigError, RacecraftError
 from racecraft.json_file import read_json_object
-from racecraft.judging.trained import trained_camera
+from racecraft.judging.trained import is_road_of, trained_camera, trained_title, trained_tracks
 from racecraft.learn import NetworkSpec
 from racecraft.learn.learner import Weights
 from racecraft.learn.saliency import grad_cam
@@ -42,7 +42,7 @@ from racecraft.serve.evaluations.schemas import (
     SaliencyPicture,
     TrainingMaps,
 )
-from racecraft.serve.problems import NotFound
+from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.tracks.schemas import TrackSector
 from racecraft.sim.views import driver_frames
 from racecraft.track import Track, load_tracks
@@ -136,7 +136,7 @@ def get_maps(
 ) -> TrainingMaps:
     """Rewards, speeds, actions and exits of a training on its track, of the iterations from `first` to `last`."""
     folder = context.garage.folder(name)
-    track = load_tracks(folder.read_info().track)[0]
+    track = _trained_road(folder)
     iterations = iterations_of(folder.training_simtrace)
     wanted = [iteration for iteration in iterations if first <= iteration <= last]
     if len(wanted) > MAX_FILES:
@@ -166,6 +166,7 @@ def get_report(name: str, context: InContext) -> Response:
     from racecraft.analysis import report
 
     folder = context.garage.folder(name)
+    _trained_road(folder)
     headers = {"Content-Disposition": f'attachment; filename="{folder.name}-report.html"'}
     return Response(report(folder), media_type="text/html", headers=headers)
 
@@ -221,13 +222,31 @@ def evaluation_track(context: Context, folder: RunFolder, stamp: str) -> Track:
 
     Raises:
         NotFound: There is no such evaluation, or its track is gone.
+        Conflict: There is another by that name now.
     """
     trace_of(folder, stamp)
-    name = str(read_json_object(folder.evaluation(stamp) / "evaluation.json").get("track", ""))
-    for track in load_tracks(folder.read_info().track):
-        if track.name == name:
-            return track
-    return context.courses.load(name)
+    summary, info = read_json_object(folder.evaluation(stamp) / "evaluation.json"), folder.read_info()
+    name = str(summary.get("track", ""))
+    track = next((track for track in load_tracks(info.track) if track.name == name), None)
+    if track is None:
+        track = context.courses.load(name)
+    if not is_road_of(summary, info, track):
+        raise Conflict(
+            f"The track {name!r} was changed since this model was evaluated on it.", hint="Train a new model on it."
+        )
+    return track
+
+
+def _trained_road(folder: RunFolder) -> Track:
+    """The first track of a training."""
+    info = folder.read_info()
+    try:
+        return trained_tracks(info)[0]
+    except ConfigError as error:
+        raise Conflict(
+            f"The track {trained_title(info)!r} was changed since this model was trained on it.",
+            hint="Train a new model on it.",
+        ) from error
 
 
 @lru_cache(maxsize=4)
