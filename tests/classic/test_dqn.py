@@ -46,6 +46,17 @@ def test_sac_learns_from_every_step_once_it_is_warm(monkeypatch: pytest.MonkeyPa
     assert len(stepped) == optimizers * (100 - 40) // 2
 
 
+@pytest.mark.parametrize(("environment", "algorithm"), [("CartPole-v1", "dqn"), ("Pendulum-v1", "sac")])
+def test_a_memory_smaller_than_the_warm_up_is_warm_when_it_is_full(
+    monkeypatch: pytest.MonkeyPatch, environment: str, algorithm: str
+) -> None:
+    monkeypatch.setattr(job, "EPISODES", 1)
+    settings = {"warm_up": 1000, "memory": 16, "batch": 16, "num_envs": 4, "steps_per_update": 4}
+    early, late = (learn(environment, algorithm, seed=1, settings=settings, until=f"{n} steps") for n in (8, 80))
+    for name, weights in early.policy.arrays.items():
+        assert (weights != late.policy.arrays[name]).any(), name
+
+
 def test_a_limit_in_seconds_lets_it_learn_until_then(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
 

@@ -38,7 +38,7 @@ class DQNSettings(Settings):
     memory: int = 50_000
     """Steps that are remembered."""
     warm_up: int = 1000
-    """Steps before anything is learned from them."""
+    """Steps before anything is learned from them; a smaller memory need only be full."""
     batch: int = 64
     """Steps that one update looks at."""
     steps_per_update: int = 4
@@ -87,7 +87,8 @@ def learn(worlds: Worlds, policy: Values, settings: DQNSettings, rng: np.random.
         memory.add(seen, actions, step)
         optimizer.learning_rate = settings.learning_rate * max(1.0 - worlds.steps / settings.steps, 0.0)
 
-        owed += worlds.num_envs / settings.steps_per_update if len(memory) >= settings.warm_up else 0.0
+        is_warm = len(memory) >= min(settings.warm_up, settings.memory)
+        owed += worlds.num_envs / settings.steps_per_update if is_warm else 0.0
         while owed >= 1.0:
             owed -= 1.0
             states, acted, rewards, terminated, successors = memory.sample(settings.batch, rng)

@@ -41,7 +41,7 @@ class SACSettings(Settings):
     memory: int = 100_000
     """Steps that are remembered."""
     warm_up: int = 500
-    """Steps by lot before anything is learned."""
+    """Steps by lot before anything is learned; a smaller memory need only be full."""
     batch: int = 128
     """Steps that one update looks at."""
     steps_per_update: int = 1
@@ -101,7 +101,7 @@ def learn(worlds: Worlds, policy: SquashedActor, settings: SACSettings, rng: np.
     while worlds.steps < settings.steps:
         seen = worlds.observations
         noise = rng.standard_normal((worlds.num_envs, n), np.float32)
-        is_warm = len(memory) >= settings.warm_up
+        is_warm = len(memory) >= min(settings.warm_up, settings.memory)
         actions = policy.draw(seen, noise)[0]
         if is_fresh and not is_warm:
             actions = rng.uniform(-1.0, 1.0, (worlds.num_envs, n)).astype(np.float32)
