@@ -281,6 +281,10 @@ def test_how_it_learned_notes_and_a_copy_to_change(changed: Visit) -> None:
     notes.fill("The inside line is shorter.")
     page.get_by_text("Kept", exact=True).wait_for()
     assert client.get("/api/models/heron").json()["notes"] == "The inside line is shorter."
+    page.get_by_role("tab", name="Evaluation").click()
+    page.get_by_role("button", name="Start an evaluation").wait_for()
+    page.get_by_role("tab", name="Watch").click()
+    expect(page.get_by_label("Notes")).to_have_value("The inside line is shorter.", timeout=1000 * PATIENCE)
     page.reload()
     expect(page.get_by_label("Notes")).to_have_value("The inside line is shorter.", timeout=1000 * PATIENCE)
 
