@@ -20,6 +20,7 @@ class Source extends EventTarget {
 }
 
 describe("a stream", () => {
+  const page = Object.assign(new EventTarget(), { documentElement: {}, hidden: false });
   const sources: Source[] = [];
   const seen: unknown[] = [];
   const open = (url: string) => {
@@ -31,6 +32,7 @@ describe("a stream", () => {
   beforeEach(() => {
     vi.useFakeTimers();
     sources.length = seen.length = 0;
+    vi.stubGlobal("document", page);
   });
   afterEach(() => vi.useRealTimers());
 
@@ -54,6 +56,23 @@ describe("a stream", () => {
     sources[0]!.send("eye", { frame: "AA==", frame_shape: [1, 1] });
     expect(pictures).toEqual([{ frame: "AA==", frame_shape: [1, 1] }]);
     stop();
+  });
+
+  it("holds no connection while its page is hidden, and goes on when it is seen again", () => {
+    const look = (hidden: boolean) => {
+      page.hidden = hidden;
+      page.dispatchEvent(new Event("visibilitychange"));
+    };
+    const stop = followModel("a", on, open);
+    sources[0]!.send("points", [1], "100");
+    look(true);
+    expect([sources.length, sources[0]!.readyState]).toEqual([1, 2]);
+    look(false);
+    expect(sources[1]!.url).toBe("/api/events/a?offset=100");
+    stop();
+    look(true);
+    look(false);
+    expect(sources.length).toBe(2);
   });
 
   it("leaves a broken connection to the browser, and stays closed when it is closed", () => {

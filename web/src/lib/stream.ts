@@ -15,11 +15,11 @@ export interface Handlers {
 
 export const RETRY = 2000; // ms
 
-/** Follow until the returned function is called. */
+/** Follow until the returned function is called; not while the page is hidden, as a browser has six connections to a server. */
 export function followModel(run: string, on: Handlers, open = (url: string) => new EventSource(url)): () => void {
   let offset = 0;
   let timer: ReturnType<typeof setTimeout> | undefined;
-  let source: EventSource;
+  let source: EventSource | undefined;
   const connect = () => {
     const mine = (source = open(`/api/events/${encodeURIComponent(run)}?offset=${offset}${on.eye ? "&eye=true" : ""}`));
     mine.addEventListener("points", (event) => {
@@ -35,9 +35,18 @@ export function followModel(run: string, on: Handlers, open = (url: string) => n
       if (mine.readyState === 2) timer = setTimeout(connect, RETRY);
     };
   };
-  connect();
-  return () => {
+  const close = () => {
     clearTimeout(timer);
-    source.close();
+    source?.close();
+  };
+  const turn = () => {
+    close();
+    if (!document.hidden) connect();
+  };
+  document.addEventListener("visibilitychange", turn);
+  turn();
+  return () => {
+    document.removeEventListener("visibilitychange", turn);
+    close();
   };
 }
