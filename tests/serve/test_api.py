@@ -345,6 +345,12 @@ def test_models_that_nobody_named_have_names_of_their_own_that_one_can_say(conso
         console.client.delete(f"/api/models/{name}")
 
 
+def test_a_track_that_is_named_twice_is_learned_on_once(console: RunningConsole) -> None:
+    name = console.create(track="oval", more_tracks=["hairpin", "oval", "hairpin"], train=False)
+    assert console.client.get(f"/api/models/{name}").json()["num_tracks"] == 2
+    console.client.delete(f"/api/models/{name}")
+
+
 def test_when_all_words_are_taken_a_name_has_a_number() -> None:
     assert free_name(set(ANIMALS) - {"heron"}) == "heron"
     word, number = free_name(set(ANIMALS)).split("-")

@@ -14,6 +14,7 @@ from browsers import Visit, needs_browser, needs_pages, visiting
 from running_consoles import PATIENCE, running_console
 
 from racecraft.reward import preset_names
+from until_true import until_true
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
@@ -76,6 +77,50 @@ def test_what_was_typed_for_a_new_model_outlives_a_reload(visit: Visit) -> None:
     page.get_by_text("return 7.0").wait_for()
     assert page.get_by_role("radio", name="Paperclip").get_attribute("aria-checked") == "true"
     assert page.get_by_role("button", name="Head to bot").get_attribute("aria-pressed") == "true"
+
+
+def test_when_a_training_ends_is_shown_as_it_will_be_asked_for(visit: Visit) -> None:
+    page = _fresh(visit, "/create")
+    goals = page.get_by_role("group", name="Train until")
+    laps = page.get_by_label("Laps of an evaluation to complete")
+    assert laps.input_value() == "5"
+    page.get_by_role("button", name="Object avoidance").click()
+    page.get_by_role("checkbox", name="and no longer than").wait_for()
+    until_true(page, "document.querySelectorAll('input[max=\"43200\"]').length")
+    assert laps.input_value() == "20"
+    assert page.get_by_label("Minutes").input_value() == "10"
+    laps.fill("")
+    laps.blur()
+    assert laps.input_value() == "20"
+    goals.get_by_role("button", name="Steps").click()
+    page.get_by_label("Steps", exact=True).fill("64")
+    page.reload()
+    page.get_by_text("The function is fine.").wait_for()
+    assert goals.get_by_role("button", name="Steps").get_attribute("aria-pressed") == "true"
+    assert page.get_by_label("Steps", exact=True).input_value() == "64"
+    goals.get_by_role("button", name="In words").click()
+    page.get_by_label("'5 laps', 'no better lap'").fill("no better lap")
+    page.reload()
+    page.get_by_text("The function is fine.").wait_for()
+    assert goals.get_by_role("button", name="In words").get_attribute("aria-pressed") == "true"
+
+
+def test_a_track_is_learned_on_once_and_one_of_an_address_is_named(visit: Visit) -> None:
+    page = _fresh(visit, "/create/generated:5")
+    tracks = page.get_by_role("radiogroup", name="Track").get_by_role("radio")
+    assert tracks.and_(page.locator("[tabindex='0']")).all_inner_texts() == ["generated:5"]
+    page.get_by_label("one more track").select_option("paperclip")
+    page.get_by_role("button", name="Leave out: Paperclip").wait_for()
+    tracks.filter(has_text="Paperclip").click()
+    assert page.get_by_role("button", name="Leave out: Paperclip").count() == 0
+    assert tracks.and_(page.locator("[aria-checked='true']")).count() == 1
+    tracks.filter(has_text="generated:5").click()
+
+
+def test_an_address_that_cannot_be_read_is_no_page(visit: Visit) -> None:
+    page = visit.page
+    page.goto(f"{visit.console.client.base_url}/models/%E0%A4%A")
+    page.get_by_text("The console has no page at").wait_for()
 
 
 def test_a_name_with_a_space_is_refused_in_a_sentence(visit: Visit) -> None:

@@ -10,6 +10,15 @@ export function go(path: string): void {
 
 addEventListener("popstate", () => (route.path = location.pathname));
 
+/** What an address is made of; one that cannot be read is of no page. */
+export function partsOf(path: string): string[] {
+  try {
+    return path.split("/").filter(Boolean).map(decodeURIComponent);
+  } catch {
+    return [path];
+  }
+}
+
 /** A click on a link of ours changes the page without loading it anew. */
 export function follow(event: MouseEvent): void {
   const link = (event.target as Element).closest("a");

@@ -78,7 +78,7 @@ def create_model(request: NewModel, context: InContext, consoles: InConsoles, us
     settings = make_settings(
         metadata=metadata,
         hyperparameters=parameters,
-        track=[context.courses.path_or_name(name) for name in (request.track, *request.more_tracks)],
+        track=[context.courses.path_or_name(name) for name in dict.fromkeys((request.track, *request.more_tracks))],
         direction=request.direction,
         network=request.network,
         vehicle=_vehicle(request.vehicle),
