@@ -69,7 +69,7 @@ export const create: Record<keyof typeof english, string> = {
   goal_limit: "und nicht länger als",
   estimate: "Etwa {time}",
   estimate_most: "Höchstens etwa {time}",
-  estimate_usual: "Etwa {time}: üblich bei {count} Modellen auf dieser Strecke",
+  estimate_usual: "Etwa {time}: üblich auf dieser Strecke (Modelle: {count})",
   estimate_laps: "Auf einer leichten Strecke meist unter einer Minute",
   estimate_laps_among: "In der Regel ein bis drei Minuten",
   estimate_unknown: "Noch keine Schätzung",

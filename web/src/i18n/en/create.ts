@@ -67,7 +67,7 @@ export const create = {
   goal_limit: "and no longer than",
   estimate: "About {time}",
   estimate_most: "At most about {time}",
-  estimate_usual: "About {time}: usual of {count} models on this track",
+  estimate_usual: "About {time}: usual on this track (models: {count})",
   estimate_laps: "Mostly less than a minute on an easy track",
   estimate_laps_among: "One to three minutes as a rule",
   estimate_unknown: "No estimate yet",
