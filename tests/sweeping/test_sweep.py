@@ -10,7 +10,7 @@ import pytest
 from racecraft.errors import RewardError, RunError
 from racecraft.run import RunFolder
 from racecraft.sweeping import Sweep, board_of, make_sweep, read_sweep, sweep_names
-from racecraft.sweeping.board import Outcome, outcome_of
+from racecraft.sweeping.board import Outcome, is_tied, outcome_of
 from racecraft.training.job import Training
 from racecraft.tuning.trial import Report
 
@@ -97,7 +97,7 @@ def test_the_board_knows_chance() -> None:
     }
     board = board_of("laps", words, found)
     assert [(row.setting, row.is_tied) for row in board.places] == [
-        ("fast", False), ("lucky", True), ("slow", False), ("lost", False), ("never", True)
+        ("fast", False), ("lucky", True), ("slow", False), ("lost", True), ("never", True)
     ]  # fmt: skip
     fast = board.places[0]
     assert (fast.laps_after.mean, fast.laps_after.count, fast.seeds) == (215.0, 4, 4)
@@ -106,3 +106,35 @@ def test_the_board_knows_chance() -> None:
     assert board.places[4].best_lap.mean is None
     one = board_of("lap_time", {"a": {}}, {"a": outcomes(9.5)}).places[0]
     assert (one.best_lap.mean, one.best_lap.low) == (9.5, None)
+
+
+ALL = dict[int, float | None](enumerate(range(200, 400, 10)))  # 20 seeds
+NONE = dict[int, float | None].fromkeys(ALL)
+
+
+@pytest.mark.parametrize(
+    ("first", "other", "tied"),
+    [
+        (ALL, {**NONE, 3: 230.0}, False),
+        (ALL, NONE, False),
+        (ALL, ALL, True),
+        (NONE, NONE, True),
+        ({**NONE, 3: 230.0}, NONE, True),
+        (ALL, {**ALL, 3: None}, True),  # one seed is chance
+        ({**ALL, 3: None}, {**ALL, 4: None}, True),
+        (ALL, {**{seed: value + seed % 3 for seed, value in ALL.items() if value}, 3: None}, False),  # never faster
+        ({**ALL, 3: None}, {**dict.fromkeys(ALL, 1000.0), 4: None, 5: None}, False),  # 19 signs to 1
+        (ALL, {**dict.fromkeys(ALL, 1.0), 3: None}, True),  # 19 signs, but for the other
+        ({1: 200, 2: 210, 3: 220, 4: 230}, {1: 900, 2: 920, 3: 910, 4: None}, False),  # slower, and fails, too
+        ({1: 200, 2: 210, 3: 220, 4: 230}, {1: 900, 2: None, 3: None, 4: None}, True),  # too few seeds to tell
+        ({1: 200, 2: 210, 3: 220, 4: 230}, dict.fromkeys(range(1, 5)), False),
+        ({1: 200, 2: 210, 3: 220}, {1: 300, 2: 310, 3: 320}, False),
+        ({1: 200, 2: 210, 3: None}, {1: 300, 2: 310, 3: None}, False),  # where both fail says nothing
+        ({1: 200}, {1: 900}, True),
+        ({1: 200, 2: 210}, {3: 900, 4: None}, True),  # no seed of both
+    ],
+)
+def test_a_seed_that_fails_is_slower_than_any(
+    first: dict[int, float | None], other: dict[int, float | None], tied: bool
+) -> None:
+    assert is_tied(first, other) is tied

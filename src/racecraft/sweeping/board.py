@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
-from racecraft.race.statistics import mean_interval
+from racecraft.race.statistics import mean_interval, wilson_interval
 from racecraft.run import RunFolder, judged_laps
 from racecraft.run.history import read_history
 
@@ -53,7 +53,7 @@ class Place:
     best_lap: Figure
     """s"""
     is_tied: bool
-    """Whether the difference to the first place, seed by seed, could be chance."""
+    """Whether the difference to the first place could be chance."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,15 +95,15 @@ def board_of(goal: str, settings: Mapping[str, dict[str, Any]], outcomes: Mappin
         outcomes: By setting and seed, of those that have begun.
     """
 
-    def values(setting: str) -> dict[int, float]:
-        found = {seed: _value(goal, outcome) for seed, outcome in outcomes.get(setting, {}).items()}
-        return {seed: value for seed, value in found.items() if value is not None}
+    def values(setting: str) -> dict[int, float | None]:
+        return {seed: _value(goal, outcome) for seed, outcome in outcomes.get(setting, {}).items()}
 
     def key(setting: str) -> tuple[float, float]:
-        reached, begun = values(setting), outcomes.get(setting, {})
+        begun = values(setting)
         if not begun:
             return math.inf, math.inf
-        return -len(reached) / len(begun), sum(reached.values()) / len(reached) if reached else math.inf
+        reached = _known(begun.values())
+        return -len(reached) / len(begun), sum(reached) / len(reached) if reached else math.inf
 
     order = sorted(settings, key=key)
     first = values(order[0]) if order else {}
@@ -124,21 +124,49 @@ def board_of(goal: str, settings: Mapping[str, dict[str, Any]], outcomes: Mappin
     )
 
 
-def is_tied(first: Mapping[int, float], other: Mapping[int, float]) -> bool:
-    """Whether nobody can tell two settings apart: the interval of their differences, seed by seed, holds 0."""
-    differences = [other[seed] - value for seed, value in first.items() if seed in other]
-    if len(differences) < 2:
-        return True
+def is_tied(first: Mapping[int, float | None], other: Mapping[int, float | None]) -> bool:
+    """Whether nobody can tell two settings apart: the interval of their differences, seed by seed, holds 0.
+
+    A seed that reached the goal with one of them alone was slower with the other by nobody knows how much. Where there
+    are such seeds, they are tied unless the first was faster with more seeds than chance gives (a sign test), or only
+    the other failed and was slower also where it did not. Never tied are those of which the first reached the goal so
+    much more often that Wilson's intervals of the shares lie apart.
+
+    Args:
+        first: What each seed that has begun came to; None for one that has not reached the goal.
+        other: The same of the other.
+    """
+    share, others = (wilson_interval(len(_known(one.values())), len(one)) for one in (first, other))
+    if others.high < share.low:
+        return False
+    pairs = [(value, other[seed]) for seed, value in first.items() if seed in other]
+    differences = [theirs - ours for ours, theirs in pairs if ours is not None and theirs is not None]
+    ahead = sum(ours is not None and theirs is None for ours, theirs in pairs)
+    behind = sum(ours is None and theirs is not None for ours, theirs in pairs)
     interval = mean_interval(differences)
-    return interval.low <= 0.0 <= interval.high
+    if ahead == behind == 0:
+        return interval.low <= 0.0 <= interval.high
+    faster = ahead + sum(difference > 0.0 for difference in differences)
+    slower = behind + sum(difference < 0.0 for difference in differences)
+    return not (_is_beyond_chance(faster, slower) or (behind == 0 and interval.low > 0.0))
+
+
+def _is_beyond_chance(more: int, less: int) -> bool:
+    """Whether so many heads and so few tails, or fewer, come of less than 2.5 % of all throws of a fair coin."""
+    count = more + less
+    return 40 * sum(math.comb(count, tails) for tails in range(less + 1)) < 1 << count
 
 
 def _value(goal: str, outcome: Outcome) -> float | None:
     return outcome.best_lap if goal == "lap_time" else outcome.laps_after
 
 
+def _known(values: Iterable[float | None]) -> list[float]:
+    return [float(value) for value in values if value is not None]
+
+
 def _figure(values: Sequence[float | None]) -> Figure:
-    known = [float(value) for value in values if value is not None]
+    known = _known(values)
     if not known:
         return Figure(mean=None, low=None, high=None, count=0)
     mean = sum(known) / len(known)
