@@ -208,7 +208,14 @@ def test_rendering_gives_a_picture_whatever_is_observed():
         ({"reward": "raicng"}, RewardError, "racing"),
         ({"reward": 3}, RewardError, "3"),
         ({"reward": "def reward_function(params)\n    return 1.0"}, RewardError, "line 1"),
-        ({"seat": "leather"}, TypeError, "seat"),
+        ({"action_space": 3}, ConfigError, "action_space is 3"),
+        ({"camera": 3}, ConfigError, "camera is 3"),
+        ({"sensors": 3}, ConfigError, "sensors is 3"),
+        ({"sensors": ["LIDAR", "observation"], "lidar": 3}, ConfigError, "lidar is 3"),
+        ({"seat": "leather"}, ConfigError, "seat"),
+        ({"observatoin": "state"}, ConfigError, "Did you mean 'observation'"),
+        ({"num_envs": 2}, ConfigError, "make_vec"),
+        ({"cars_per_race": 2}, ConfigError, "cars_per_race"),
     ],
 )
 def test_a_bad_argument_is_named(settings, error, words):

@@ -136,7 +136,15 @@ def test_every_race_draws_its_conditions_from_the_seed():
 
 
 def test_mistakes_of_a_caller_are_said():
-    for settings in ({"num_cars": 0}, {"num_cars": 9}, {"num_cars": "2"}, {"render_mode": "human"}):
+    wrong = (
+        {"num_cars": 0},
+        {"num_cars": 9},
+        {"num_cars": "2"},
+        {"render_mode": "human"},
+        {"seat": 1},
+        {"opponents": []},
+    )
+    for settings in wrong:
         with pytest.raises(ConfigError):
             RacecraftParallelEnv(track="oval", **settings)
     env = RacecraftParallelEnv(track="oval", observation="state")

@@ -238,6 +238,10 @@ def test_rendering_gives_one_picture_per_car():
         ({"num_envs": 0}, ConfigError, "num_envs"),
         ({"num_threads": -1}, ConfigError, "num_threads"),
         ({"track": []}, ConfigError, "track"),
+        ({"track": 3}, ConfigError, "track is 3"),
+        ({"track": ["oval", 3]}, ConfigError, "3"),
+        ({"opponents": []}, ConfigError, r"with opponents=\[\]"),
+        ({"seat": "leather"}, ConfigError, "with seat='leather'"),
         ({"reward": "racign"}, RewardError, "racing"),
     ],
 )

@@ -13,7 +13,7 @@ from racecraft.checks import check_whole
 from racecraft.env.info import single_info
 from racecraft.env.observation import Observation
 from racecraft.env.rendering import Renderer, check_render_mode
-from racecraft.env.task import DrivingTask, TaskSettings, seed_key
+from racecraft.env.task import DrivingTask, TaskSettings, check_names, seed_key
 from racecraft.errors import ConfigError, ResetNeeded
 from racecraft.extras import needed_for
 from racecraft.track import Track
@@ -66,6 +66,7 @@ class RacecraftParallelEnv(ParallelEnv[str, Observation, Any]):  # type: ignore[
         render_mode: str | None = None,
         **settings: Unpack[TaskSettings],
     ) -> None:
+        check_names(settings, own=("track", "num_cars", "render_mode"))
         check_whole("num_cars", num_cars, 1, 8)
         check_render_mode(render_mode)
         self.render_mode = render_mode

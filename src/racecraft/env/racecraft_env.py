@@ -14,7 +14,7 @@ from racecraft.env.info import single_info
 from racecraft.env.observation import Observation
 from racecraft.env.opponents import Driver, Opponents, check_opponents
 from racecraft.env.rendering import Renderer, check_render_mode
-from racecraft.env.task import DrivingTask, TaskSettings, seed_key
+from racecraft.env.task import DrivingTask, TaskSettings, check_names, seed_key
 from racecraft.errors import ConfigError, ResetNeeded
 from racecraft.track import Track
 
@@ -165,6 +165,7 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
         opponents: Sequence[Driver] = (),
         **settings: Unpack[TaskSettings],
     ) -> None:
+        check_names(settings, own=("track", "render_mode", "opponents"))
         if not isinstance(track, str | Path | Track):
             raise ConfigError(
                 f"track is {track!r}, expected one name, path or Track.",

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, Final, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from racecraft.agent import ActionSpace, LidarConfig, ModelMetadata, camera_of
+from racecraft.agent import (
+    ActionSpace,
+    ContinuousActionSpace,
+    DiscreteActionSpace,
+    LidarConfig,
+    ModelMetadata,
+    camera_of,
+)
 from racecraft.agent import action_space as preset_action_space
 from racecraft.agent.sensors import LIDARS
 from racecraft.checks import check_type, check_whole
@@ -17,11 +24,17 @@ from racecraft.env.info import LapClock
 from racecraft.env.observation import ObservationKind, Observer, check_kind
 from racecraft.env.rewards import RewardFunction, open_reward
 from racecraft.env.sensor_observation import SensorObserver
+from racecraft.errors import ConfigError, did_you_mean
 from racecraft.sim import CameraSpec, Objects, Randomization, Simulation, Start, Vehicle
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.track import Track, load_track
 
+_OF_OTHERS: Final = {
+    "opponents": "One car has opponents: gymnasium.make('Racecraft-v0', opponents=[...]).",
+    "num_envs": "Many cars are for gymnasium.make_vec('Racecraft-v0', num_envs=...).",
+    "num_cars": "Several agents on one track are for RacecraftParallelEnv.",
+}
 _STEPS = ROW_COLUMNS.index("steps")
 
 
@@ -54,6 +67,25 @@ class TaskSettings(TypedDict, total=False):
     """Completed laps that end an episode."""
     max_episode_steps: int
     """Steps of 1/15 s that truncate an episode."""
+
+
+def check_names(settings: Mapping[str, object], *, own: Sequence[str]) -> None:
+    """Refuse settings that an environment does not have.
+
+    Args:
+        settings: Those that are not its own, by name.
+        own: Its own, beside `TaskSettings`.
+
+    Raises:
+        ConfigError: One of them is not among `TaskSettings`.
+    """
+    known = (*own, *TaskSettings.__annotations__)
+    for name, value in settings.items():
+        if name not in TaskSettings.__annotations__:
+            hint = _OF_OTHERS.get(name) or did_you_mean(name, known)
+            raise ConfigError(
+                f"The environment cannot be made with {name}={value!r}; its settings are {', '.join(known)}.", hint=hint
+            )
 
 
 class DrivingTask:
@@ -89,8 +121,16 @@ class DrivingTask:
         check_kind(observation)
         objects = NO_OBJECTS if objects is None else objects
         check_type("objects", objects, Objects, "use racecraft.sim.Objects(...)")
+        check_type("camera", camera, CameraSpec, "use racecraft.CameraSpec(...)")
+        check_type("sensors", sensors, (list, tuple, type(None)), "use a list of AWS's sensor names")
+        check_type("lidar", lidar, (LidarConfig, type(None)), "use racecraft.agent.LidarConfig(...)")
         check_whole("max_episode_steps", max_episode_steps, 1, 2**31 - 2)
+        check_type(
+            "track", track, (str, Path, Track, list, tuple), "use a name, a file or a Track, or several in a list"
+        )
         tracks = [track] if isinstance(track, str | Path | Track) else list(track)
+        for item in tracks:
+            check_type("track", item, (str, Path, Track), "use a name, a file or a Track")
         self.action_space = _action_space(action_space)
         self.simulation = Simulation(
             [item if isinstance(item, Track) else load_track(item) for item in tracks],
@@ -183,6 +223,8 @@ def seed_key(seed: Any) -> int:
 
 
 def _action_space(value: str | Path | ActionSpace) -> ActionSpace:
+    kinds = (str, Path, DiscreteActionSpace, ContinuousActionSpace)
+    check_type("action_space", value, kinds, "use a preset's name, a model_metadata.json, or an action space")
     if isinstance(value, Path) or (isinstance(value, str) and value.endswith(".json")):
         return ModelMetadata.load(value).action_space
     return preset_action_space(value) if isinstance(value, str) else value

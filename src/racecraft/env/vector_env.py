@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from racecraft.env.info import vector_info
 from racecraft.env.observation import Observation
 from racecraft.env.rendering import Renderer, check_render_mode
-from racecraft.env.task import DrivingTask, TaskSettings, seed_key
+from racecraft.env.task import DrivingTask, TaskSettings, check_names, seed_key
 from racecraft.errors import ConfigError, ResetNeeded, ShapeError
 from racecraft.track import Track
 
@@ -64,6 +64,7 @@ class RacecraftVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
         render_mode: str | None = None,
         **settings: Unpack[TaskSettings],
     ) -> None:
+        check_names(settings, own=("track", "num_envs", "autoreset_mode", "copy", "num_threads", "render_mode"))
         check_render_mode(render_mode)
         self.render_mode = render_mode
         self._mode = _autoreset_mode(autoreset_mode)
