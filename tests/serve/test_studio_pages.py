@@ -132,6 +132,15 @@ def test_a_model_is_driven_as_a_car_and_taken_to_one(studio: tuple[RunningConsol
     assert download.value.suggested_filename == "right.tar.gz"
     assert Path(download.value.path()).read_bytes().startswith(b"\x1f\x8b")
 
+    chosen = page.locator("select", has=page.locator("option", has_text="as a car"))
+    first = studio[0].client.get("/api/models/right/evaluations").json()[-1]["stamp"]
+    chosen.select_option(first)
+    job = studio[0].client.post("/api/models/right/train", json={"until": "6500 steps"}).json()
+    page.locator(".badge.training").wait_for()
+    assert studio[0].wait_for(studio[0].job_ended(job["id"]))["state"] == "done"
+    page.locator(".badge.finished").wait_for()
+    assert chosen.input_value() == first
+
 
 @pytest.mark.parametrize(("kind", "begins"), [("CSV", b'"Place'), ("SVG", b"<svg"), ("PNG", b"\x89PNG")])
 def test_a_chart_is_kept_as_a_file(studio: tuple[RunningConsole, Any], kind: str, begins: bytes) -> None:
