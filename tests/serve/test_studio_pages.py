@@ -295,6 +295,10 @@ def test_training_goes_on_with_a_changed_reward(studio: tuple[RunningConsole, An
     page.keyboard.press("ControlOrMeta+a")
     page.keyboard.press("Delete")  # or Chromium gives the new text the look of the old, which the policy forbids
     page.keyboard.insert_text("def reward_function(params):\n    return params['speed']\n")
+    page.get_by_role("button", name="Undo the changes").wait_for()
+    page.get_by_role("tab", name="Log").click()
+    page.get_by_role("tab", name="Set-up").click()
+    editor.get_by_text("return params['speed']").wait_for()
     page.get_by_label("Go on until").last.fill("7000 steps")
     page.get_by_role("button", name="Go on with this reward").click()
     page.wait_for_url("**/models/right/watch")
