@@ -119,6 +119,27 @@ def test_what_cannot_be_is_refused():
         CameraSpec(baseline=-1)
 
 
+@pytest.mark.parametrize(
+    ("sizes", "words"),
+    [
+        ({"num_sectors": 7}, "num_sectors is 7; allowed is a divisor of 64"),
+        ({"num_sectors": 0}, "num_sectors is 0"),
+        ({"num_sectors": 8.0}, "num_sectors is 8.0"),
+        ({"num_values_per_sector": 0}, "num_values_per_sector is 0"),
+        ({"num_values_per_sector": 65}, "num_values_per_sector is 65"),
+        ({"num_values_per_sector": 8.0}, "num_values_per_sector is 8.0"),
+        ({"clipping_dist": 0}, "clipping_dist is 0"),
+        ({"clipping_dist": 0.15}, "clipping_dist is 0.15; allowed is a number above 0.15"),
+        ({"clipping_dist": 12.5}, "clipping_dist is 12.5"),
+        ({"clipping_dist": "2"}, "clipping_dist is '2'"),
+        ({"clipping_dist": float("nan")}, "clipping_dist is nan"),
+    ],
+)
+def test_sizes_that_no_lidar_has_are_refused(sizes, words):
+    with pytest.raises(ConfigError, match=words):
+        LidarConfig(**sizes)
+
+
 def _oval():
     from racecraft.track import load_track
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from racecraft.checks import check_choice
+from racecraft.checks import check_choice, check_number, check_whole, require
 from racecraft.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 FRAME_HEIGHT = 120  # pixels
 FRAME_WIDTH = 160  # pixels
 LIDAR_RAYS = 64
+CLIPPING_LIMITS = (0.15, 12.0)  # m: above the first, to the second
 STEREO_BASELINE = 0.06  # m between the lenses of the stereo pair; LEFT_CAMERA is its left one
 
 CAMERAS = ("FRONT_FACING_CAMERA", "observation", "LEFT_CAMERA", "STEREO_CAMERAS")
@@ -25,14 +26,28 @@ SENSOR_NAMES = CAMERAS + LIDARS
 
 @dataclass(frozen=True)
 class LidarConfig:
-    """How ``DISCRETIZED_SECTOR_LIDAR`` turns 64 rays into bits."""
+    """How ``DISCRETIZED_SECTOR_LIDAR`` turns 64 rays into bits.
+
+    Raises:
+        ConfigError: A number is outside what AWS's files may say.
+    """
 
     num_sectors: int = 8
     """Sectors over the whole 300°; divides 64."""
     num_values_per_sector: int = 8
-    """Distance bins of a sector, one bit each."""
+    """Distance bins of a sector, one bit each; up to 64."""
     clipping_dist: float = 2.0
-    """Metres beyond which a sector counts as free."""
+    """Metres beyond which a sector counts as free, above 0.15, to 12."""
+
+    def __post_init__(self) -> None:
+        for name in ("num_sectors", "num_values_per_sector"):
+            check_whole(f"LidarConfig {name}", getattr(self, name), 1, LIDAR_RAYS, is_plain=True)
+        is_divisor = LIDAR_RAYS % self.num_sectors == 0
+        require("LidarConfig num_sectors", self.num_sectors, is_divisor, f"a divisor of {LIDAR_RAYS}")
+        low, high = CLIPPING_LIMITS
+        check_number("LidarConfig clipping_dist", self.clipping_dist, low, high, is_plain=True)
+        allowed = f"a number above {low:g}, to {high:g}"
+        require("LidarConfig clipping_dist", self.clipping_dist, self.clipping_dist > low, allowed)
 
 
 def check_sensors(names: Sequence[str]) -> tuple[str, ...]:
