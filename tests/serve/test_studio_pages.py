@@ -185,6 +185,20 @@ def test_models_are_compared(studio: tuple[RunningConsole, Any]) -> None:
     assert page.get_by_role("region", name="Results").locator("tbody tr").count() == 2
 
 
+def test_a_model_is_compared_with_another_that_is_still_chosen(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/compare/left/right")
+    code = page.get_by_role("region", name="Reward code")
+    code.wait_for()
+    page.get_by_role("combobox", name="left →").select_option("right")
+    page.get_by_role("button", name="left oval").click()
+    page.wait_for_url("**/compare/right")
+    page.get_by_role("button", name="left oval").click()
+    page.wait_for_url("**/compare/right/left")
+    assert page.get_by_role("combobox", name="right →").input_value() == "left"
+    code.wait_for()
+    assert page.locator("tr.removed").count() > 3
+
+
 def test_models_are_chosen_in_the_garage_to_be_compared(studio: tuple[RunningConsole, Any]) -> None:
     page = visit(studio, "/")
     page.get_by_role("button", name="Compare left").click()
