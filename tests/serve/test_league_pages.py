@@ -129,6 +129,27 @@ def test_two_pupils_enter_and_see_where_they_stand(lesson: Lesson, race: int) ->
         assert page.get_by_text("Ada Lovelace").count() == 0
 
 
+def test_a_board_that_was_left_asks_for_nothing_more(lesson: Lesson, race: int) -> None:
+    page = lesson.visits["Comet"].open(f"/league/{race}")
+    held: list[Any] = []
+    page.route(f"**/api/boards/{race}?*", lambda route: held.append(route))
+    for _ in range(100):
+        if held:
+            break
+        page.wait_for_timeout(100)
+    page.get_by_role("navigation").get_by_role("link", name="League").click()
+    page.wait_for_url("**/league")
+    asked: list[str] = []
+    note = lambda request: asked.append(request.url)  # noqa: E731
+    page.on("request", note)
+    for route in held:
+        route.continue_()
+    page.unroute(f"**/api/boards/{race}?*")
+    page.wait_for_timeout(5500)  # longer than a board waits
+    page.remove_listener("request", note)
+    assert [url for url in asked if f"/api/boards/{race}?" in url] == []
+
+
 def test_the_teacher_judges_and_ends_it_and_everybody_sees_the_films(lesson: Lesson, race: int) -> None:
     last = ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"][1]["name"]
     teacher, pupil = lesson.visits["teacher"].open(f"/league/{race}"), lesson.visits[last].open(f"/league/{race}")
