@@ -117,8 +117,9 @@ export class Lesson {
 
   /** Until somebody trains, a car that has learned already drives; not for who wants nothing to move. */
   show(track: TrackFile): void {
+    if (this.isRunning) return;
+    [this.look, this.picture] = [undefined, undefined]; // also the cars of a training that is over
     if (this.state !== "ready" || matchMedia("(prefers-reduced-motion: reduce)").matches) return;
-    [this.look, this.picture] = [undefined, undefined];
     this.workers.plain!.postMessage({ kind: "show", plan: this.plan, track } satisfies Show);
   }
 
