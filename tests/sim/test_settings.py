@@ -9,7 +9,7 @@ import pytest
 
 from racecraft.errors import ConfigError, NonFiniteAction, RacecraftError, ShapeError
 from racecraft.sim import CameraSpec, Simulation, Start, Vehicle
-from racecraft.track import load_track
+from racecraft.track import Track, load_track
 
 OVAL = load_track("oval")
 NOT_NUMBERS = (math.nan, math.inf, -math.inf, None, "1", True, [1], object())
@@ -48,6 +48,14 @@ def test_settings(name, bad):
         assert name in message.lower()
         assert "\n" not in message
         assert repr(value) in message or name == "vehicle"
+
+
+def test_an_open_track_has_one_lap():
+    x = np.linspace(0.0, 6.0, 25)
+    road = Track("road", *(np.stack((x, np.full(25, y)), axis=1) for y in (0.0, 0.5, -0.5)))
+    Simulation([OVAL, road], num_envs=2, camera=None, laps=1)
+    with pytest.raises(ConfigError, match="laps is 2; allowed is 1 on an open track"):
+        Simulation([OVAL, road], num_envs=2, camera=None, laps=2)
 
 
 @pytest.mark.parametrize("tracks", [[], (), None, "oval", ["oval"], [OVAL, None], np.zeros((9, 6)), 5])

@@ -103,7 +103,7 @@ class Simulation:
         track_order: ``fixed``: car i drives track i modulo their number, or its `track_choice`; ``random``: one drawn
             for every episode.
         randomize: Preset name, file or `Randomization`: the ranges of what differs from episode to episode.
-        laps: Completed laps that end an episode; laps flow without a stop.
+        laps: Completed laps that end an episode; laps flow without a stop. An open track has only one.
         time_limit: Seconds that truncate an episode; 0 for none.
         max_steps: Steps that truncate an episode.
         substeps: Physics steps to a control step.
@@ -176,6 +176,7 @@ class Simulation:
         check_whole("num_envs", num_envs, 1, 1_000_000)
         check_whole("seed", seed, 0, 2**64 - 1)
         check_whole("laps", laps, 1, 1_000_000)
+        require("laps", laps, laps == 1 or all(track.is_closed for track in self.tracks), "1 on an open track")
         check_whole("max_steps", max_steps, 2, 2**31 - 1)
         check_whole("substeps", substeps, 4, 128)
         check_whole("num_threads", num_threads, 0, 1024)
