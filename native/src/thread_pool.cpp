@@ -1,5 +1,7 @@
 #include "thread_pool.hpp"
 
+#include <unistd.h>
+
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
@@ -31,12 +33,15 @@ class ThreadPool::Workers {
     }
     ~Workers();
 
+    // A forked child has a copy of this but none of the threads.
+    bool are_elsewhere() const { return getpid() != process_; }
     void run(const Loop& loop);
 
   private:
     void work();
     void drain(const Loop& loop);
 
+    const pid_t process_ = getpid();  // whose threads these are
     std::mutex mutex_;
     std::condition_variable wake_;
     std::condition_variable finished_;
@@ -62,6 +67,11 @@ void ThreadPool::Workers::drain(const Loop& loop) {
 }
 
 void ThreadPool::Workers::run(const Loop& loop) {
+    if (are_elsewhere()) {  // the lock, too, may be held by a thread that is not here
+        next_.store(0);
+        drain(loop);
+        return;
+    }
     {
         const std::lock_guard lock(mutex_);
         loop_ = loop;
@@ -91,7 +101,12 @@ void ThreadPool::Workers::work() {
 }
 
 ThreadPool::ThreadPool(int num_threads) : num_threads_(num_threads > 0 ? num_threads : available_cores()) {
-    if (num_threads_ > 1) workers_ = std::make_shared<Workers>(num_threads_ - 1);
+    if (num_threads_ == 1) return;
+    // A forked child leaves its copy lying: its end would wait for ever, for threads that are not there.
+    const auto end = [](const Workers* workers) {
+        if (!workers->are_elsewhere()) delete workers;
+    };
+    workers_ = std::shared_ptr<Workers>(new Workers(num_threads_ - 1), end);
 }
 
 ThreadPool::~ThreadPool() = default;

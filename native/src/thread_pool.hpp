@@ -1,5 +1,6 @@
 // A fixed set of threads that run the same loop body over [0, count) and then wait for the next loop. In a
-// browser's tab native/wasm/one_thread.cpp or shared_threads.cpp takes the place of thread_pool.cpp.
+// browser's tab native/wasm/one_thread.cpp or shared_threads.cpp takes the place of thread_pool.cpp. In a
+// forked child, which has no threads but the one that forked, the caller runs the loops alone.
 #pragma once
 
 #include <cstddef>

@@ -2,6 +2,9 @@
 // well.
 #include "thread_pool.hpp"
 
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <memory>
 #include <mutex>
@@ -103,6 +106,26 @@ TEST(pools_may_run_side_by_side) {
     }
     for (std::thread& user : users) user.join();
     CHECK_EQUAL(calls.load(), 3 * 100 * 10);
+}
+
+TEST(a_forked_child_runs_loops_alone_and_ends) {
+    auto pool = std::make_unique<ThreadPool>(3);
+    int sum = 0;
+    pool->for_each(1, [&](size_t) { ++sum; });
+    const pid_t child = fork();
+    if (child == 0) {
+        alarm(20);  // ends a child that waits for ever
+        for (int loop = 0; loop < 3; ++loop) pool->for_each(100, [&](size_t) { ++sum; });
+        pool.reset();
+        _exit(sum == 301 ? 0 : 1);
+    }
+    CHECK(child > 0);
+    int status = -1;
+    CHECK_EQUAL(waitpid(child, &status, 0), child);
+    CHECK_EQUAL(status, 0);
+    std::atomic<int> calls{0};
+    pool->for_each(100, [&](size_t) { ++calls; });
+    CHECK_EQUAL(calls.load(), 100);
 }
 
 }  // namespace racecraft

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import math
+import multiprocessing
 import os
 import resource
 import subprocess
@@ -280,6 +281,40 @@ def test_calls_from_several_threads_wait_for_each_other():
         user.join(timeout=60)
         assert not user.is_alive()
     assert errors == []
+
+
+@pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning")  # from Python 3.12 on
+def test_a_forked_child_steps_to_the_same_bits_and_ends():
+    simulation = Simulation(OVAL, num_envs=64, camera=SMALL, num_threads=2)
+    actions = np.tile([0.2, 2.0], (64, 1))
+    simulation.step(actions)
+    begun = simulation.save()
+
+    def bits() -> bytes:
+        for _ in range(5):
+            simulation.step(actions)
+        return b"".join(a.tobytes() for a in (simulation.rows, simulation.vehicles, simulation.frames))
+
+    def drive_and_drop() -> None:
+        nonlocal simulation
+        there.send_bytes(bits())
+        del simulation
+        gc.collect()
+
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe()
+    child = context.Process(target=drive_and_drop, daemon=True)
+    child.start()
+    try:
+        assert here.poll(30)
+        found = here.recv_bytes()
+        child.join(30)
+        assert child.exitcode == 0
+    finally:
+        child.kill()
+        child.join()
+    simulation.load(begun)
+    assert bits() == found
 
 
 def test_a_car_takes_little_memory():
