@@ -15,7 +15,9 @@ from racecraft import _native
 from racecraft.agent import PRESETS, DiscreteActionSpace, action_space
 from racecraft.env import ENV_ID, STATE_BOUNDS, RacecraftEnv, RacecraftVectorEnv, register_environments
 from racecraft.env.task import DrivingTask, TaskSettings
+from racecraft.race import Autopilot
 from racecraft.sim import STATUS_NAMES, CameraSpec
+from racecraft.sim.simulation import MAX_STEERING
 
 DATASHEET = inspect.getdoc(RacecraftEnv) or ""
 SETTINGS = {"track": "oval", "observation": "state"}
@@ -53,6 +55,29 @@ def test_make_limits_the_steps_of_both():
     envs.reset(seed=0)
     assert [bool(envs.step(np.array([5]))[3][0]) for _ in range(2)] == [False, True]
     envs.close()
+
+
+def test_episodes_are_as_long_as_the_spec_says():
+    default = inspect.signature(DrivingTask).parameters["max_episode_steps"].default
+    assert gymnasium.spec(ENV_ID).max_episode_steps == default
+    settings = {**SETTINGS, "action_space": "continuous", "start": "fixed", "laps": 1000, "reward": lambda params: 1.0}
+    env = gymnasium.make(ENV_ID, max_episode_steps=default + 50, **settings)
+    driver, is_over, length = Autopilot(), False, 0
+    state, _ = env.reset(seed=0)
+    while not is_over:
+        ((steering, speed),) = driver(state[None])
+        state, _, terminated, truncated, _ = env.step(np.float32([steering / MAX_STEERING, (speed - 2.25) / 1.75]))
+        is_over, length = terminated or truncated, length + 1
+    assert truncated
+    assert length == env.spec.max_episode_steps == default + 50
+    env.close()
+
+
+def test_make_knows_the_pictures_that_there_are():
+    with pytest.warns(UserWarning, match="HumanRendering"):
+        env = gymnasium.make(ENV_ID, render_mode="human", **SETTINGS)
+    assert env.unwrapped.render_mode == "rgb_array"
+    env.unwrapped.close()
 
 
 def test_registering_again_does_nothing():

@@ -14,7 +14,7 @@ from racecraft.env.info import single_info
 from racecraft.env.observation import Observation
 from racecraft.env.opponents import Driver, Opponents, check_opponents
 from racecraft.env.rendering import Renderer, check_render_mode
-from racecraft.env.task import DrivingTask, TaskSettings, check_names, seed_key
+from racecraft.env.task import MOST_STEPS, DrivingTask, TaskSettings, check_names, seed_key
 from racecraft.errors import ConfigError, ResetNeeded
 from racecraft.track import Track
 
@@ -242,3 +242,11 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
         """End the reward's process; calling again does nothing."""
         self._is_running = False
         self._task.close()
+
+
+def make_single(*args: Any, **settings: Any) -> RacecraftEnv:
+    """The environment as `gymnasium.make` wants it, which cuts its episodes itself."""
+    return RacecraftEnv(*args, **{"max_episode_steps": MOST_STEPS, **settings})
+
+
+make_single.metadata = RacecraftEnv.metadata  # type: ignore[attr-defined]  # Gymnasium looks for its render modes

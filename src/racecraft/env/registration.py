@@ -7,6 +7,8 @@ from typing import Final
 import gymnasium
 
 ENV_ID: Final = "Racecraft-v0"
+EPISODE_STEPS: Final = 3000
+"""Steps of 1/15 s that truncate an episode, unless told otherwise."""
 
 
 def register_environments() -> None:
@@ -19,6 +21,7 @@ def register_environments() -> None:
     if ENV_ID not in gymnasium.registry:
         gymnasium.register(
             id=ENV_ID,
-            entry_point="racecraft.env.racecraft_env:RacecraftEnv",
+            entry_point="racecraft.env.racecraft_env:make_single",
             vector_entry_point="racecraft.env.vector_env:RacecraftVectorEnv",
+            max_episode_steps=EPISODE_STEPS,
         )

@@ -22,6 +22,7 @@ from racecraft.agent.sensors import LIDARS
 from racecraft.checks import check_type, check_whole
 from racecraft.env.info import LapClock
 from racecraft.env.observation import ObservationKind, Observer, check_kind
+from racecraft.env.registration import EPISODE_STEPS
 from racecraft.env.rewards import RewardFunction, open_reward
 from racecraft.env.sensor_observation import SensorObserver
 from racecraft.errors import ConfigError, did_you_mean
@@ -29,6 +30,9 @@ from racecraft.sim import CameraSpec, Objects, Randomization, Simulation, Start,
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.track import Track, load_track
+
+MOST_STEPS: Final = 2**31 - 2
+"""The longest episode there is."""
 
 _OF_OTHERS: Final = {
     "opponents": "One car has opponents: gymnasium.make('Racecraft-v0', opponents=[...]).",
@@ -116,7 +120,7 @@ class DrivingTask:
         start: str | Start = "random",
         direction: str = "forward",
         laps: int = 1,
-        max_episode_steps: int = 3000,
+        max_episode_steps: int = EPISODE_STEPS,
     ) -> None:
         check_kind(observation)
         objects = NO_OBJECTS if objects is None else objects
@@ -124,7 +128,7 @@ class DrivingTask:
         check_type("camera", camera, CameraSpec, "use racecraft.CameraSpec(...)")
         check_type("sensors", sensors, (list, tuple, type(None)), "use a list of AWS's sensor names")
         check_type("lidar", lidar, (LidarConfig, type(None)), "use racecraft.agent.LidarConfig(...)")
-        check_whole("max_episode_steps", max_episode_steps, 1, 2**31 - 2)
+        check_whole("max_episode_steps", max_episode_steps, 1, MOST_STEPS)
         check_type(
             "track", track, (str, Path, Track, list, tuple), "use a name, a file or a Track, or several in a list"
         )
