@@ -18,6 +18,11 @@ from racecraft.serve.models.names import ANIMALS, free_name
 from racecraft.sim.vehicle import load_vehicle
 from racecraft.track import load_track
 
+OF_OBJECTS = """def reward_function(params):
+    _, ahead = params["closest_objects"]
+    x, y = params["objects_location"][ahead]
+    return abs(params["x"] - x) + abs(params["y"] - y)
+"""
 GATE = "def reward_function(params):\n    return 1.0 if params['all_wheels_on_track'] else 0.001\n"
 
 
@@ -56,6 +61,17 @@ def test_a_reward_is_checked_and_painted(console: RunningConsole) -> None:
     assert set(middle) == {1.0}
     assert {row[0] for row in rewards} == {0.001}
 
+    among = {"source": OF_OBJECTS, "track": "oval"}
+    alone = client.post("/api/rewards/check", json=among).json()
+    assert not alone["ok"]
+    assert "IndexError" in alone["problems"][0]["message"]
+    for race in ({"race": "object-avoidance"}, {"race": "head-to-bot", "objects": 1}, {"race": "head-to-head"}):
+        assert client.post("/api/rewards/check", json={**among, **race}).json()["ok"], race
+    boxes = {"name": "among-boxes", "train": False, "track": "oval", "race": "object-avoidance"}
+    assert client.post("/api/models", json=boxes).status_code == 201
+    assert client.post("/api/rewards/check", json={**among, "of": "among-boxes"}).json()["ok"]
+    nowhere = client.post("/api/rewards/check", json={**among, "race": "downhill"})
+    assert (nowhere.status_code, "downhill" in nowhere.json()["error"]["message"]) == (422, True)
     broken = client.post("/api/rewards/check", json={"source": "def reward_function(p:\n", "track": "oval"}).json()
     assert not broken["ok"]
     assert broken["problems"][0]["line"] == 1

@@ -16,6 +16,8 @@ export type TrackGeometry = Schemas["TrackGeometry"];
 export type PresetPictures = Schemas["PresetPictures"];
 export type RewardPreset = Schemas["RewardPreset"];
 export type RewardVerdict = Schemas["RewardVerdict"];
+/** Among what a reward function is tried. */
+export type Tried = Partial<Omit<Schemas["RewardCheck"], "source" | "track">>;
 export type RewardPainting = Schemas["RewardPainting"];
 export type ActionPreset = Schemas["ActionPreset"];
 export type EvaluationCard = Schemas["EvaluationCard"];
@@ -135,8 +137,8 @@ export const api = {
   pictures: () => ask<PresetPictures>("GET", "/rewards/pictures"),
   rewards: () => ask<RewardPreset[]>("GET", "/rewards"),
   actions: () => ask<ActionPreset[]>("GET", "/actions"),
-  checkReward: (source: string, track: string, run?: string) =>
-    ask<RewardVerdict>("POST", "/rewards/check", { source, track, ...(run ? { run } : {}) }),
+  checkReward: (source: string, track: string, tried: Tried = {}) =>
+    ask<RewardVerdict>("POST", "/rewards/check", { source, track, ...tried }),
   choices: () => ask<Choices>("GET", "/choices"),
   evaluations: (run: string) => ask<EvaluationCard[]>("GET", `/models/${name(run)}/evaluations`),
   evaluate: (run: string, request: Record<string, unknown>) =>

@@ -1,5 +1,5 @@
 /** The check of a reward function while it is typed: an answer counts for the text that it was asked about, and no longer. */
-import { api, Problem, type RewardVerdict } from "../api/client";
+import { api, Problem, type RewardVerdict, type Tried } from "../api/client";
 import { said } from "../i18n/index.svelte";
 
 const PAUSE = 400; // ms without typing, after which the text is checked
@@ -36,11 +36,11 @@ export class RewardCheck {
   }
 
   /** Check a text in a moment, unless another one comes. */
-  ask(text: string, track: string, run?: string): void {
+  ask(text: string, track: string, tried: Tried = {}): void {
     this.#text = text;
     clearTimeout(this.#timer);
     if (!text) return;
-    this.#timer = setTimeout(() => void this.#check(text, track, run), PAUSE);
+    this.#timer = setTimeout(() => void this.#check(text, track, tried), PAUSE);
   }
 
   /** What the server said when the text was to be trained with. */
@@ -50,10 +50,10 @@ export class RewardCheck {
     [this.#of, this.#found] = [text, { ok: false, problems: [mistake], situations: [], painting: null, laps: [] }];
   }
 
-  async #check(text: string, track: string, run?: string) {
+  async #check(text: string, track: string, tried: Tried) {
     let answer: RewardVerdict | undefined;
     try {
-      answer = await this.#answer(text, track, run);
+      answer = await this.#answer(text, track, tried);
     } catch (error) {
       if (error instanceof Problem && text === this.#text) this.refuse(text, error);
       return;

@@ -15,9 +15,11 @@ from racecraft.agent.action_space import PRESETS, DiscreteActionSpace
 from racecraft.analysis import pay_laps
 from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
+from racecraft.judging.trained import is_road_of, trained_objects
 from racecraft.reward import check_reward, dry_run, load_preset, preset_names
 from racecraft.reward.painting import paint_presets, paint_reward
 from racecraft.serve.context import Computes, Context, InContext
+from racecraft.serve.models.garage import RACED
 from racecraft.serve.rewards.schemas import (
     Action,
     ActionPreset,
@@ -30,6 +32,7 @@ from racecraft.serve.rewards.schemas import (
     RewardSituation,
     RewardVerdict,
 )
+from racecraft.sim.objects import NO_OBJECTS, Objects, objects_for_race
 from racecraft.track import load_track
 
 PICTURED: Final = "hairpin"
@@ -111,7 +114,8 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
         return RewardVerdict(ok=False, problems=found, situations=[], painting=None)
     track = context.courses.load(request.track)
     foreign = context.garage.is_foreign(request.source)
-    outcomes = dry_run(request.source, track, foreign=foreign)
+    objects, cars = _among(request, context)
+    outcomes = dry_run(request.source, track, objects=objects, cars_per_race=cars, foreign=foreign)
     for outcome in outcomes:
         if outcome.error is not None and outcome.error.line:
             found.append(
@@ -147,14 +151,25 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
     return RewardVerdict(ok=True, problems=found, situations=situations, painting=painting, laps=laps)
 
 
+def _among(request: RewardCheck, context: Context) -> tuple[Objects, int]:
+    """What the car that is paid is among: objects, and cars that share its track."""
+    if request.of is not None:
+        info = context.garage.folder(request.of).read_info()
+        return trained_objects(info), (info.settings.get("opponents") or {}).get("cars", 1)
+    if request.race == RACED:
+        return NO_OBJECTS, request.cars or 2
+    count = {} if request.objects is None or request.race == "time-trial" else {"count": request.objects}
+    return objects_for_race(request.race, settings=count), 1
+
+
 def _laps(context: Context, request: RewardCheck, *, foreign: bool) -> list[RewardLap]:
     """The last laps of the model that was asked for, where it was evaluated on the track."""
     folder = context.garage.folder(str(request.run))
-    track = context.courses.load(request.track)
+    track, info = context.courses.load(request.track), folder.read_info()
     for path in sorted(folder.path.glob("evaluation-*/evaluation.json"), reverse=True)[:20]:
         trace = path.parent / "evaluation-simtrace" / "0-iteration.csv"
         with suppress(RacecraftError):
-            if read_json_object(path).get("track") == track.name and trace.is_file():
+            if trace.is_file() and is_road_of(read_json_object(path), info, track):
                 return [
                     RewardLap(
                         number=lap.number,

@@ -51,6 +51,12 @@ class RewardCheck(Message):
     track: str = Field(max_length=200)
     run: RunName | None = None
     """Of a model whose last laps are to be paid anew."""
+    of: RunName | None = None
+    """Of a model that is to learn from it: it is tried among the objects and cars that the model trains with."""
+    race: str = Field("time-trial", max_length=40)
+    """Without such a model, the race that it is to learn for; as of a new model, like the two that follow."""
+    objects: int | None = Field(None, ge=1, le=32)
+    cars: int | None = Field(None, ge=2, le=8)
 
 
 class RewardProblem(Message):
