@@ -15,6 +15,8 @@ from racecraft.classic.q_table import TableSettings, epsilon, epsilon_greedy, le
 from racecraft.classic.q_table import learn as q_learn
 from racecraft.classic.sarsa import learn as sarsa_learn
 
+pytestmark = pytest.mark.usefixtures("quickly")
+
 Floats = np.ndarray[Any, Any]
 
 

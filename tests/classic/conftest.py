@@ -1,0 +1,18 @@
+"""Worlds that take little of a long training's time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import quick_worlds
+
+from racecraft.classic import a3c
+
+
+@pytest.fixture
+def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Gymnasium's classic worlds to the bit, in a fraction of the time, in this process and in those of A3C."""
+    quick_worlds.install(monkeypatch.setattr)
+    first = f"import sys; sys.path.append({str(Path(__file__).parent)!r}); import quick_worlds; quick_worlds.install()"
+    monkeypatch.setattr(a3c, "PROGRAM", f"{first}; {a3c.PROGRAM}")
