@@ -79,7 +79,7 @@ truth = solve(gamma=0.99)
 # You know this line from the slot machines: old guess + a step × surprise. New is only that the worth of the next
 # square is part of what came. So knowledge of the goal creeps backwards, a square with each visit.
 #
-# `src/racecraft/classic/q_table.py` is this line and little else. Read it: it has some eighty lines.
+# `src/racecraft/classic/q_table.py` is this line and little else. Read it: it has about a hundred lines.
 
 # %%
 learned = learn("FrozenLake-v1", "q-table", seed=1, until="150000 steps")

@@ -27,7 +27,7 @@
 # - **Target network.** The future is asked of a copy of the network that stands still, and is brought up to date only
 #   now and then. So the answers hold for a while.
 #
-# `src/racecraft/classic/dqn.py` is all of it, in a hundred lines. Its settings can switch both off.
+# `src/racecraft/classic/dqn.py` is all of it, in little more than a hundred lines. Its settings can switch both off.
 
 # %%
 import numpy as np
