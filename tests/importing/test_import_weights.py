@@ -13,6 +13,7 @@ from aws_models import DEEP, AwsModel
 from runs_made import nothing_was_made
 
 from racecraft import evaluate, resume, train
+from racecraft.agent import Hyperparameters
 from racecraft.errors import SourceError
 from racecraft.importing import import_run
 from racecraft.race import RULE_SETS, load_driver
@@ -121,6 +122,17 @@ def test_a_car_s_archive_and_every_place_of_a_graph(tmp_path: Path) -> None:
         imported(two)
     assert "--checkpoint FILE" in caught.value.hint
     assert imported(two, checkpoint="b.pb")[0] == "b.pb"
+
+
+def test_a_trained_model_without_hyperparameters_goes_on_with_awss(tmp_path: Path) -> None:
+    files = {name: text for name, text in small().items() if "hyperparameters" not in name}
+    trained = import_run(models.as_tar({**files, "model.pb": models.GRAPH}, tmp_path / "car.tar.gz"), name="trained")
+    assert "There is no hyperparameters.json: it goes on with AWS's defaults." in trained.notes
+    folder = RunFolder.open(trained.run)
+    assert folder.read_hyperparameters() == Hyperparameters()
+    assert read_settings(folder).ppo.learning_rate == 3e-4
+    fresh = import_run(models.as_tar(files, tmp_path / "new.tar.gz"), name="fresh", reward="centerline")
+    assert "There is no hyperparameters.json: it trains with Racecraft's own settings." in fresh.notes
 
 
 def test_the_weights_of_the_pretrained_model_until_there_are_own_ones(tmp_path: Path) -> None:

@@ -86,6 +86,14 @@ def test_last_four_and_best_are_kept(store):
     assert index["last_checkpoint"].keys() == {"name", "avg_eval_metric", "time_stamp"}
 
 
+def test_what_a_run_began_with_is_kept(store):
+    save(store, 0)
+    for step in range(100, 900, 100):
+        save(store, step, score=(float(step),))
+    assert [entry.step for entry in store.entries()] == [0, 500, 600, 700, 800]
+    assert_good(store.load("0"))
+
+
 def test_without_scores_the_best_is_the_last(store):
     for step in (100, 200, 300):
         save(store, step)

@@ -302,6 +302,10 @@ def _read_hyperparameters(model: _Model, metadata: ModelMetadata) -> Hyperparame
     name = model.find(HYPERPARAMETERS)
     if model.root + RUN in model.source.files and name != model.root + HYPERPARAMETERS:
         name = ""  # what a run of ours leaves for AWS's tools is never read back: ours may lie outside of AWS's ranges
+    if not name and model.weights is not None and model.root + RUN not in model.source.files:
+        # ours are for small networks that know nothing: a step of theirs would ruin what this one has learned
+        model.notes.append(f"There is no {HYPERPARAMETERS}: it goes on with AWS's defaults.")
+        return Hyperparameters()
     if not name:
         model.notes.append(f"There is no {HYPERPARAMETERS}: it trains with Racecraft's own settings.")
         return None

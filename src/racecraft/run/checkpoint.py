@@ -30,7 +30,7 @@ from racecraft.run.atomic import TEMPORARY, write_file, write_json
 from racecraft.run.tensor_file import is_storable, tensor_file
 
 FORMAT = 1
-KEEP = 4  # as AWS: the last four and the best
+KEEP = 4  # as AWS: the last four and the best; and the one that a run began with
 MAX_FILE_BYTES = 1 << 33  # 8 GiB; AWS's networks with Adam's state take 140 MB
 MAX_MANIFEST_BYTES = 1 << 22
 MANIFEST = "manifest.json"
@@ -258,8 +258,9 @@ class CheckpointStore:
         return _best(self.entries())
 
     def _kept(self, entries: list[Entry]) -> list[Entry]:
+        """The last ones, the best one, and what a run began with: weights from elsewhere are nowhere else."""
         best = _best(entries)
-        return [entry for entry in entries if entry in entries[-self.keep :] or entry is best]
+        return [entry for entry in entries if entry in entries[-self.keep :] or entry is best or entry.step == 0]
 
     def _write_manifest(self, entries: list[Entry]) -> None:
         best = _best(entries) or entries[-1]
