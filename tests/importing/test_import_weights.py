@@ -110,7 +110,8 @@ def test_an_index_that_says_nothing_is_no_hindrance(damage: str, tmp_path: Path)
 
 @pytest.mark.costly
 def test_a_car_s_archive_and_every_place_of_a_graph(tmp_path: Path) -> None:
-    for place in ("agent/model.pb", "model.pb", "model/model_3.pb", "output/frozen.pb"):
+    odd = ("agent/best lap.pb", "model (1).pb", "agent/modéle.pb")
+    for place in ("agent/model.pb", "model.pb", "model/model_3.pb", "output/frozen.pb", *odd):
         files = {**small(), place: models.GRAPH, "worker_0.multi_agent_graph_0.json": "{}"}
         for source in (
             models.as_tar(files, tmp_path / f"{len(place)}.tar.gz"),

@@ -148,13 +148,15 @@ def _archive(path: Path, folder: Path, limits: Limits) -> Source:
         base = member.name.rpartition("/")[2]
         if base.startswith("._") or member.name.startswith("__MACOSX/"):
             continue  # what macOS puts beside every file
-        if member.size <= MAX_BYTES.get(role(member.name), -1) and is_plain(base.removeprefix(".")):
+        what, is_kept_as_it_is = role(member.name), is_plain(base.removeprefix("."))
+        # weights are read here and left: a car takes any graph, whatever its name
+        if member.size <= MAX_BYTES.get(what, -1) and (is_kept_as_it_is or what == "weights"):
             total += member.size
             if total > MAX_KEPT_BYTES:
                 raise SourceError(
                     f"{path.name} holds more than {MAX_KEPT_BYTES:,} bytes of logs, weights and settings."
                 )
-            kept = folder / str(number) / base
+            kept = folder / str(number) / (base if is_kept_as_it_is else "weights")
             kept.parent.mkdir()
             with kept.open("xb") as file:
                 while data := member.read(CHUNK):
