@@ -55,6 +55,15 @@ def test_a_file_of_any_name_is_one_track(tmp_path):
     assert load_tracks(str(path))[0].digest == generate_track(1).digest
 
 
+def test_a_text_longer_than_a_path_names_tracks(tmp_path):
+    save_route(generate_track(1), tmp_path / "long.npy")
+    joined = " + ".join([str(tmp_path / "long.npy")] * 200)
+    assert len(load_tracks(joined)) == 200
+    for name in ("a" * 400, "a\0b", "a" * 400 + " + oval"):
+        with pytest.raises(TrackNotFound, match="does not exist"):
+            load_tracks(name)
+
+
 def test_digests():
     oval, kidney = load_track("oval"), load_track("kidney")
     assert joint_digest([oval]) == oval.digest

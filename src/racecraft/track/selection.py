@@ -66,7 +66,7 @@ def joint_digest(tracks: Sequence[Track]) -> str:
 def _expand(name: str | Path) -> list[str | Path]:
     if isinstance(name, Path):
         return _files(name) if name.is_dir() else [name]
-    if JOINT in name and not Path(name).exists():
+    if JOINT in name and not _is_there(name):
         return [found for part in name.split(JOINT) for found in _expand(part.strip())]
     if name == "library":
         return list(track_names())
@@ -78,8 +78,15 @@ def _expand(name: str | Path) -> list[str | Path]:
         if not first <= last < first + MAX_TRACKS:
             raise TrackError(f"Tracks {name!r}: the seeds must rise, {MAX_TRACKS} at most.")
         return [f"{GENERATED}{seed}{seeds[3]}" for seed in range(first, last + 1)]
-    is_folder = name != "" and name not in track_names() and Path(name).is_dir()
+    is_folder = name != "" and name not in track_names() and _is_there(name) and Path(name).is_dir()
     return _files(Path(name)) if is_folder else [name]
+
+
+def _is_there(name: str) -> bool:
+    try:
+        return Path(name).exists()
+    except (OSError, ValueError):  # too long to be one, or with a sign that none has
+        return False
 
 
 def _files(folder: Path) -> list[str | Path]:
