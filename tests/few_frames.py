@@ -13,7 +13,7 @@ FEW_FRAMES: Final = """
     const timer = setTimeout(() => {
       const frame = ask((time) => (asked.delete(id), draw(time)));
       asked.set(id, () => forget(frame));
-    }, 120);
+    }, 240);
     return id;
   };
   window.cancelAnimationFrame = (id) => (asked.get(id)?.(), asked.delete(id));
