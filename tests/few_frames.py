@@ -1,4 +1,4 @@
-"""What moves on a page is drawn a few times a second: sixty would be most of a test's work, and show the same."""
+"""What moves on a page is drawn four times a second: sixty would be most of a test's work, and show the same."""
 
 from typing import Final
 
