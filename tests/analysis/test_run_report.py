@@ -93,7 +93,7 @@ def test_a_flying_lap_is_paid_like_any_other_at_the_line(tmp_path: Path, reward:
     assert abs(first.rewards[0]) < 0.05  # from standing
     for lap in (second, third):
         assert lap.rewards[0] > 0.5 * lap.rewards[1]
-        assert lap.rewards.min() > 0.02
+        assert lap.rewards[:-1].min() > 0.02  # the last step leads beyond 100 %, which nobody is paid for
     counted = pay_laps("def reward_function(params):\n    return params['steps']\n", track, trace)
     assert counted[1].rewards[:3].tolist() == [3.0, 4.0, 5.0]  # of the lap, not of the trial
 
