@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
-import quick_worlds
 
+import quick_worlds
 from racecraft.classic import a3c
 
 
@@ -14,5 +12,4 @@ from racecraft.classic import a3c
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Gymnasium's classic worlds to the bit, in a fraction of the time, in this process and in those of A3C."""
     quick_worlds.install(monkeypatch.setattr)
-    first = f"import sys; sys.path.append({str(Path(__file__).parent)!r}); import quick_worlds; quick_worlds.install()"
-    monkeypatch.setattr(a3c, "PROGRAM", f"{first}; {a3c.PROGRAM}")
+    monkeypatch.setattr(a3c, "PROGRAM", f"{quick_worlds.FIRST_LINE}; {a3c.PROGRAM}")

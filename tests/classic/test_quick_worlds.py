@@ -7,6 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+
 from quick_worlds import QUICK, install
 
 EPISODES = {

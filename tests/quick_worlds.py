@@ -1,14 +1,15 @@
 """Gymnasium's classic worlds with the same bits in a fraction of the time, for tests that take a million steps there.
 
 Gymnasium computes a handful of numbers at a time with NumPy, whose calls cost far more than the sums. Here stand the
-same operations in the same order on Python's numbers; `test_quick_worlds.py` holds each beside Gymnasium's, to the bit.
-What these tests are about, what is learned in these worlds, sees no difference.
+same operations in the same order on Python's numbers; `classic/test_quick_worlds.py` holds each beside Gymnasium's, to
+the bit. What such tests are about, what is learned in these worlds, sees no difference.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import cos, pi
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -136,6 +137,11 @@ QUICK: Final = (
     (frozen_lake, "categorical_sample", categorical_sample),
     (cliffwalking, "categorical_sample", categorical_sample),
 )
+
+
+FOLDER: Final = str(Path(__file__).parent)
+FIRST_LINE: Final = f"import sys; sys.path.append({FOLDER!r}); import quick_worlds; quick_worlds.install()"
+"""Of a program for a process of its own: there, too."""
 
 
 def install(put: Callable[[Any, str, Any], None] = setattr) -> None:
