@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,7 @@ def blas_threads() -> set[int]:
 
 def test_products_take_one_thread_while_it_learns_and_judges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # with two, CartPole's DQN took another course, and forty times the processor on a busy machine
+    import_module("scipy.linalg")  # brings a library of its own, after the one that was found when learning was imported
     seen = []
 
     def judged(*worlds: Any) -> Any:

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Final
 
 import numpy as np  # noqa: F401  loaded first, as its library is looked for among those that are
-from threadpoolctl import ThreadpoolController
-
-_LIBRARIES: Final = ThreadpoolController()
+from threadpoolctl import threadpool_limits
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """So within; afterwards as before."""
-    with _LIBRARIES.limit(limits=1, user_api="blas"):
+    """So within, in every library that is loaded by then; afterwards as before."""
+    with threadpool_limits(limits=1, user_api="blas"):
         yield
