@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.film.encoding import write_video
 from racecraft.learn.native_regressor import NativeRegressor
@@ -22,6 +23,7 @@ from racecraft.perception.reading import read_pictures
 from racecraft.perception.telling import tell
 from racecraft.race import RULE_SETS, evaluate
 from racecraft.replay import Replay, write_replay
+from racecraft.sim.camera import CAMERAS
 from racecraft.track import load_track
 
 
@@ -79,15 +81,27 @@ def test_a_video_may_be_badly_labelled(tmp_path: Path, perceiver: Perceiver) -> 
         perceive([tmp_path / "in.mp4"], perceiver=perceiver)
 
 
-def test_a_replay_shows_what_the_driver_saw(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("sensor", "camera"),
+    [("FRONT_FACING_CAMERA", "2018"), ("LEFT_CAMERA", "2018"), ("STEREO_CAMERAS", "2018"), ("LEFT_CAMERA", "2026")],
+)
+def test_a_replay_shows_what_the_driver_saw(tmp_path: Path, sensor: str, camera: str) -> None:
     seen: list[NDArray[np.uint8]] = []
 
     def driver(frames: NDArray[np.uint8]) -> NDArray[np.float32]:
-        seen.append(frames[0].copy())
+        seen.append(frames[0].reshape(-1, 120, 160)[0].copy())  # of two lenses the left one
         return np.array([[0.1, 1.0]], np.float32)
 
-    rules = replace(RULE_SETS["first_lap"], time_limit=1.0)
-    evaluation = evaluate(driver, load_track("oval"), rules=rules, num_trials=1, randomize="none", num_threads=1)
+    evaluation = evaluate(
+        driver,
+        load_track("oval"),
+        rules=replace(RULE_SETS["first_lap"], time_limit=1.0),
+        num_trials=1,
+        camera=replace(CAMERAS[camera], age=0.0),  # poses are those of the steps
+        sensors=SensorSuite((sensor,)),
+        randomize="none",
+        num_threads=1,
+    )
     pictures = list(read_pictures([write_replay(Replay.of(evaluation), tmp_path / "a.replay")]))
     assert len(pictures) == len(seen) + 1  # the first is of the step that prepares the start
     for picture, frame in zip(pictures[1:], seen, strict=True):

@@ -129,6 +129,18 @@ def test_what_perception_believes_of_one_moment(raced: tuple[RunningConsole, str
         assert len(seen["line_rows"]) == len(seen["line_columns"]) == len(seen["line_error"]) > 3
         assert np.shape(seen["regions"]) == (len(seen["region_rows"]), len(seen["region_columns"]))
         assert seen["distance_m"] is None
+    sensors = console.runs / name / "model_metadata.json"
+    document = sensors.read_text()
+    sensors.write_text(json.dumps({**json.loads(document), "sensor": ["LEFT_CAMERA"]}))
+    try:
+        beside = console.client.get(path, params={"lap": 1, "row": 3}).json()
+        drawn = console.client.get(path.replace("belief", "saliency"), params={"lap": 1, "row": 3}).json()
+    finally:
+        sensors.write_text(document)
+    assert beside["offset_m"] - seen["offset_m"] == pytest.approx(0.03, abs=0.015)
+    looks = [np.frombuffer(base64.b64decode(one["frame"]), np.uint8).astype(int) for one in (seen, beside, drawn)]
+    assert np.abs(looks[1] - looks[0]).mean() > 3.0
+    assert np.abs(looks[1] - looks[2]).mean() < 1.0
     refused(console.client.get(path, params={"lap": 9, "row": 3}), 404, "no step 3 in lap 9")
     refused(console.client.get(path, params={"lap": 1, "row": 10**6}), 404)
 

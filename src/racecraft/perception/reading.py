@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -138,10 +138,11 @@ def _from_video(path: Path) -> Iterator[Picture]:
 
 
 def _from_replay(path: Path) -> Iterator[Picture]:
-    """What the driver of its best car saw."""
+    """What the driver of its best car saw, of a stereo camera the left one of its pictures."""
     replay = read_replay(path)
     recording = replay.evaluation.best_trial.recording
-    camera = CameraSpec(width=SHOWN[0], height=SHOWN[1], palette=replay.conditions.palette)
+    lens = (replay.conditions.camera or CameraSpec()).left_lens
+    camera = replace(lens, width=SHOWN[0], height=SHOWN[1])
     view = Scene(recording.track, palette=camera.palette).driver_view(camera, lit_walls=False)
     for step, (x, y, heading) in enumerate(recording.poses.tolist()):
         yield _picture(f"{path}#{step}", view.draw(x, y, heading, cars=recording.objects(step)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from racecraft.checks import check_choice, check_number, check_whole
@@ -54,6 +54,11 @@ class CameraSpec:
         for name, (low, high) in limits.items():
             check_number(f"Camera setting {name}", getattr(self, name), low, high)
         check_choice("Camera palette", self.palette, PALETTES)
+
+    @property
+    def left_lens(self) -> CameraSpec:
+        """The camera of its one lens, or of the left one of two."""
+        return replace(self, left=self.left + 0.5 * self.baseline, baseline=0.0)
 
 
 CAMERAS: Final = {

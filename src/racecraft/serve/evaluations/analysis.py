@@ -44,6 +44,7 @@ from racecraft.serve.evaluations.schemas import (
 )
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.tracks.schemas import TrackSector
+from racecraft.sim.camera import CameraSpec
 from racecraft.sim.views import driver_frames
 from racecraft.track import Track, load_tracks
 
@@ -107,7 +108,7 @@ def get_saliency(
     heading = float(found.heading[row])
     origin = found.points[row] - AHEAD * np.array([math.cos(heading), math.sin(heading)])
     driven = driven_direction(track, [found.points])
-    frame = driver_frames(driven, [[*origin.tolist(), heading]], trained_camera(folder.read_info()))[0]
+    frame = driver_frames(driven, [[*origin.tolist(), heading]], lens_of(folder))[0]
     if target is not None and target >= spec.num_actions:
         raise NotFound(f"The policy of {name!r} has no output {target}; allowed are 0 to {spec.num_actions - 1}.")
     seen = grad_cam(spec, weights, frame, target=target)
@@ -235,6 +236,11 @@ def evaluation_track(context: Context, folder: RunFolder, stamp: str) -> Track:
             f"The track {name!r} was changed since this model was evaluated on it.", hint="Train a new model on it."
         )
     return track
+
+
+def lens_of(folder: RunFolder) -> CameraSpec:
+    """What the model sees through; of a stereo camera the left lens."""
+    return folder.read_model_metadata().suite.camera(trained_camera(folder.read_info())).left_lens
 
 
 def _trained_road(folder: RunFolder) -> Track:

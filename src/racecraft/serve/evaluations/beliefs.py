@@ -12,9 +12,8 @@ import numpy as np
 from fastapi import APIRouter, Query
 
 from racecraft.analysis import driven_direction, read_laps
-from racecraft.judging.trained import trained_camera
 from racecraft.serve.context import Computes, InContext
-from racecraft.serve.evaluations.analysis import AHEAD, evaluation_track, trace_of
+from racecraft.serve.evaluations.analysis import AHEAD, evaluation_track, lens_of, trace_of
 from racecraft.serve.evaluations.objects import objects_of
 from racecraft.serve.evaluations.schemas import RoadBelief, RoadObject
 from racecraft.serve.problems import NotFound
@@ -50,7 +49,7 @@ def get_belief(
         raise NotFound(f"Evaluation {stamp} of {name!r} has no step {row} in lap {lap}.")
     heading = float(found.heading[row])
     x, y = found.points[row] - AHEAD * np.array([math.cos(heading), math.sin(heading)])
-    camera = trained_camera(folder.read_info())
+    camera = lens_of(folder)
     view = Scene(driven_direction(track, [found.points]), palette=camera.palette).driver_view(camera, lit_walls=False)
     there = [_view(one, row) for one in objects_of(folder, stamp, laps).get(lap, [])]
     picture = view.draw(float(x), float(y), heading, cars=there)
