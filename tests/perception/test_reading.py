@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageOps
 
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.errors import ConfigError, ShapeError
@@ -58,6 +58,58 @@ def test_pictures_of_every_kind_and_size(tmp_path: Path, perceiver: Perceiver) -
     assert [path.name for path in painted] == ["00000-a.png", "00001-b.png", "00002-c.png", "00003-a.png"]
     with Image.open(painted[0]) as image:
         assert image.size == (640, 480)
+
+
+@pytest.mark.parametrize("name", ["a#1", "a#2.b", "50%", "with a space", "%d"])
+def test_painted_pictures_keep_the_names_of_their_files(tmp_path: Path, perceiver: Perceiver, name: str) -> None:
+    road().save(tmp_path / f"{name}.png")
+    road(160, 120).save(tmp_path / f"{name}.jpg")
+    told = perceive([tmp_path], output=tmp_path / "seen", perceiver=perceiver)
+    assert [one["file"] for one in told] == [str(tmp_path / f"{name}{ending}") for ending in (".jpg", ".png")]
+    assert sorted(path.name for path in (tmp_path / "seen").iterdir()) == [f"0000{i}-{name}.png" for i in range(2)]
+
+
+def test_a_picture_of_16_bits_is_as_bright_as_one_of_8(tmp_path: Path) -> None:
+    grey = np.asarray(road(160, 120).convert("L"))
+    Image.fromarray(grey.astype(np.uint16) * 257 + np.uint16(60)).save(tmp_path / "deep.png")
+    Image.fromarray(grey).save(tmp_path / "plain.png")
+    deep, plain = read_pictures([tmp_path / "deep.png", tmp_path / "plain.png"])
+    assert np.array_equal(deep.seen, plain.seen)
+    assert np.array_equal(deep.shown, plain.shown)
+
+
+@pytest.mark.parametrize("orientation", range(10))
+@pytest.mark.parametrize("ending", ["jpg", "png", "webp"])
+def test_a_picture_is_seen_the_way_up_that_its_camera_says(tmp_path: Path, orientation: int, ending: str) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    pixels = np.zeros((120, 160, 3), np.uint8)
+    pixels[:40, :50] = 250
+    pixels[:40, 50:] = 120
+    lying = Image.fromarray(pixels)
+    lying.save(tmp_path / f"lying.{ending}", exif=exif, quality=95)
+    upright = Image.open(tmp_path / f"lying.{ending}")
+    ImageOps.exif_transpose(upright).save(tmp_path / "upright.png", exif=b"")
+    one, other = read_pictures([tmp_path / f"lying.{ending}", tmp_path / "upright.png"])
+    assert np.array_equal(one.seen, other.seen)
+
+
+def test_what_is_damaged_about_a_picture_leaves_it_as_it_lies(tmp_path: Path) -> None:
+    chance = np.random.default_rng(1)
+    exif = Image.Exif()
+    exif[0x0112], exif[0x010F] = 6, "maker"
+    whole = exif.tobytes()
+    road(160, 120).save(tmp_path / "a.png")
+    (plain,) = read_pictures([tmp_path / "a.png"])
+    turned = 0
+    for _ in range(60):
+        damaged = bytearray(whole)
+        for place in chance.integers(len(whole), size=4):
+            damaged[place] = chance.integers(256)
+        road(160, 120).save(tmp_path / "a.png", exif=bytes(damaged))
+        (picture,) = read_pictures([tmp_path / "a.png"])
+        turned += not np.array_equal(picture.seen, plain.seen)
+    assert turned < 50
 
 
 def test_a_video_is_painted_as_one(tmp_path: Path, perceiver: Perceiver) -> None:

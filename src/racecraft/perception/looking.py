@@ -59,22 +59,21 @@ def perceive(
 def _looked_at(
     looker: Perceiver, sources: Sequence[str | Path], told: list[dict[str, Any]], *, paints: bool = True
 ) -> Iterator[tuple[str, NDArray[np.uint8]]]:
-    """Name and painted picture, one after the other; `told` grows with them."""
+    """Name of the file and painted picture, one after the other; `told` grows with them."""
     pictures = read_pictures(sources)
     while some := list(islice(pictures, TOGETHER)):
         belief = looker(np.stack([picture.seen for picture in some]))
         for index, picture in enumerate(some):
             told.append(tell(picture.file, belief, index))
-            yield picture.file, paint(picture.shown, belief, index) if paints else picture.shown
+            yield picture.stem, paint(picture.shown, belief, index) if paints else picture.shown
 
 
 def _write_pictures(painted: Iterator[tuple[str, NDArray[np.uint8]]], folder: Path) -> None:
     from PIL import Image
 
     try:
-        for number, (file, pixels) in enumerate(painted):
+        for number, (name, pixels) in enumerate(painted):
             folder.mkdir(parents=True, exist_ok=True)
-            name = Path(file.partition("#")[0]).stem
             Image.fromarray(pixels).save(folder / f"{number:05d}-{name}.png")
     except OSError as error:
         raise RunError(f"{folder} cannot be written: {error.strerror or error}.") from error

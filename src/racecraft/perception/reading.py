@@ -5,11 +5,12 @@ Everybody's files: what is no picture, too large or too many is refused in a sen
 
 from __future__ import annotations
 
+import struct
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from racecraft.extras import needed_for
 from racecraft.replay.replay import read_replay
 from racecraft.sim.camera import LUMA, CameraSpec
 from racecraft.sim.views import Scene
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 PICTURES: Final = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
 VIDEOS: Final = (".mp4", ".mkv", ".mov", ".avi", ".webm")
@@ -32,6 +36,12 @@ SHAPE: Final = (160, 120)
 """What the network gets, width and height."""
 SHOWN: Final = (640, 480)
 """What is painted on, width and height."""
+_ORIENTATION: Final = 0x0112
+_TURNS: Final[dict[Any, tuple[bool, int]]] = {
+    **{2: (True, 0), 3: (False, 2), 4: (True, 2)},
+    **{5: (True, 3), 6: (False, 1), 7: (True, 1), 8: (False, 3)},
+}
+"""What EXIF's orientations ask for: to mirror, and quarters to the right."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +50,8 @@ class Picture:
 
     file: str
     """Where it is from: a path, and behind ``#`` the frame's number in a video or replay."""
+    stem: str
+    """Name of that file, without its ending."""
     shown: NDArray[np.uint8]
     """RGB (480, 640, 3)."""
     seen: NDArray[np.uint8]
@@ -108,7 +120,7 @@ def _from_file(path: Path) -> Picture:
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(path, formats=("PNG", "JPEG", "WEBP", "BMP")) as image:
                 _check_size(path, *image.size)
-                return _picture(str(path), np.asarray(image.convert("RGB")))
+                return _picture(path, _upright(image))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         if isinstance(error, ConfigError):
             raise
@@ -132,7 +144,7 @@ def _from_video(path: Path) -> Iterator[Picture]:
             _check_size(path, stream.codec_context.width, stream.codec_context.height)
             for number, frame in enumerate(container.decode(stream)):
                 _check_size(path, frame.width, frame.height)
-                yield _picture(f"{path}#{number}", np.asarray(frame.to_ndarray(format="rgb24"), np.uint8))
+                yield _picture(path, np.asarray(frame.to_ndarray(format="rgb24"), np.uint8), frame=number)
     except (av.error.FFmpegError, OSError) as error:
         raise ConfigError(f"{_named(path)} is no video that can be read.") from error
 
@@ -145,17 +157,45 @@ def _from_replay(path: Path) -> Iterator[Picture]:
     camera = replace(lens, width=SHOWN[0], height=SHOWN[1])
     view = Scene(recording.track, palette=camera.palette).driver_view(camera, lit_walls=False)
     for step, (x, y, heading) in enumerate(recording.poses.tolist()):
-        yield _picture(f"{path}#{step}", view.draw(x, y, heading, cars=recording.objects(step)))
+        yield _picture(path, view.draw(x, y, heading, cars=recording.objects(step)), frame=step)
 
 
-def _picture(name: str, pixels: NDArray[np.uint8]) -> Picture:
+def _upright(image: Image) -> NDArray[np.uint8]:
+    """RGB (height, width, 3) as a person sees the picture: turned as its EXIF data says, and 16 bits of grey as 8."""
+    turns = _turns_of(image)
+    if image.mode.startswith("I"):
+        deep = np.asarray(image).astype(np.uint32)
+        grey = ((deep * 255 + 32767) // 65535).astype(np.uint8)
+        pixels = np.repeat(grey[:, :, None], 3, axis=2)
+    else:
+        pixels = np.asarray(image.convert("RGB"))
+    is_mirrored, quarters = turns
+    return np.ascontiguousarray(np.rot90(pixels[:, ::-1] if is_mirrored else pixels, -quarters))
+
+
+def _turns_of(image: Image) -> tuple[bool, int]:
+    """Whether a picture has to be mirrored from left to right, and then how many quarters turned to the right."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of what is damaged among them
+            return _TURNS.get(image.getexif().get(_ORIENTATION), (False, 0))
+    except (SyntaxError, ValueError, struct.error):  # what is said of a picture is damaged, the picture is not
+        return False, 0
+
+
+def _picture(path: Path, pixels: NDArray[np.uint8], *, frame: int | None = None) -> Picture:
     """Resized as the original does it: bilinear, then grey."""
     from PIL import Image
 
     image = Image.fromarray(pixels)
     small = np.asarray(image.resize(SHAPE, Image.Resampling.BILINEAR))
     grey = np.rint(small @ np.array(LUMA)).astype(np.uint8)
-    return Picture(name, np.asarray(image.resize(SHOWN, Image.Resampling.BILINEAR)), grey)
+    return Picture(
+        file=str(path) if frame is None else f"{path}#{frame}",
+        stem=path.stem,
+        shown=np.asarray(image.resize(SHOWN, Image.Resampling.BILINEAR)),
+        seen=grey,
+    )
 
 
 def _check_size(path: Path, width: int, height: int) -> None:
