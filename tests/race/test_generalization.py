@@ -15,7 +15,7 @@ from racecraft.errors import ConfigError, TrackNotFound
 from racecraft.learn import PPOConfig
 from racecraft.race import Generalization, TrackResult, generalization, generalize
 from racecraft.sim import CameraSpec
-from racecraft.track import load_tracks
+from racecraft.track import Track, load_tracks
 
 SMALL = CameraSpec(width=40, height=30)
 TRACKS = load_tracks(["oval", "straight", "kidney", "reinvent_2018"])
@@ -55,6 +55,22 @@ def test_a_trial_does_not_depend_on_its_company(table, monkeypatch):
     by_name = {row.track: row for row in table.results if row.direction == "reverse"}
     for row in alone.results:
         assert row.completions[0] == by_name[row.track].completions[0]
+
+
+def test_no_longer_road_beside_it_gives_a_slow_car_more_time():
+    def slowly(frames: np.ndarray) -> np.ndarray:
+        return LineFollower()(frames) * np.float32([1.0, 0.3])
+
+    straight, _, longer = sorted(load_tracks(["straight", "oval", "reinvent_2018"]), key=lambda track: track.length)
+    assert straight.name == "straight"
+
+    def drive(*tracks: Track) -> TrackResult:
+        found = generalize(slowly, tracks, camera=SMALL, directions=["forward"], num_trials=2, num_threads=1)
+        return found.results[0]
+
+    alone = drive(straight)
+    assert all(0.5 < completion < 1.0 for completion in alone.completions)  # not waited for
+    assert drive(straight, longer) == alone
 
 
 def test_randomisation_changes_trials_and_repeats_with_the_seed():

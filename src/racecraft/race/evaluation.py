@@ -243,26 +243,29 @@ def drive_lap(
     *,
     sees: str = "frames",
     sensors: SensorSuite | None = None,
-    max_seconds: float = 0.0,
+    max_seconds: float | NDArray[np.float64] = 0.0,
     on_row: Callable[[NDArray[np.float64]], None] | None = None,
 ) -> Completion:
-    """The same from where the cars stand."""
+    """The same from where the cars stand; `max_seconds` may be each car's own  (N,)."""
     sensors = _sensors_of(policy, sensors)
     rewards = np.zeros(simulation.num_envs)
     is_running = np.ones(simulation.num_envs, dtype=np.bool_)
-    for _ in range(round(max_seconds / CONTROL_DT) if max_seconds > 0.0 else MAX_STEPS):
+    rows = simulation.rows.copy()  # those that laps ended with
+    limits = np.where(np.greater(max_seconds, 0.0), np.rint(np.divide(max_seconds, CONTROL_DT)), MAX_STEPS)
+    for step in range(1, int(limits.max()) + 1):
         simulation.step(_checked(policy(_sight(simulation, sees, sensors)), simulation.num_envs))
         rewards += is_running * centerline_rewards(simulation.rows)
         if on_row is not None and is_running[0]:
             on_row(simulation.rows[0])
-        is_running = ~(simulation.terminated | simulation.truncated)
+        rows[is_running] = simulation.rows[is_running]
+        is_running &= ~(simulation.terminated | simulation.truncated) & (step < limits)
         if not is_running.any():
             break
-    status = simulation.rows[:, _STATUS].astype(int)
+    status = rows[:, _STATUS].astype(int)
     is_complete = status == _LAP_COMPLETE
     return Completion(
-        completions=np.where(is_complete, 1.0, simulation.rows[:, _PROGRESS].clip(0.0, 1.0)),
-        lap_times=np.where(is_complete, simulation.rows[:, _TIME], np.nan),
+        completions=np.where(is_complete, 1.0, rows[:, _PROGRESS].clip(0.0, 1.0)),
+        lap_times=np.where(is_complete, rows[:, _TIME], np.nan),
         rewards=rewards,
         statuses=tuple(STATUS_NAMES[code] for code in status),
     )

@@ -178,7 +178,7 @@ def generalize(
         )
         for direction in directions:
             _line_up(simulation, direction, seed=seed)
-            patience = max(road.length for road in roads) / SLOWEST
+            patience = np.tile([road.length / SLOWEST for road in roads], num_trials)
             outcome = drive_lap(_awake(policy, simulation), simulation, sensors=sensors, max_seconds=patience)
             for course, index in enumerate(group):
                 times = outcome.lap_times[course :: len(roads)]
