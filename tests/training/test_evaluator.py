@@ -16,7 +16,8 @@ from racecraft.learn import NetworkSpec, make_learner
 from racecraft.race.evaluation import Completion
 from racecraft.race.policy import NetworkPolicy
 from racecraft.run import EpisodeCounter
-from racecraft.sim import Objects, Obstacles
+from racecraft.sim import Objects, Obstacles, Simulation
+from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.training import EvaluationReport, Until, evaluator
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.regimes import OBJECTS
@@ -112,6 +113,43 @@ def test_among_objects_enough_of_the_way_is_good() -> None:
     for completion, is_good in ((OBJECTS.good - 0.01, False), (OBJECTS.good, True)):
         among.best_score = (completion, -1e6)
         assert among.was_good is is_good
+
+
+def objects_of(simulation: Simulation) -> list[list[float]]:
+    """Where each car's objects stand, m along the track and beside its middle."""
+    begin = len(ROW_COLUMNS) + len(OBJECT_HEADER)
+    objects = simulation.judged[:, begin:].reshape(simulation.num_envs, -1, len(OBJECT_COLUMNS))
+    places = [OBJECT_COLUMNS.index(name) for name in ("object_distance", "object_offset")]
+    return objects[:, :, places].reshape(simulation.num_envs, -1).tolist()
+
+
+def test_among_objects_every_evaluation_drives_among_those_of_its_seed_whatever_was_driven_before() -> None:
+    random = replace(SETTINGS, objects=Objects(obstacles=Obstacles(count=3, placement="random")))
+
+    def places(judged: Evaluator) -> list[list[float]]:
+        judged.evaluate(step=64, seconds=1.0, counter=EpisodeCounter(2))
+        return objects_of(judged._trials)
+
+    first = evaluator_for(random)
+    told = places(first)
+    assert told[0] != told[1]  # trials differ
+    assert places(first) == told
+    resumed = evaluator_for(random)
+    resumed.load_state(first.state())
+    assert places(resumed) == told
+    assert places(evaluator_for(replace(random, seed=1))) != told
+
+
+def test_among_objects_evaluations_are_no_layouts_of_the_training() -> None:
+    objects = Objects(obstacles=Obstacles(count=3, placement="random"))
+    judged = evaluator_for(replace(SETTINGS, objects=objects))
+    judged.evaluate(step=64, seconds=1.0, counter=EpisodeCounter(2))
+    training = Simulation([load_track("oval")], num_envs=2, seed=0, camera=None, objects=objects)
+    met = objects_of(training)
+    for _ in range(5):
+        training.reset()
+        met += objects_of(training)
+    assert not any(places in met for places in objects_of(judged._trials))
 
 
 def test_trials_are_told_as_episodes_on_the_runs_clock(judged: Evaluator) -> None:

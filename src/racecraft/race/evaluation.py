@@ -21,7 +21,7 @@ from racecraft.errors import ConfigError, ShapeError
 from racecraft.race.conditions import Conditions
 from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.marshal import Marshal
-from racecraft.race.placement import line_up
+from racecraft.race.placement import line_up, race_keys
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.sim.camera import CameraSpec
@@ -219,7 +219,7 @@ def completion(
         policy: What drives.
         simulation: From `trial_simulation`, with the same rules; it is reset first and can be used again.
         rules: Its starts are used: jitter as in `evaluate`, so equal seeds mean equal starts.
-        seed: Of the starts.
+        seed: Of the starts, and of where objects stand: whatever was driven before, equal seeds mean equal places.
         sees: ``frames`` or ``state``, as for `evaluate`.
         sensors: What ``frames`` are read from, as for `evaluate`.
         max_seconds: Simulated seconds after which a slow car is stopped; 0 for none.
@@ -233,6 +233,8 @@ def completion(
     _needed(simulation.camera, sees)
     if simulation.laps != 1:
         raise ConfigError(f"completion judges one lap; the simulation was made for {simulation.laps}.")
+    if simulation.num_objects:
+        simulation.reset(seeds=race_keys(simulation, seed))
     line_up(simulation, rules, seed=seed)
     return drive_lap(policy, simulation, sees=sees, sensors=sensors, max_seconds=max_seconds, on_row=on_row)
 

@@ -167,7 +167,7 @@ def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
     Starts all over the lap are the simulation's own, as are those of cars that share a road: on a grid, without jitter.
     """
     if rules.starts == "lap":
-        simulation.reset(seeds=_keys(simulation, seed))
+        simulation.reset(seeds=race_keys(simulation, seed))
         return
     if simulation.randomize.is_off:
         simulation.reset()
@@ -183,7 +183,7 @@ def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
         simulation.set_pose(trial, *start_pose(track, rules, seed=seed, trial=trial, offset=offset))
 
 
-def _keys(simulation: Simulation, seed: int) -> NDArray[np.uint64]:
+def race_keys(simulation: Simulation, seed: int) -> NDArray[np.uint64]:
     """What each race of a simulation draws from, by its number alone: all 64 bits depend on all of the seed's  (N,)."""
     size = simulation.cars_per_race
     digests = [hashlib.sha256(f"{seed}/{race}".encode()).digest() for race in range(simulation.num_envs // size)]
