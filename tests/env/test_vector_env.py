@@ -243,6 +243,9 @@ def test_rendering_gives_one_picture_per_car():
         ({"opponents": []}, ConfigError, r"with opponents=\[\]"),
         ({"seat": "leather"}, ConfigError, "with seat='leather'"),
         ({"reward": "racign"}, RewardError, "racing"),
+        ({"copy": "no"}, ConfigError, "copy is 'no'; allowed are True and False"),
+        ({"copy": 1}, ConfigError, "copy is 1; allowed are True and False"),
+        ({"copy": None}, ConfigError, "copy is None"),
     ],
 )
 def test_a_bad_argument_is_named(settings, error, words):

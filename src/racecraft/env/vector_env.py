@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from racecraft.checks import check_flag
 from racecraft.env.info import vector_info
 from racecraft.env.observation import Observation
 from racecraft.env.rendering import Renderer, check_render_mode
@@ -66,6 +67,7 @@ class RacecraftVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
     ) -> None:
         check_names(settings, own=("track", "num_envs", "autoreset_mode", "copy", "num_threads", "render_mode"))
         check_render_mode(render_mode)
+        check_flag("copy", copy)
         self.render_mode = render_mode
         self._mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
