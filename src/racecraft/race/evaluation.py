@@ -21,7 +21,7 @@ from racecraft.errors import ConfigError, ShapeError
 from racecraft.race.conditions import Conditions
 from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.marshal import Marshal
-from racecraft.race.placement import line_up, race_keys
+from racecraft.race.placement import line_up
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.sim.camera import CameraSpec
@@ -233,9 +233,7 @@ def completion(
     _needed(simulation.camera, sees)
     if simulation.laps != 1:
         raise ConfigError(f"completion judges one lap; the simulation was made for {simulation.laps}.")
-    if simulation.num_objects:
-        simulation.reset(seeds=race_keys(simulation, seed))
-    line_up(simulation, rules, seed=seed)
+    line_up(simulation, rules, seed=seed, is_anew=True)
     return drive_lap(policy, simulation, sees=sees, sensors=sensors, max_seconds=max_seconds, on_row=on_row)
 
 

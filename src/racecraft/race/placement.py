@@ -161,15 +161,21 @@ def _ahead(track: Track, places: Any, s: float) -> Any:
     return ahead - track.length * np.round(ahead / track.length) if track.is_closed else ahead
 
 
-def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
+def line_up(simulation: Simulation, rules: RaceRules, *, seed: int, is_anew: bool = False) -> None:
     """Put every car of a simulation at the start of its trial; equal seeds mean equal starts and conditions.
 
     Starts all over the lap are the simulation's own, as are those of cars that share a road: on a grid, without jitter.
+
+    Args:
+        simulation: With a car for each trial.
+        rules: Where laps begin.
+        seed: Of starts and conditions.
+        is_anew: Draw objects from it, too, whatever was driven before; a race has those of its simulation's own seed.
     """
     if rules.starts == "lap":
-        simulation.reset(seeds=race_keys(simulation, seed))
+        simulation.reset(seeds=_keys(simulation, seed))
         return
-    if simulation.randomize.is_off:
+    if simulation.randomize.is_off and not (is_anew and simulation.num_objects):
         simulation.reset()
     else:
         races = np.arange(simulation.num_envs, dtype=np.uint64) // np.uint64(simulation.cars_per_race)
@@ -183,7 +189,7 @@ def line_up(simulation: Simulation, rules: RaceRules, *, seed: int) -> None:
         simulation.set_pose(trial, *start_pose(track, rules, seed=seed, trial=trial, offset=offset))
 
 
-def race_keys(simulation: Simulation, seed: int) -> NDArray[np.uint64]:
+def _keys(simulation: Simulation, seed: int) -> NDArray[np.uint64]:
     """What each race of a simulation draws from, by its number alone: all 64 bits depend on all of the seed's  (N,)."""
     size = simulation.cars_per_race
     digests = [hashlib.sha256(f"{seed}/{race}".encode()).digest() for race in range(simulation.num_envs // size)]

@@ -241,11 +241,12 @@ export class Trainer {
   /** Every trial at its start, as racecraft.race.placement.line_up: the first where the simulation puts it. */
   private lineUp(): void {
     const { trials, core, road, plan } = this;
-    trials.reset();
     const hasObjects = trials.rowWidth > this.columns.length;
+    const seed = BigInt((this.seed + plan.evaluationSeed) % 2 ** 32);
+    const keys = BigUint64Array.from({ length: trials.count }, (_, trial) => BigInt(trial) + (seed << 20n));
+    trials.reset(undefined, hasObjects ? keys : undefined); // the same objects every time
     const column = this.columns.indexOf("offset");
     const offsets = Array.from({ length: trials.count }, (_, trial) => trials.rows[trial * trials.rowWidth + column]!);
-    const seed = BigInt((this.seed + plan.evaluationSeed) % 2 ** 32);
     for (let trial = 1; trial < trials.count; trial++) {
       const offset = hasObjects ? offsets[trial]! : 0; // an object near the start asks for the other lane
       const { x, y, heading } = startPose(core, road, plan.known.rules["first_lap"]!, { seed, trial, lap: 0, offset });
