@@ -17,12 +17,12 @@ from said_in_lessons import FIGURES, STATEMENTS
 
 from racecraft.course import check, checks_of, find_lesson, lessons, read_cells, read_progress, show, to_notebook
 from racecraft.course import progress as progress_file
-from racecraft.course.lesson import Facts
+from racecraft.course.lesson import Facts, Lesson
 from racecraft.course.phrases import Phrases, german_label
 from racecraft.course.pictures import bar_chart, line_chart
 from racecraft.course.quiz import LANGUAGES
 from racecraft.course.show import Picture
-from racecraft.course.shown import Shown, digest_of, picture_path, read_shown, shown_path
+from racecraft.course.shown import Shown, digest_of, keep_shown, picture_path, read_shown, shown_path
 from racecraft.errors import ConfigError
 
 TEXT = """\
@@ -253,6 +253,39 @@ def test_what_the_text_says_of_the_run_is_so(number: int) -> None:
     for statement in statements:
         assert statement.text in text
         assert statement.holds(printed), statement.text
+
+
+def test_german_pictures_of_other_code_than_was_shown_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lesson = Lesson(number=4, path=tmp_path / "04_tiny.py")
+    code = """# %%
+from racecraft.course import show
+from racecraft.course.pictures import bar_chart
+
+show(bar_chart("Laps", {"hole": 1.0}), "before")
+"""
+    lesson.path.write_text(code)
+    shown_path(lesson).parent.mkdir()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", [str(lesson.path)])
+    (one,) = keep_shown(lesson).outputs[0]
+    assert (one.kind, one.name, one.german is not None) == ("picture", "before", True)
+    lesson.path.write_text(code.replace("before", "after"))
+    with pytest.raises(ConfigError, match="lesson 4 showed in English is of other code") as refused:
+        keep_shown(lesson, ("de",))
+    assert refused.value.hint == "First run python -m racecraft.course.shown 4 without --language."
+    assert not picture_path(lesson, "after", "de").exists()
+    (one,) = keep_shown(lesson, ("en",)).outputs[0]
+    assert (one.name, one.german) == ("after", None)
+    (one,) = keep_shown(lesson, ("de",)).outputs[0]
+    assert (one.name, one.german is not None) == ("after", True)
+    named = one.model_copy(update={"name": "renamed"})
+    shown = Shown(digest=digest_of(lesson.cells()), outputs={0: [named]})
+    shown_path(lesson).write_text(shown.model_dump_json())
+    shutil.copyfile(picture_path(lesson, "after"), picture_path(lesson, "renamed"))
+    with pytest.raises(ConfigError, match="of other code"):
+        keep_shown(lesson, ("de",))
 
 
 def test_without_its_pictures_a_lesson_shows_its_words(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from racecraft.course.percent import Cell
 from racecraft.course.phrases import LANGUAGE, label_in
 from racecraft.course.quiz import LANGUAGES, Language
 from racecraft.course.show import Picture
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, RacecraftError
 
 WIDEST, WIDEST_FILM = 800, 480  # px
 _PICTURE: Final = re.compile(r"^\[picture: (?P<path>.+)\]$")
@@ -132,27 +132,44 @@ def code_of(cells: Iterable[Cell]) -> list[Cell]:
 
 
 def keep_shown(lesson: Lesson, languages: Sequence[Language] = LANGUAGES) -> Shown:
-    """Run a lesson once for each language, and keep what it prints and draws; of German the pictures alone."""
+    """Run a lesson once for each language, and keep what it prints and draws; of German the pictures alone.
+
+    Raises:
+        ConfigError: Only German pictures are asked for, and those in English are of other code.
+    """
     shown = read_shown(lesson)
+    if "en" not in languages and shown.digest != digest_of(lesson.cells()):
+        raise _outdated(lesson)
     for language in languages:
         outputs, pictures = _run(lesson, language)
         if language == "en":
             shown = Shown(digest=digest_of(lesson.cells()), outputs=outputs)
         else:
-            shown = shown.model_copy(update={"outputs": _with_german(shown.outputs, outputs)})
+            shown = shown.model_copy(update={"outputs": _with_german(lesson, shown.outputs, outputs)})
         words = {word for picture in pictures.values() for word in picture.words}
         shown = shown.model_copy(update={"words": sorted(words)})
     shown_path(lesson).write_text(shown.model_dump_json(indent=1, exclude_none=True) + "\n", encoding="utf-8")
     return shown
 
 
-def _with_german(outputs: dict[int, list[Output]], german: dict[int, list[Output]]) -> dict[int, list[Output]]:
+def _outdated(lesson: Lesson) -> ConfigError:
+    return ConfigError(
+        f"What lesson {lesson.number} showed in English is of other code than it has now.",
+        hint=f"First run python -m racecraft.course.shown {lesson.number} without --language.",
+    )
+
+
+def _with_german(
+    lesson: Lesson, outputs: dict[int, list[Output]], german: dict[int, list[Output]]
+) -> dict[int, list[Output]]:
     drawn = {one.name: one for several in german.values() for one in several if isinstance(one, Drawn)}
     fields = set(Sight.model_fields)
 
     def paired(one: Output) -> Output:
         if isinstance(one, Printed):
             return one
+        if one.name not in drawn:
+            raise _outdated(lesson)
         return one.model_copy(update={"german": Sight(**drawn[one.name].model_dump(include=fields))})
 
     return {number: [paired(one) for one in several] for number, several in outputs.items()}
@@ -244,4 +261,7 @@ if __name__ == "__main__":
     parser.add_argument("lessons", nargs="*", type=int)
     parser.add_argument("--language", choices=LANGUAGES)
     wanted = parser.parse_args()
-    main(wanted.lessons, (wanted.language,) if wanted.language else LANGUAGES)
+    try:
+        main(wanted.lessons, (wanted.language,) if wanted.language else LANGUAGES)
+    except RacecraftError as error:
+        sys.exit(f"{error} {error.hint}".rstrip())
