@@ -186,6 +186,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "GET /api/boards/{cup}/duels/{duel}/heats/{heat}/film": ("hidden", None),
     "GET /api/boards/{cup}/duels/{duel}/heats/{heat}/replay": ("hidden", None),
     "GET /api/boards/{cup}": ("member", None),
+    "GET /api/boards/{cup}/season": ("member", None),
     "GET /api/boards/{cup}/film": ("hidden", "?submissions=1"),
     "GET /api/boards/{cup}/race.json": ("member", None),
     "GET /api/boards/{cup}/replays/{submission_id}": ("hidden", None),

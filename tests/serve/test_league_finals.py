@@ -207,6 +207,32 @@ def test_anybody_can_check_a_final_and_sees_what_was_changed(
     assert said() == honest
 
 
+def test_a_stranger_sees_the_season_of_the_public_races_alone(season: Season, bracket: int) -> None:
+    both = (season.qualifying, bracket)
+    for race in both:
+        ok(season.teacher.patch(f"/api/league/races/{race}", json={"is_public": True}))
+
+    def told(client: httpx.Client, race: int) -> dict[str, list[int]]:
+        return {
+            row["name"]: [one["race"] for one in row["results"]]
+            for row in ok(client.get(f"/api/boards/{race}/season"))
+            if not row["is_me"]
+        }
+
+    with season.league.stranger() as stranger:
+        everything = told(season.teacher, bracket)
+        assert set(everything) == {"Ann", "Ben", "Cem"}
+        assert everything == {name: list(both) for name in everything}
+        assert told(stranger, bracket) == everything
+        ok(season.teacher.patch(f"/api/league/races/{season.qualifying}", json={"is_public": False}))
+        assert told(stranger, bracket) == {name: [bracket] for name in everything}
+        refused(stranger.get(f"/api/boards/{season.qualifying}/season"), 404)
+        assert told(season.teacher, bracket) == everything
+        ann = season.pupils["Ann"]
+        assert set(told(ann, bracket)) == {"Ben", "Cem"}, "she is told which row is hers"
+    ok(season.teacher.patch(f"/api/league/races/{season.qualifying}", json={"is_public": True}))
+
+
 def test_until_a_final_is_over_its_films_are_coarse_and_a_job_that_is_begun_again_goes_on(
     season: Season, bracket: int
 ) -> None:

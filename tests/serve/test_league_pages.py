@@ -22,6 +22,7 @@ from leagues import RunningLeague, ok, running_league, untrained_run
 from running_consoles import PATIENCE
 
 from few_frames import FEW_FRAMES
+from racecraft.serve.store.tables import now
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -205,6 +206,33 @@ def test_the_best_meet_in_a_final_and_the_wall_shows_it_heat_by_heat(lesson: Les
     page = teacher.open(f"/groups/{group}/season")
     row = page.get_by_role("row", name=first["name"])
     assert "+25" in row.inner_text()
+
+
+def test_a_spectator_without_account_sees_how_the_pace_went_in_the_public_races(lesson: Lesson, race: int) -> None:
+    group = ok(lesson.league.owner.get("/api/groups"))[0]["id"]
+    terms = {"title": "Monday cup", "track": "oval", "laps": 1}
+    second = ok(lesson.league.owner.post(f"/api/groups/{group}/races", json=terms), 201)["id"]
+    address = f"/api/league/races/{second}"
+    for name in ("Comet", "Turbo"):
+        model = f"{name.lower()}-one"
+        number = ok(pupil_client(lesson, name).post(f"{address}/enter", json={"model": model}), 202)["id"]
+        entered = f"{address}/submissions/{number}"
+        lesson.league.console.wait_for(lambda: ok(pupil_client(lesson, name).get(entered))["state"] == "done")  # noqa: B023
+    ok(lesson.league.owner.patch(address, json={"closes": now().isoformat(), "is_public": True}))
+    spectator = lesson.arrive("spectator")
+    page = spectator.open(f"/league/{second}")
+    page.get_by_role("row", name="Comet").wait_for()
+    page.wait_for_load_state("networkidle")
+    lines = page.locator("table.standings svg[role=img]")
+    assert lines.count() == 0, "one race is no line, and the other one is not theirs to see"
+    ok(lesson.league.owner.patch(f"/api/league/races/{race}", json={"is_public": True}))
+    page = spectator.open(f"/league/{second}")
+    lines.nth(1).wait_for()
+    first = ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"][0]["name"]
+    said = page.get_by_role("row", name=first).locator("svg[role=img]").get_attribute("aria-label")
+    assert "Friday cup: first" in str(said)
+    assert "Monday cup" in str(said)
+    spectator.complaints = [one for one in spectator.complaints if "401" not in one]
 
 
 def test_the_teacher_says_something_about_a_model_and_its_owner_reads_it(lesson: Lesson, race: int) -> None:

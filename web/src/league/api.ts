@@ -96,6 +96,7 @@ export const leagueApi = {
   judgeAgain: (id: number, submission: number) =>
     ask<unknown>("POST", `/league/races/${id}/submissions/${submission}/judge`),
   removeRace: (id: number) => ask<void>("DELETE", `/league/races/${id}`),
+  boardSeason: (id: number) => ask<SeasonRow[]>("GET", `/boards/${id}/season`),
   board: (id: number, top: number) => ask<BoardPage>("GET", `/boards/${id}?top=${top}`),
   film: (id: number, submissions: number[]) =>
     ask<RaceReplay>("GET", `/boards/${id}/film?submissions=${submissions.join(",")}`),

@@ -35,7 +35,7 @@ from racecraft.serve.submissions.schemas import (
     SubmissionChange,
     SubmissionInfo,
 )
-from racecraft.serve.submissions.season import read_season
+from racecraft.serve.submissions.season import SeasonStanding, read_season
 
 router = APIRouter(prefix="/api", tags=["league"])
 
@@ -69,18 +69,7 @@ def get_season(group_id: Id, consoles: InConsoles, person: InPerson) -> list[Sea
     """Points of a group's races that are over, most first, and what led to them."""
     consoles.groups.require(group_id, person.id)
     with consoles.owner.database.transaction() as session:
-        found = read_season(session, group_id)
-    return [
-        SeasonRow(
-            name=one.name,
-            points=one.points,
-            races=one.races,
-            wins=one.wins,
-            is_me=one.user == person.id,
-            results=[SeasonResult(**vars(result)) for result in one.results],
-        )
-        for one in found
-    ]
+        return _season(read_season(session, group_id), me=person.id)
 
 
 @router.patch("/league/races/{race_id}")
@@ -137,6 +126,16 @@ def get_board(race_id: Id, request: Request, consoles: InLeague, top: Top = 100)
         mine=mine.row if mine is not None else None,
         beaten=_beaten(mine, board.entrants),
     )
+
+
+@router.get("/boards/{race_id}/season", dependencies=[Computes])
+def get_board_season(race_id: Id, request: Request, consoles: InLeague) -> list[SeasonRow]:
+    """The season that a race belongs to, as far as whoever sees the board may see it: others the public races alone."""
+    user: int | None = request.state.user_id
+    race = consoles.league.get(race_id, user)
+    with consoles.owner.database.transaction() as session:
+        found = read_season(session, race.group, public=race.part == "spectator")
+    return _season(found, me=user)
 
 
 @router.get("/boards/{race_id}/race.json")
@@ -262,6 +261,20 @@ def _submit(consoles: Consoles, race_id: int, data: bytes, model: str, user_id: 
     number = consoles.league.submit(race_id, data, model=model, user_id=user_id)
     consoles.owner.supervisor.wake()
     return consoles.league.submission(race_id, number, user_id=user_id)
+
+
+def _season(found: list[SeasonStanding], *, me: int | None) -> list[SeasonRow]:
+    return [
+        SeasonRow(
+            name=one.name,
+            points=one.points,
+            races=one.races,
+            wins=one.wins,
+            is_me=me is not None and one.user == me,
+            results=[SeasonResult(**vars(result)) for result in one.results],
+        )
+        for one in found
+    ]
 
 
 def _row(row: Row, *, first: int | None, is_me: bool, medals: Medals | None) -> BoardRow:

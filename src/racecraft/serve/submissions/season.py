@@ -15,6 +15,8 @@ from racecraft.serve.submissions.finalists import board_of
 POINTS: Final = (25, 18, 15, 12, 10, 8, 6, 4, 2, 1)
 """By place, as Formula 1 gives them since 2010."""
 DEEPEST: Final = 100  # places of a race that are looked at
+PUBLIC_RACES: Final = 20
+"""A stranger's question costs so many boards and no more."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,15 +57,22 @@ class SeasonStanding:
         return sum(one.points == POINTS[0] for one in self.results)
 
 
-def read_season(session: Session, group_id: int) -> list[SeasonStanding]:
-    """Who has how many points in a group, most first; of equals who has won more. Practice is none of it."""
+def read_season(session: Session, group_id: int, *, public: bool = False) -> list[SeasonStanding]:
+    """Who has how many points in a group, most first; of equals who has won more. Practice is none of it.
+
+    Args:
+        session: To read in.
+        group_id: Whose.
+        public: Only of races that everybody may see, and of the latest `PUBLIC_RACES` of them.
+    """
     later = aliased(Race)
     leads_on = sa.exists().where(later.after_id == Race.id, later.deleted.is_(None)).label("leads_on")
     held = sa.select(Race, leads_on).where(Race.group_id == group_id, Race.deleted.is_(None), Race.secret != "")
+    if public:
+        held = held.where(Race.visibility == "public")
+    over = [(race, leads) for race, leads in session.execute(held.order_by(Race.id)) if state_of(race) == "closed"]
     found: dict[int, SeasonStanding] = {}
-    for race, gives_none in session.execute(held.order_by(Race.id)).all():
-        if state_of(race) != "closed":
-            continue
+    for race, gives_none in over[-PUBLIC_RACES:] if public else over:
         board = board_of(session, race, user_id=None, top=DEEPEST)
         for row in board.rows:
             if row.place is None:
