@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.film.ghost import LINGERING, best_lap_ghost, ghost_of
-from racecraft.film.ghost_source import load_ghosts
+from racecraft.film.ghost_source import check_sources, load_ghosts
 from racecraft.film.overlay import INSET
 from racecraft.film.video import frames
 from racecraft.race import Autopilot, RaceRules, evaluate
@@ -77,6 +78,12 @@ def test_ghosts_come_from_replays_of_the_same_road(tmp_path: Path) -> None:
     assert np.array_equal(ghost.poses, FAST.trials[0].recording.poses)
     assert again.is_lap
     assert ghost.color != again.color
+    track, rules = SLOW.conditions.track, SLOW.conditions.rules
+    check_sources([str(path), "best-lap"], track, rules, run=None)
+    with pytest.raises(ConfigError, match="another direction"):  # before anybody drives
+        check_sources([str(path)], track, replace(rules, direction="reverse"), run=None)
+    with pytest.raises(ConfigError, match="up to 16"):
+        check_sources(["best-lap"] * 17, track, rules, run=None)
     with pytest.raises(ConfigError, match="another direction"):
         load_ghosts([str(path)], drive(1.5, direction="reverse").conditions)
     with pytest.raises(ConfigError, match="up to 16"):

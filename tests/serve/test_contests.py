@@ -229,6 +229,62 @@ def test_what_cannot_be_driven_is_refused(console: RunningConsole, cars: list[di
         assert client.get(f"/api/contests/{address}").status_code == 404
 
 
+def test_a_heat_may_start_where_a_secret_says(
+    console: RunningConsole, cars: list[dict[str, str]], tmp_path: Path
+) -> None:
+    asked = {"models": cars, "track": "oval", "secret": True}
+    told = console.client.post("/api/contests/heats", json=asked).json()
+    assert (len(told["commitment"]), told["secret"], told["seed"]) == (64, "", None)
+    file = console.runs / ".racecraft" / "contests" / told["id"] / "race.replay"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(b"the secret")  # as while the film is made
+    assert console.client.get(f"/api/contests/{told['id']}/replay.file").status_code == 404
+    heat = console.wait_for(over(console, told["id"]))
+    assert (heat["commitment"], len(heat["secret"]), heat["seed"]) == (told["commitment"], 64, None)
+    path = tmp_path / "heat.replay"
+    path.write_bytes(console.client.get(f"/api/contests/{heat['id']}/replay.file").content)
+    replay = read_replay(path)
+    assert verify(replay, race=heat["commitment"]).is_genuine
+    assert replay.race is not None
+    assert (replay.race.secret, replay.race.commitment) == (heat["secret"], heat["commitment"])
+    assert replay.conditions.seed == replay.race.seed
+    other = console.client.post("/api/contests/heats", json=asked).json()
+    assert other["commitment"] != heat["commitment"]
+    assert console.client.post(f"/api/jobs/{other['id']}/cancel").status_code < 300
+    both = console.client.post("/api/contests/heats", json=asked | {"seed": 3})
+    assert both.status_code == 422
+    assert both.json()["error"]["message"] == "secret and seed are two ways to say where the heat starts; give one."
+    known = console.client.post("/api/contests/heats", json={"models": cars, "track": "oval", "seed": 3}).json()
+    assert (known["commitment"], known["secret"], known["seed"]) == ("", "", 3)
+    assert console.wait_for(over(console, known["id"]))["secret"] == ""
+
+
+def test_ghosts_accompany_the_film_of_a_heat(console: RunningConsole, cars: list[dict[str, str]]) -> None:
+    settings: dict[str, Any] = {"models": cars, "track": "oval", "seed": 5}
+    before = started(console, "heats", **settings)
+    ghosts = [{"model": "bob", "checkpoint": "last"}, "best-lap", {"heat": before["id"]}]
+    heat = started(console, "heats", **settings, ghosts=ghosts)
+    assert heat["ghosts"] == ghosts
+    assert heat["heat"] == before["heat"]  # nobody who drives sees them
+    films = [console.client.get(f"/api/contests/{one['id']}/video").content for one in (before, heat)]
+    assert films[0] != films[1]
+    post = console.client.post
+    for ghost, status in (
+        ({"model": "nobody"}, 404),
+        ({"model": "ada", "checkpoint": 1}, 409),
+        ({"heat": "0" * 16}, 404),
+        ({"heat": "../../console.db"}, 404),
+        ("/etc/passwd", 422),
+        ("@8192", 422),
+    ):
+        reply = post("/api/contests/heats", json=settings | {"ghosts": [ghost]})
+        assert reply.status_code == status, (ghost, reply.text)
+    away = post("/api/contests/heats", json=settings | {"direction": "reverse", "ghosts": [{"heat": before["id"]}]})
+    assert away.status_code == 422
+    assert "in another direction or of another form" in away.json()["error"]["message"]
+    assert post("/api/contests/heats", json=settings | {"ghosts": ["best-lap"] * 17}).status_code == 422
+
+
 def test_a_removed_contest_leaves_nothing(console: RunningConsole, cars: list[dict[str, str]]) -> None:
     heat = started(console, "heats", models=cars, track="oval", max_resets=0)
     assert heat["kind"] == "head-to-model"

@@ -183,6 +183,44 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
     assert sent.value.post_data_json == {"models": ["bob"], "checkpoint": kept["step"]}
 
 
+def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> None:
+    client, console = visit.console.client, visit.console
+    models = [{"model": "ada"}, {"model": "bob"}]
+    asked = {"models": models, "title": "Before", "seed": 1}
+    before = client.post("/api/contests/heats", json=asked).json()["id"]
+    away = client.post("/api/contests/heats", json=asked | {"title": "Away", "track": "oval"}).json()["id"]
+    for heat in (before, away):
+        assert console.wait_for(console.job_ended(heat))["state"] == "done"
+    page = visit.open("/contests/new")
+    for name in ("ada", "bob"):
+        page.get_by_role("combobox", name="Add a model").select_option(name)
+    page.get_by_role("combobox", name="Track").select_option("reinvent_2018")
+    assert page.get_by_label("Seed").is_visible()
+    page.get_by_role("checkbox", name="From a secret").check()
+    assert page.get_by_label("Seed").count() == 0
+    ghost = page.get_by_role("combobox", name="Add a ghost")
+    assert ghost.locator("option", has_text="Before").count() == 1
+    assert ghost.locator("option", has_text="Away").count() == 0  # on another road
+    for choice in ("model bob", "lap", f"heat {before}", "model ada"):
+        ghost.select_option(choice)
+    page.get_by_role("combobox", name="Checkpoint of bob").nth(1).select_option("last")
+    page.get_by_role("button", name="Take out the ghost: ada").click()
+    with page.expect_request("**/api/contests/heats") as sent:
+        page.get_by_role("button", name="Start the heat with 2").click()
+    asked = sent.value.post_data_json
+    assert (asked["secret"], asked["seed"]) == (True, None)
+    assert asked["ghosts"] == [{"model": "bob", "checkpoint": "last"}, "best-lap", {"heat": before}]
+    page.get_by_role("heading", name="How to check it").wait_for()
+    heat = page.url.rpartition("/")[2]
+    commitment = client.get(f"/api/contests/{heat}").json()["commitment"]
+    assert page.get_by_text(commitment).is_visible()
+    page.get_by_role("heading", name="The heat in 3D").wait_for()
+    page.get_by_text(client.get(f"/api/contests/{heat}").json()["secret"], exact=True).wait_for()
+    assert page.get_by_text(commitment).is_visible()
+    told = "bob, The fastest lap, again with every lap, The best car of an earlier heat"
+    assert page.get_by_text(told, exact=True).is_visible()
+
+
 def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
     page = visit.open("/races")
     page.get_by_role("link", name="New heat or ladder").click()

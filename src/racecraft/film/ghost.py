@@ -17,6 +17,8 @@ from racecraft.sim.simulation import CONTROL_DT
 from racecraft.sim.views import RACER_COLORS, CarView
 from racecraft.track.canvas import Color
 
+MAX_GHOSTS: Final = 16
+"""In one film."""
 GHOST_ALPHA: Final = 0.5
 """How solid a ghost is."""
 LINGERING: Final = 1.0

@@ -14,17 +14,18 @@ from pathlib import Path
 from typing import Final
 
 from racecraft.errors import ConfigError
-from racecraft.film.ghost import LIVERY, Ghost, best_lap_ghost, ghost_of
+from racecraft.film.ghost import LIVERY, MAX_GHOSTS, Ghost, best_lap_ghost, ghost_of
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry import load_entry
 from racecraft.race.evaluation import evaluate
 from racecraft.race.placement import driven_track
 from racecraft.race.recording import Recording
+from racecraft.race.rules import RaceRules
 from racecraft.replay.replay import read_replay
 from racecraft.track.canvas import Color
+from racecraft.track.track import Track
 
 BEST_LAP: Final = "best-lap"
-MAX_GHOSTS: Final = 16
 
 
 def load_ghosts(
@@ -50,8 +51,7 @@ def load_ghosts(
         ConfigError: A source means nothing here, or a replay is of another road.
         RacecraftError: A replay or a model cannot be read.
     """
-    if len(sources) > MAX_GHOSTS:
-        raise ConfigError(f"There are {len(sources)} ghosts; allowed are up to {MAX_GHOSTS}.")
+    _check_number(sources)
     found = []
     for index, source in enumerate(sources):
         color = (colors or LIVERY)[index % len(colors or LIVERY)]
@@ -59,27 +59,37 @@ def load_ghosts(
             if (ghost := best_lap_ghost(recordings, color=color)) is not None:
                 found.append(ghost)
         elif Path(source).is_file():
-            found.append(_from_replay(Path(source), conditions, color))
+            found.append(_from_replay(Path(source), conditions.track, conditions.rules, color))
         else:
             found.append(_from_model(source, conditions, color, run=run, trial=trial))
     return found
 
 
-def check_sources(sources: Sequence[str], *, run: Path | None) -> None:
-    """Refuse what `load_ghosts` would, as far as that can be known before a race.
+def check_sources(sources: Sequence[str], track: Track, rules: RaceRules, *, run: Path | None) -> None:
+    """Refuse before a race what `load_ghosts` would refuse after it.
 
     Raises:
-        ConfigError: A source means nothing here.
+        ConfigError: A source means nothing here, or a replay is of another road.
         RacecraftError: A replay or a model cannot be read.
     """
+    _check_number(sources)
     for source in sources:
-        if source != BEST_LAP and not Path(source).is_file():
+        if source == BEST_LAP:
+            continue
+        if Path(source).is_file():
+            _from_replay(Path(source), track, rules, LIVERY[0])
+        else:
             load_entry(_model(source, run))
 
 
-def _from_replay(path: Path, conditions: Conditions, color: Color) -> Ghost:
+def _check_number(sources: Sequence[str]) -> None:
+    if len(sources) > MAX_GHOSTS:
+        raise ConfigError(f"There are {len(sources)} ghosts; allowed are up to {MAX_GHOSTS}.")
+
+
+def _from_replay(path: Path, track: Track, rules: RaceRules, color: Color) -> Ghost:
     replay = read_replay(path)
-    theirs, ours = (driven_track(one.track, one.rules) for one in (replay.conditions, conditions))
+    theirs, ours = driven_track(replay.conditions.track, replay.conditions.rules), driven_track(track, rules)
     if theirs.digest != ours.digest:
         raise ConfigError(
             f"The ghost {path.name} drove on {theirs.name}, in another direction or of another form than {ours.name}.",

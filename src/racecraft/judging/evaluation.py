@@ -190,7 +190,7 @@ def evaluate_run(
         randomize = load_randomization(randomize)
     where = track if isinstance(track, Track) else load_track(track) if track else trained_track(info)
 
-    check_sources(ghosts, run=folder.path)
+    check_sources(ghosts, where, rules, run=folder.path)
     step, policy = load(folder, checkpoint=checkpoint, num_threads=num_threads)
     evaluation = evaluate(
         policy,

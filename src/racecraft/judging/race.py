@@ -125,7 +125,7 @@ def race_models(
         secret=secret,
     )
     entries = load_entries(models, num_threads=num_threads)
-    check_sources(ghosts, run=None)
+    check_sources(ghosts, conditions.track, conditions.rules, run=None)
     announce(terms.announcement)
     contest = hold_race(entries, terms, num_threads=num_threads)
     trial, colors = contest.shown_trial, LIVERY[len(entries) % len(LIVERY) :]

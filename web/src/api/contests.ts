@@ -8,6 +8,7 @@ export type ContestCard = Schemas["ContestCard"];
 export type ContestDetail = Schemas["ContestDetail"];
 export type LadderMatch = Schemas["LadderMatch"];
 export type Starter = Required<Schemas["Starter"]>;
+export type Ghost = Starter | Required<Schemas["EarlierHeat"]> | "best-lap";
 export type NewHeat = Partial<Schemas["NewHeat"]> & { models: Starter[] };
 export type NewLadder = Partial<Schemas["NewLadder"]> & { models: Starter[]; tracks: string[] };
 

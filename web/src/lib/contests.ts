@@ -1,5 +1,5 @@
 /** What heats and ladders are called. */
-import type { ContestCard } from "../api/contests";
+import type { ContestCard, Ghost } from "../api/contests";
 import type { Key } from "../i18n/en";
 import { t } from "../i18n/index.svelte";
 
@@ -14,3 +14,15 @@ export const ladderKind = (kind: string): string =>
 
 /** How many laps, in words. */
 export const lapsOf = (count: number): string => t(count === 1 ? "races_one_lap" : "races_laps_count", { count });
+
+/** What a heat or a ladder is called. */
+export const contestName = (contest: Pick<ContestCard, "title" | "models" | "is_ladder">): string =>
+  contest.title || contest.models.join(contest.is_ladder ? ", " : " – ");
+
+/** A ghost of a film, by what there is to know of earlier heats. */
+export function ghostName(ghost: Ghost, heats: ContestCard[]): string {
+  if (ghost === "best-lap") return t("contests_ghost_best_lap");
+  if ("model" in ghost) return ghost.model;
+  const heat = heats.find((one) => one.id === ghost.heat);
+  return heat ? contestName(heat) : t("contests_ghost_heats");
+}

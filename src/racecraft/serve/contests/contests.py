@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import secrets
 import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,11 +19,14 @@ import sqlalchemy as sa
 from racecraft.contest.ladder import check_ladder
 from racecraft.contest.terms import TOGETHER, race_terms
 from racecraft.errors import ConfigError
+from racecraft.race.announcement import draw_secret
 from racecraft.race.conditions import Conditions
-from racecraft.serve.contests.files import VIDEO, contest_folder, count_matches, entry_name
+from racecraft.serve.contests.files import REPLAY, VIDEO, contest_folder, count_matches, entry_name
 from racecraft.serve.contests.schemas import (
     ContestCard,
     ContestDetail,
+    EarlierHeat,
+    Ghost,
     HeatRow,
     LadderMatch,
     LadderPlace,
@@ -38,6 +42,8 @@ from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
 from racecraft.serve.tracks.courses import Courses
+from racecraft.sim.randomization import load_randomization
+from racecraft.sim.vehicle import load_vehicle
 
 KINDS: Final = ("heat", "ladder")
 """Of the jobs."""
@@ -74,23 +80,35 @@ class Contests:
         """Queue a heat; its id.
 
         Raises:
-            RacecraftError: A model or the track is not usable, or there are too many contests.
+            RacecraftError: A model, a ghost or the track is not usable, or there are too many contests.
         """
+        if request.secret and request.seed is not None:
+            raise ConfigError("secret and seed are two ways to say where the heat starts; give one.")
         terms, kind = settle(request), "head-to-model" if len(request.models) == 2 else "grid"
-        conditions = Conditions(track=self._courses.load(request.track), rules=terms.rules, objects=terms.objects)
-        race_terms(
+        conditions = Conditions(
+            track=self._courses.load(request.track),
+            rules=terms.rules,
+            vehicle=load_vehicle(request.vehicle),
+            objects=terms.objects,
+            randomize=load_randomization(request.randomize),
+        )
+        announced = race_terms(
             conditions,
             kind=kind,
             num_cars=len(request.models),
             ranking=request.ranking,
             minimum_laps=request.minimum_laps,
-        )
+            secret=draw_secret() if request.secret else None,
+        ).announcement
+        self._check_ghosts(request.ghosts, conditions)
         payload = request.model_dump() | {
             "kind": kind,
             "tracks": [request.track],
             "paths": [self._courses.path_or_name(request.track)],
+            "secret": announced.secret,
+            "commitment": announced.commitment if request.secret else "",
         }
-        return self._add("heat", payload, request.models, terms)
+        return self._add("heat", payload, request.models, terms, ghosts=request.ghosts)
 
     def start_ladder(self, request: NewLadder) -> str:
         """Queue a ladder; its id.
@@ -128,6 +146,9 @@ class Contests:
             vehicle=payload["vehicle"],
             randomize=payload.get("randomize", "none"),
             seed=payload["seed"],
+            commitment=payload.get("commitment", ""),
+            secret=payload.get("secret", "") if job.state in ENDED else "",
+            ghosts=payload.get("ghosts", []),
             direction=terms.rules.direction,
             ranking=payload.get("ranking", "total"),
             schedule=payload.get("schedule", ""),
@@ -171,10 +192,11 @@ class Contests:
         """One of its files.
 
         Raises:
-            NotFound: It has none of that name.
+            NotFound: It has none of that name, or none that may be seen before its secret.
         """
-        path = self.folder(self.job(contest).id) / name
-        if not path.is_file():
+        job = self.job(contest)
+        path = self.folder(job.id) / name
+        if not path.is_file() or (_is_secret(job.payload) and job.state not in ENDED):
             raise NotFound("There is nothing to see of it.")
         return path
 
@@ -182,16 +204,28 @@ class Contests:
         found = [job for kind in KINDS for job in self._queue.list(kind=kind, limit=MAX_CONTESTS)]
         return sorted(found, key=lambda job: job.created, reverse=True)
 
-    def _add(self, kind: str, payload: dict[str, Any], starters: list[Starter], terms: Terms) -> str:
-        for starter in starters:
+    def _check_ghosts(self, ghosts: Sequence[Ghost], conditions: Conditions) -> None:
+        """Refuse those of an earlier heat that there is not, or that was on another road."""
+        earlier = [str(self.file(ghost.heat, REPLAY)) for ghost in ghosts if isinstance(ghost, EarlierHeat)]
+        if earlier:
+            from racecraft.film.ghost_source import check_sources
+
+            check_sources(earlier, conditions.track, conditions.rules, run=None)
+
+    def _add(
+        self, kind: str, payload: dict[str, Any], starters: list[Starter], terms: Terms, *, ghosts: Sequence[Ghost] = ()
+    ) -> str:
+        driving = [*starters, *(ghost for ghost in ghosts if isinstance(ghost, Starter))]
+        for starter in driving:
             self._garage.require_checkpoint(starter.model, starter.checkpoint)
         if len(self._jobs()) >= MAX_CONTESTS:
             raise Conflict(f"There are {MAX_CONTESTS} heats and ladders already.", hint="Delete some first.")
         payload["terms"] = terms.to_dict()
-        if payload["seed"] is None:
+        if payload["seed"] is None and not _is_secret(payload):
             payload["seed"] = secrets.randbelow(2**32)
-        folders = [self._garage.folder(starter.model) for starter in starters]
-        cargo = self._mirror.share(*folders, tracks=payload["paths"])
+        folders = [self._garage.folder(starter.model) for starter in driving]
+        is_here = any(isinstance(ghost, EarlierHeat) for ghost in ghosts)  # its replay does not travel
+        cargo = None if is_here else self._mirror.share(*folders, tracks=payload["paths"])
         return self._queue.add(kind, starters[0].model, payload, cargo=cargo).id
 
     def _card(self, job: Job) -> ContestCard:
@@ -213,3 +247,8 @@ class Contests:
             else len(result.get("matches", ())),
             error=str((job.error or {}).get("message", "")),
         )
+
+
+def _is_secret(payload: Mapping[str, Any]) -> bool:
+    """Whether its starts are drawn from a secret."""
+    return bool(payload.get("commitment"))

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from racecraft.contest.terms import MAX_GRID
+from racecraft.film.ghost import MAX_GHOSTS
 from racecraft.serve.races.schemas import CheckpointChoice, RaceKind, RaceSettings, Ranking
 from racecraft.serve.schemas import Message, RunName
 
@@ -20,6 +21,16 @@ class Starter(Message):
 
     model: RunName
     checkpoint: CheckpointChoice = "best"
+
+
+class EarlierHeat(Message):
+    """The best car of a heat that was driven before, on the same road."""
+
+    heat: str = Field(max_length=40)
+
+
+Ghost = Starter | EarlierHeat | Literal["best-lap"]
+"""A model that drives the same race alone, a car of an earlier heat, or the fastest lap of this one, lap after lap."""
 
 
 class NewHeat(RaceSettings):
@@ -38,6 +49,10 @@ class NewHeat(RaceSettings):
     """What else is on the road."""
     count: int = Field(3, ge=1, le=20)
     """How many boxes or bot cars."""
+    secret: bool = False
+    """Draw the starts and objects from a secret instead of a seed; its commitment is told first."""
+    ghosts: list[Ghost] = Field(default_factory=list, max_length=MAX_GHOSTS)
+    """Cars in the film that were not there."""
 
 
 class NewLadder(RaceSettings):
@@ -137,7 +152,14 @@ class ContestDetail(ContestCard):
     """What stands or drives on the road besides the models."""
     vehicle: str
     randomize: str
-    seed: int
+    seed: int | None
+    """None where it is drawn from a secret."""
+    commitment: str
+    """SHA-256 of the secret and of what the heat is held by, told from the beginning; empty where there is none."""
+    secret: str
+    """64 hexadecimal digits, told when the heat is over; empty until then, and where there is none."""
+    ghosts: list[Ghost]
+    """Of a heat's film."""
     direction: str
     ranking: Ranking
     """Of a heat: what places go by."""

@@ -26,7 +26,9 @@ def heat(task: Task) -> dict[str, Any]:
     """Let two to eight models race on one road."""
     from racecraft.contest.contest import hold_race
     from racecraft.contest.terms import race_terms
+    from racecraft.errors import ConfigError
     from racecraft.film.ghost import LIVERY, Rival
+    from racecraft.film.ghost_source import check_sources, load_ghosts
     from racecraft.film.video import film
     from racecraft.race.conditions import Conditions
     from racecraft.race.entry import load_entries
@@ -40,7 +42,7 @@ def heat(task: Task) -> dict[str, Any]:
     conditions = Conditions(
         track=load_track(payload["paths"][0]),
         rules=held.rules,
-        seed=payload["seed"],
+        seed=payload["seed"] or 0,
         vehicle=load_vehicle(payload["vehicle"]),
         objects=held.objects,
         randomize=load_randomization(payload.get("randomize", "none")),
@@ -52,7 +54,12 @@ def heat(task: Task) -> dict[str, Any]:
         num_cars=len(entries),
         ranking=payload.get("ranking", "total"),
         minimum_laps=payload.get("minimum_laps"),
+        secret=bytes.fromhex(payload.get("secret", "")) or None,
     )
+    if payload.get("commitment") not in (None, "", terms.announcement.commitment):
+        raise ConfigError(f"The track {conditions.track.name!r} is not the one that the race was announced on.")
+    sources = _ghosts(task)
+    check_sources(sources, conditions.track, conditions.rules, run=None)
     contest = hold_race(entries, terms)
     ((_, replay),) = contest.replays()
     write_replay(replay, folder / REPLAY)
@@ -69,6 +76,9 @@ def heat(task: Task) -> dict[str, Any]:
             for car, name in enumerate(contest.names)
             if car != first
         ],
+        ghosts=load_ghosts(
+            sources, terms.conditions, recordings=recordings, colors=LIVERY[len(entries) % len(LIVERY) :]
+        ),
         sensors=entries[first].sensors,
     )
     return {
@@ -134,6 +144,19 @@ def _driven(trial: Trial) -> dict[str, Any]:
 def _models(task: Task) -> list[str]:
     """Their best checkpoint unless another is asked for, which their names then say."""
     return [str(task.runs / entry_name(one)) for one in task.job.payload["models"]]
+
+
+def _ghosts(task: Task) -> list[str]:
+    """Of the film, as `load_ghosts` takes them."""
+    state = task.runs / STATE_FOLDER
+    return [
+        one
+        if isinstance(one, str)
+        else str(contest_folder(state, one["heat"]) / REPLAY)
+        if "heat" in one
+        else str(task.runs / entry_name(one))
+        for one in task.job.payload.get("ghosts", ())
+    ]
 
 
 def _folder(task: Task) -> Path:

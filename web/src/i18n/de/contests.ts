@@ -34,6 +34,21 @@ export const contests: Record<keyof typeof english, string> = {
   contests_road_none: "Nichts sonst",
   contests_road_boxes: "Kisten",
   contests_road_bots: "Bots",
+  contests_secret: "Aus einem Geheimnis: niemand weiß, wo es losgeht",
+  contests_secret_lead:
+    "Starts und Hindernisse werden daraus gezogen. Die Zusage steht vorher da, das Geheimnis mit dem Ergebnis.",
+  contests_known_lead: "Sonst dürfen alle wissen, wo es losgeht.",
+  contests_fair_open:
+    "Notiere die Zusage jetzt. Ist der Lauf vorbei, steht sein Geheimnis da, und beide zeigen, dass die Starts gezogen waren, bevor jemand fuhr.",
+  contests_fair_over:
+    "Aus dem Geheimnis folgen die Starts und mit den Regeln in der Datei die Zusage, die vorher dastand: racecraft verify heat.replay --race ZUSAGE prüft alles.",
+  contests_ghosts: "Geister im Film",
+  contests_ghosts_lead: "Autos, die nicht dabei waren, nur für Menschen: wer fährt, sieht sie nicht.",
+  contests_ghost_add: "Einen Geist dazunehmen",
+  contests_ghost_best_lap: "Die schnellste Runde, in jeder Runde wieder",
+  contests_ghost_models: "Modelle, jedes allein im selben Rennen",
+  contests_ghost_heats: "Das beste Auto eines früheren Laufs",
+  contests_ghost_leave: "Den Geist herausnehmen: {name}",
   contests_schedule: "Wer gegen wen",
   contests_schedule_round_robin: "Jeder gegen jeden",
   contests_schedule_swiss: "Etwa gleich Starke (weniger Rennen)",

@@ -30,6 +30,21 @@ export const contests = {
   contests_road_none: "Nothing else",
   contests_road_boxes: "Boxes",
   contests_road_bots: "Bot cars",
+  contests_secret: "From a secret: nobody knows where it starts",
+  contests_secret_lead:
+    "Starts and objects are drawn from it. Its commitment is told first, the secret with the result.",
+  contests_known_lead: "Else everybody may know where it starts.",
+  contests_fair_open:
+    "Note the commitment now. When the heat is over its secret is told, and both show that the starts were drawn before anybody drove.",
+  contests_fair_over:
+    "The secret gives the starts, and with the rules in the file the commitment that was told first: racecraft verify heat.replay --race COMMITMENT checks it all.",
+  contests_ghosts: "Ghosts in the film",
+  contests_ghosts_lead: "Cars that were not there, for people only: who drives does not see them.",
+  contests_ghost_add: "Add a ghost",
+  contests_ghost_best_lap: "The fastest lap, again with every lap",
+  contests_ghost_models: "Models, each alone in the same race",
+  contests_ghost_heats: "The best car of an earlier heat",
+  contests_ghost_leave: "Take out the ghost: {name}",
   contests_schedule: "Who meets whom",
   contests_schedule_round_robin: "Everyone meets everyone",
   contests_schedule_swiss: "Those of like strength (fewer races)",
