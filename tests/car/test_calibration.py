@@ -86,6 +86,17 @@ def test_commands_are_shares_of_this_car_s_lock_and_speed() -> None:
     np.testing.assert_allclose(unmeasured[:, 1], [1.6, 2.0, 1.6])
 
 
+def test_no_speed_is_told_that_the_simulator_does_not_drive() -> None:
+    fast = CarCalibration(speeds=((20.0, 2.0), (60.0, 8.0)), slider_percent=60.0)
+    space = table((-30, 1), (30, 2), (0, 4))
+    assert fast.fastest(space) == 8.0
+    np.testing.assert_allclose(fast.commands(space.table, space)[:, 1], [3.275, 4.0, 4.0])
+    slow = CarCalibration(speeds=((50.0, 0.05),), slider_percent=50.0)
+    assert slow.fastest(space) == 0.05
+    np.testing.assert_allclose(slow.commands(space.table, space)[:, 1], [0.1, 0.1, 0.1])
+    assert MEASURED.fastest(space) == 1.5
+
+
 def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
     MEASURED.save(tmp_path / "car.json")
     assert load_calibration(tmp_path / "car.json") == MEASURED

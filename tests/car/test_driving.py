@@ -12,9 +12,11 @@ from PIL import Image
 from test_export import trained
 
 from racecraft import load_track
-from racecraft.agent import DiscreteActionSpace
+from racecraft.agent import ActionSpace, DiscreteActionSpace
 from racecraft.agent.sensor_suite import SensorSuite
+from racecraft.car import evaluation
 from racecraft.car.calibration import CarCalibration
+from racecraft.car.command import Floats
 from racecraft.car.driving import CAR_CAMERA, CarPolicy, car_picture
 from racecraft.car.evaluation import evaluate_as_car
 from racecraft.car.picture import DOT, FINE, LEFTS, PANEL, TOP, draw_commands
@@ -117,6 +119,25 @@ def test_the_evaluation_drives_what_the_car_makes_of_it_and_says_so(run: Path) -
     pairs = zip(trace["steer"][driven].tolist(), trace["throttle"][driven].tolist(), strict=True)
     assert list(pairs) == [pytest.approx(table[action], abs=1e-9) for action in trace["action"][driven].tolist()]
     assert verify(read_replay(outcome.files["replay"])).is_genuine
+
+
+def test_of_a_car_that_is_faster_than_the_simulator_the_picture_shows_what_was_driven(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[float, str]] = []
+
+    def draw(chosen: Floats, resulting: Floats, space: ActionSpace, path: Path, *, note: str) -> Path:
+        drawn.append((resulting[:, 1].max(), note))
+        return draw_commands(chosen, resulting, space, path, note=note)
+
+    monkeypatch.setattr(evaluation, "draw_commands", draw)
+    fast = CarCalibration(speeds=((60.0, 8.0),), slider_percent=60.0)
+    outcome = evaluate_as_car(run, car=fast, laps=1, num_trials=1, max_resets=0, video=False, num_threads=1)
+    (trial,) = outcome.evaluation.trials
+    assert trial.recording.column("speed").max() == 4.0
+    assert drawn == [(4.0, "the simulator drives 4 m/s at most")]
+    evaluate_as_car(run, car=MEASURED, laps=1, num_trials=1, max_resets=0, video=False, num_threads=1)
+    assert drawn[1] == (pytest.approx(1.5), "")
 
 
 @pytest.mark.costly

@@ -58,6 +58,11 @@ def test_a_car_is_measured_and_driven(racecraft: Run, trained: Path) -> None:
     assert "as_car" not in racecraft("evaluate", str(trained), *driving[2:]).document
 
 
+def test_of_a_car_that_is_too_fast_it_is_said_what_the_simulator_drives(racecraft: Run) -> None:
+    told = [racecraft("car", "calibrate", "--speed", speed).out for speed in ("60=4.1", "60=4.0")]
+    assert ["The simulator drives 4 m/s at most" in text for text in told] == [True, False]
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "says"),
     [

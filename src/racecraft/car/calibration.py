@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from racecraft.agent.action_space import MAX_STEERING, ActionSpace
+from racecraft.agent.action_space import MAX_SPEED, MAX_STEERING, MIN_SPEED, ActionSpace
 from racecraft.car.command import Floats, largest, steering_share, throttle
 from racecraft.checks import check_number, require
 from racecraft.errors import ConfigError, RunError, did_you_mean
@@ -89,8 +89,12 @@ class CarCalibration:
         beyond = speeds[-1] * percent / positions[-1]
         return np.where(percent > positions[-1], beyond, np.interp(percent, positions, speeds))
 
+    def fastest(self, space: ActionSpace) -> float:
+        """M/s that full throttle drives with a model, be it more than the simulator's car can."""
+        return float(self.speed(np.array([self.slider(space)]), largest(space)[1])[0])
+
     def commands(self, chosen: Floats, space: ActionSpace) -> Floats:
-        """What the wheels and the motor do for choices of a model.
+        """What the wheels and the motor do for choices of a model, as far as the simulator's car can: 0.1 to 4 m/s.
 
         Args:
             chosen: Angles in rad and speeds in m/s as the metadata lists them  (N, 2).
@@ -101,8 +105,8 @@ class CarCalibration:
         """
         share = steering_share(chosen[:, 0], space)
         angles = share * np.radians(np.where(share > 0, self.left_degrees, self.right_degrees))
-        slider = self.slider(space)
-        return np.column_stack([angles, self.speed(slider * throttle(chosen[:, 1], space), largest(space)[1])])
+        speeds = self.speed(self.slider(space) * throttle(chosen[:, 1], space), largest(space)[1])
+        return np.column_stack([angles, speeds.clip(MIN_SPEED, MAX_SPEED)])
 
     def save(self, path: str | Path) -> None:
         """Write a file that `load_calibration` reads.

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.agent.action_space import MAX_SPEED, MIN_SPEED, ActionSpace, ContinuousActionSpace, DiscreteActionSpace
+from racecraft.agent.action_space import ActionSpace, ContinuousActionSpace, DiscreteActionSpace
 from racecraft.agent.sensors import FRAME_HEIGHT, FRAME_WIDTH
 from racecraft.car.calibration import CarCalibration
 from racecraft.car.command import Floats
@@ -90,5 +90,4 @@ def _resulting(space: ActionSpace, car: CarCalibration) -> ActionSpace:
     """A table of what the car makes of each action; a continuous space is left as it is."""
     if isinstance(space, ContinuousActionSpace):
         return space
-    table = car.commands(space.table, space)
-    return DiscreteActionSpace(np.column_stack([table[:, 0], table[:, 1].clip(MIN_SPEED, MAX_SPEED)]))
+    return DiscreteActionSpace(car.commands(space.table, space))

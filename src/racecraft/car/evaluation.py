@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from racecraft.agent.action_space import MAX_SPEED
 from racecraft.car.calibration import CarCalibration
 from racecraft.car.driving import CAR_CAMERA, CarPolicy
 from racecraft.car.export import export_run, read_exported
@@ -25,6 +26,7 @@ from racecraft.sim.randomization import Randomization, load_randomization
 from racecraft.sim.simulation import CONTROL_DT
 
 PICTURE: Final = "as-car.png"
+TOO_FAST: Final = f"the simulator drives {MAX_SPEED:g} m/s at most"
 UNMEASURED: Final = CarCalibration()
 
 
@@ -73,5 +75,6 @@ def evaluate_as_car(
         np.concatenate(driver.resulting),
         driver.listed,
         outcome.files["summary"].with_name(PICTURE),
+        note=TOO_FAST if car.fastest(space) > MAX_SPEED else "",
     )
     return replace(outcome, files={**outcome.files, "as a car": picture})

@@ -31,7 +31,7 @@ DOT: Final[Color] = (226, 88, 34)
 DOTS_ACROSS: Final = 220  # places of dots along a side: those of one place are one dot
 
 
-def draw_commands(chosen: Floats, resulting: Floats, space: ActionSpace, path: Path) -> Path:
+def draw_commands(chosen: Floats, resulting: Floats, space: ActionSpace, path: Path, *, note: str = "") -> Path:
     """Write the picture.
 
     Args:
@@ -39,6 +39,7 @@ def draw_commands(chosen: Floats, resulting: Floats, space: ActionSpace, path: P
         resulting: Angles of the wheels in rad and speeds in m/s  (S, 2).
         space: The model's action space: its ends are on the axes, driven or not.
         path: Where to.
+        note: On what speeds came of it, beside the words on the axis.
     """
     from PIL import Image, ImageDraw
 
@@ -53,6 +54,7 @@ def draw_commands(chosen: Floats, resulting: Floats, space: ActionSpace, path: P
         shares = (pairs - low) / (high - low)
         cells, counts = np.unique(np.round(shares * DOTS_ACROSS), axis=0, return_counts=True)
         _panel(draw, LEFTS[column], title, low, high, ticks)
+        _axis_words(draw, LEFTS[column], "" if is_signed else note)
         for (x, y), share in zip(cells / DOTS_ACROSS, counts / len(pairs), strict=True):
             _dot(draw, LEFTS[column], x, y, 3 + 20 * share**0.5)
     image.reduce(FINE).save(path)
@@ -72,8 +74,6 @@ def _panel(draw: ImageDraw.ImageDraw, left: int, title: str, low: float, high: f
 
     large, small = (ImageFont.load_default(size * FINE) for size in (20, 15))
     _text(draw, left, 30, title, large, anchor="ls")
-    _text(draw, left, 62, "up: what the car makes of it", small, anchor="ls")
-    _text(draw, left + PANEL, TOP + PANEL + 62, "commanded", small, anchor="rs")
     for tick in ticks:
         place = PANEL * (tick - low) / (high - low)
         _line(draw, [(left + place, TOP), (left + place, TOP + PANEL)], SOFT, 1)
@@ -82,6 +82,15 @@ def _panel(draw: ImageDraw.ImageDraw, left: int, title: str, low: float, high: f
         _text(draw, left - 12, TOP + PANEL - place, f"{tick:g}", small, anchor="rm")
     for piece in range(0, PANEL, 16):
         _line(draw, [(left + piece, TOP + PANEL - piece), (left + piece + 8, TOP + PANEL - piece - 8)], INK, 2)
+
+
+def _axis_words(draw: ImageDraw.ImageDraw, left: int, note: str) -> None:
+    from PIL import ImageFont
+
+    small = ImageFont.load_default(15 * FINE)
+    words = "up: what the car makes of it" + (f"; {note}" if note else "")
+    _text(draw, left, 62, words, small, anchor="ls")
+    _text(draw, left + PANEL, TOP + PANEL + 62, "commanded", small, anchor="rs")
 
 
 def _dot(draw: ImageDraw.ImageDraw, left: int, x: float, y: float, radius: float) -> None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.text import Text
 
+from racecraft.agent.action_space import MAX_SPEED
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -32,6 +34,8 @@ def say_calibrated(car: CarCalibration, path: Path) -> None:
         f"Full throttle: {speeds or 'not measured, so as fast as a model was trained to drive'}; {slider}.",
         f"Latency: {1000 * car.latency_seconds:g} ms.",
     ]
+    if any(speed > MAX_SPEED for _, speed in car.speeds):
+        lines.append(f"The simulator drives {MAX_SPEED:g} m/s at most: what is faster is driven, and drawn, at that.")
     console = Console()
     for line in lines:
         console.print(Text(line), soft_wrap=True)
