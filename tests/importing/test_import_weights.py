@@ -167,6 +167,14 @@ def test_a_checkpoint_goes_on_learning_where_it_stopped(tmp_path: Path) -> None:
     assert resume(found.run, until="1 steps").steps > 0
     after = folder.checkpoints.load()
     assert after.step > 0
+    first, *_ = entries = folder.checkpoints.entries()  # judged before its first update, and the same
+    assert [entry.step for entry in entries] == [0, after.step]
+    assert first.score is not None
+    assert first.metrics["completion"] == first.score[0]
+    judged = folder.checkpoints.load(0)
+    assert judged.metadata["origin"] == begin.metadata["origin"]
+    for name, array in begin.arrays.items():
+        np.testing.assert_array_equal(judged.arrays[name], array, err_msg=name)
     learned = [name for name in begin.arrays if not np.array_equal(after.arrays[name], begin.arrays[name])]
     assert learned  # it did learn
     for name, array in begin.arrays.items():

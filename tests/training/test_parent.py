@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tiny_runs import Recorder, Train, assert_same, weights
+from tiny_runs import Recorder, Train, assert_same, logs, weights
 
 from racecraft.agent import ModelMetadata, action_space
 from racecraft.errors import CheckpointError, ConfigError, RunError
-from racecraft.learn import NetworkSpec, initial_weights
+from racecraft.learn import DistillConfig, NetworkSpec, initial_weights
+from racecraft.race.evaluation import Completion
 from racecraft.run import RunFolder
-from racecraft.training import resume
+from racecraft.run.history import read_history
+from racecraft.training import EvaluationReport, evaluator, resume
 from racecraft.training.parent import fitting, open_parent
 from racecraft.training.plan import make_plan
 from racecraft.training.start import read_settings
@@ -66,6 +68,67 @@ def test_it_needs_its_parent_no_longer(tiny: Train, parent: Path, tmp_path: Path
     resume(later, until="128 steps")
     resume(child.path, until="128 steps")
     assert_same(later, child.path)
+
+
+def judged_steps(run: Path) -> list[int]:
+    return [point["step"] for point in read_history(RunFolder.open(run).history)[0] if point["kind"] == "evaluation"]
+
+
+def test_what_it_begins_with_is_judged_first_and_stays_the_best_where_all_that_comes_of_it_is_worse(
+    tiny: Train, parent: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shares = iter([0.9, 0.5, 0.3])
+
+    def drive(*arguments: Any, **settings: Any) -> Completion:
+        share, none = next(shares), np.full(2, np.nan)
+        return Completion(
+            completions=np.full(2, share), lap_times=none, rewards=np.zeros(2), statuses=("off_track",) * 2
+        )
+
+    monkeypatch.setattr(evaluator, "completion", drive)
+    recorder = Recorder()
+    child = tiny(parent=f"{parent}@last", until="128 steps", evaluate_every=64, reporter=recorder).run
+    assert [(report.step, report.is_best) for report in recorder.evaluations] == [(0, True), (64, False), (128, False)]
+    assert judged_steps(child) == [0, 64, 128]
+    store = RunFolder.open(child).checkpoints
+    assert [(entry.step, entry.score) for entry in store.entries()] == [
+        (0, (0.9, -1e6)),
+        (64, (0.5, -1e6)),
+        (128, (0.3, -1e6)),
+    ]
+    best, theirs = store.load("best"), weights(parent)
+    assert (best.step, best.metrics["completion"]) == (0, 0.9)
+    for name, array in best.arrays.items():
+        np.testing.assert_array_equal(array, theirs[name], err_msg=name)
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "distill"])
+def test_killed_before_its_first_update_it_resumes_as_if_it_never_was(
+    tiny: Train, parent: Path, tmp_path: Path, algorithm: str
+) -> None:
+    killed = tmp_path / "killed"
+
+    class Killing(Recorder):
+        def evaluation(self, report: EvaluationReport) -> None:
+            super().evaluation(report)
+            if report.step == 64:
+                shutil.copytree(tmp_path / "runs" / "child", killed)
+
+    settings: dict[str, Any] = {"parent": parent, "evaluate_every": 64, "until": "192 steps"}
+    if algorithm == "distill":
+        short = DistillConfig(num_envs=8, num_steps=8, teacher_steps=128, minibatch_size=32)
+        settings |= {"algorithm": "distill", "distill": short}
+    child = tiny(name="child", reporter=Killing(), **settings).run
+    assert [entry.step for entry in RunFolder.open(killed).checkpoints.entries()] == [0]
+    resume(killed)
+    assert judged_steps(killed) == judged_steps(child) == [0, 64, 128, 192]
+    assert_same(killed, child)
+    assert logs(killed) == logs(child)
+
+
+def test_one_that_begins_from_nothing_is_not_judged_before_it_learned(parent: Path) -> None:
+    assert judged_steps(parent) == [64, 128]
+    assert [entry.step for entry in RunFolder.open(parent).checkpoints.entries()] == [64, 128]
 
 
 def test_another_action_space_gives_the_policy_a_new_last_layer_and_says_so(tiny: Train, parent: Path) -> None:

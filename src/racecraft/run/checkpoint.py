@@ -129,7 +129,7 @@ class CheckpointStore:
         """Save a checkpoint, then remove what need not be kept.
 
         Args:
-            step: Camera steps of training so far.
+            step: Camera steps of training so far; of step 0, what a run begins with, only the one saved last is kept.
             arrays: Numeric arrays by name.
             metadata: Any JSON: settings, counters, states of random generators.
             metrics: Numbers to show in lists of checkpoints.
@@ -158,7 +158,7 @@ class CheckpointStore:
         entry = Entry(step, f"{step:09d}-{digest[:8]}.safetensors", size, digest, time_stamp, ranked, shown)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            kept = self._kept([*(e for e in self.entries() if e.file != entry.file), entry])
+            kept = self._kept([*(e for e in self.entries() if e.file != entry.file and (step or e.step)), entry])
             write_file(self.folder / entry.file, pieces)
             self._write_manifest(kept)
         except OSError as error:

@@ -14,13 +14,15 @@ import threading
 import time
 import warnings
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from racecraft.errors import CheckpointError, RacecraftError, RewardError
 from racecraft.run import CheckpointWarning, RunFolder
 from racecraft.training.interruption import interruptible
 from racecraft.training.meter import Meter
+from racecraft.training.parent import WEIGHTS
 from racecraft.training.progress import Reporter, SilentReporter, TrainResult
 from racecraft.training.session import Session, open_session
 from racecraft.training.start import read_settings
@@ -102,6 +104,8 @@ class Training:
         reason = self._limit_reached(session)
         if reason in ("laps", "lap_time", "no_better_lap", "seconds", "steps"):
             self.reporter.note(f"The limit of {self.settings.until} was reached before; --until sets another.")
+        if session.begun is not None and not reason:
+            self._judge_beginning(session, session.begun)
         while not reason:
             stats = algorithm.iterate()
             if session.opponents is not None:
@@ -177,6 +181,13 @@ class Training:
         self.reporter.evaluation(evaluator.last)
         self.meter.parts["evaluation"] += time.perf_counter() - begun
 
+    def _judge_beginning(self, session: Session, origin: dict[str, Any]) -> None:
+        """Weights from elsewhere are a checkpoint like those that come of them: the best may be it."""
+        learner = session.evaluator.policy.learner
+        arrays = {f"{WEIGHTS}{name}": array for name, array in learner.weights().items()}
+        self._evaluate(session)
+        self._save(session, arrays, {"network": asdict(session.algorithm.spec), "origin": origin})
+
     def _look(self, session: Session) -> None:
         begun = time.perf_counter()
         with session.algorithm.driving():
@@ -191,16 +202,21 @@ class Training:
     def _checkpoint(self, session: Session) -> None:
         """Logs first: what a checkpoint counts is then on disk, whatever happens in between."""
         begun = time.perf_counter()
-        algorithm, evaluator = session.algorithm, session.evaluator
         session.logs.trace.flush()
         session.logs.metrics.write()
+        self._save(session, session.state(), session.metadata())
+        self.meter.parts["checkpoint"] += time.perf_counter() - begun
+
+    def _save(self, session: Session, arrays: dict[str, Any], metadata: dict[str, Any]) -> None:
+        """A checkpoint with the evaluation of the same step, where there was one."""
+        algorithm, evaluator = session.algorithm, session.evaluator
         last = evaluator.last
         is_judged = last is not None and last.step == algorithm.total_steps
         lap = last.best_lap if last is not None else None
         self.folder.checkpoints.save(
             algorithm.total_steps,
-            session.state(),
-            metadata=session.metadata(),
+            arrays,
+            metadata=metadata,
             metrics={
                 "completion": last.completion,
                 "laps": last.laps_completed,
@@ -210,7 +226,6 @@ class Training:
             else {},
             score=evaluator.score if is_judged else None,
         )
-        self.meter.parts["checkpoint"] += time.perf_counter() - begun
 
     def way_on(self, error: RacecraftError) -> str:
         """What to do after an error, as a hint for the command line; who trains otherwise says something else."""

@@ -128,8 +128,14 @@ def fitting(weights: Mapping[str, NDArray[Any]], spec: NetworkSpec) -> Arrays:
 
 
 def is_weights_only(saved: Checkpoint) -> bool:
-    """Whether a checkpoint has no training of ours behind it: `racecraft import` made it of a model's weights."""
+    """Whether a checkpoint is what its run began with, weights from elsewhere and nothing of a training."""
     return "origin" in saved.metadata
+
+
+def origin_of(saved: Checkpoint) -> dict[str, Any]:
+    """Where the weights that a run begins with came from: what an import says, or a parent's checkpoint and step."""
+    named = {name: saved.metadata[name] for name in ("file", "step") if name in saved.metadata}
+    return dict(saved.metadata.get("origin", named))
 
 
 def begin_from(learner: Learner, saved: Checkpoint) -> None:

@@ -43,7 +43,7 @@ from racecraft.training.environment import TrainingEnvironment, open_simulation
 from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
 from racecraft.training.opponents import OpponentPool
-from racecraft.training.parent import begin_from, is_weights_only
+from racecraft.training.parent import begin_from, is_weights_only, origin_of
 from racecraft.training.settings import TrainSettings
 from racecraft.training.start import aws_hyperparameters, require_trainable, require_valid_reward
 
@@ -80,6 +80,8 @@ class Session:
     meter: Meter
     since: int
     """Step that the stretch under way began at."""
+    begun: dict[str, Any] | None
+    """Where the weights that it begins with came from; None where they are random, or training goes on."""
 
     def state(self) -> dict[str, Any]:
         """The arrays that the next step depends on, by name."""
@@ -220,6 +222,7 @@ def open_session(
             opponents=environment.opponents if isinstance(environment, TrainingEnvironment) else None,
             meter=meter,
             since=since,
+            begun=None if begun is None else origin_of(begun),
         )
         if saved is None and settings.algorithm == "distill":
             steps = settings.distill.teacher_steps

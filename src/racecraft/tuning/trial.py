@@ -115,6 +115,8 @@ class _Judge(SilentReporter):
 
     def evaluation(self, report: EvaluationReport) -> None:
         """Compare the best so far with the median of trials before at the same evaluation."""
+        if report.step == 0:  # what all trials begin with
+            return
         self.best = max(self.best, report.completion)
         lap = report.best_lap if self.order.goal == "lap_time" and report.best_lap is not None else NO_LAP
         number = len(self.marks)
