@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import pytest
 from command_line import Run
 
 FILE = "seeds = [1]\n[all]\ntrack = 'oval'\nuntil = '256 steps'\nnum_envs = 8\n"
+ACTIONS = [{"steering_angle": angle, "speed": 1.0} for angle in (-20, 0, 20)]
 
 
 def test_a_sweep_is_trained_and_its_board_shown(racecraft: Run, tmp_path: Path) -> None:
@@ -22,3 +25,22 @@ def test_a_sweep_is_trained_and_its_board_shown(racecraft: Run, tmp_path: Path) 
     assert "a sweep 's' already" in again.err
     assert racecraft("sweep").status == 2
     assert racecraft("sweep", "--resume", "s", "--name", "t").status == 2
+
+
+@pytest.mark.costly
+def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None:
+    Path("all.json").write_text(json.dumps({"num_epoch": 3, "batch_size": 32}))
+    Path("one.json").write_text(json.dumps({"action_space": ACTIONS, "preview": 1}))
+    settings = "hyperparameters = 'all.json'\n[settings.plain]\n[settings.seen]\nmodel_metadata = 'one.json'\n"
+    Path("sweep.toml").write_text(FILE.replace("num_envs = 8", "num_envs = 8\n" + settings))
+    notes = [
+        "all.json: unknown field 'num_epoch' has no effect. Did you mean 'num_epochs'?",
+        "Setting 'seen': one.json: unknown field 'preview' has no effect.",
+    ]
+    told = racecraft("sweep", "sweep.toml", "--name", "s", "--processes", "1", "--json")
+    assert told.status == 0, told.err
+    assert told.document["notes"] == notes
+    said = racecraft("sweep", "sweep.toml", "--name", "t", "--processes", "1")
+    assert [note in " ".join(said.err.split()) for note in notes] == [True, True]
+    assert "has no effect" not in said.out
+    assert racecraft("sweep", "--resume", "s", "--board", "--json").document["notes"] == []

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from racecraft.cli.app import INTERRUPTED, Json, app, print_json
+from racecraft.cli.app import INTERRUPTED, Json, app, print_json, text
 
 if TYPE_CHECKING:
     from racecraft.tuning.trial import Report
@@ -49,11 +49,16 @@ def sweep(
         if not as_json:
             sweep_text.say_run(run, how)
 
-    swept = Sweep(runs, resume) if file is None else make_sweep(read_sweep(read_text(file)), runs=runs, name=name)
+    plan = None if file is None else read_sweep(read_text(file))
+    swept = Sweep(runs, resume) if plan is None else make_sweep(plan, runs=runs, name=name)
+    notes = () if plan is None else plan.notes
+    if not as_json:
+        for note in notes:
+            text().say_progress(note)
     is_interrupted = False if board else swept.train(processes=processes, cluster=cluster, on_end=tell)
     found = swept.board()
     if as_json:
-        print_json({"sweep": swept.name, **found.to_dict(), "is_interrupted": is_interrupted})
+        print_json({"sweep": swept.name, **found.to_dict(), "is_interrupted": is_interrupted, "notes": list(notes)})
     else:
         sweep_text.say_board(swept.name, found, runs=runs)
     if is_interrupted:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from racecraft.cli.app import INTERRUPTED, Json, app, is_given, print_json
+from racecraft.cli.app import INTERRUPTED, Json, app, is_given, print_json, text
 
 _OF_A_CALL = ("resume", "minutes", "trials", "processes", "as_json")
 
@@ -61,31 +61,33 @@ def tune(
             if is_given(context, str(option.name)) and option.name not in _OF_A_CALL:
                 context.fail(f"{option.opts[0]} does not go with --resume: a search keeps what it was started with.")
     from racecraft.cli import tune_text
-    from racecraft.tuning import Tuning, start_tuning
+    from racecraft.training.plan import make_plan
+    from racecraft.tuning import Tuning, make_tuning
 
-    folder = resume
+    folder, notes = resume, tuple[str, ...]()
     if folder is None:
         options: dict[str, Any] = {"track": track, "reward": reward, "actions": actions}
         if parent is not None:  # what is not given is the parent's
             options = {name: value for name, value in options.items() if is_given(context, name)}
-        folder = start_tuning(
+        plan = make_plan(
             **options,
-            search=search,
-            goal=goal,
-            trial_steps=trial_steps,
-            window=window,
             model_metadata=model_metadata,
             hyperparameters=hyperparameters,
             parent=parent,
             seed=seed,
             num_threads=num_threads,
-            name=name,
-            root=root,
         )
+        folder = make_tuning(
+            plan, search=search, goal=goal, trial_steps=trial_steps, window=window, name=name, root=root
+        )
+        notes = plan.notes
+    if not as_json:
+        for note in notes:
+            text().say_progress(note)
     tuning = Tuning(folder, on_trial=None if as_json else lambda trial: tune_text.say_trial(trial, tuning.goal))
     outcome = tuning.run(minutes=minutes, max_trials=trials, processes=processes)
     if as_json:
-        print_json(outcome.to_dict())
+        print_json({**outcome.to_dict(), "notes": list(notes)})
     else:
         tune_text.say_tuned(outcome)
     if outcome.is_interrupted:

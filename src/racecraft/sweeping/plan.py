@@ -68,6 +68,19 @@ class SweepPlan:
     seeds: tuple[int, ...]
     settings: tuple[Setting, ...]
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences for the user about files and parents: once what is said of all settings, else of which."""
+        said: dict[str, list[str]] = {}
+        for setting in self.settings:
+            for note in dict.fromkeys(setting.plan.notes):
+                said.setdefault(note, []).append(setting.name)
+        count = len(self.settings)
+        return tuple(
+            note if len(names) == count else f"Setting {', '.join(map(repr, names))}: {note}"
+            for note, names in said.items()
+        )
+
 
 def read_sweep(
     text: str,
