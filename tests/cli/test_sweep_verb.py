@@ -29,10 +29,12 @@ def test_a_sweep_is_trained_and_its_board_shown(racecraft: Run, tmp_path: Path) 
 
 @pytest.mark.costly
 def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None:
-    Path("all.json").write_text(json.dumps({"num_epoch": 3, "batch_size": 32}))
-    Path("one.json").write_text(json.dumps({"action_space": ACTIONS, "preview": 1}))
+    Path("all.json").write_text(json.dumps({"num_epoch": 3, "num_epochs": 3, "num_episodes_between_training": 1}))
+    Path("one.json").write_text(
+        json.dumps({"action_space": ACTIONS, "neural_network": "RACECRAFT_SMALL", "preview": 1})
+    )
     settings = "hyperparameters = 'all.json'\n[settings.plain]\n[settings.seen]\nmodel_metadata = 'one.json'\n"
-    Path("sweep.toml").write_text(FILE.replace("num_envs = 8", "num_envs = 8\n" + settings))
+    Path("sweep.toml").write_text(FILE.replace("256 steps", "1 steps") + settings)
     notes = [
         "all.json: unknown field 'num_epoch' has no effect. Did you mean 'num_epochs'?",
         "Setting 'seen': one.json: unknown field 'preview' has no effect.",
