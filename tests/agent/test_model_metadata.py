@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -109,6 +110,25 @@ def test_what_is_unknown_of_the_lidar_is_kept_and_written_back():
     assert metadata.to_dict()["lidar_config"] == {**config, "num_values_per_sector": 8, "clipping_dist": 0.5}
     again = ModelMetadata.from_dict(metadata.to_dict())
     assert (again, again.notes) == (metadata, metadata.notes)
+
+
+def test_what_is_unknown_of_an_action_is_kept_and_written_back(tmp_path):
+    listed = [{**TWO[0], "note": "left"}, {**TWO[1], "index": 7, "spede": 2}]
+    limits = {"steering_angle": {**LIMITS["steering_angle"], "unit": "°"}, "speed": LIMITS["speed"], "why": [1, 2]}
+    written = {
+        "discrete": [{**TWO[0], "index": 0, "note": "left"}, {**TWO[1], "index": 1, "spede": 2}],
+        "continuous": limits,
+    }
+    for space in (listed, limits):
+        metadata = ModelMetadata.from_dict({"action_space": space, "version": "3"}, name="m.json")
+        metadata.save(tmp_path / "m.json")
+        document = json.loads((tmp_path / "m.json").read_text())
+        assert document["action_space"] == written[metadata.action_space.kind]
+        again = ModelMetadata.from_dict(document, name="m.json")
+        unknown = [note for note in metadata.notes if "unknown" in note]
+        assert (again, len(unknown), list(again.notes)) == (metadata, 2, unknown)
+        other = replace(metadata, action_space=action_space("default")).to_dict()["action_space"]
+        assert all(set(action) == {"steering_angle", "speed", "index"} for action in other)
 
 
 def test_clipping_distance_is_what_a_car_calls_clipping_dist():

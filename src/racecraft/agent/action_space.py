@@ -33,12 +33,14 @@ class DiscreteActionSpace:
 
     Args:
         table: Rows of (steering_angle [rad], speed [m/s])   (A, 2), A from 2 to 30.
+        extra: Of each action what else its file says, which means nothing here.
     """
 
     kind = "discrete"
 
-    def __init__(self, table: ArrayLike) -> None:
+    def __init__(self, table: ArrayLike, *, extra: Sequence[Mapping[str, Any]] = ()) -> None:
         self.table = _frozen(table, name="table")
+        self.extra = tuple(extra)
         if self.table.ndim != 2 or self.table.shape[1] != 2:
             raise ShapeError(f"table has shape {self.table.shape}, expected (actions, 2): steering_angle, speed.")
         if not MIN_ACTIONS <= len(self.table) <= MAX_ACTIONS:
@@ -78,12 +80,12 @@ class DiscreteActionSpace:
 
     @classmethod
     def from_aws(cls, actions: Sequence[Mapping[str, Any]]) -> DiscreteActionSpace:
-        """From AWS's list of ``{"steering_angle": degrees, "speed": m/s}``; other keys are ignored."""
+        """From AWS's list of ``{"steering_angle": degrees, "speed": m/s}``; other keys are `extra`."""
+        table = [(math.radians(float(a["steering_angle"])), float(a["speed"])) for a in actions]
+        known = ("steering_angle", "speed", "index")
         return cls(
-            np.array(
-                [(math.radians(float(a["steering_angle"])), float(a["speed"])) for a in actions],
-                dtype=np.float64,
-            ).reshape(-1, 2)
+            np.array(table, dtype=np.float64).reshape(-1, 2),
+            extra=[{key: value for key, value in a.items() if key not in known} for a in actions],
         )
 
     def to_aws(self) -> list[dict[str, float | int]]:
@@ -92,6 +94,11 @@ class DiscreteActionSpace:
             {"steering_angle": steering, "speed": speed, "index": index}
             for index, (steering, speed) in enumerate(self.to_degrees())
         ]
+
+    def to_file(self) -> list[dict[str, Any]]:
+        """The same with `extra`."""
+        extra = self.extra or ({},) * self.size
+        return [{**action, **more} for action, more in zip(self.to_aws(), extra, strict=True)]
 
     def to_commands(self, actions: ArrayLike) -> NDArray[np.float32]:
         """Commands for ``Simulation.step``   (N, 2) from action indices   (N,)."""
@@ -146,6 +153,7 @@ class ContinuousActionSpace:
     Args:
         low: Smallest (steering_angle [rad], speed [m/s])   (2,).
         high: Largest   (2,); steering spans zero.
+        extra: What else its file says, which means nothing here, at any depth.
     """
 
     kind = "continuous"
@@ -153,8 +161,9 @@ class ContinuousActionSpace:
     """Numbers the policy gives: steering and speed."""
     labels = ("steering_angle", "speed")
 
-    def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
+    def __init__(self, low: ArrayLike, high: ArrayLike, *, extra: Mapping[str, Any] = {}) -> None:
         self.low, self.high = _frozen(low, name="low"), _frozen(high, name="high")
+        self.extra = dict(extra)
         if self.low.shape != (2,) or self.high.shape != (2,):
             raise ShapeError(
                 f"low has shape {self.low.shape} and high {self.high.shape}, expected (2,): steering_angle, speed."
@@ -173,11 +182,16 @@ class ContinuousActionSpace:
 
     @classmethod
     def from_aws(cls, limits: Mapping[str, Mapping[str, Any]]) -> ContinuousActionSpace:
-        """From AWS's ``{"steering_angle": {"low", "high"} in degrees, "speed": {"low", "high"}}``."""
+        """From AWS's ``{"steering_angle": {"low", "high"} in °, "speed": {"low", "high"}}``; others are `extra`."""
         steering, speed = limits["steering_angle"], limits["speed"]
+        inside = {
+            name: {key: value for key, value in limits[name].items() if key not in ("low", "high")}
+            for name in ("steering_angle", "speed")
+        }
         return cls(
             [math.radians(float(steering["low"])), float(speed["low"])],
             [math.radians(float(steering["high"])), float(speed["high"])],
+            extra={**limits, **inside},
         )
 
     def to_aws(self) -> dict[str, dict[str, float]]:
@@ -186,6 +200,10 @@ class ContinuousActionSpace:
             "steering_angle": {"low": _degrees(float(self.low[0])), "high": _degrees(float(self.high[0]))},
             "speed": {"low": float(self.low[1]), "high": float(self.high[1])},
         }
+
+    def to_file(self) -> dict[str, Any]:
+        """The same with `extra`."""
+        return {**self.extra, **{name: {**ends, **self.extra.get(name, {})} for name, ends in self.to_aws().items()}}
 
     def to_commands(self, actions: ArrayLike) -> NDArray[np.float32]:
         """Commands for ``Simulation.step``   (N, 2) from actions   (N, 2); what is beyond ±1 counts as ±1."""

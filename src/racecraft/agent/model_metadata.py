@@ -226,7 +226,7 @@ class ModelMetadata:
     def to_dict(self) -> dict[str, Any]:
         """The content of AWS's file, complete."""
         document: dict[str, Any] = {
-            "action_space": self.action_space.to_aws(),
+            "action_space": self.action_space.to_file(),
             "sensor": list(self.sensors),
             "neural_network": self.neural_network,
             "version": self.version,
