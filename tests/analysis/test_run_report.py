@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shutil
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -53,6 +55,24 @@ def test_a_report_needs_nothing_else(run: Path) -> None:
         ElementTree.fromstring(picture)
         assert "nan" not in picture
     assert len(text) < 2_000_000
+
+
+def test_nothing_is_drawn_on_a_road_that_was_redrawn_since(run: Path, tmp_path: Path) -> None:
+    """A file of the run says what road it was; by its name alone, another lies there now."""
+    again = tmp_path / "again"
+    shutil.copytree(run, again)
+    text = write_report(again).read_text()
+    assert "Racing line, coloured by speed" in text
+    (summary,) = again.glob("evaluation-*/evaluation.json")
+    redrawn = {"track_digest": "0" * 64}
+    summary.write_text(json.dumps({**json.loads(summary.read_text()), **redrawn}))
+    without = write_report(again).read_text()
+    assert "The track was changed since, so neither the line nor the corners are drawn." in without
+    assert "Racing line" not in without
+    assert "<h2>Where it was paid</h2>" in without
+    information = json.loads((again / "run.json").read_text())
+    (again / "run.json").write_text(json.dumps({**information, **redrawn}))
+    assert "<h2>Where it was paid</h2>" not in write_report(again).read_text()
 
 
 @pytest.mark.costly

@@ -47,6 +47,15 @@ def test_a_lap_in_training_and_a_lap_afterwards_count_alike(run: RunFolder) -> N
     assert (best.best_lap, best.stamp) == (9.6, "20260101000000")
 
 
+def test_the_road_decides_and_not_its_name(run: RunFolder) -> None:
+    run.write_info(RunInfo(seed=1, track="oval", track_digest="as it was"))
+    race(run, "20260101000000", best_lap_seconds=5.0, track_digest="redrawn")
+    assert judged_laps(run) == []
+    race(run, "20260101000001", best_lap_seconds=9.0, track="oval-copied", track_digest="as it was")
+    race(run, "20260101000002", best_lap_seconds=9.5)  # of an earlier version
+    assert [one.best_lap for one in judged_laps(run)] == [9.0, 9.5]
+
+
 def test_a_completion_is_the_mean_of_its_trials_and_what_is_no_number_counts_nowhere(run: RunFolder) -> None:
     run.history.parent.mkdir(exist_ok=True)
     points = [([1.0, 0.5], []), ([0, 0.0], []), ([True, "1", None, 0.4], [True, -1.0]), ([], [])]

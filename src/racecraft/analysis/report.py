@@ -23,10 +23,11 @@ from racecraft.analysis.report_page import page, pairs, section, table
 from racecraft.analysis.svg import Chart, Curve, action_fan, cell_map, line_chart, racing_line
 from racecraft.errors import RacecraftError, RunError
 from racecraft.json_file import read_json_object
+from racecraft.judging.trained import is_road_of
 from racecraft.run import RunFolder, Stretch, read_stretches
 from racecraft.run.atomic import write_file
 from racecraft.run.history import read_history
-from racecraft.track import Track, load_track, load_tracks
+from racecraft.track import Track, joint_digest, load_track, load_tracks
 
 MAX_POINTS: Final = 200_000
 PLACES: Final = 240
@@ -61,7 +62,8 @@ def report(folder: RunFolder) -> str:
         RacecraftError: The run, or its track, cannot be read.
     """
     info = folder.read_info()
-    track = load_tracks(info.track)[0]
+    roads = load_tracks(info.track)
+    track = roads[0]
     points = _history(folder)
     evaluation = _latest_evaluation(folder)
     stretches = read_stretches(folder)
@@ -75,7 +77,12 @@ def report(folder: RunFolder) -> str:
         with suppress(RacecraftError, KeyError):
             hero, more = _race(folder, stamp, summary, track)
             sections = [*more, *sections]
-    sections += [_maps(folder, track), checkpoint_table(folder, stretches), _actions(folder, track)]
+    is_as_it_was = joint_digest(roads) == info.track_digest
+    sections += [
+        _maps(folder, track) if is_as_it_was else "",
+        checkpoint_table(folder, stretches),
+        _actions(folder, track),
+    ]
     sections += rewards(stretches, folder.read_reward_function())
     sections.append(_settings(folder))
     return page(folder.name, lead, figures, hero, sections, versions=info.versions)
@@ -89,6 +96,9 @@ def _race(folder: RunFolder, stamp: str, summary: dict[str, Any], trained_on: Tr
     name = str(summary.get("track", ""))
     track = trained_on if name in ("", trained_on.name) else load_track(name)
     laps = read_laps(folder.evaluation(stamp) / "evaluation-simtrace" / "0-iteration.csv")
+    if not is_road_of(summary, folder.read_info(), track):
+        words = "The track was changed since, so neither the line nor the corners are drawn."
+        return "", [section("Laps of the last evaluation", f"<p>{words}</p>{_laps(laps)}")]
     driven = driven_direction(track, [lap.points for lap in laps])
     whole = sorted((lap for lap in laps if lap.is_complete), key=lambda lap: lap.seconds)
     best = whole[0] if whole else max(laps, key=lambda lap: lap.share[-1])
@@ -100,6 +110,11 @@ def _race(folder: RunFolder, stamp: str, summary: dict[str, Any], trained_on: Tr
         parts.append(section("The two best laps, place by place", _telemetry(driven, whole[0], whole[1])))
     if whole:
         parts.append(_corners(driven, whole))
+    parts.append(section("Laps of the last evaluation", _laps(laps)))
+    return hero, parts
+
+
+def _laps(laps: Sequence[TracedLap]) -> str:
     rows = [
         [
             str(lap.number),
@@ -112,8 +127,7 @@ def _race(folder: RunFolder, stamp: str, summary: dict[str, Any], trained_on: Tr
         for lap in laps
     ]
     heads = ["Lap", "Time, s", "Completion", "Mean speed, m/s", "Penalty, s", "End"]
-    parts.append(section("Laps of the last evaluation", table(heads, rows)))
-    return hero, parts
+    return table(heads, rows)
 
 
 def _telemetry(track: Track, first: TracedLap, second: TracedLap) -> str:

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.json_file import read_json_object
-from racecraft.run.folder import RunFolder
+from racecraft.run.folder import RunFolder, RunInfo
 from racecraft.run.history import MAX_LINE
 
 _EVALUATION: Final = b'{"kind": "evaluation"'
@@ -44,14 +44,14 @@ def judged_laps(folder: RunFolder) -> list[Judged]:
     Raises:
         RunError: The run itself cannot be read.
     """
-    tracks = {Path(part).stem for part in folder.read_info().track.split(",")}
+    info = folder.read_info()
     known = [*_during_training(folder.history)]
     seen = {judged.step for judged in known}
     for entry in folder.checkpoints.entries():  # all that an imported run may have
         lap = _number(entry.metrics.get("best_lap_s"))
         if entry.step not in seen and (lap is not None or entry.metrics.get("completion") is not None):
             known.append(Judged(step=entry.step, completion=_number(entry.metrics.get("completion")), best_lap=lap))
-    return [*known, *_afterwards(folder, tracks)]
+    return [*known, *_afterwards(folder, info)]
 
 
 def best_of(judged: Sequence[Judged]) -> Judged | None:
@@ -73,17 +73,25 @@ def _during_training(history: Path) -> Iterator[Judged]:
                 yield Judged(step=int(point["step"]), completion=mean, best_lap=min(laps, default=None))
 
 
-def _afterwards(folder: RunFolder, tracks: set[str]) -> Iterator[Judged]:
+def _afterwards(folder: RunFolder, info: RunInfo) -> Iterator[Judged]:
     for path in sorted(folder.path.glob("evaluation-*/evaluation.json")):
         with suppress(ConfigError, RunError, TypeError, ValueError):
             summary = read_json_object(path)
-            if Path(str(summary.get("track", ""))).stem in tracks:
+            if _is_own_track(summary, info):
                 yield Judged(
                     step=int(summary.get("step") or 0),
                     completion=_number(summary.get("mean_completion")),
                     best_lap=_number(summary.get("best_lap_seconds")),
                     stamp=path.parent.name.removeprefix("evaluation-"),
                 )
+
+
+def _is_own_track(summary: dict[str, Any], info: RunInfo) -> bool:
+    """Whether an evaluation was driven on the road the run learns on; an older one tells its name alone."""
+    told = summary.get("track_digest")
+    if told is not None:
+        return bool(told == info.track_digest)
+    return Path(str(summary.get("track", ""))).stem in {Path(part).stem for part in info.track.split(",")}
 
 
 def _number(value: Any) -> float | None:
