@@ -292,6 +292,15 @@ def test_a_store_that_did_not_answer_at_first_is_asked_again(
     database.close()
 
 
+def test_a_store_lies_in_its_folder_whatever_that_is_called(tmp_path: Path) -> None:
+    folder = make_run(tmp_path / "runs")
+    store = Artifacts(f"file://{tmp_path}/which? 50%20 #1")
+    store.keep(folder)
+    assert store.names() == ["a"]
+    assert (tmp_path / "which? 50%20 #1" / "runs" / "a").is_dir()
+    assert len(list(tmp_path.iterdir())) == 2
+
+
 @pytest.mark.parametrize("url", ["gs://x", "http://127.0.0.1", "file://relative", ""])
 def test_other_stores_are_refused(url: str) -> None:
     with pytest.raises(ConfigError, match="s3://"):

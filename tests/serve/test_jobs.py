@@ -71,6 +71,16 @@ def test_a_database_that_cannot_be_opened_is_told(tmp_path: Path) -> None:
         Database(f"sqlite:///{tmp_path / 'file.db'}").migrate()
 
 
+def test_a_database_lies_in_its_folder_whatever_that_is_called(tmp_path: Path) -> None:
+    folder = tmp_path / "which? 50% #1"
+    folder.mkdir()
+    database = Database(f"sqlite:///{folder / 'console.db'}")
+    database.migrate()
+    database.close()
+    assert (folder / "console.db").is_file()
+    assert [path.name for path in tmp_path.iterdir()] == [folder.name]
+
+
 def test_jobs_are_claimed_in_order_by_kind(queue: JobQueue) -> None:
     first, second = queue.add("train", "a", {}), queue.add("train", "b", {})
     other = queue.add("evaluate", "a", {})

@@ -271,6 +271,13 @@ def test_a_search_that_makes_no_sense_is_refused(tmp_path: Path, settings: dict[
         begin(tmp_path, **settings)
 
 
+def test_a_study_lies_in_its_search_whatever_the_folder_is_called(tmp_path: Path) -> None:
+    root = tmp_path / "which? 50% #1 {x}"
+    Tuning(begin(root)).past()
+    assert (root / "search" / "study.sqlite").is_file()
+    assert [path.name for path in tmp_path.iterdir()] == [root.name]
+
+
 def test_names_limits_and_damage_are_told_in_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="not allowed"):
         begin(tmp_path, name="../up")

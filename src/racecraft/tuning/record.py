@@ -6,6 +6,7 @@ it does not depend on how often anything was killed.
 
 from __future__ import annotations
 
+import sqlite3
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -45,7 +46,10 @@ class Record:
         self._states = self._library.trial.TrialState
         file = folder / "study.sqlite"
         try:
-            storage = self._library.storages.RDBStorage(f"sqlite:///{file.resolve()}")
+            storage = self._library.storages.RDBStorage(  # by its path: an address takes some characters for its own
+                f"sqlite:///{file.name}",
+                engine_kwargs={"creator": lambda: sqlite3.connect(file.resolve(), check_same_thread=False)},
+            )
             self._study: optuna.Study = self._library.create_study(
                 study_name="racecraft", storage=storage, load_if_exists=True, direction="minimize"
             )

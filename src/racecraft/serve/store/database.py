@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import sqlalchemy as sa
 from sqlalchemy.exc import SQLAlchemyError
@@ -17,6 +17,7 @@ from racecraft.errors import RunError
 from racecraft.serve.store.tables import Table, User, now
 
 MIGRATIONS = Path(__file__).parent / "migrations"
+SQLITE: Final = "sqlite:///"
 LOCAL_USER = "you"  # of a console of one's own
 
 
@@ -24,7 +25,7 @@ class Database:
     """A pool of connections.
 
     Args:
-        url: SQLAlchemy URL.
+        url: SQLAlchemy URL; the file of a ``sqlite:///FILE`` is taken to the letter.
 
     Raises:
         RunError: It cannot be opened or brought up to date.
@@ -32,7 +33,7 @@ class Database:
 
     def __init__(self, url: str) -> None:
         self.url = url
-        self.engine = sa.create_engine(url, pool_pre_ping=not url.startswith("sqlite"))
+        self.engine = sa.create_engine(_opened(url), pool_pre_ping=not url.startswith("sqlite"))
         if url.startswith("sqlite"):
             sa.event.listen(self.engine, "connect", _prepare_sqlite)
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
@@ -150,6 +151,12 @@ class Database:
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+def _opened(url: str) -> str | sa.URL:
+    """A folder's name may hold what an address takes for its own, such as ? and %."""
+    file = url.removeprefix(SQLITE)
+    return url if file == url else sa.URL.create("sqlite", database=file)
 
 
 def _make(connection: sa.Connection, version: str) -> None:

@@ -80,9 +80,8 @@ class ObjectStore:
         self._broken = (exceptions.BaseError, OSError)
         endpoint = os.environ.get("AWS_ENDPOINT_URL", os.environ.get("AWS_ENDPOINT", ""))
         try:
-            if url.startswith("file:"):
-                Path(url.removeprefix("file://")).mkdir(parents=True, exist_ok=True)
-                self._store: Any = store.from_url(url)
+            if url.startswith("file:"):  # to the letter: names of folders may hold what an address takes for its own
+                self._store: Any = store.LocalStore(Path(url.removeprefix("file://")), mkdir=True)
             else:
                 # obstore's own 5 s to connect and 30 s to answer are too short where a machine or a line is busy
                 times = {"connect_timeout": "30 seconds", "timeout": "300 seconds"}
