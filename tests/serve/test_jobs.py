@@ -12,9 +12,10 @@ import pytest
 import sqlalchemy as sa
 from running_consoles import running_console
 
-from racecraft.errors import RunError
+from racecraft.errors import ConfigError, RunError
 from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, MAX_LOSSES, JobQueue, kinds_of
 from racecraft.serve.jobs.turns import waiting_line
+from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job, Table, User, now
 
@@ -69,6 +70,18 @@ def test_a_database_that_cannot_be_opened_is_told(tmp_path: Path) -> None:
     (tmp_path / "file.db").write_bytes(b"not a database, but long enough to be read as one" * 100)
     with pytest.raises(RunError, match="cannot be opened"):
         Database(f"sqlite:///{tmp_path / 'file.db'}").migrate()
+
+
+@pytest.mark.parametrize("url", ["sqlite", "sqlite:x.db", "sqlite://", "sqlite:///", "mysql://a@b/c"])
+def test_what_is_no_database_is_refused(tmp_path: Path, url: str) -> None:
+    with pytest.raises(ConfigError, match=r"database is '\w+'; allowed are sqlite:///FILE and "):
+        ServeSettings(runs=tmp_path, database=url)
+
+
+def test_an_address_of_a_database_that_cannot_be_read_is_told_without_its_password() -> None:
+    with pytest.raises(ConfigError, match="address of the console's database cannot be read") as told:
+        Database("postgresql+psycopg://racecraft:secret:p@rt@db.local:secret/racecraft")
+    assert "secret" not in str(told.value)
 
 
 def test_a_database_lies_in_its_folder_whatever_that_is_called(tmp_path: Path) -> None:

@@ -94,9 +94,10 @@ class ServeSettings:
                 f"artifacts is {self.artifacts.split('://')[0]!r}; allowed are s3://BUCKET/PREFIX and file:///FOLDER."
             )
         self._check_address()
-        if self.database and not self.database.startswith(("sqlite", "postgresql+psycopg://")):
+        is_file = self.database.startswith("sqlite:///") and self.database != "sqlite:///"
+        if self.database and not is_file and not self.database.startswith("postgresql+psycopg://"):
             raise ConfigError(
-                f"database is {self.database.split('://')[0]!r}; allowed are sqlite:///FILE and "
+                f"database is {self.database.split(':')[0][:40]!r}; allowed are sqlite:///FILE and "
                 "postgresql+psycopg://USER@HOST/NAME."
             )
 

@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session, sessionmaker
 
-from racecraft.errors import RunError
+from racecraft.errors import ConfigError, RunError
 from racecraft.serve.store.tables import Table, User, now
 
 MIGRATIONS = Path(__file__).parent / "migrations"
@@ -28,12 +28,18 @@ class Database:
         url: SQLAlchemy URL; the file of a ``sqlite:///FILE`` is taken to the letter.
 
     Raises:
-        RunError: It cannot be opened or brought up to date.
+        ConfigError: This is no such URL.
     """
 
     def __init__(self, url: str) -> None:
         self.url = url
-        self.engine = sa.create_engine(_opened(url), pool_pre_ping=not url.startswith("sqlite"))
+        try:
+            self.engine = sa.create_engine(_opened(url), pool_pre_ping=not url.startswith("sqlite"))
+        except (sa.exc.ArgumentError, ValueError) as error:  # whose message may hold a part of the password
+            raise ConfigError(
+                "The address of the console's database cannot be read.",
+                hint="Allowed is postgresql+psycopg://USER:PASSWORD@HOST:PORT/NAME; in a password @ is %40, / is %2F.",
+            ) from error
         if url.startswith("sqlite"):
             sa.event.listen(self.engine, "connect", _prepare_sqlite)
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
