@@ -18,7 +18,7 @@
 # an episode as it can get. That is its only wish; it knows nothing of racing.
 
 # %% [markdown]
-# ## A car learns in two seconds
+# ## A car learns in a few seconds
 #
 # Here is a reward function. It looks like every one you will write: a function of `params`, a dictionary that tells
 # where the car is and what it does, returning a number.

@@ -34,7 +34,7 @@ for cut, name in zip(CAR_IN_A_TABLE, ("across the road", "angle to the road", "b
     print(f"{name:18} cut at {cut.edges}")
 
 # %% [markdown]
-# ## Learning, in less than a second
+# ## Learning, within seconds
 #
 # It is the Q-learning of lesson 4, with the very same line. It learns on an oval, with 64 cars at once, which all
 # write into the same table; cars that did the same in the same cell move it by their mean. The reward is 1 in the

@@ -223,6 +223,9 @@ def test_what_a_lesson_showed_is_of_the_code_that_it_has(number: int) -> None:
     shown = Shown.model_validate_json(shown_path(lesson).read_bytes())
     assert read_shown(lesson) == shown, "a picture is missing"
     assert shown.digest == digest_of(lesson.cells()), f"run python -m racecraft.course.shown {number}"
+    printed = "\n".join(one.text for outputs in shown.outputs.values() for one in outputs if one.kind == "text")
+    learned = [float(seconds) for seconds in re.findall(r"\b(?:in|for) ([\d.]+) s\b", printed)]
+    assert sum(learned) <= lesson.facts.seconds, "its parts took longer than it is said to"
     drawn = [one for outputs in shown.outputs.values() for one in outputs if one.kind == "picture"]
     for one in drawn:
         assert one.german, f"run python -m racecraft.course.shown {number} --language de"

@@ -103,7 +103,7 @@ def test_a_learner_goes_through_three_lessons(visit: Visit) -> None:
     assert visit.violations() == []
     assert visit.overflow() <= 0
     page = visit.open("/lessons/1", width=390)
-    expect(page.get_by_role("heading", name="Ein Auto lernt in zwei Sekunden")).to_be_visible()
+    expect(page.get_by_role("heading", name="Ein Auto lernt in ein paar Sekunden")).to_be_visible()
     assert set(page.locator("div.text").evaluate_all("all => all.map(one => one.lang)")) == {"de"}
     assert page.get_by_text("noch nicht übersetzt").count() == 0
     assert page.get_by_text("racecraft lessons open 1 --language de").count() > 1

@@ -60,7 +60,7 @@ def say_lessons(lessons: Sequence[Lesson], progress: Progress, language: str) ->
         table.add_row(
             str(lesson.number),
             Text.assemble((facts.title[language], "bold"), "\n", (facts.goal[language], "dim")),
-            f"{facts.seconds:.0f} s",
+            f"~{facts.seconds:.0f} s",
             Text(f"{solved} {words['of']} {len(names)}", "green" if solved == len(names) else ""),
             Text("–" if share is None else f"{100 * share:.0f} %", "green" if share == 1.0 else ""),
         )

@@ -33,7 +33,7 @@ class Facts(BaseModel):
     goal: Words
     """What a learner can do or explain afterwards, in one sentence."""
     seconds: float
-    """That it takes from top to bottom on one core of two, measured."""
+    """That it takes from top to bottom on one core of two, about."""
     questions: tuple[Question, ...]
 
 

@@ -12,7 +12,7 @@ export const de: Record<CourseKey, string> = {
   begin: "Mit Lektion {number} beginnen",
   go_on: "Mit Lektion {number} weitermachen",
   all_done: "Du hast alle gelesen.",
-  runs_for: "läuft {seconds} s",
+  runs_for: "läuft etwa {seconds} s",
   lesson: "Lektion {number}",
   goal: "Ziel",
   english: "Ein Teil dieser Lektion ist noch nicht übersetzt und steht auf Englisch da.",

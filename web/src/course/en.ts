@@ -10,7 +10,7 @@ export const en = {
   begin: "Begin with lesson {number}",
   go_on: "Go on with lesson {number}",
   all_done: "You have read all of them.",
-  runs_for: "runs for {seconds} s",
+  runs_for: "runs for about {seconds} s",
   lesson: "Lesson {number}",
   goal: "Goal",
   english: "A part of this lesson is not translated yet, and stands in English.",
