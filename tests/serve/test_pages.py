@@ -135,7 +135,7 @@ def visited() -> Iterator[tuple[RunningConsole, Page]]:
 
 
 ONE_BEST_LAP = r"""() => {
-  const told = document.querySelector(".figures dd").innerText.match(/[\d.]+ s/)?.[0];
+  const told = document.querySelector(".figures dd").innerText.match(/[\d.]+\ss/)?.[0];
   const above = document.querySelector("header p.row").innerText;
   if (told && !above.includes(told)) throw new Error(`${told} is not in ${above}`);
   return told;

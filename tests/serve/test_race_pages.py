@@ -73,7 +73,7 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     visit.console.wait_for(lambda: float(clock.inner_text().split()[0]) > 0.5)
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("slider", name="Moment of the race").fill("3")
-    assert clock.inner_text() == "0.2 s"
+    assert clock.inner_text() == "0.2\xa0s"
     assert page.locator(".film li").nth(0).locator("[aria-pressed=true]").count() == 1
     page.get_by_role("button", name="Why is").click()  # now the film is about the other one
     page.locator(".film li").nth(1).locator("[aria-pressed=true]").wait_for()

@@ -149,7 +149,7 @@ def test_the_medal_of_the_best_lap_is_on_the_card_and_on_its_pages(changed: Visi
         page = changed.open("/models/other/watch")
         won = page.get_by_role("complementary").get_by_text(medal.capitalize(), exact=True)
         won.wait_for()
-        assert f"Bronze {model['medals']['bronze']:.2f} s" in str(won.get_attribute("title"))
+        assert f"Bronze {model['medals']['bronze']:.2f}\xa0s" in str(won.get_attribute("title"))
         shutil.rmtree(folder)
 
 

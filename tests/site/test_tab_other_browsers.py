@@ -173,7 +173,7 @@ def test_a_car_learns_and_is_downloaded(visitor: Visitor, tmp_path: Path) -> Non
     archive = tmp_path / "model.tar.gz"
     archive.write_bytes(base64.b64decode(visitor.tab.wait(DOWNLOADED)))
     judged = RunFolder(import_run(archive, root=tmp_path).run).checkpoints.load("best").metadata["evaluator"]["last"]
-    visitor.read(f"best {min(judged['lap_times']):.2f} s")
+    visitor.read(f"best {min(judged['lap_times']):.2f}\xa0s")
 
 
 def test_a_reward_in_python_is_checked_and_trains(visitor: Visitor) -> None:

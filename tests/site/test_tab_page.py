@@ -141,7 +141,7 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
     page.get_by_role("button", name="Race it: oval-racing-1").click()
     expect(page.get_by_label("Ghost")).to_have_value("model:oval-racing-1", timeout=PATIENCE)
     page.get_by_role("button", name="Back").click()
-    shown = page.get_by_text(re.compile(r"oval, 5 of 5 laps, best \d+\.\d\d s")).inner_text()
+    shown = page.get_by_text(re.compile(r"oval, 5 of 5 laps, best \d+\.\d\d\ss")).inner_text()
     with page.expect_download() as download:
         page.get_by_role("button", name="Download: oval-racing-1").click()
     archive = tmp_path / download.value.suggested_filename
@@ -152,7 +152,7 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
     driven = evaluate(imported.run, rules=rules, seed=seed, video=False).evaluation
     laps = [lap for trial in driven.trials for lap in trial.lap_times]
     assert len(laps) == 5
-    assert f"best {min(laps):.2f} s" in shown
+    assert f"best {min(laps):.2f}\xa0s" in shown
     limit = known_limit(load_track("oval"), VEHICLES[STANDARD_CAR])
     assert limit is not None
     missed = limit.medals.next_after(min(laps))
@@ -173,7 +173,7 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
 
 def test_a_models_laps_are_watched_again_corner_by_corner(page: Page) -> None:
     about = page.get_by_label("Your models").locator(".model").get_by_text(re.compile("best")).inner_text()
-    best = re.search(r"best (\S+ s)", about)
+    best = re.search(r"best (\S+\ss)", about)
     assert best is not None
     page.get_by_role("button", name="Watch its laps: oval-racing-1").click()
     shown = page.get_by_role("dialog")
@@ -211,7 +211,7 @@ def test_a_drawn_track_is_trained_on_and_goes_with_its_model(page: Page, tmp_pat
     page.get_by_role("img", name=PAINTED).wait_for(timeout=PATIENCE)
     page.get_by_role("button", name="Train", exact=True).click()
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
-    shown = page.get_by_text(re.compile(r"mine, 5 of 5 laps, best \d+\.\d\d s")).inner_text()
+    shown = page.get_by_text(re.compile(r"mine, 5 of 5 laps, best \d+\.\d\d\ss")).inner_text()
     files = {}
     for button in ("Download this road", "Download: mine-racing-1"):
         with page.expect_download() as download:
@@ -224,7 +224,7 @@ def test_a_drawn_track_is_trained_on_and_goes_with_its_model(page: Page, tmp_pat
     driven = evaluate(imported.run, rules=rules, seed=seed, video=False).evaluation
     laps = [lap for trial in driven.trials for lap in trial.lap_times]
     assert len(laps) == 5
-    assert f"best {min(laps):.2f} s" in shown
+    assert f"best {min(laps):.2f}\xa0s" in shown
     page.get_by_role("button", name="Change this track").click()
     desk.get_by_role("button", name="Delete this track").click()
     desk.get_by_text("A model of yours drives on mine").wait_for()
@@ -291,7 +291,7 @@ def test_somebody_drives_a_lap_and_then_against_it(page: Page) -> None:
     page.keyboard.up("ArrowUp")
     page.get_by_role("button", name="Back").click()
     page.get_by_role("button", name="Drive yourself").click()
-    page.get_by_label("Ghost").get_by_text(re.compile(r"Your best lap · \d+\.\d\d s")).wait_for(
+    page.get_by_label("Ghost").get_by_text(re.compile(r"Your best lap · \d+\.\d\d\ss")).wait_for(
         state="attached", timeout=PATIENCE
     )
     page.get_by_role("button", name="Back").click()
@@ -363,7 +363,7 @@ def test_a_replay_is_driven_again_in_the_tab_and_a_changed_number_is_named(page:
     page.get_by_role("button", name="Watch its laps", exact=True).click()
     shown, best = page.get_by_role("dialog"), min(trial.laps[0].time for trial in evaluation.trials)
     shown.get_by_text("A replay does not say what its driver was paid for.").wait_for(timeout=PATIENCE)
-    shown.get_by_text(re.compile(rf"^club.replay, Lap \d · {best:.2f} s$")).wait_for()
+    shown.get_by_text(re.compile(rf"^club.replay, Lap \d · {best:.2f}\ss$")).wait_for()
     page.get_by_role("button", name="Back").click()
     replay = read_replay(path)
     replay.rewards[1][40] = 0.25

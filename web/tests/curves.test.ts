@@ -105,7 +105,9 @@ describe("hints", () => {
     curves.add([judged(5000, 1, true), judged(10000, 0.5, false), judged(20000, 0.4, false)]);
     expect(hints(curves, 10)).toEqual([]);
     curves.add([judged(30000, 0.6, false)]);
-    expect(hints(curves, 10)).toEqual([{ key: "forgot", values: { best: "100 %", step: "5,000", now: "60 %" } }]);
+    expect(hints(curves, 10)).toEqual([
+      { key: "forgot", values: { best: "100\u00a0%", step: "5,000", now: "60\u00a0%" } },
+    ]);
     expect(logOf(curves).map((entry) => entry.kind)).toEqual(["evaluation", "evaluation", "evaluation", "best"]);
   });
   it("see it in a short training, too, but not from one lucky iteration", () => {

@@ -19,7 +19,7 @@ describe("settings that had a say", () => {
     const [space] = differences([few, any].map((action_space) => hadASay({ model_metadata: { action_space } })));
     expect(space).toEqual({
       name: "model_metadata.action_space",
-      values: ["−30°: 1; 2 m/s\n0°: 2 m/s", "−30° … 30°\n0.5 … 4 m/s"],
+      values: ["−30°: 1; 2\u00a0m/s\n0°: 2\u00a0m/s", "−30° … 30°\n0.5 … 4\u00a0m/s"],
     });
   });
 });

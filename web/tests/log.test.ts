@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { LogEntry } from "../src/lib/curves";
 import { among, asText, searchOf, story, wantedBy } from "../src/lib/log";
+import { loose } from "../src/lib/numbers";
 
 const judged = (kind: "best" | "evaluation", seconds: number, lap: number): LogEntry => ({
   ...{ kind, seconds, step: 1000 * seconds },
@@ -29,15 +30,16 @@ test("entries are narrowed by kind and words; the best is an evaluation, too", (
   expect(among(ENTRIES, { kind: "evaluation", words: "" })).toEqual(ENTRIES.slice(0, 2));
   expect(among(ENTRIES, { kind: "best", words: "" })).toEqual([ENTRIES[1]]);
   expect(among(ENTRIES, { kind: "all", words: " STOPPED " })).toEqual([note]);
+  expect(among(ENTRIES, { kind: "all", words: "9.25 s" })).toEqual([ENTRIES[1]]); // as it is typed
   expect(among(ENTRIES, { kind: "note", words: "9.25" })).toEqual([]);
 });
 
 test("a file has a line each, oldest first", () => {
   expect(asText(ENTRIES).split("\n")).toEqual([
     "0:01\t7\tStopped by its owner.",
-    `1:00\t60000\t${story(ENTRIES[1]!)}`,
-    `1:15\t75000\t${story(ENTRIES[0]!)}`,
+    `1:00\t60000\t${loose(story(ENTRIES[1]!))}`,
+    `1:15\t75000\t${loose(story(ENTRIES[0]!))}`,
     "",
   ]);
-  expect(story(ENTRIES[1]!)).toContain("1 of 2 laps, 75 %, 9.25 s");
+  expect(story(ENTRIES[1]!)).toContain("1 of 2 laps, 75\u00a0%, 9.25\u00a0s");
 });

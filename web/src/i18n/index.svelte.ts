@@ -4,7 +4,7 @@ import { en, type Key } from "./en";
 import { fill, type Values } from "./fill";
 import { choose, language, type Language } from "./language.svelte";
 import { translator } from "./sentences";
-import { fixed } from "../lib/numbers";
+import { bound, fixed } from "../lib/numbers";
 
 export { language, languages, type Language } from "./language.svelte";
 
@@ -21,7 +21,7 @@ export async function learnErrors(): Promise<void> {
 void learnErrors();
 
 /** What the server said, in the page's language where it is known there. */
-export const said = (text: string): string => (language.choice !== "en" && translated ? translated(text) : text);
+export const said = (text: string): string => bound(language.choice !== "en" && translated ? translated(text) : text);
 
 export function speak(choice: Language): void {
   choose(choice);

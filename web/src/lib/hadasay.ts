@@ -1,5 +1,5 @@
 /** The settings of a training that had a say in it, as they are held against another's. */
-import { plain } from "./numbers";
+import { plain, withUnit } from "./numbers";
 
 type Document = Record<string, unknown>;
 
@@ -24,11 +24,12 @@ function actionsText(space: unknown): string {
   if (!Array.isArray(space)) {
     const { steering_angle: angle, speed } = space as Record<string, { low: number; high: number }>;
     return angle && speed
-      ? `${plain(angle.low)}° … ${plain(angle.high)}°\n${plain(speed.low)} … ${plain(speed.high)} m/s`
+      ? `${plain(angle.low)}° … ${plain(angle.high)}°\n${plain(speed.low)} … ${withUnit(speed.high, "m/s")}`
       : JSON.stringify(space);
   }
   const speeds = new Map<number, number[]>();
   for (const { steering_angle, speed } of space as { steering_angle: number; speed: number }[])
     speeds.set(steering_angle, [...(speeds.get(steering_angle) ?? []), speed]);
-  return [...speeds].map(([angle, all]) => `${plain(angle)}°: ${all.map(plain).join("; ")} m/s`).join("\n");
+  const told = (all: number[]) => [...all.slice(0, -1).map(plain), withUnit(all.at(-1), "m/s")].join("; ");
+  return [...speeds].map(([angle, all]) => `${plain(angle)}°: ${told(all)}`).join("\n");
 }

@@ -1,7 +1,7 @@
 /** What happened in a training, as people read it, and which of it an address asks for: /models/NAME/log?kind=best&words=9. */
 import { said, t } from "../i18n/index.svelte";
 import { bestLapOf, completionOf, type LogEntry } from "./curves";
-import { clock, percent, seconds } from "./numbers";
+import { clock, loose, percent, seconds } from "./numbers";
 
 export const KINDS = ["all", "evaluation", "best", "note"] as const;
 export interface Wanted {
@@ -39,12 +39,12 @@ export const among = (entries: LogEntry[], { kind, words }: Wanted): LogEntry[] 
   entries.filter(
     (entry) =>
       (kind === "all" || entry.kind === kind || (kind === "evaluation" && entry.kind === "best")) &&
-      story(entry).toLowerCase().includes(words.trim().toLowerCase()),
+      loose(story(entry)).toLowerCase().includes(words.trim().toLowerCase()),
   );
 
 /** A line each, oldest first, as logs are. */
 export const asText = (entries: LogEntry[]): string =>
   entries
     .toReversed()
-    .map((entry) => `${clock(entry.seconds)}\t${entry.step}\t${story(entry)}\n`)
+    .map((entry) => `${clock(entry.seconds)}\t${entry.step}\t${loose(story(entry))}\n`)
     .join("");

@@ -3,7 +3,7 @@ import type { RuleSet } from "../api/races";
 import type { components } from "../api/schema";
 import type { Key } from "../i18n/en";
 import { t } from "../i18n/index.svelte";
-import { plain } from "./numbers";
+import { plain, withUnit } from "./numbers";
 
 type Asked = components["schemas"]["NewHeat"];
 type Lane = 1 | -1;
@@ -102,7 +102,7 @@ interface Group {
 }
 
 const placeOf = ([at, lane]: [number, number]) =>
-  `${plain(Math.round(1000 * at) / 10)} % ${t(lane === 1 ? "road_inner" : "road_outer")}`;
+  `${withUnit(Math.round(1000 * at) / 10, "%")} ${t(lane === 1 ? "road_inner" : "road_outer")}`;
 
 /** What is on the road besides the models, in words. */
 export function toldObjects(objects: Record<string, unknown>): string {
@@ -112,13 +112,13 @@ export function toldObjects(objects: Record<string, unknown>): string {
   const name: Key = bots ? "races_bots" : group.kind === "car" ? "road_parked_cars" : "races_objects";
   return [
     `${t(name)}: ${plain(group.count)}`,
-    ...(bots ? [`${plain(group.speed)} m/s`] : []),
+    ...(bots ? [withUnit(group.speed, "m/s")] : []),
     ...(group.changes_lane ? [t("road_lanes_told")] : []),
     group.placement === "fixed" ? group.positions.map(placeOf).join(", ") : t(`road_${group.placement}`),
   ].join(" · ");
 }
 
-const cost = (value: unknown) => `${plain(Number(value))} s`;
+const cost = (value: unknown) => withUnit(Number(value), "s");
 
 /** The rules that something was driven under, as labels and values. */
 export function toldRules(rules: Record<string, unknown>): [string, string][] {
