@@ -105,7 +105,7 @@ def test_a_lap_is_scrubbed_with_a_ghost_beside_it(studio: tuple[RunningConsole, 
     page.get_by_text("Time behind the chosen lap").first.wait_for()
     slider = page.get_by_role("slider", name="Moment of the lap")
     slider.fill("1")
-    assert slider.get_attribute("aria-valuetext") == "1.00 s"
+    assert slider.get_attribute("aria-valuetext") == "1.00\xa0s"
     place = page.locator(".now").get_attribute("cx")
     page.get_by_role("img", name="Speed, m/s").click(position={"x": 300, "y": 60})
     page.locator(f".now:not([cx='{place}'])").wait_for(state="attached")
@@ -173,6 +173,26 @@ def test_maps_and_saliency(studio: tuple[RunningConsole, Any]) -> None:
     with page.expect_download() as download:
         page.get_by_role("link", name="Download the report").click()
     assert b"Laps of the last evaluation" in Path(download.value.path()).read_bytes()
+
+
+def test_a_map_that_was_asked_for_before_does_not_come_after(studio: tuple[RunningConsole, Any]) -> None:
+    page = visit(studio, "/models/left/analysis")
+    told = page.get_by_role("region", name="Where it happened").locator(".controls .number")
+    told.wait_for()
+    whole = told.inner_text()
+    assert page.get_by_role("slider", name="Iteration").get_attribute("max") != "0"
+    held: list[Any] = []
+    page.route("**/maps?*", lambda route: route.continue_() if held else held.append(route))
+    box = page.get_by_role("checkbox", name="The whole training")
+    box.uncheck()
+    studio[0].wait_for(lambda: page.wait_for_timeout(50) or held)
+    with page.expect_response("**/maps?*"):
+        box.check()
+    with page.expect_response("**/maps?*"):
+        held[0].continue_()  # late
+    page.wait_for_timeout(300)
+    assert told.inner_text() == whole
+    page.unroute("**/maps?*")
 
 
 def test_models_are_compared(studio: tuple[RunningConsole, Any]) -> None:
