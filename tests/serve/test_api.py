@@ -45,7 +45,10 @@ def test_what_the_console_offers(console: RunningConsole) -> None:
     lines = client.get("/api/tracks/oval").json()
     assert len(lines["center"]) == len(lines["inner"]) == len(lines["outer"])
     assert "racing" in {reward["name"] for reward in client.get("/api/rewards").json()}
-    kinds = {preset["name"]: preset["kind"] for preset in client.get("/api/actions").json()}
+    presets = client.get("/api/actions").json()
+    (fast,) = (preset for preset in presets if preset["name"] == "fast")
+    assert [action["speed"] for action in fast["actions"][:3]] == [4 / 3, 8 / 3, 4.0]  # all their digits
+    kinds = {preset["name"]: preset["kind"] for preset in presets}
     assert kinds["continuous"] == "continuous"
     assert kinds["default"] == "discrete"
     assert client.get("/api/openapi.json").json()["paths"]["/api/models"]

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { ActionPreset, NumberChoice } from "../src/api/client";
-import { actionAt, grid, metadataOf, rings, sameSpace, scaleOf, tidy, tip } from "../src/lib/actions";
+import { actionAt, changed, grid, metadataOf, reachOf, rings, sameSpace, scaleOf, tidy, tip } from "../src/lib/actions";
 import { around, differences, diffLines } from "../src/lib/diff";
 import { estimate, fromSlider, isSafe, toSlider } from "../src/lib/numberscale";
 
@@ -49,6 +49,34 @@ describe("an action space", () => {
       [30, 0.5],
       [30, 1],
     ]);
+  });
+  it("is carried with all its digits, and what is left alone keeps them", () => {
+    const thirds = grid(30, 7, 4, 3);
+    expect(thirds.slice(0, 4)).toEqual([
+      { steering_angle: -30, speed: 4 / 3 },
+      { steering_angle: -30, speed: 8 / 3 },
+      { steering_angle: -30, speed: 4 },
+      { steering_angle: -20, speed: 4 / 3 },
+    ]);
+    expect(changed(thirds[0]!, { steering_angle: -29, speed: 4 / 3 })).toEqual({ steering_angle: -29, speed: 4 / 3 });
+    expect(changed(thirds[0]!, { steering_angle: -30, speed: 1.43 })).toEqual({ steering_angle: -30, speed: 1.45 });
+    const rounded = thirds.map(({ steering_angle, speed }) => ({ steering_angle, speed: +speed.toFixed(3) }));
+    expect(sameSpace(space(thirds), space(rounded))).toBe(false); // and is not taken for another
+    expect(metadataOf(space(thirds))["action_space"]).toEqual(thirds.map((one, index) => ({ ...one, index })));
+  });
+  it("may steer further where a file of 2018 does, and stays such a file", () => {
+    const old = [-45, 0, 45].map((steering_angle) => ({ steering_angle, speed: 1 }));
+    expect([reachOf(old), reachOf(grid(30, 3, 1, 2))]).toEqual([45, 30]);
+    expect(changed(old[0]!, { steering_angle: -45, speed: 2 }, reachOf(old))).toEqual({
+      steering_angle: -45,
+      speed: 2,
+    });
+    expect(changed(old[0]!, { steering_angle: -60, speed: 1 }, reachOf(old))).toEqual({
+      steering_angle: -45,
+      speed: 1,
+    });
+    expect(metadataOf(space(old))["version"]).toBe("2");
+    expect(metadataOf(space(grid(30, 3, 1, 2)))["version"]).toBe("5");
   });
   it("knows whether it is a preset's", () => {
     expect(sameSpace(space(grid(30, 3, 1, 2)), space(grid(30, 3, 1, 2)))).toBe(true);

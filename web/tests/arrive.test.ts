@@ -69,6 +69,25 @@ test("a download comes back as what it was", async () => {
   expect(weights).toEqual(model.weights);
 });
 
+test("actions arrive with all their digits, and as wide as files of their version may be", async () => {
+  const told = (version: unknown, angles: number[]) =>
+    changed("model_metadata.json", (metadata) => ({
+      ...{ ...metadata, version }, // none is not written
+      action_space: angles.map((steering_angle) => ({ steering_angle, speed: 4 / 3 })),
+    }));
+  for (const version of ["1", "2", 2, undefined]) {
+    const { space: found } = await arrives(await told(version, [-45, 0, 45]));
+    expect(found?.actions.map((one) => [one.steering_angle, one.speed])).toEqual([-45, 0, 45].map((a) => [a, 4 / 3]));
+    expect(
+      new TextDecoder().decode(
+        (await untar(await archive({ ...model, space: found }, plan), () => 1 << 20)).get("mine/model_metadata.json"),
+      ),
+    ).toContain('"version":"2"');
+  }
+  expect(await problem(await told("5", [-45, 0, 45]))).toBe("arrive_damaged");
+  expect(await problem(await told("2", [-46, 0, 45]))).toBe("arrive_damaged");
+});
+
 test("what this page does not have is refused with its name", async () => {
   const settings = (more: object) =>
     changed("run.json", (run) => ({ ...run, settings: { ...(run["settings"] as object), ...more } }));

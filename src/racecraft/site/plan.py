@@ -18,7 +18,6 @@ from racecraft.reward import situations
 from racecraft.run.folder import RunInfo
 from racecraft.run.simtrace import STEP_WIDTH
 from racecraft.serve.rewards.routes import list_actions
-from racecraft.serve.rewards.schemas import ActionPreset
 from racecraft.serve.tracks.courses import geometry
 from racecraft.sim.camera import CAMERAS, CameraSpec
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS, STATUS_NAMES
@@ -175,7 +174,7 @@ def plan() -> dict[str, Any]:
         "objectKinds": list(OBJECT_KINDS),
         "traceWidth": STEP_WIDTH,
         "objectColumns": {"header": list(OBJECT_HEADER), "each": list(OBJECT_COLUMNS)},
-        "spaces": [told_space(preset) for preset in list_actions()],
+        "spaces": [preset.model_dump() for preset in list_actions()],
         "races": {race: told_race(race) for race in RACE_TYPES},
         "known": known(),
     }
@@ -213,14 +212,6 @@ def _metadata(space: ActionSpace, objects: Objects) -> ModelMetadata:
 def _settings(space: ActionSpace, objects: Objects = NO_OBJECTS) -> TrainSettings:
     until = Until.parse(regime_of(objects=objects).until)
     return make_settings(metadata=_metadata(space, objects), objects=objects, until=until, algorithm="ppo")
-
-
-def told_space(preset: ActionPreset) -> dict[str, Any]:
-    """A preset as the console has it, with its numbers to the last digit: the page trains with them."""
-    told, space = preset.model_dump(), action_space(preset.name)
-    if isinstance(space, DiscreteActionSpace):
-        told["actions"] = [{"steering_angle": angle, "speed": speed} for angle, speed in space.to_degrees()]
-    return told
 
 
 def told_policy(space: ActionSpace, objects: Objects = NO_OBJECTS) -> dict[str, Any]:

@@ -1,18 +1,32 @@
 /** Action spaces as people edit them: degrees and m/s, within what the car can do. */
 import type { Action, ActionPreset } from "../api/client";
 
-export const MAX_STEERING = 30;
+export const MAX_STEERING = 30; // degrees; the car's front wheels turn no further
+export const MAX_FILE_STEERING = 45; // degrees; files of 2018 have it: rewards and logs say so
 export const [MIN_SPEED, MAX_SPEED] = [0.1, 4];
 export const [MIN_ACTIONS, MAX_ACTIONS] = [2, 30];
 export const REACH = 92; // px of the fastest arrow
 
 export const clamp = (value: number, low: number, high: number) => Math.min(Math.max(value, low), high);
 
+/** How far actions may steer: as the wheels do, or where a file says more, as such files may. */
+export const reachOf = (actions: Action[]): number =>
+  actions.some((action) => Math.abs(action.steering_angle) > MAX_STEERING) ? MAX_FILE_STEERING : MAX_STEERING;
+
 /** An action the car can do, in half degrees and twentieths of a metre a second. */
-export const tidy = (action: Action): Action => ({
-  steering_angle: clamp(Math.round(action.steering_angle * 2) / 2, -MAX_STEERING, MAX_STEERING) + 0,
+export const tidy = (action: Action, reach = MAX_STEERING): Action => ({
+  steering_angle: clamp(Math.round(action.steering_angle * 2) / 2, -reach, reach) + 0,
   speed: clamp(Math.round(action.speed * 20) / 20, MIN_SPEED, MAX_SPEED),
 });
+
+/** The same action as somebody changed it; what they left as it was keeps all its digits. */
+export function changed(before: Action, to: Action, reach = MAX_STEERING): Action {
+  const tidied = tidy(to, reach);
+  return {
+    steering_angle: to.steering_angle === before.steering_angle ? before.steering_angle : tidied.steering_angle,
+    speed: to.speed === before.speed ? before.speed : tidied.speed,
+  };
+}
 
 /** The speed that the longest arrow stands for: room to pull beyond the fastest action. */
 export const scaleOf = (actions: Action[]): number =>
@@ -44,13 +58,14 @@ export function grid(maxSteering: number, angles: number, maxSpeed: number, spee
   for (let angle = 0; angle < angles; angle++)
     for (let speed = 1; speed <= speeds; speed++)
       found.push({
-        steering_angle: angles > 1 ? +(-maxSteering + (2 * maxSteering * angle) / (angles - 1)).toFixed(3) : 0,
-        speed: +((maxSpeed * speed) / speeds).toFixed(3),
+        steering_angle: angles > 1 ? -maxSteering + (2 * maxSteering * angle) / (angles - 1) : 0,
+        speed: (maxSpeed * speed) / speeds,
       });
   return found;
 }
 
-const near = (a: number, b: number) => Math.abs(a - b) < 1e-3;
+/** Of numbers that were turned into radians and back; what differs by more is carried as it is. */
+const near = (a: number, b: number) => Math.abs(a - b) < 1e-9;
 
 export const sameSpace = (a: ActionPreset, b: ActionPreset): boolean =>
   a.kind === b.kind &&
@@ -64,11 +79,19 @@ export const sameSpace = (a: ActionPreset, b: ActionPreset): boolean =>
       near(value, [...(b.steering_angle ?? []), ...(b.speed ?? [])][index]!),
     ));
 
-/** The original's document of an action space. */
+const VERSION = "5"; // of the original's simulator
+const OLD = "2"; // whose files may say more than the wheels turn
+
+/** The original's document of an action space, with the version of its simulator that has such actions. */
 export const metadataOf = (space: ActionPreset): Record<string, unknown> =>
   space.kind === "discrete"
-    ? { action_space_type: "discrete", action_space: space.actions.map((action, index) => ({ ...action, index })) }
+    ? {
+        version: reachOf(space.actions) > MAX_STEERING ? OLD : VERSION,
+        action_space_type: "discrete",
+        action_space: space.actions.map((action, index) => ({ ...action, index })),
+      }
     : {
+        version: VERSION,
         action_space_type: "continuous",
         action_space: {
           steering_angle: { low: space.steering_angle![0], high: space.steering_angle![1] },

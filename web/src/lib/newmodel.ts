@@ -110,7 +110,7 @@ function actionsOf({ space, sensors }: Wishes, { spaces }: Known): Partial<NewMo
   const preset = presetOf(space, spaces);
   if (preset) return { actions: preset.name, ...(sensors.length ? { sensors } : {}) };
   const sensor = sensors.length ? sensors : ["FRONT_FACING_CAMERA"];
-  return { model_metadata: { ...metadataOf(space), sensor, neural_network: "RACECRAFT_SMALL", version: "5" } };
+  return { model_metadata: { ...metadataOf(space), sensor, neural_network: "RACECRAFT_SMALL" } };
 }
 
 function numbersOf({ algorithm, learning, tuned }: Wishes, { choices }: Known): Partial<NewModel> {

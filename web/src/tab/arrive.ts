@@ -3,7 +3,7 @@
  * It may be anybody's, so nothing of it is believed: what is taken over is checked field by field, and what else it says
  * is left. How it drives is not read but judged anew. */
 import type { ActionPreset } from "../api/client";
-import { MAX_ACTIONS, MAX_SPEED, MAX_STEERING, MIN_ACTIONS } from "../lib/actions";
+import { MAX_ACTIONS, MAX_FILE_STEERING, MAX_SPEED, MAX_STEERING, MIN_ACTIONS } from "../lib/actions";
 import { ArrivalProblem } from "./arrivalproblem";
 import { sha256, type Model } from "./model";
 import type { Plan, RaceType } from "./plan";
@@ -133,12 +133,15 @@ const ROUNDED = 1e-6; // degrees or m/s: what a number that was turned into radi
 const within = (value: unknown, low: number, high: number): number =>
   typeof value === "number" && value >= low - ROUNDED && value <= high + ROUNDED ? value : damaged();
 
-function spaceOf({ action_space_type: kind, action_space: given }: Table): ActionPreset {
+const OLD = ["1", "2"]; // versions of the original's simulator whose files may say more than the wheels turn
+
+function spaceOf({ action_space_type: kind, action_space: given, version }: Table): ActionPreset {
   const space = { name: "", description: "" };
   if (kind !== "continuous") {
     if (!Array.isArray(given) || given.length < MIN_ACTIONS || given.length > MAX_ACTIONS) return damaged();
+    const reach = OLD.includes(String(version ?? OLD[0])) ? MAX_FILE_STEERING : MAX_STEERING;
     const actions = given.map((one: Table | null) => ({
-      steering_angle: within(one?.["steering_angle"], -MAX_STEERING, MAX_STEERING),
+      steering_angle: within(one?.["steering_angle"], -reach, reach),
       speed: within(one?.["speed"], 0, MAX_SPEED),
     }));
     return { ...space, kind: "discrete", actions };

@@ -82,10 +82,7 @@ def list_actions() -> list[ActionPreset]:
         space = action_space(name)
         text = DESCRIPTIONS.get(name, "")
         if isinstance(space, DiscreteActionSpace):
-            actions = [
-                Action(steering_angle=round(math.degrees(angle), 3), speed=round(speed, 3))
-                for angle, speed in space.table.tolist()
-            ]
+            actions = [Action(steering_angle=angle, speed=speed) for angle, speed in space.to_degrees()]
             listed.append(ActionPreset(name=name, description=text, kind="discrete", actions=actions))
         else:
             limits = space.to_aws()
