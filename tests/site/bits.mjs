@@ -133,7 +133,13 @@ function ask(core, { rows, count, source, track: of, seed }) {
   }
 }
 
-const check = (_, { source, track: of }) => python.check(source, of);
+/** What a check says; with `among`, after the moments that there are among its objects. */
+async function check(core, { source, track: of, among }) {
+  if (!among) return python.check(source, of);
+  const { momentsAmong } = await load("src/tab/among.ts");
+  const situations = momentsAmong(core, of, among);
+  return { moments: situations, ...python.check(source, { ...of, situations }) };
+}
 
 function train(
   core,

@@ -15,8 +15,9 @@ from test_core_bits import PLAIN, SEED, in_node, trained
 
 from racecraft.errors import RewardError
 from racecraft.reward import RewardWorker, check_reward, dry_run, keeps_state, situations
+from racecraft.sim import Bots, Objects, Obstacles
 from racecraft.site.__main__ import python_files
-from racecraft.site.plan import packed, track_file
+from racecraft.site.plan import packed, plan, track_file
 from racecraft.track import load_track
 
 pytestmark = pytest.mark.slow
@@ -72,6 +73,17 @@ def reward_function(params):
     "empty": "",
     "two megabytes": "def reward_function(params):\n    return 1.0\n" + "#" * 2_000_000,
 }
+AMONG = {
+    "object-avoidance": Objects(obstacles=Obstacles(count=5, placement="even")),
+    "head-to-bot": Objects(bots=Bots(count=2, placement="random", speed=0.7, changes_lane=True)),
+}
+LOOKS_OUT = """def reward_function(params):
+    behind, ahead = params["closest_objects"]
+    x, y = params["objects_location"][ahead]
+    away = abs(params["x"] - x) + abs(params["y"] - y)
+    hit = params["is_crashed"] * 10.0
+    return params["objects_distance"][ahead] + away + behind + params["objects_speed"][behind] - hit
+"""
 MANY_PRINTS = """def reward_function(params):
     for number in range(200_000):
         print(number)
@@ -82,6 +94,13 @@ MANY_PRINTS = """def reward_function(params):
 @pytest.fixture(scope="module")
 def rows() -> np.ndarray[Any, Any]:
     return np.stack([situation.row for situation in situations(load_track(TRACK))])
+
+
+def among(race: str) -> dict[str, Any]:
+    """What the page is told of a race's objects."""
+    told = plan()
+    about = {name: told[name] for name in ("vehicle", "statuses", "objectColumns")}
+    return {**about, "objects": AMONG[race].to_dict(), "trials": told["races"][race]["trials"]}
 
 
 @pytest.fixture(scope="module")
@@ -104,9 +123,12 @@ def found(native: Any, rows: Any, tmp_path_factory: pytest.TempPathFactory) -> d
         *({**asked, "source": source} for source in (REMEMBERS, MANY_PRINTS, *BROKEN.values())),
         *({"what": "check", "source": source, "track": track} for source in CHECKED.values()),
         {"what": "check", "source": "import numpy as np\n" + CHECKED["good"], "track": track},
+        *({"what": "check", "source": LOOKS_OUT, "track": track_file(TRACK), "among": among(race)} for race in AMONG),
     ]
     training, remembers, prints, *rest = in_node("core", cases, tmp_path_factory.mktemp("python"))["results"]
+    rest, told = rest[: -len(AMONG)], rest[-len(AMONG) :]
     return {
+        "among": dict(zip(AMONG, told, strict=True)),
         "training": training,
         "remembers": remembers,
         "prints": prints,
@@ -151,6 +173,18 @@ def test_situations_are_paid_as_in_a_dry_run(found: Any, name: str) -> None:
     tried = dry_run(CHECKED[name], load_track(TRACK))
     theirs = found["checked"][name]["situations"]
     assert [[one["name"], one["reward"]] for one in theirs] == [[one.situation.name, one.reward] for one in tried]
+
+
+@pytest.mark.parametrize("race", AMONG)
+def test_a_reward_is_tried_among_the_objects_of_its_race(found: Any, race: str) -> None:
+    tried = dry_run(LOOKS_OUT, load_track(TRACK), objects=AMONG[race])
+    theirs = found["among"][race]
+    assert theirs["ok"], theirs["problems"]
+    assert [one["name"] for one in theirs["situations"]] == [one.situation.name for one in tried]
+    for told, ours in zip(theirs["moments"], tried, strict=True):
+        np.testing.assert_allclose(told["row"], ours.situation.row, rtol=0, atol=1e-9, err_msg=told["name"])
+    for told, ours in zip(theirs["situations"], tried, strict=True):
+        assert told["reward"] == pytest.approx(ours.reward, abs=1e-8), told["name"]
 
 
 def test_millions_of_prints_leave_the_last_of_them(found: Any) -> None:

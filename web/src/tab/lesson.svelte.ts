@@ -123,15 +123,16 @@ export class Lesson {
     this.workers.plain!.postMessage({ kind: "show", plan: this.plan, track } satisfies Show);
   }
 
-  /** What is wrong with a reward function; what does not answer is ended. While the worker trains, the question waits. */
-  check(source: string, track: TrackFile): Promise<RewardVerdict> {
+  /** What is wrong with a reward function, among the objects of a race; what does not answer is ended. While the worker trains, the question waits. */
+  check(source: string, track: TrackFile, type: RaceType, objects: Objects): Promise<RewardVerdict> {
     this.preparePython();
     return new Promise((answer) => {
       const question = (this.painted = ++this.questions);
       const post = () => {
         clearTimeout(this.asked?.timer);
-        const { statuses } = this.plan;
-        const asked = { kind: "check", question, source, track: $state.snapshot(track), statuses } satisfies Check;
+        const { vehicle, statuses, objectColumns, races } = this.plan;
+        const among = { objects, trials: races[type].trials, vehicle, statuses, objectColumns };
+        const asked = { kind: "check", question, source, track: $state.snapshot(track), among } satisfies Check;
         this.workers.python!.postMessage(asked);
         this.asked!.timer = window.setTimeout(() => {
           answer(refusal(`The reward function did not return within ${PATIENCE} s.`));

@@ -56,8 +56,8 @@ export class Python {
     return new Python(calls);
   }
 
-  /** Its mistakes, and what it pays in situations on a track. */
-  check(source: string, { waypoints, situations }: TrackFile): RewardVerdict {
+  /** Its mistakes, and what it pays in situations on a track, which may be among objects. */
+  check(source: string, { waypoints, situations }: Pick<TrackFile, "waypoints" | "situations">): RewardVerdict {
     return JSON.parse(this.calls.check(JSON.stringify({ source, waypoints, situations }))) as RewardVerdict;
   }
 

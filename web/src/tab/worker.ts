@@ -1,5 +1,6 @@
 /** The thread beside the page in which cars drive and learn, with Python where it is asked for; it is ended by ending the
  * worker. */
+import { momentsAmong, type Among } from "./among";
 import type { RewardPainting, RewardVerdict } from "../api/client";
 import type { Drive, DriveState, Settings } from "../api/drives";
 import type { Look, Picture } from "../scene/poses";
@@ -53,7 +54,7 @@ export interface Check {
   question: number;
   source: string;
   track: TrackFile;
-  statuses: string[];
+  among: Among; // what it is tried with
 }
 
 /** What a preset pays along a track is to be painted. */
@@ -222,11 +223,13 @@ async function handle(asked: Asked): Promise<void> {
 }
 
 /** What is wrong with a reward, and then, where nothing is, its painting. */
-async function check({ question, source, track, statuses }: Check, { core, python }: Loaded): Promise<void> {
-  const verdict = python!.check(source, track);
+async function check({ question, source, track, among }: Check, { core, python }: Loaded): Promise<void> {
+  const situations = momentsAmong(core.core, track, among);
+  const verdict = python!.check(source, { waypoints: track.waypoints, situations });
   tell({ kind: "checked", question, verdict });
   const open = () => python!.open(source, track, 1, core.core.names("row").length, 0).pay;
-  if (verdict.ok) await painted({ question, track, statuses }, core, open, () => tell({ kind: "painting" }));
+  if (verdict.ok)
+    await painted({ question, track, statuses: among.statuses }, core, open, () => tell({ kind: "painting" }));
 }
 
 let newest = 0; // of the questions for paintings; a training is one, too
