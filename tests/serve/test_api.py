@@ -78,6 +78,19 @@ def test_a_reward_is_checked_and_painted(console: RunningConsole) -> None:
     broken = client.post("/api/rewards/check", json={"source": "def reward_function(p:\n", "track": "oval"}).json()
     assert not broken["ok"]
     assert broken["problems"][0]["line"] == 1
+    elsewhere = GATE.replace("\n", "\n    assert params['track_length'] < 20\n", 1)
+    wide = {"source": elsewhere, "track": "oval"}
+    assert client.post("/api/rewards/check", json=wide).json()["ok"]
+    verdict = client.post("/api/rewards/check", json={**wide, "more_tracks": ["oval", "hairpin"]}).json()
+    assert (verdict["ok"], verdict["problems"][-1]["line"]) == (False, 2)
+    assert verdict["problems"][-1]["hint"] == "It failed on the track 'hairpin', one of 2."
+    both = {"name": "on-both", "train": False, "track": "oval", "more_tracks": ["hairpin"]}
+    refused = client.post("/api/models", json={**both, "reward": elsewhere})
+    assert (refused.status_code, refused.json()["error"]["hint"]) == (422, verdict["problems"][-1]["hint"])
+    assert client.post("/api/models", json=both).status_code == 201
+    assert not client.post("/api/rewards/check", json={**wide, "of": "on-both"}).json()["ok"]
+    nowhere = client.post("/api/rewards/check", json={**wide, "more_tracks": ["/etc/passwd.npy"]})
+    assert nowhere.status_code == 404
     failing = GATE.replace("1.0 if", "1 / 0 if")
     verdict = client.post("/api/rewards/check", json={"source": failing, "track": "oval"}).json()
     assert not verdict["ok"]

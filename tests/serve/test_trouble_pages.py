@@ -119,6 +119,16 @@ def test_a_track_is_learned_on_once_and_one_of_an_address_is_named(visit: Visit)
     tracks.filter(has_text="generated:5").click()
 
 
+def test_a_reward_is_tried_on_each_track_that_is_learned_on(visit: Visit) -> None:
+    page = _fresh(visit, "/create/oval")
+    _write(page, "def reward_function(params):\n    assert params['track_length'] < 20\n    return 1.0\n")
+    page.get_by_text("The function is fine.").wait_for()
+    page.get_by_label("one more track").select_option("hairpin")
+    page.get_by_text("It failed on the track 'hairpin', one of 2.").wait_for()
+    page.get_by_role("button", name="Leave out: ").click()
+    page.get_by_text("The function is fine.").wait_for()
+
+
 def test_an_address_that_cannot_be_read_is_no_page(visit: Visit) -> None:
     page = visit.page
     page.goto(f"{visit.console.client.base_url}/models/%E0%A4%A")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 from tiny_runs import TINY, Train, assert_same
 
 from racecraft.agent.sensor_suite import SensorSuite
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, RewardError
 from racecraft.run import RunFolder
 from racecraft.sim import Randomization
 from racecraft.track import load_track
@@ -54,6 +56,32 @@ def test_of_several_tracks_a_car_draws_one_for_every_episode(names):
         drawn.append(cars.column("track_index").tolist())
     assert len({tuple(indices) for indices in drawn}) == (1 if len(names) == 1 else 4)
     assert {index for indices in drawn for index in indices} == set(range(len(names)))
+
+
+def test_a_reward_is_tried_on_every_track_that_is_learned_on(tmp_path, tiny: Train):
+    source = tmp_path / "short.py"
+    source.write_text(
+        "def reward_function(params):\n    return {17: 1.0, 23: 1.0}[int(params['track_length'] + 0.5)]\n"
+    )
+    settings = {"reward": source, "ppo": TINY, "until": "64 steps", "evaluate_every": 64}
+    with pytest.raises(RewardError, match="KeyError: 39") as caught:
+        tiny(**settings, track=["oval", "bowtie", "hairpin"])
+    assert (caught.value.line, caught.value.hint) == (2, "It failed on the track 'hairpin', one of 3.")
+    with pytest.raises(RewardError, match="KeyError: 39") as caught:
+        tiny(**settings, track="hairpin")
+    assert caught.value.hint == ""
+    assert tiny(**settings, track=["oval", "bowtie"]).steps == 64
+
+
+def test_of_very_many_tracks_some_are_tried_the_first_and_the_last_among_them(monkeypatch: pytest.MonkeyPatch):
+    dry_run = sys.modules["racecraft.reward.dry_run"]
+    tried: list[object] = []
+    monkeypatch.setattr(dry_run, "dry_run", lambda source, track: tried.append(track) or [])
+    assert dry_run.dry_run_on("", list(range(1000))) == ([], None)
+    assert (len(tried), tried[0], tried[-1]) == (dry_run.MOST_TRACKS, 0, 999)
+    tried.clear()
+    dry_run.dry_run_on("", list(range(7)))
+    assert tried == list(range(7))
 
 
 def test_a_track_that_changed_is_refused(tmp_path, tiny: Train):

@@ -9,7 +9,7 @@
 """
 
 from racecraft.reward.check import Problem, check_reward, validate_reward
-from racecraft.reward.dry_run import Outcome, Situation, dry_run, situations
+from racecraft.reward.dry_run import Outcome, Situation, dry_run, dry_run_on, situations
 from racecraft.reward.params import format_params, make_params
 from racecraft.reward.source import load_preset, load_reward, preset_names
 from racecraft.reward.state import keeps_state
@@ -22,6 +22,7 @@ __all__ = [
     "Situation",
     "check_reward",
     "dry_run",
+    "dry_run_on",
     "format_params",
     "keeps_state",
     "load_preset",

@@ -8,6 +8,7 @@ may fail only because no car gets from one situation to the next: its error coun
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,7 @@ STEP_SECONDS = 1.0 / 15.0  # between two calls for the same car
 TYPICAL_SPEED = 1.5  # m/s
 HALF_CAR = 0.08  # m from the car's middle line to its wheels
 HALF_VIEW = math.radians(60.0)  # of the camera, to each side
+MOST_TRACKS = 32  # of several that are tried
 NEAR = 0.6  # m from an object's middle to the point that x and y mean
 _X, _Y, _HEADING, _OFFSET, _DISTANCE = (
     OBJECT_COLUMNS.index(f"object_{name}") for name in ("x", "y", "heading", "offset", "distance")
@@ -122,6 +124,34 @@ def dry_run(
         if worker is not None:
             worker.close()
     return outcomes
+
+
+def dry_run_on(source: str, tracks: Sequence[Track], **options: Any) -> tuple[list[Outcome], RewardError | None]:
+    """Call a reward function in every situation of each of a training's tracks, until it fails on one.
+
+    Of more than `MOST_TRACKS` so many are tried, the first and the last among them: each takes its time.
+
+    Args:
+        source: Text of the user's ``reward_function.py``.
+        tracks: That are learned on.
+        options: Of `dry_run`.
+
+    Returns:
+        The outcomes on the first track, and the first error, whose hint names its track where there are several.
+
+    Raises:
+        RewardError: As for `dry_run`.
+    """
+    found: list[Outcome] = []
+    for index in np.unique(np.linspace(0, len(tracks) - 1, min(len(tracks), MOST_TRACKS)).round().astype(int)):
+        outcomes = dry_run(source, tracks[index], **options)
+        found = found or outcomes
+        for outcome in outcomes:
+            if (error := outcome.error) is not None:
+                where = f"It failed on the track {tracks[index].name!r}, one of {len(tracks)}."
+                error.hint = "\n".join(filter(None, (where if len(tracks) > 1 else "", error.hint)))
+                return found, error
+    return found, None
 
 
 def situations(track: Track, *, objects: Objects = NO_OBJECTS, cars_per_race: int = 1) -> list[Situation]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError
 from racecraft.learn import DistillConfig, PPOConfig, SACConfig
 from racecraft.learn.sb3 import SB3Config
-from racecraft.reward import dry_run, load_preset, preset_names, validate_reward
+from racecraft.reward import dry_run_on, load_preset, preset_names, validate_reward
 from racecraft.run import RunFolder, RunInfo, change_reward
 from racecraft.run.training_params import TrainingParams
 from racecraft.track import Track, joint_digest, load_tracks
@@ -68,7 +69,11 @@ def start_run(
         start_position_offset=settings.start.offset % 1.0,
         min_eval_trials=settings.evaluation_trials,
     )
-    write_run(folder, settings, tracks, reward, metadata, hyperparameters, params, parent=parent, foreign=foreign)
+    try:
+        write_run(folder, settings, tracks, reward, metadata, hyperparameters, params, parent=parent, foreign=foreign)
+    except BaseException:
+        shutil.rmtree(folder.path, ignore_errors=True)
+        raise
     return folder
 
 
@@ -201,14 +206,14 @@ def require_valid_reward(
     A preset, to the letter, was tried when Racecraft was tested, and is not made to wait.
 
     Raises:
-        RewardError: The static check finds a mistake, a call fails in one of the situations of a track, or the source
+        RewardError: The static check finds a mistake, a call fails in a situation of one of the tracks, or the source
             is foreign and cannot be locked in.
     """
     if not foreign and source in map(load_preset, preset_names()):
         return
     validate_reward(source)
-    for outcome in dry_run(
-        source, tracks[0], objects=settings.objects, cars_per_race=settings.cars_per_race, foreign=foreign
-    ):
-        if outcome.error is not None:
-            raise outcome.error
+    _, error = dry_run_on(
+        source, tracks, objects=settings.objects, cars_per_race=settings.cars_per_race, foreign=foreign
+    )
+    if error is not None:
+        raise error

@@ -16,7 +16,7 @@ from racecraft.analysis import pay_laps
 from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
 from racecraft.judging.trained import is_road_of, trained_objects
-from racecraft.reward import check_reward, dry_run, load_preset, preset_names
+from racecraft.reward import check_reward, dry_run_on, load_preset, preset_names
 from racecraft.reward.painting import paint_presets, paint_reward
 from racecraft.serve.context import Computes, Context, InContext
 from racecraft.serve.models.garage import RACED
@@ -33,7 +33,8 @@ from racecraft.serve.rewards.schemas import (
     RewardVerdict,
 )
 from racecraft.sim.objects import NO_OBJECTS, Objects, objects_for_race
-from racecraft.track import load_track
+from racecraft.track import Track, load_track
+from racecraft.track.selection import load_tracks
 
 PICTURED: Final = "hairpin"
 """The track of the presets' pictures: small, with bends both ways."""
@@ -112,19 +113,14 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
     track = context.courses.load(request.track)
     foreign = context.garage.is_foreign(request.source)
     objects, cars = _among(request, context)
-    outcomes = dry_run(request.source, track, objects=objects, cars_per_race=cars, foreign=foreign)
-    for outcome in outcomes:
-        if outcome.error is not None and outcome.error.line:
-            found.append(
-                RewardProblem(
-                    line=outcome.error.line,
-                    column=outcome.error.column or 1,
-                    severity="error",
-                    message=str(outcome.error),
-                    hint=outcome.error.hint,
-                )
+    tracks = [track, *_more_tracks(request, context)]
+    outcomes, error = dry_run_on(request.source, tracks, objects=objects, cars_per_race=cars, foreign=foreign)
+    if error is not None and error.line:
+        found.append(
+            RewardProblem(
+                line=error.line, column=error.column or 1, severity="error", message=str(error), hint=error.hint
             )
-            break
+        )
     situations = [
         RewardSituation(
             name=outcome.situation.name,
@@ -135,7 +131,7 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
         )
         for outcome in outcomes
     ]
-    if any(outcome.error is not None for outcome in outcomes):
+    if error is not None:
         return RewardVerdict(ok=False, problems=found, situations=situations, painting=None)
     painted = paint_reward(request.source, track, foreign=foreign)
     painting = RewardPainting(
@@ -146,6 +142,15 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
     )
     laps = _laps(context, request, foreign=foreign) if request.run is not None else []
     return RewardVerdict(ok=True, problems=found, situations=situations, painting=painting, laps=laps)
+
+
+def _more_tracks(request: RewardCheck, context: Context) -> list[Track]:
+    """The others that are learned on."""
+    if request.of is None:
+        return [context.courses.load(name) for name in dict.fromkeys(request.more_tracks) if name != request.track]
+    with suppress(RacecraftError):  # a folder of tracks that is gone says nothing of the function
+        return list(load_tracks(context.garage.folder(request.of).read_info().track)[1:])
+    return []
 
 
 def _among(request: RewardCheck, context: Context) -> tuple[Objects, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -49,6 +49,8 @@ class RewardCheck(Message):
 
     source: str = Field(max_length=140_000)
     track: str = Field(max_length=200)
+    more_tracks: list[Annotated[str, Field(max_length=200)]] = Field(default_factory=list, max_length=200)
+    """That are learned on, too, as of a new model: it is tried on each."""
     run: RunName | None = None
     """Of a model whose last laps are to be paid anew."""
     of: RunName | None = None
