@@ -105,6 +105,8 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     # rewards, actions and sensors
     "reward/params.py": (5, ("tests/reward/test_params.py", "tests/reward/test_object_params.py")),
     "reward/dry_run.py": (4, ("tests/reward/test_dry_run.py",)),
+    "reward/keys.py": (5, ("tests/reward/test_check.py",)),
+    "reward/rehearsal.py": (4, ("tests/reward/test_dry_run.py",)),
     "reward/worker.py": (4, ("tests/reward/test_worker.py", "tests/reward/test_worker_faults.py")),
     "agent/action_space.py": (5, ("tests/agent/test_action_space.py",)),
     "agent/lidar.py": (3, ("tests/agent/test_observe_lidar.py", "tests/agent/test_sensors.py")),

@@ -179,6 +179,7 @@ WARNINGS = [
         "no key 'w'",
     ),
     (body("same = params", "same['w'] = 1", "return params['w']"), 4, "no key 'w'"),
+    (body("(same := params)['w'] = 1", "return params['w']"), 3, "no key 'w'"),
     ("add = lambda p: p.update(w=1)\n" + body("add(params)", "return params['w']"), 4, "no key 'w'"),
     (body("import time", "return time.time()"), 3, "clock on the wall"),
     ("import numpy as np\nrng = np.random.default_rng()\n" + body(RETURN), 2, "without a seed"),
