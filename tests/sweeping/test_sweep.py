@@ -80,6 +80,20 @@ def test_names_that_are_taken_or_gone_are_refused(tmp_path: Path) -> None:
         Sweep(tmp_path, "s")
 
 
+def test_a_sweep_that_cannot_be_made_leaves_no_run(tmp_path: Path) -> None:
+    reward = tmp_path / "mine.py"
+    reward.write_text("def reward_function(params):\n    return params['sped']\n")
+    text = FILE.replace("numbers = { learning_rate = 0.002 }", f"reward = '{reward}'")
+    runs = tmp_path / "runs"
+    with pytest.raises(RewardError, match="no key 'sped'"):
+        make_sweep(read_sweep(text), runs=runs, name="s")
+    assert list(runs.iterdir()) == []
+    RunFolder.create(runs, name="s-bold-2")
+    with pytest.raises(RunError, match="s-bold-2 exists"):
+        make_sweep(read_sweep(FILE), runs=runs, name="s")
+    assert [path.name for path in runs.iterdir()] == ["s-bold-2"], "which it did not make"
+
+
 def outcomes(*values: float | None) -> dict[int, Outcome]:
     return {
         seed: Outcome(steps=1000, laps_after=None if value is None else int(value), best_lap=value)

@@ -16,7 +16,7 @@ from tiny_runs import Recorder, Train, assert_same
 from racecraft.errors import CheckpointError, RacecraftError, RewardError, RunError, TrainingError
 from racecraft.learn import UpdateStats, make_learner
 from racecraft.reward import RewardWorker
-from racecraft.run import RunFolder, checkpoint, metrics, simtrace
+from racecraft.run import RunFolder, checkpoint, folder, metrics, simtrace
 from racecraft.training import resume, session
 
 # Never true in the dry run, whose only situation off the track has 95 steps.
@@ -131,6 +131,15 @@ def test_a_reward_edited_badly_is_refused_on_resume(tiny: Train) -> None:
 
 def _no_space(*_: Any, **__: Any) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_full_disk_at_the_beginning_leaves_the_name_free(
+    tiny: Train, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(folder, "write_json", _no_space)
+    with pytest.raises(RunError, match="No space"):
+        tiny(name="mine")
+    assert not (tmp_path / "runs" / "mine").exists()
 
 
 def test_a_full_disk_at_a_checkpoint_leaves_the_ones_before(

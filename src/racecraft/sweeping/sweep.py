@@ -10,6 +10,7 @@ them into its queue. Killed at any moment it goes on, and every run ends in the 
 from __future__ import annotations
 
 import queue
+import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -45,7 +46,7 @@ def sweep_names(runs: Path) -> list[str]:
 
 
 def make_sweep(plan: SweepPlan, *, runs: str | Path = "runs", name: str | None = None) -> Sweep:
-    """Make the runs of a sweep, untrained.
+    """Make the runs of a sweep, untrained: all of them, or none.
 
     Args:
         plan: What is to be trained.
@@ -69,15 +70,20 @@ def make_sweep(plan: SweepPlan, *, runs: str | Path = "runs", name: str | None =
         "seeds": list(plan.seeds),
         "settings": {setting.name: setting.words for setting in plan.settings},
     }
-    for setting in plan.settings:
-        for seed in plan.seeds:
-            seeded = replace(setting.plan, settings=replace(setting.plan.settings, seed=seed))
-            seeded.start(root=runs, name=_run(name, setting.name, seed))
+    made: list[RunFolder] = []
     try:
+        for setting in plan.settings:
+            for seed in plan.seeds:
+                seeded = replace(setting.plan, settings=replace(setting.plan.settings, seed=seed))
+                made.append(seeded.start(root=runs, name=_run(name, setting.name, seed)))
         file.parent.mkdir(parents=True, exist_ok=True)
         write_json(file, document)
-    except OSError as error:
-        raise RunError(f"{file} cannot be written: {error.strerror or error}.") from error
+    except BaseException as error:
+        for folder in made:
+            shutil.rmtree(folder.path, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise RunError(f"{file} cannot be written: {error.strerror or error}.") from error
+        raise
     return Sweep(runs, name)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
