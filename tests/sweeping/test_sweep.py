@@ -9,10 +9,13 @@ import pytest
 
 from racecraft.errors import RewardError, RunError
 from racecraft.run import RunFolder
+from racecraft.run.lock import exclusive_lock
 from racecraft.sweeping import Sweep, board_of, make_sweep, read_sweep, sweep_names
+from racecraft.sweeping import sweep as sweep_module
 from racecraft.sweeping.board import Outcome, is_tied, outcome_of
 from racecraft.training.job import Training
-from racecraft.tuning.trial import Report
+from racecraft.tuning import seats
+from racecraft.tuning.trial import Order, Report
 
 FILE = """
 seeds = [1, 2]
@@ -78,6 +81,28 @@ def test_names_that_are_taken_or_gone_are_refused(tmp_path: Path) -> None:
     (tmp_path / ".sweeps" / "s.json").write_text("{}")
     with pytest.raises(RunError, match="cannot be read"):
         Sweep(tmp_path, "s")
+
+
+def test_a_sweep_is_trained_by_one_process_at_a_time(tmp_path: Path) -> None:
+    sweep = make_sweep(read_sweep(FILE), runs=tmp_path, name="s")
+    with exclusive_lock(sweep.file.with_suffix(".lock")), pytest.raises(RunError, match=r"^Sweep 's' is in use by"):
+        sweep.train()
+
+
+def test_what_kills_its_process_again_and_again_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[str] = []
+
+    class Mortal(seats.HereSeat):
+        def run(self, order: Order) -> Report:
+            tried.append(Path(order.run).name)
+            raise seats.SeatLost("It ended.")
+
+    monkeypatch.setattr(sweep_module, "ProcessSeat", Mortal)
+    told: dict[str, Report | Exception] = {}
+    sweep = make_sweep(read_sweep(FILE), runs=tmp_path, name="s")
+    sweep.train(processes=2, on_end=told.__setitem__)
+    assert sorted(tried) == sorted(3 * list(sweep.names()))
+    assert set(map(str, told.values())) == {"It ended."}
 
 
 def test_a_sweep_that_cannot_be_made_leaves_no_run(tmp_path: Path) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +110,13 @@ def test_a_seat_that_was_stopped_before_its_process_was_there_trains_nothing() -
     seat = seats.ProcessSeat()
     seat.stop()
     with pytest.raises(seats.SeatLost):
+        seat.run(Order(run="none", goal="laps", trial_steps=1))
+
+
+def test_how_a_seats_process_ended_is_its_own_status() -> None:
+    seat, code = seats.ProcessSeat(), "import os, time; os.close(1); time.sleep(0.2); os._exit(3)"
+    seat._process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    with pytest.raises(seats.SeatLost, match="ended with status 3"):
         seat.run(Order(run="none", goal="laps", trial_steps=1))
 
 

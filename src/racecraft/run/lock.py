@@ -14,10 +14,14 @@ from racecraft.errors import RunError
 
 
 @contextmanager
-def exclusive_lock(path: Path) -> Iterator[None]:
+def exclusive_lock(path: Path, *, of: str = "") -> Iterator[None]:
     """Hold a lock file while the block runs; it names the holder for whoever comes second.
 
     The system drops the lock with the process, however it ends, so a file of a dead process does not count.
+
+    Args:
+        path: The lock file.
+        of: What it is for; by default the folder that it lies in.
 
     Raises:
         RunError: Another process, or another part of this one, holds it.
@@ -31,7 +35,7 @@ def exclusive_lock(path: Path) -> Iterator[None]:
             system.lock(descriptor)
         except OSError as error:
             raise RunError(
-                f"{path.parent} is in use by process {_holder(descriptor)}.",
+                f"{of or path.parent} is in use by process {_holder(descriptor)}.",
                 hint="Wait for it, stop it, or give the new run another name.",
             ) from error
         os.ftruncate(descriptor, 0)

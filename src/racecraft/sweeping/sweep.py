@@ -13,6 +13,7 @@ import queue
 import shutil
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -171,9 +172,11 @@ class Sweep:
         else:
             self._seats = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
         threads = max(1, num_cores() // count)
-        with exclusive_lock(self.file.with_suffix(".lock")), interruptible(self._stop, self.stop):
+        lock = exclusive_lock(self.file.with_suffix(".lock"), of=f"Sweep {self.name!r}")
+        losses: Counter[str] = Counter()
+        with lock, interruptible(self._stop, self.stop):
             workers = [
-                threading.Thread(target=self._work, args=(seat, waiting, threads, on_end), daemon=True)
+                threading.Thread(target=self._work, args=(seat, waiting, threads, losses, on_end), daemon=True)
                 for seat in self._seats
             ]
             for worker in workers:
@@ -198,9 +201,9 @@ class Sweep:
         seat: Seat,
         waiting: queue.SimpleQueue[str],
         num_threads: int,
+        losses: Counter[str],
         on_end: Callable[[str, Report | Exception], None],
     ) -> None:
-        losses: dict[str, int] = {}
         while not self._stop.is_set():
             try:
                 name = waiting.get_nowait()
@@ -216,7 +219,7 @@ class Sweep:
             try:
                 on_end(name, seat.run(order))
             except SeatLost as error:
-                losses[name] = losses.get(name, 0) + 1
+                losses[name] += 1
                 if not self._stop.is_set() and losses[name] < MAX_LOSSES:
                     waiting.put(name)
                 elif not self._stop.is_set():

@@ -87,8 +87,10 @@ class ProcessSeat:
             process.stdin.flush()
         line = process.stdout.readline()
         if not line.endswith(b"\n"):
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(5.0)  # it is about to say how it ended
             self.close()
-            raise SeatLost(f"The trial's process ended with status {process.returncode}.")
+            raise SeatLost(f"The process that trained it ended with status {process.returncode}.")
         answer = json.loads(line)
         if "error" in answer:
             raise error_of(answer["error"])
