@@ -77,3 +77,14 @@ def test_anything_else_says_itself_what_is_allowed() -> None:
     with pytest.raises(ConfigError) as error:
         require("laps", 2, False, "more than 2")
     assert str(error.value) == "laps is 2; allowed is more than 2."
+
+
+def test_a_long_value_is_cut_in_the_message() -> None:
+    for check in (
+        lambda: check_number("share", "x" * 10**6, 0.0),
+        lambda: check_choice("colour", "x" * 10**6, COLOURS),
+    ):
+        with pytest.raises(ConfigError) as error:
+            check()
+        assert "xxx…" in str(error.value)
+        assert len(str(error.value)) < 700

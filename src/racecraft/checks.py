@@ -13,12 +13,14 @@ from racecraft.errors import ConfigError, did_you_mean
 
 MAX_COUNT: Final = 10**9
 """Of steps, samples, ...: who asks for more has made a mistake."""
+MAX_SHOWN: Final = 500
+"""Characters of a value in a message: it may be a whole file."""
 
 
 def require(name: str, value: Any, is_met: bool, allowed: str) -> None:
     """Refuse a value that does not meet what the words `allowed` say."""
     if not is_met:
-        raise ConfigError(f"{name} is {value!r}; allowed is {allowed}.")
+        raise ConfigError(f"{name} is {shown(value)}; allowed is {allowed}.")
 
 
 def check_whole(name: str, value: Any, low: int, high: int = MAX_COUNT, *, is_plain: bool = False) -> None:
@@ -53,10 +55,16 @@ def check_choice(name: str, value: Any, allowed: Iterable[str]) -> None:
     known = tuple(allowed)
     if not isinstance(value, str) or value not in known:
         hint = did_you_mean(str(value), known)
-        raise ConfigError(f"{name} is {value!r}; allowed are {', '.join(known)}.", hint=hint)
+        raise ConfigError(f"{name} is {shown(value)}; allowed are {', '.join(known)}.", hint=hint)
 
 
 def check_type(name: str, value: Any, allowed: type | tuple[type, ...], advice: str) -> None:
     """Refuse a value of another type, saying what to give instead."""
     if not isinstance(value, allowed):
-        raise ConfigError(f"{name} is {value!r}; {advice}.")
+        raise ConfigError(f"{name} is {shown(value)}; {advice}.")
+
+
+def shown(value: Any) -> str:
+    """A value for a message, cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 1]}…"

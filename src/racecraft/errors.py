@@ -17,14 +17,16 @@ MOST_NAMES: Final = 500
 class RacecraftError(Exception):
     """Base of all errors that Racecraft raises on purpose.
 
+    What it says may quote a stranger's file, so nothing in it drives a terminal or cannot be encoded.
+
     Args:
         message: One sentence with the value at fault and what is allowed.
         hint: What to do next, when the message alone does not say it.
     """
 
     def __init__(self, message: str, *, hint: str = "") -> None:
-        super().__init__(message)
-        self.hint = hint
+        super().__init__(_printable_lines(message))
+        self.hint = _printable_lines(hint)
 
 
 class TrackError(RacecraftError, ValueError):
@@ -111,6 +113,10 @@ class TrainingError(RacecraftError, RuntimeError):
 def printable(text: str) -> str:
     """Somebody else's words for a message, without what could drive a terminal."""
     return "".join(mark if mark.isprintable() else "�" for mark in text)
+
+
+def _printable_lines(text: str) -> str:
+    return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
