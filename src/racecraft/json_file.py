@@ -1,12 +1,13 @@
 """Strict reading of small text and JSON files of strangers, and one sentence for what is wrong in them.
 
-Never accepted is a file that says two things at once (duplicate keys) or has numbers that are none.
+Never accepted is a file that says two things at once (duplicate keys), or has numbers or letters that are none.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
@@ -58,7 +59,7 @@ def read_json_object(path: str | Path, *, max_bytes: int = MAX_BYTES) -> dict[st
     """The JSON object in a UTF-8 file.
 
     Raises:
-        ConfigError: Not readable, too large, not UTF-8, not a JSON object, or with duplicate keys or NaN.
+        ConfigError: Not readable, too large, not UTF-8, not a JSON object, or with duplicate keys, NaN or half letters.
     """
     return parse_json_object(read_text(path, max_bytes=max_bytes), name=str(path))
 
@@ -67,7 +68,15 @@ def parse_json_object(data: bytes | str, *, name: str) -> dict[str, Any]:
     """As :func:`read_json_object`, from memory; ``name`` is what messages call it."""
     text = decode_text(data, name=name) if isinstance(data, bytes) else data
     try:
-        document = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite_float)
+        document = json.loads(
+            text,
+            object_pairs_hook=_unique,
+            parse_constant=_no_constant,
+            parse_float=_finite_float,
+            parse_int=_finite_int,
+        )
+        if "\\u" in text:
+            _check_pairs(document)
     except RecursionError as error:
         raise ConfigError(f"{name} is nested too deeply.") from error
     except json.JSONDecodeError as error:
@@ -78,6 +87,14 @@ def parse_json_object(data: bytes | str, *, name: str) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise ConfigError(f"{name} holds a JSON {_json_type(document)}, expected an object {{...}}.")
     return document
+
+
+def parse_json_line(line: bytes) -> dict[str, Any] | None:
+    """The object of a line of a file that grows line by line, or None where the line is damaged."""
+    try:
+        return parse_json_object(line, name="The line")
+    except ConfigError:
+        return None
 
 
 def write_json_object(path: str | Path, document: Mapping[str, Any]) -> None:
@@ -110,6 +127,20 @@ def _finite_float(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{text} is too large for a number")
     return value
+
+
+def _finite_int(text: str) -> int:
+    value = int(text)
+    if abs(value) > sys.float_info.max:  # who computes with it would have infinity
+        raise ValueError("a whole number is too large for a number")
+    return value
+
+
+def _check_pairs(document: object) -> None:
+    try:
+        json.dumps(document, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        raise ValueError("a text has half of a surrogate pair, which can be neither shown nor stored") from error
 
 
 def _json_type(value: object) -> str:

@@ -23,6 +23,7 @@ BAD_HISTORY: dict[str, tuple[str, str, str]] = {
     "no metrics": ("metrics/TrainingMetrics.json", "[]", "expected an object"),
     "no trials": ("metrics/TrainingMetrics.json", '{"metrics": [1]}', "no list of trials"),
     "text in metrics": ("metrics/TrainingMetrics.json", models.metrics().replace("100", '"x"'), "is not a number"),
+    "huge": ("metrics/TrainingMetrics.json", models.metrics().replace("100", "1" * 400), "too large for a number"),
     "infinite": ("metrics/TrainingMetrics.json", models.metrics().replace("100", "1e999"), "too large"),
     "no status": ("metrics/TrainingMetrics.json", models.metrics().replace("episode_status", "x"), "no episode_status"),
     "odd name": ("metrics/Training Metrics $(x).json", models.metrics(), "odd characters"),
