@@ -257,6 +257,18 @@ def test_manifest_cannot_point_elsewhere(store, tmp_path):
         assert_good(store.load())
 
 
+@pytest.mark.parametrize("field", ["step", "size", "time_stamp", "score", "metrics"])
+@pytest.mark.parametrize("text", ["Infinity", "NaN", '"nan"', "1" + "0" * 400, "[NaN]", '["nan"]', '{"lap": "nan"}'])
+def test_a_manifest_with_numbers_that_are_none_is_done_without(store, field, text):
+    save(store, 100)
+    manifest = store.folder / "manifest.json"
+    document = json.loads(manifest.read_text())
+    document["checkpoints"][0][field] = "HERE"
+    manifest.write_text(json.dumps(document).replace('"HERE"', text))
+    with pytest.warns(CheckpointWarning, match="is damaged"):
+        assert_good(store.load())
+
+
 def test_manifest_of_a_later_version_is_left_alone(store):
     save(store, 100)
     manifest = store.folder / "manifest.json"

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import CheckpointError, did_you_mean
+from racecraft.json_file import parse_json_object
 from racecraft.run.atomic import TEMPORARY, write_file, write_json
 from racecraft.run.tensor_file import is_storable, tensor_file
 
@@ -276,10 +277,7 @@ class CheckpointStore:
             data = file.read(MAX_MANIFEST_BYTES + 1)
         if len(data) > MAX_MANIFEST_BYTES:
             raise ValueError(f"larger than {MAX_MANIFEST_BYTES:,} bytes")
-        try:
-            document = json.loads(data)
-        except RecursionError as error:
-            raise ValueError("nested too deeply") from error
+        document = parse_json_object(data, name="it")
         if document["format"] != FORMAT:
             raise CheckpointError(
                 f"{self.folder / MANIFEST} has format {document['format']!r}, this version reads {FORMAT}.",
@@ -358,18 +356,30 @@ def _aws(entry: Entry) -> dict[str, Any]:
 def _entry(line: Mapping[str, Any]) -> Entry:
     """An entry from JSON, refused unless every value is what it has to be."""
     entry = Entry(
-        step=int(line["step"]),
+        step=_whole(line["step"]),
         file=str(line["file"]),
-        size=int(line["size"]),
+        size=_whole(line["size"]),
         sha256=str(line["sha256"]),
-        time_stamp=float(line["time_stamp"]),
-        score=None if line["score"] is None else tuple(map(float, line["score"])),
-        metrics=dict(line["metrics"]),
+        time_stamp=_number(line["time_stamp"]),
+        score=None if line["score"] is None else tuple(map(_number, line["score"])),
+        metrics={name: None if value is None else _number(value) for name, value in dict(line["metrics"]).items()},
     )
     name = _NAME.fullmatch(entry.file)
     if name is None or int(name[1]) != entry.step or not entry.sha256.startswith(name[2]):
         raise ValueError(f"{entry.file!r} is not the name of a checkpoint of step {entry.step}")
     return entry
+
+
+def _whole(value: object) -> int:
+    if type(value) is not int or value < 0:
+        raise ValueError(f"{str(value)[:40]!r} is no whole number from 0")
+    return value
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):  # a text may say "nan"
+        raise ValueError(f"{str(value)[:40]!r} is no number")
+    return float(value)
 
 
 def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> list[memoryview]:
@@ -403,12 +413,10 @@ def header_of(path: Path) -> tuple[dict[str, Any], dict[str, tuple[str, tuple[in
 
     try:
         with safe_open(path, framework="numpy") as file:
-            header = json.loads((file.metadata() or {})[HEADER_KEY])
+            header = parse_json_object((file.metadata() or {})[HEADER_KEY], name="its header")
             names: list[str] = file.keys()
             slices = {name: file.get_slice(name) for name in names}
             kinds = {name: (str(one.get_dtype()), tuple(one.get_shape())) for name, one in slices.items()}
-    except (OSError, SafetensorError, RecursionError) as error:
+    except (OSError, SafetensorError) as error:
         raise ValueError(str(error)) from error
-    if not isinstance(header, dict):
-        raise ValueError("its header is not an object")
     return header, kinds
