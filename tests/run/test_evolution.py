@@ -38,6 +38,9 @@ def test_what_was_kept_is_read_and_what_is_damaged_passed_over(tmp_path: Path) -
             {"step": 2, "lap_time": None, "completion": 0.1, "poses": [[1, 2, 3]] * (MAX_POSES + 1)},
             {"step": 2, "lap_time": None, "completion": 0.1, "poses": [["x", 2, 3]] * 2},
             {"step": 3, "lap_time": None, "completion": 0.1, "poses": [[1e30, 2, 3]] * 2},
+            {"step": 64, "lap_time": "nan", "completion": 0.1, "poses": [[1, 2, 3]] * 2},
+            {"step": 64, "lap_time": 9.0, "completion": "nan", "poses": [[1, 2, 3]] * 2},
+            {"step": 64, "lap_time": 10**400, "completion": 0.1, "poses": [[1, 2, 3]] * 2},
             [],
         ):
             file.write(json.dumps(point) + "\n")

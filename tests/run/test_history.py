@@ -72,6 +72,8 @@ def test_half_lines_damaged_lines_and_foreign_files(tmp_path: Path) -> None:
     assert [point["step"] for point in points] == [1, 2]
     assert path.read_bytes()[offset:] == b'{"step"'
     assert read_history(path, offset=10**9)[0] == points  # shorter than it was: from its start
+    path.write_bytes(b"[" * 60_000 + b'\n{"step": NaN}\n{"step": 1e999}\n{"text": "\\ud800"}\n')
+    assert read_history(path) == ([], path.stat().st_size)  # what no page could show
     path.write_bytes(b'{"step"')
     assert read_history(path) == ([], 0)  # the whole file is half a line
     long = b'{"step": 1}\n' * 6000

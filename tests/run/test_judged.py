@@ -69,6 +69,8 @@ def test_damaged_files_are_passed_over(run: RunFolder) -> None:
     train(run, [10.0])
     with run.history.open("a") as file:
         file.write('{"kind": "evaluation", "step": 4\n{"kind": "evaluation", "step": 5, "lap_times": "x"}\n')
+        file.write('{"kind": "evaluation", "step": Infinity, "completions": [], "lap_times": []}\n')
+        file.write('{"kind": "evaluation", "step": 6, "completions": [' + "1" * 400 + '], "lap_times": [1]}\n')
     race(run, "20260101000000", best_lap_seconds="fast")
     (run.evaluation("20260101000000") / "evaluation.json").with_name("other").write_text("")
     run.evaluation("20260101000003").mkdir()

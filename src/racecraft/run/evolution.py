@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_number
 from racecraft.run.folder import RunFolder
 from racecraft.run.history import read_history
 
@@ -85,13 +86,16 @@ def _place(step: int) -> int:
 
 def _drive(point: dict[str, Any]) -> Drive | None:
     try:
-        lap_time, poses = point["lap_time"], np.array(point["poses"], dtype=np.int64)
-        if poses.ndim != 2 or poses.shape[1] != 3 or not 2 <= len(poses) <= MAX_POSES:
+        lap_time, completion, poses = point["lap_time"], point["completion"], np.array(point["poses"])
+        check_number("completion", completion, -math.inf)
+        if lap_time is not None:
+            check_number("lap_time", lap_time, 0.0)
+        if poses.dtype != np.int64 or poses.ndim != 2 or poses.shape[1] != 3 or not 2 <= len(poses) <= MAX_POSES:
             return None
         return Drive(
             step=int(point["step"]),
             lap_time=None if lap_time is None else float(lap_time),
-            completion=min(max(float(point["completion"]), 0.0), 1.0),
+            completion=min(max(float(completion), 0.0), 1.0),
             poses=poses,
         )
     except (KeyError, TypeError, ValueError, OverflowError):

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.errors import RunError
+from racecraft.json_file import parse_json_line
 from racecraft.run.closing import Closing
 
 SPACING: Final = 0.25  # s between two iterations that are written, at least: an hour is 3 MB
@@ -90,15 +91,8 @@ def read_history(path: Path, *, offset: int = 0, max_bytes: int = 1 << 20) -> tu
     end = data.rfind(b"\n") + 1
     if end == 0 and len(data) > MAX_LINE:
         end = len(data)  # no line of ours is so long
-    points = []
-    for line in data[:end].splitlines():
-        try:
-            point = json.loads(line)
-        except ValueError:
-            continue
-        if isinstance(point, dict):
-            points.append(point)
-    return points, offset + end
+    points = map(parse_json_line, data[:end].splitlines())
+    return [point for point in points if point is not None], offset + end
 
 
 def _offset_after(path: Path, step: int) -> int:
@@ -106,10 +100,9 @@ def _offset_after(path: Path, step: int) -> int:
     offset = 0
     with path.open("rb") as file:
         for line in file:
-            try:
-                if not line.endswith(b"\n") or json.loads(line)["step"] > step:
-                    break
-            except (ValueError, KeyError, TypeError):
+            point = parse_json_line(line) if line.endswith(b"\n") else None
+            behind = None if point is None else point.get("step")
+            if not isinstance(behind, int) or behind > step:
                 break
             offset += len(line)
     return offset

@@ -6,7 +6,6 @@ learns on: those during training, and those by the rules of a race afterwards.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.errors import ConfigError, RunError
-from racecraft.json_file import read_json_object
+from racecraft.json_file import parse_json_line, read_json_object
 from racecraft.run.folder import RunFolder, RunInfo
 from racecraft.run.history import MAX_LINE
 
@@ -66,10 +65,10 @@ def _during_training(history: Path) -> Iterator[Judged]:
             if not line.startswith(_EVALUATION):
                 continue
             with suppress(ValueError, KeyError, TypeError):
-                point = json.loads(line)
+                point = parse_json_line(line) or {}
                 shares = [share for share in map(_number, point["completions"]) if share is not None]
                 laps = [lap for lap in map(_number, point["lap_times"]) if lap is not None]
-                mean = sum(shares) / len(shares) if shares else None
+                mean = _number(sum(shares) / len(shares)) if shares else None
                 yield Judged(step=int(point["step"]), completion=mean, best_lap=min(laps, default=None))
 
 
