@@ -316,6 +316,7 @@ def test_reader_takes_every_era(path, columns, rows, tmp_path):
         (",".join(WRITTEN) + "\n" + ",".join(["1.5"] + ["1"] * 17), "episode is not a whole number"),
         (",".join(WRITTEN) + "\n" + ",".join(["1", "1", "inf"] + ["1"] * 15), "X is not a finite number"),
         (",".join(WRITTEN) + "\n" + '"' + "x" * 200_000, "is not a sim-trace"),
+        (",".join(WRITTEN) + "\n" + ",".join(["1"] * 9 + ["0"] * 6 + ["x" * 9000, "1", "1"]), "9,000 characters"),
         ((",".join(["1"] * 15) + "\n") * 11, "more than 10 rows"),
     ],
 )

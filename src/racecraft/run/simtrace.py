@@ -53,6 +53,7 @@ MAX_BYTES = 1 << 31  # of all files of a run; beyond it every other iteration is
 MAX_FILES = 4096  # the same for their number
 EPISODES_PER_ITERATION = 20  # of AWS, unless hyperparameters say otherwise
 MAX_READ_ROWS = 2_000_000
+MAX_STATUS = 40  # characters of a row's episode_status; ours and AWS's have up to 11
 
 _KEPT = (
     "steps",
@@ -399,6 +400,8 @@ def read_simtrace(path: str | Path, *, max_rows: int = MAX_READ_ROWS) -> dict[st
 def _parse(name: str, texts: tuple[str, ...]) -> NDArray[Any]:
     """A column's values; a ValueError says what is wrong."""
     if name == "episode_status":
+        if (longest := max(map(len, texts), default=0)) > MAX_STATUS:  # every row of the array would be as long
+            raise ValueError(f"{name} has {longest:,} characters; allowed are {MAX_STATUS}")
         return np.array(texts, dtype=np.str_)
     if name in ("done", "all_wheels_on_track"):
         if wrong := set(texts) - {"True", "False", "0", "1"}:
