@@ -117,9 +117,16 @@ def test_objects_of_a_console_job(lines: str, objects: Bots | Obstacles | None, 
     assert ("NUMBER_OF_OBSTACLES" in found.unused) == (objects is None)
 
 
-def test_a_wrong_setting_of_objects_leaves_no_run(tmp_path: Path) -> None:
-    env = "DR_WORLD_NAME=oval\nDR_RACE_TYPE=HEAD_TO_BOT\nDR_H2B_NUMBER_OF_BOT_CARS=many\n"
-    with pytest.raises(ConfigError, match="NUMBER_OF_BOT_CARS is 'many'; allowed is a whole number"):
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        ("DR_RACE_TYPE=HEAD_TO_BOT\nDR_H2B_NUMBER_OF_BOT_CARS=many\n", "is 'many'; allowed is a whole number"),
+        ("DR_RACE_TYPE=OBJECT_AVOIDANCE\nDR_OA_OBJECT_POSITIONS=0.2,inf\n", 'allowed is "fraction,lane'),
+    ],
+)
+def test_a_wrong_setting_of_objects_leaves_no_run(lines: str, says: str, tmp_path: Path) -> None:
+    env = f"DR_WORLD_NAME=oval\n{lines}"
+    with pytest.raises(ConfigError, match=says):
         import_run(models.as_folder({**models.DRFC, "run.env": env}, tmp_path / "drfc"), name="x")
     assert not Path("runs/x").exists()
 

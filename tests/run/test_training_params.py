@@ -46,7 +46,7 @@ def test_defaults(tmp_path):
         ("- 1", "is not a list of settings"),
         ("just text", "is not a list of settings"),
         ("A: [", "not valid YAML at line"),
-        ("A: !!python/object/apply:os.system ['true']", "not valid YAML"),
+        ("A: !!python/object/apply:os.system ['true']", "has a YAML tag"),
         ("a: &x [1, 1]\nb: *x", "YAML alias"),
         ("RACE_TYPE: DRAG", "RACE_TYPE is 'DRAG'; allowed is TIME_TRIAL"),
         ("WORLD_NAME: 3", "WORLD_NAME is 3; allowed is a track's name"),
@@ -57,6 +57,9 @@ def test_defaults(tmp_path):
         ("BEST_MODEL_METRIC: speed", "BEST_MODEL_METRIC is 'speed'; allowed is 'progress'"),
         ("[" * 200_000, "nested too deeply"),
         ("- " * 100_000, "nested too deeply"),
+        ("WORLD_NAME: !!timestamp never", "has a YAML tag"),
+        ("EXTRA: !!bool perhaps", "has a YAML tag"),
+        ("EXTRA: 0x" + "f" * 4000, "a value of 4,002 characters without quotes"),
     ],
 )
 def test_bad_files(text, words):

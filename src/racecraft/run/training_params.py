@@ -17,6 +17,8 @@ from racecraft.run.atomic import write_file
 
 MAX_BYTES = 1 << 18
 MAX_DEPTH = 20  # of nested YAML
+MAX_PLAIN = 1000  # characters of a value without quotes, which may be read as a number
+_REFUSED = {"AliasToken": "a YAML alias (*...)", "TagToken": "a YAML tag (!...)"}
 RaceType = Literal["TIME_TRIAL", "OBJECT_AVOIDANCE", "HEAD_TO_BOT", "HEAD_TO_MODEL", "F1"]
 _YES_NO = "true or false"
 
@@ -75,8 +77,10 @@ class TrainingParams:
                 depth += kind.endswith("StartToken") - kind.endswith("EndToken")
                 if depth > MAX_DEPTH:  # before the parser, which takes quadratic time in the depth
                     raise ConfigError(f"{name} is nested too deeply.")
-                if kind == "AliasToken":
-                    raise ConfigError(f"{name} has a YAML alias (*...), which is not allowed.")
+                if kind in _REFUSED:
+                    raise ConfigError(f"{name} has {_REFUSED[kind]}, which is not allowed.")
+                if isinstance(token, yaml.ScalarToken) and token.plain and len(token.value) > MAX_PLAIN:
+                    raise ConfigError(f"{name} has a value of {len(token.value):,} characters without quotes.")
             document = yaml.safe_load(text)
         except ConfigError:
             raise

@@ -246,7 +246,7 @@ def parse_positions(text: str) -> Positions:
     try:
         pairs = [part.split(",") for part in text.strip().strip('"').split(";") if part.strip()]
         return tuple((float(fraction), int(float(lane))) for fraction, lane in pairs)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise ValueError('allowed is "fraction,lane;fraction,lane", for example "0.23,-1;0.46,1"') from error
 
 
