@@ -202,6 +202,7 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "serve/submissions/board.py": (4, (BOARD,)),
     "serve/submissions/copies.py": (2, ("tests/serve/test_copies.py",)),
     "serve/submissions/league.py": (6, (*ENTRIES, BOARD)),
+    "serve/submissions/season.py": (8, ("tests/serve/test_seasons.py",)),
     "serve/workers/leases.py": (4, ("tests/serve/test_leases.py", *TOKENS)),
     "serve/workers/parcels.py": (4, TOKENS),
 }
