@@ -70,6 +70,9 @@ def test_it_goes_on_where_it_was_and_says_what_cannot_be_trained(tmp_path: Path)
     assert isinstance(told["s-bold-1"], RewardError)
     assert (tmp_path / "s-plain-1" / "checkpoints" / "manifest.json").read_bytes() == kept
     assert [place.seeds for place in sweep.board().places] == [2, 1]
+    (tmp_path / "s-plain-2" / "run.json").write_text('{"a"')
+    with pytest.warns(UserWarning, match=r"without s-plain-2: .* is not valid JSON"):
+        assert [place.seeds for place in sweep.board().places] == [1, 1]
 
 
 def test_names_that_are_taken_or_gone_are_refused(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import queue
 import shutil
 import threading
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -128,15 +129,20 @@ class Sweep:
                 yield _run(self.name, setting, seed)
 
     def board(self) -> Board:
-        """The leaderboard so far; runs that are gone or have not begun are left out."""
+        """The leaderboard so far, without runs that are gone or have not begun; of a damaged one it warns."""
         outcomes: dict[str, dict[int, Outcome]] = {}
         for setting in self.settings:
             for seed in self.seeds:
                 folder = self.run_of(setting, seed)
-                if (folder.path / "run.json").is_file():
+                if not (folder.path / "run.json").is_file():
+                    continue
+                try:
                     outcome = outcome_of(folder)
-                    if outcome.steps:
-                        outcomes.setdefault(setting, {})[seed] = outcome
+                except RunError as error:
+                    warnings.warn(f"The board is without {folder.name}: {error}", stacklevel=2)
+                    continue
+                if outcome.steps:
+                    outcomes.setdefault(setting, {})[seed] = outcome
         return board_of(self.goal, self.settings, outcomes)
 
     def train(
