@@ -204,6 +204,7 @@ def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> 
     for choice in ("model bob", "lap", f"heat {before}", "model ada"):
         ghost.select_option(choice)
     page.get_by_role("combobox", name="Checkpoint of bob").nth(1).select_option("last")
+    page.get_by_label("Title").fill("Haunted")
     page.get_by_role("button", name="Take out the ghost: ada").click()
     with page.expect_request("**/api/contests/heats") as sent:
         page.get_by_role("button", name="Start the heat with 2").click()

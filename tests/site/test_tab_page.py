@@ -331,6 +331,16 @@ def test_a_reward_of_ones_own_is_checked_and_trains(page: Page) -> None:
     page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
 
 
+def test_a_reward_of_ones_own_is_tried_among_the_objects_of_its_race(page: Page) -> None:
+    page.get_by_role("combobox", name="Track").select_option("oval")
+    write(page, "def reward_function(params):\n    return params['objects_distance'][params['closest_objects'][1]]\n")
+    page.get_by_text("IndexError").wait_for(timeout=PATIENCE)  # on an empty road
+    page.get_by_role("button", name="Object avoidance").click()
+    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("near an object", exact=True).wait_for()
+    page.get_by_text("crash", exact=True).wait_for()
+
+
 def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("hairpin")
     write(page, "def reward_function(params):\n    print('from afar')\n    return 1.0\n")

@@ -106,6 +106,8 @@ export const de: Record<TabKey, string> = {
   situation_off_track: "neben der Strecke",
   situation_other_way: "Gegenrichtung",
   situation_on_pace: "gut in der Zeit",
+  situation_near_an_object: "vor einem Hindernis",
+  situation_crash: "Zusammenstoß",
   situation_finish: "Ziel",
   replays: "Ein Replay prüfen",
   replays_lead:

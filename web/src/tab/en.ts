@@ -99,6 +99,8 @@ export const en = {
   situation_off_track: "off track",
   situation_other_way: "other way",
   situation_on_pace: "on pace",
+  situation_near_an_object: "near an object",
+  situation_crash: "crash",
   situation_finish: "finish",
   replays: "Check a replay",
   replays_lead:

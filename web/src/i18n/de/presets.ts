@@ -62,5 +62,7 @@ export const presets: Record<keyof typeof english, string> = {
   situation_off_track: "Alle Räder jenseits des rechten Randes, Ende der Episode.",
   situation_other_way: "Auf der Mittellinie, die Strecke andersherum gefahren.",
   situation_on_pace: "Nach genau 100 Schritten, zwei Drittel der Runde geschafft.",
+  situation_near_an_object: "Geradewegs auf ein Hindernis zu.",
+  situation_crash: "In ein Hindernis, Ende der Episode.",
   situation_finish: "Die Runde ist geschafft.",
 };

@@ -57,5 +57,7 @@ export const presets = {
   situation_off_track: "All wheels beyond the right border, end of the episode.",
   situation_other_way: "On the centre line, driving the track in the other direction.",
   situation_on_pace: "After exactly 100 steps, two thirds of the lap done.",
+  situation_near_an_object: "Straight towards an object.",
+  situation_crash: "Into an object, end of the episode.",
   situation_finish: "The lap is complete.",
 } as const;
