@@ -338,6 +338,15 @@ def test_an_account_is_ones_own(lesson: Lesson, race: int) -> None:
     assert "Turbo" not in [row["name"] for row in ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"]]
 
 
+def test_a_page_comes_up_behind_a_fragment_that_cannot_be_read(lesson: Lesson) -> None:
+    astray, teacher = lesson.arrive("astray"), lesson.visits["teacher"]
+    for visit, path in ((astray, "card"), (astray, "join"), (astray, "reset"), (teacher, "me")):
+        visit.page.goto(f"{visit.console.client.base_url}/{path}#%E0%A4%A")
+        visit.page.locator("h1").wait_for()
+    assert [one for one in astray.complaints if "401" not in one] == []
+    astray.complaints.clear()  # who asks at the door is a stranger: 401
+
+
 def test_a_forgotten_password_and_the_log_that_tells_of_it(lesson: Lesson, race: int) -> None:
     from playwright.sync_api import expect
 
