@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -12,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from racecraft.errors import ConfigError, RewardError, RunError
+from racecraft.errors import CheckpointError, ConfigError, RewardError, RunError
 from racecraft.learn import PPOConfig
-from racecraft.run import RunFolder
+from racecraft.run import RunFolder, checkpoint
 from racecraft.tuning import (
     Parameter,
     TrialOutcome,
@@ -258,6 +260,32 @@ def test_a_trial_that_fails_is_told_and_the_search_goes_on(tmp_path: Path) -> No
     assert all(trial.params["K"] >= 3 and "ZeroDivisionError" in trial.error for trial in failed)
     assert outcome.best is not None
     assert outcome.best.params["K"] < 3
+
+
+def test_a_full_disk_ends_the_search_and_is_no_trials_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_space(*_: Any, **__: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    folder = begin(tmp_path)
+    with monkeypatch.context() as full:
+        full.setattr(checkpoint, "write_file", no_space)
+        with pytest.raises(CheckpointError, match="No space"):
+            Tuning(folder).run(minutes=5)
+    outcome = Tuning(folder).run(minutes=5, max_trials=1)
+    assert [trial.state for trial in outcome.trials] == ["out of time", "complete"]
+    assert outcome.trials[0].params == outcome.trials[1].params
+
+
+def test_a_study_that_is_damaged_in_the_middle_is_told_in_a_sentence(tmp_path: Path) -> None:
+    folder = begin(tmp_path)
+
+    def damage(_: TrialOutcome) -> None:
+        (folder / "study.sqlite").write_bytes(b"not a database" * 1000)
+
+    with pytest.raises(RunError, match=r"study\.sqlite cannot be used: file is not a database\."):
+        Tuning(folder, on_trial=damage).run(minutes=5, max_trials=2)
+    with pytest.raises(RunError, match=r"study\.sqlite cannot be used"):
+        Tuning(folder).past()
 
 
 def test_what_does_not_train_now_is_an_error_and_no_search(tmp_path: Path) -> None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import sqlite3
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,8 +23,34 @@ from racecraft.tuning.trial import Report
 if TYPE_CHECKING:
     import optuna
 
+STUDY: Final = "study.sqlite"
 MAX_LOSSES: Final = 3
 """How often what makes a trial may die before the trial has failed."""
+
+
+@contextmanager
+def study_of(folder: Path, *kinds: type[Exception]) -> Iterator[None]:
+    """What goes wrong with a search's study, said in a sentence.
+
+    Args:
+        folder: Of the search.
+        kinds: Errors that can mean nothing else here, besides those of Optuna and its database.
+
+    Raises:
+        RunError: It is damaged, or cannot be read or written.
+    """
+    library = _optuna()
+    from sqlalchemy.exc import SQLAlchemyError
+
+    try:
+        yield
+    except (library.exceptions.OptunaError, SQLAlchemyError, *kinds) as error:
+        cause = error.__cause__ or error  # which says more than Optuna does
+        reason = str(getattr(cause, "orig", None) or cause) or type(cause).__name__
+        raise RunError(
+            f"{folder / STUDY} cannot be used: {reason.splitlines()[0].rstrip('.')}.",
+            hint="Make room and go on with --resume, or start a new tuning where it is damaged.",
+        ) from error
 
 
 class Record:
@@ -44,8 +71,8 @@ class Record:
         self._folder, self._space, self._seed, self._window = folder, space, seed, window
         self._library = _optuna()
         self._states = self._library.trial.TrialState
-        file = folder / "study.sqlite"
-        try:
+        file = folder / STUDY
+        with study_of(folder, Exception):
             storage = self._library.storages.RDBStorage(  # by its path: an address takes some characters for its own
                 f"sqlite:///{file.name}",
                 engine_kwargs={"creator": lambda: sqlite3.connect(file.resolve(), check_same_thread=False)},
@@ -53,9 +80,6 @@ class Record:
             self._study: optuna.Study = self._library.create_study(
                 study_name="racecraft", storage=storage, load_if_exists=True, direction="minimize"
             )
-        except Exception as error:
-            message = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise RunError(f"{file} cannot be used: {message}.", hint="Start a new tuning.") from error
 
     @property
     def seconds(self) -> float:

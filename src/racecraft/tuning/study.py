@@ -23,7 +23,7 @@ from typing import Any, Final
 
 from racecraft.agent import ModelMetadata
 from racecraft.checks import check_whole, require
-from racecraft.errors import ConfigError, RacecraftError, RunError
+from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
 from racecraft.extras import check_installed
 from racecraft.json_file import read_json_object
 from racecraft.run.atomic import write_json
@@ -36,7 +36,7 @@ from racecraft.training.plan import Plan
 from racecraft.training.settings import TrainSettings
 from racecraft.tuning.constants import rewrite_constants
 from racecraft.tuning.outcome import Outcome, TrialOutcome
-from racecraft.tuning.record import Record, name_of
+from racecraft.tuning.record import Record, name_of, study_of
 from racecraft.tuning.seats import HereSeat, ProcessSeat, Seat, SeatLost
 from racecraft.tuning.space import Parameter
 from racecraft.tuning.trial import Order, Report
@@ -114,7 +114,8 @@ class Tuning:
 
         Raises:
             ConfigError: A limit is not allowed.
-            RunError: The tuning is in use, or its storage is damaged.
+            RunError: The tuning is in use, its storage is damaged, or the folder takes nothing more.
+            CheckpointError: The folder takes nothing more.
             RacecraftError: The very first trial, which is what the user has now, cannot be trained.
         """
         require("minutes", minutes, 0 < minutes <= 30 * 24 * 60, "a number above 0, up to 43,200")
@@ -123,7 +124,7 @@ class Tuning:
         most = processes or (num_cores() if self.plan.settings.device == "cpu" else 1)
         count = min(most, self.window)
         seats: list[Seat] = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
-        with exclusive_lock(self.folder / ".lock"):
+        with exclusive_lock(self.folder / ".lock"), study_of(self.folder):
             record = self._record()
             record.take_up()
             call = _Call(record, seats, deadline=time.monotonic() + 60.0 * minutes, max_trials=max_trials)
@@ -131,10 +132,10 @@ class Tuning:
                 with interruptible(self._stop, self.stop):
                     self._search(call)
             finally:
-                for number, _ in call.busy.values():
-                    record.tell_cut(number)
                 for seat in seats:
                     seat.close()
+                for number, _ in call.busy.values():
+                    record.tell_cut(number)
             is_interrupted = self._stop.is_set() and not call.is_full
             return self._write(record, is_interrupted=is_interrupted)
 
@@ -144,7 +145,8 @@ class Tuning:
         Raises:
             RunError: The storage is damaged.
         """
-        return self._record().trials()
+        with study_of(self.folder):
+            return self._record().trials()
 
     def seconds(self) -> float:
         """Wall clock of all calls so far.
@@ -152,7 +154,8 @@ class Tuning:
         Raises:
             RunError: The storage is damaged.
         """
-        return self._record().seconds
+        with study_of(self.folder):
+            return self._record().seconds
 
     def stop(self) -> None:
         """Ask the search to end; trials under way are begun again by the next `run`. Safe from any thread."""
@@ -212,7 +215,10 @@ class Tuning:
 
     def _end(self, call: _Call, seat: Seat, outcome: Report | BaseException) -> None:
         record, (number, place) = call.record, call.busy[seat]
-        if isinstance(outcome, RacecraftError):
+        if isinstance(outcome, RunError | CheckpointError):  # of the folder, whatever a trial's numbers are
+            call.failure = outcome
+            record.tell_cut(number)
+        elif isinstance(outcome, RacecraftError):
             record.tell_failed(number, f"{type(outcome).__name__}: {outcome}")
             if place == 0:
                 call.failure = outcome  # what the user has now does not train: nothing to search around
