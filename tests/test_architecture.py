@@ -11,6 +11,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "racecraft"
 NATIVE = Path(__file__).parents[1] / "native"
 LAYERS = (
     "errors",
+    "scoped_warnings",
     "version",
     "system",
     "checks",

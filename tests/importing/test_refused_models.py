@@ -34,7 +34,7 @@ BAD_MODELS: dict[str, tuple[dict[str, str], str]] = {
     "yaml": (changed("training_params.yaml", "WORLD_NAME: [oval"), "training_params.yaml is not valid YAML"),
     "python in yaml": (
         changed("training_params.yaml", "WORLD_NAME: !!python/object/apply:os.system ['true']"),
-        "not valid YAML",
+        "YAML tag",
     ),
     "bomb in yaml": (changed("training_params.yaml", "a: &a [1]\nb: [*a, *a]"), "YAML alias"),
     "direction": (changed("training_params.yaml", "REVERSE_DIR: perhaps"), "REVERSE_DIR is 'perhaps'"),

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from tiny_runs import TINY, Recorder, Train, assert_same, logs, weights
 from racecraft import training
 from racecraft.errors import CheckpointError, ConfigError, RunError
 from racecraft.run import RunFolder
+from racecraft.run.checkpoint import Checkpoint, CheckpointStore
 from racecraft.track import generate_track
 from racecraft.training import Reporter, TrainResult, Until, resume
 from racecraft.training.job import Training
@@ -224,6 +226,23 @@ def test_a_damaged_last_checkpoint_falls_back_to_the_one_before(tiny: Train, dam
     assert "Using step 256" in recorder.notes[0]
     assert "step 256" in recorder.notes[1]
     assert_same(run, undisturbed)
+
+
+def test_what_python_collects_meanwhile_is_no_note_of_a_run(tiny: Train, monkeypatch: pytest.MonkeyPatch) -> None:
+    # a file or process of somebody else's that is collected while a checkpoint is read warns, too
+    run = tiny(until="64 steps").run
+    load = CheckpointStore.load
+
+    def slow(store: CheckpointStore, which: str | int = "last") -> Checkpoint:
+        warnings.warn("subprocess 4711 is still running", ResourceWarning, stacklevel=2)
+        return load(store, which)
+
+    monkeypatch.setattr(CheckpointStore, "load", slow)
+    recorder = Recorder()
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        resume(run, until="128 steps", reporter=recorder)
+    assert recorder.notes == ["Resumed at step 64."]
 
 
 def test_without_any_whole_checkpoint_it_says_so(tiny: Train) -> None:

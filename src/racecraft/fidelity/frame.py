@@ -7,7 +7,6 @@ Every candidate is drawn by the camera that trains, so what fits is what a polic
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError
 from racecraft.fidelity.likeness import edge_offsets, mean_difference, structural_similarity
+from racecraft.scoped_warnings import scoped_warnings
 from racecraft.sim.camera import LUMA, CameraSpec
 from racecraft.sim.views import Scene, driver_frames
 from racecraft.track.load import load_track
@@ -151,16 +151,17 @@ def _read(path: Path) -> NDArray[np.uint8]:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise ConfigError(f"Frame {path} is larger than {MAX_BYTES // 1_000_000} MB.", hint=hint)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(path, formats=("PNG", "JPEG", "WEBP", "BMP")) as image:
-                wide, high = image.size
-                if max(wide, high) > MAX_SIDE or wide < SHAPE[0] or abs(3 * wide - 4 * high) > wide / 50:
-                    raise ConfigError(
-                        f"Frame {path} has {wide} x {high} pixels; it must be 4:3, {SHAPE[0]} to {MAX_SIDE} wide.",
-                        hint=hint,
-                    )
-                return np.array(image.convert("RGB"))
+        with (
+            scoped_warnings("error", Image.DecompressionBombWarning),
+            Image.open(path, formats=("PNG", "JPEG", "WEBP", "BMP")) as image,
+        ):
+            wide, high = image.size
+            if max(wide, high) > MAX_SIDE or wide < SHAPE[0] or abs(3 * wide - 4 * high) > wide / 50:
+                raise ConfigError(
+                    f"Frame {path} has {wide} x {high} pixels; it must be 4:3, {SHAPE[0]} to {MAX_SIDE} wide.",
+                    hint=hint,
+                )
+            return np.array(image.convert("RGB"))
     except FileNotFoundError:
         raise ConfigError(f"Frame {path} does not exist.", hint=hint) from None
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:

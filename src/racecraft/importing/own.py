@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -20,6 +19,7 @@ from racecraft.importing.source import Source, SourceFile
 from racecraft.json_file import parse_json_object
 from racecraft.run import RunFolder
 from racecraft.run.stretches import FILE_NAME, recorded_stretches
+from racecraft.scoped_warnings import scoped_warnings
 from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.settings import TrainSettings
 
@@ -58,8 +58,7 @@ class OwnRun:
             notes.append(f"What the run learned with before its last change is not known: {error}")
         store = folder.checkpoints
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with scoped_warnings("ignore"):
                 step = store.load("last").step
         except CheckpointError as error:
             shutil.rmtree(store.folder, ignore_errors=True)

@@ -6,7 +6,6 @@ Everybody's files: what is no picture, too large or too many is refused in a sen
 from __future__ import annotations
 
 import struct
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from racecraft.errors import ConfigError, printable
 from racecraft.extras import needed_for
 from racecraft.replay.replay import read_replay
+from racecraft.scoped_warnings import scoped_warnings
 from racecraft.sim.camera import LUMA, CameraSpec
 from racecraft.sim.views import Scene
 
@@ -116,11 +116,12 @@ def _from_file(path: Path) -> Picture:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise ConfigError(f"Picture {_named(path)} is larger than {MAX_BYTES // 1_000_000} MB.")
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(path, formats=("PNG", "JPEG", "WEBP", "BMP")) as image:
-                _check_size(path, *image.size)
-                return _picture(path, _upright(image))
+        with (
+            scoped_warnings("error", Image.DecompressionBombWarning),
+            Image.open(path, formats=("PNG", "JPEG", "WEBP", "BMP")) as image,
+        ):
+            _check_size(path, *image.size)
+            return _picture(path, _upright(image))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         if isinstance(error, ConfigError):
             raise
@@ -176,8 +177,7 @@ def _upright(image: Image) -> NDArray[np.uint8]:
 def _turns_of(image: Image) -> tuple[bool, int]:
     """Whether a picture has to be mirrored from left to right, and then how many quarters turned to the right."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of what is damaged among them
+        with scoped_warnings("ignore", UserWarning):  # of what is damaged among them
             return _TURNS.get(image.getexif().get(_ORIENTATION), (False, 0))
     except (SyntaxError, ValueError, struct.error):  # what is said of a picture is damaged, the picture is not
         return False, 0

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ast
 import re
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -22,6 +21,7 @@ from racecraft.reward.names import bound_names, undefined_names
 from racecraft.reward.params import TEMPLATE
 from racecraft.reward.source import MAX_CHARACTERS
 from racecraft.reward.worker_process import FILENAME
+from racecraft.scoped_warnings import scoped_warnings
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -55,8 +55,7 @@ class Problem:
 def check_reward(source: str) -> list[Problem]:
     """The problems that can be seen in the source, in the order of its lines; of very many the first that are found."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Python's own are caught where the source is parsed
+        with scoped_warnings("ignore"):  # Python's own are caught where the source is parsed
             problems = list(islice(_problems(source), MAX_PROBLEMS))
     except (RecursionError, MemoryError):
         problems = [Problem(1, 1, "The source is nested too deeply to be read.")]
@@ -103,8 +102,7 @@ def _parse(source: str) -> tuple[ast.Module | None, list[Problem]]:
     """The syntax tree, or None; with Python's own errors and warnings about it."""
     findings = []
     tree: ast.Module | None = None
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with scoped_warnings("always") as caught:
         try:
             tree = ast.parse(source, FILENAME)
             compile(tree, FILENAME, "exec")  # finds more: a 'return' outside of a function, a 'nonlocal' without one
@@ -116,6 +114,8 @@ def _parse(source: str) -> tuple[ast.Module | None, list[Problem]]:
             tree = None
             findings.append(Problem(1, 1, f"The source is not text that Python reads: {error}."))
     for warning in caught:
+        if warning.filename != FILENAME:
+            continue  # of what Python collected meanwhile
         text = str(warning.message).rstrip(".") + "."
         findings.append(Problem(warning.lineno or 1, 1, text, severity="warning"))
     return tree, findings

@@ -8,9 +8,10 @@ So a change in place counts, unless what it changes was made in the same call.
 from __future__ import annotations
 
 import ast
-import warnings
 from collections.abc import Iterator
 from typing import Final
+
+from racecraft.scoped_warnings import scoped_warnings
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 
@@ -49,8 +50,7 @@ def keeps_state(source: str) -> bool:
     Args:
         source: Text of a ``reward_function.py`` that Python can read.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with scoped_warnings("ignore"):
         tree = ast.parse(source)
     return _Reader(tree).remembers()
 

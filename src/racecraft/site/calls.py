@@ -36,6 +36,7 @@ from racecraft.reward.worker_process import (
 
 SHIPPED: Final = (
     "errors.py",
+    "scoped_warnings.py",
     *(f"reward/{name}.py" for name in ("check", "failure", "imports", "keys", "names", "params", "rehearsal")),
     *(f"reward/{name}.py" for name in ("source", "state", "worker_process")),
     "site/calls.py",

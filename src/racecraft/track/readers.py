@@ -10,13 +10,13 @@ from __future__ import annotations
 import io
 import os
 import stat
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from racecraft.errors import TrackError, TrackNotFound
+from racecraft.scoped_warnings import scoped_warnings
 from racecraft.track.polyline import Floats, signed_area
 from racecraft.track.track import CLOSED_GAP, Track
 from racecraft.track.validate import MAX_WAYPOINTS, MIN_WAYPOINTS, check_rows, validate
@@ -148,8 +148,7 @@ def _read_bytes(path: Path) -> bytes:
 def _parse_npy(content: bytes, path: Path) -> Floats:
     file = io.BytesIO(content)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
+        with scoped_warnings("error"):
             version = np.lib.format.read_magic(file)
             read_header = (
                 np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0

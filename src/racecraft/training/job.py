@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import threading
 import time
-import warnings
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from typing import Any
 
 from racecraft.errors import CheckpointError, RacecraftError, RewardError
 from racecraft.run import CheckpointWarning, RunFolder
+from racecraft.scoped_warnings import scoped_warnings
 from racecraft.training.interruption import interruptible
 from racecraft.training.meter import Meter
 from racecraft.training.parent import WEIGHTS
@@ -231,8 +231,7 @@ class Training:
         """What to do after an error, as a hint for the command line; who trains otherwise says something else."""
         resume = f"racecraft train --resume {self.folder.path}"
         repair = f"Correct {self.folder.reward_function}, then: " if isinstance(error, RewardError) else ""
-        with warnings.catch_warnings(), suppress(CheckpointError):
-            warnings.simplefilter("ignore", CheckpointWarning)
+        with scoped_warnings("ignore", CheckpointWarning), suppress(CheckpointError):
             if self.folder.checkpoints.last is not None:
                 return f"The last checkpoint is good. {repair}{resume}"
         return f"{repair}{resume}" if repair else ""

@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
@@ -35,6 +34,7 @@ from racecraft.run import (
     read_stretches,
 )
 from racecraft.run.history import HistoryWriter
+from racecraft.scoped_warnings import scoped_warnings
 from racecraft.sim import CudaSimulation, Simulation
 from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.algorithms import make_algorithm, teacher_environment
@@ -248,10 +248,10 @@ def _beginning(folder: RunFolder, note: Note) -> tuple[Checkpoint | None, Checkp
     A damaged checkpoint is passed over with a note.
     """
     store = folder.checkpoints
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", CheckpointWarning)
+    with scoped_warnings("always", CheckpointWarning) as caught:
         saved = store.load("last") if store.entries() else None
-    for text in dict.fromkeys(str(warning.message) for warning in caught):
+    told = [warning for warning in caught if issubclass(warning.category, CheckpointWarning)]
+    for text in dict.fromkeys(str(warning.message) for warning in told):
         note(text)
     if saved is None and folder.read_info().parent is not None:
         return None, folder.parent_checkpoint.load()
