@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from command_line import Run
 
+from racecraft.cli.tune_text import say_tuned
+from racecraft.tuning import Outcome, Parameter, TrialOutcome
+
 SMALL = ("-t", "oval", "--search", "learning_rate", "--trial-steps", "64", "--num-threads", "1")
 ONE = ("--trials", "1", "--processes", "1", "-m", "1")
 
@@ -25,3 +28,19 @@ def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None
     assert "no effect" not in said.out
     again = racecraft("tune", "--resume", "tuning/a", *ONE, "--json")
     assert again.document["notes"] == []
+
+
+def test_no_number_of_the_table_is_folded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = ("OFF_TRACK_PENALTY", "BORDER_LOSS", "learning_rate", "gamma", "ent_coef")
+    params = dict(zip(names, (-0.00057961, 0.1714, 0.00020281, 0.99969, 123456.0), strict=True))
+    space = tuple(
+        Parameter(name=name, kind="constant", low=0.0, high=1.0, is_log=False, is_whole=False, default=value)
+        for name, value in params.items()
+    )
+    trial = TrialOutcome(
+        number=0, state="complete", value=1.0, params=params, run="r", completion=0.02,
+        best_lap_seconds=None, steps=64, seconds=1.0, error="",
+    )  # fmt: skip
+    say_tuned(Outcome(folder=tmp_path, goal="laps", space=space, trials=(trial,), importances={}, is_interrupted=False))
+    row = next(line for line in capsys.readouterr().out.splitlines() if "(now)" in line)
+    assert row.split()[-5:] == ["-0.00058", "0.1714", "0.000203", "0.9997", "1.23e+05"]

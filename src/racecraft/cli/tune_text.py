@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from racecraft.tuning import Outcome, TrialOutcome
 
 SHOWN: Final = 8  # trials in the table, the best first
+NUMBER: Final = 8  # characters of the longest number in the table, where names may be folded and numbers not
 WIDTH: Final = 24  # characters of the longest bar
 
 
@@ -59,14 +60,14 @@ def _trials(outcome: Outcome, ranked: list[TrialOutcome]) -> Table:
     table.add_column("trial", justify="right")
     table.add_column("best lap" if outcome.goal == "lap_time" else "laps after", justify="right", no_wrap=True)
     for parameter in outcome.space:
-        table.add_column(parameter.name, justify="right", overflow="fold")
+        table.add_column(parameter.name, justify="right", overflow="fold", min_width=NUMBER)
     shown = ranked[:SHOWN]
     baseline = outcome.baseline
     if baseline is not None and baseline not in shown:
         shown = [*shown, baseline]
     for trial in shown:
         is_now = baseline is not None and trial.number == baseline.number
-        numbers = (f"{trial.params[parameter.name]:.4g}" for parameter in outcome.space)
+        numbers = (_number(trial.params[parameter.name]) for parameter in outcome.space)
         name = f"{trial.number} (now)" if is_now else str(trial.number)
         style = "bold" if trial is ranked[0] else "dim" if is_now else ""
         table.add_row(name, _state(trial, outcome.goal), *numbers, style=style)
@@ -88,6 +89,11 @@ def _importances(outcome: Outcome) -> Table:
         found = "" if best is None else f"{best.params[name]:.4g}"
         table.add_row(name, f"{bar} {100 * share:.0f} %", f"{parameter.low:.4g} to {parameter.high:.4g}", found)
     return table
+
+
+def _number(value: float) -> str:
+    exact = f"{value:.4g}"
+    return exact if len(exact) <= NUMBER else f"{value:.3g}"
 
 
 def _state(trial: TrialOutcome, goal: str) -> str:
