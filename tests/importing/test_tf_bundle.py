@@ -97,6 +97,18 @@ def test_a_hostile_index_is_one_sentence(content: bytes, says: str, tmp_path: Pa
     is_refused(content, says, tmp_path)
 
 
+def test_a_block_that_is_listed_many_times_is_read_once(tmp_path: Path) -> None:
+    def trailed(content: bytes) -> bytes:
+        return content + b"\0" + mask(slow_crc32c(content + b"\0")).to_bytes(4, "little")
+
+    empty = block([])
+    listed = block([(b"%05d" % place, varint(0) + varint(len(empty))) for place in range(1000)])
+    begin = len(trailed(empty))
+    footer = varint(0) + varint(0) + varint(begin) + varint(len(listed))
+    content = trailed(empty) + trailed(listed) + footer.ljust(40, b"\0") + table([HEADER])[-8:]
+    is_refused(content, "do not lie one behind the other", tmp_path)
+
+
 def test_more_names_than_any_network_has_are_one_sentence(tmp_path: Path) -> None:
     names = ((b"%d" % i, entry()) for i in range(11_000))  # seconds to write, so not while tests are collected
     is_refused(table([HEADER, *names]), "more than 10,000 tensors", tmp_path)

@@ -105,8 +105,12 @@ def _entries(table: memoryview, wire: Wire) -> dict[str, _Entry]:
     _, _, place = _handle(footer, 0, wire)  # of the index of filters, which a checkpoint has not
     offset, size, _ = _handle(footer, place, wire)
     found: dict[str, _Entry] = {}
+    end = 0  # of the block before
     for _, value in _pairs(_block(table, offset, size, wire), wire):
         offset, size, _ = _handle(value, 0, wire)
+        if offset < end:  # a large one that is listed ten thousand times would take minutes
+            wire.refuse("is damaged: its blocks do not lie one behind the other")
+        end = offset + size + _TRAILER
         for key, message in _pairs(_block(table, offset, size, wire), wire):
             if not key:
                 _check_header(message, wire)
