@@ -233,9 +233,10 @@ def test_a_hostile_list_of_files_is_refused(tmp_path: Path, files: Any) -> None:
     index.write_text(json.dumps({"format": 1, "files": files}))
     with pytest.raises(RunError, match="not one of Racecraft's"):
         store.bring("a", tmp_path, incoming=tmp_path / "incoming")
-    index.write_text("{")
-    with pytest.raises(RunError, match="damaged"):
-        store.bring("a", tmp_path, incoming=tmp_path / "incoming")
+    for text in ("{", '{"format": 1, "number": Infinity, "files": {}}'):
+        index.write_text(text)
+        with pytest.raises(RunError, match="damaged"):
+            store.bring("a", tmp_path, incoming=tmp_path / "incoming")
     assert not (tmp_path / "up").exists()
 
 

@@ -150,6 +150,19 @@ def test_what_is_no_whole_backup_leaves_nothing(tmp_path: Path) -> None:
                 file.addfile(info, io.BytesIO(data))
         return tmp_path / name
 
+    def sparse(name: str) -> Path:
+        """A file of ten gigabytes that is one hole: its map says that there is a single byte, behind the end."""
+        hole = tarfile.TarInfo("files/hole")
+        hole.pax_headers = {
+            "GNU.sparse.major": "0",
+            "GNU.sparse.minor": "1",
+            "GNU.sparse.size": str(10**10),
+            "GNU.sparse.map": f"{10**10},0",
+        }
+        with tarfile.open(tmp_path / name, "w", format=tarfile.PAX_FORMAT) as file:
+            file.addfile(hole)
+        return tmp_path / name
+
     start = {"manifest.json": b'{"format": 1, "created": "", "racecraft": "", "revision": "0001", "rows": {}}'}
     (tmp_path / "text").write_bytes(b"not a tar at all" * 100)
     for source, told in (
@@ -163,6 +176,9 @@ def test_what_is_no_whole_backup_leaves_nothing(tmp_path: Path) -> None:
         (tmp_path, "Is a directory"),
         (tar("large", **{"manifest.json": b" " * (1 << 20) + start["manifest.json"], "end": b""}), "no backup of"),
         (tar("list", **{"manifest.json": b"[]", "end": b""}), "no backup of a league"),
+        (tar("deep", **{"manifest.json": b"[" * 100_000, "end": b""}), "no backup of a league"),
+        (tar("undated", **{"manifest.json": b'{"format": 1}', "end": b""}), "no whole backup"),
+        (sparse("sparse"), "which is no file"),
     ):
         with pytest.raises(RunError, match=told) as refused:
             restore(ServeSettings(runs=tmp_path / "place"), source)

@@ -31,7 +31,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from racecraft.errors import RunError
+from racecraft.errors import ConfigError, RunError
+from racecraft.json_file import parse_json_object
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file
 from racecraft.serve.settings import OWNER
@@ -346,8 +347,8 @@ def read_copy(data: bytes, name: str) -> Copy:
         RunError: It is none of ours.
     """
     try:
-        document = json.loads(data)
-    except (ValueError, RecursionError) as error:
+        document = parse_json_object(data, name="It")
+    except ConfigError as error:
         raise RunError(f"The list of files of run {name!r} is damaged.") from error
     try:
         if document["format"] != FORMAT or len(document["files"]) > MAX_FILES:

@@ -38,6 +38,10 @@ LEFT_OUT: Final = (f"{STATE_FOLDER}/console.db", f"{STATE_FOLDER}/{INCOMING}/", 
 """Beginnings of paths: the database is in the backup by its rows, and the rest was on its way."""
 MAX_MANIFEST: Final = 1 << 20
 """Bytes."""
+NOT_OURS: Final = (
+    *(tarfile.TarError, ValueError, KeyError, TypeError, AttributeError, EOFError, OverflowError, RecursionError),
+)
+"""What reading something else raises."""
 PASSING: Final = (".lock", ".live")
 """Beginnings of names of what only a running job has."""
 
@@ -127,7 +131,7 @@ def restore(settings: ServeSettings, source: Path) -> Backup:
         folder.rename(settings.runs)
     except RunError:  # a ValueError, too, and said already
         raise
-    except (tarfile.TarError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
+    except NOT_OURS as error:
         raise RunError(f"{source} is no backup of a league: {error}.") from error
     except OSError as error:
         raise RunError(f"{source} cannot be restored: {error.strerror or error}.") from error
@@ -210,7 +214,8 @@ def _unpack(source: Path, files: Path, rows: Path) -> tuple[dict[str, Any], int]
     files.mkdir(parents=True)
     with tarfile.open(source, "r:") as tar:
         for member in tar:
-            stream = tar.extractfile(member) if member.isfile() else None
+            is_plain = member.isfile() and not member.issparse()  # whose holes would fill a disk
+            stream = tar.extractfile(member) if is_plain else None
             if stream is None:
                 raise RunError(f"{source} holds {member.name[:80]!r}, which is no file.")
             is_whole = member.name == END
@@ -224,7 +229,7 @@ def _unpack(source: Path, files: Path, rows: Path) -> tuple[dict[str, Any], int]
                     raise RunError(f"{source} holds {member.name[:80]!r}, which has no place in a league.")
                 _write(files.joinpath(*path.parts[1:]), stream)
                 count += 1
-    if not is_whole or about.get("format") != 1:
+    if not is_whole or about.get("format") != 1 or "racecraft" not in about or "created" not in about:
         raise RunError(f"{source} is no whole backup of a league.")
     return about, count
 
