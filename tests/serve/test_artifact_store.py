@@ -134,6 +134,30 @@ def test_only_what_changed_is_copied_and_what_is_gone_is_removed(tmp_path: Path,
         store.bring("a", tmp_path / "runs", incoming=tmp_path / "incoming")
 
 
+def test_a_name_that_is_given_again_is_another_run_also_to_who_has_the_old_one(tmp_path: Path, url: str) -> None:
+    store, first, incoming = Artifacts(url), make_run(tmp_path / "first"), tmp_path / "incoming"
+    store.keep(first)
+    there = tmp_path / "there"
+    there.mkdir()
+    store.bring("a", there, incoming=incoming)
+    for step in (200, 300):
+        RunFolder(there / "a").checkpoints.save(step, {"w": np.arange(3.0)})
+        store.keep(RunFolder(there / "a"))
+    store.forget("a")
+    second = make_run(tmp_path / "second")
+    second.reward_function.write_text("another")
+    store.keep(second)
+    with pytest.raises(RunError, match="changed by another machine"):
+        store.keep(RunFolder(there / "a"))
+    assert store.bring("a", there, incoming=incoming)
+    assert contents(there / "a") == contents(second.path)
+    assert not store.bring("a", there, incoming=incoming)
+    RunFolder(there / "a").checkpoints.save(200, {"w": np.arange(3.0)})
+    store.keep(RunFolder(there / "a"))
+    assert store.bring("a", tmp_path / "second", incoming=incoming)
+    assert contents(there / "a") == contents(second.path)
+
+
 def test_two_machines_take_turns(tmp_path: Path, url: str) -> None:
     store, here, incoming = Artifacts(url), make_run(tmp_path / "here"), tmp_path / "incoming"
     store.keep(here)

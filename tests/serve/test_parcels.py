@@ -19,6 +19,7 @@ from racecraft.serve.jobs.cargo import Cargo
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.people.people import add_person
+from racecraft.serve.problems import Conflict
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.artifacts import RUNS, Artifacts, Copy
 from racecraft.serve.store.database import Database
@@ -61,7 +62,7 @@ class Desk:
             digest = hashlib.sha256(content).hexdigest()
             self._keep(job, Key(shelf, name, digest), content)
             files[path] = {"size": len(content), "time": 1, "sha256": digest}
-        document = {"format": 1, "number": before.number + 1, "files": files}
+        document = {"format": 1, "number": before.number + 1, "life": before.life, "files": files}
         self._keep(job, Key(shelf, name), json.dumps(document).encode())
 
     def _keep(self, job: Job, key: Key, data: bytes) -> None:
@@ -122,7 +123,7 @@ def test_a_stretch_says_what_the_files_say_and_those_before_it_stay(desk: Desk) 
     folder.path.joinpath(two).unlink()
     document = desk.store.copy("run")
     assert document is not None
-    (folder.path / ".copy").write_text(str(document.number))
+    (folder.path / ".copy").write_text(f"{document.number} {document.life}")
     desk.store.keep(folder)
     job = desk.take("train")
     assert "says something else" in desk.refuses(job, RUNS, "run", {two: second.replace(b"2.0", b"3.0")})
@@ -131,6 +132,17 @@ def test_a_stretch_says_what_the_files_say_and_those_before_it_stay(desk: Desk) 
     desk.send(job, RUNS, "run", {two: json.dumps(later).encode()})  # after a restart at the same step
     for change in (None, second.replace(b'"step": 256', b'"step": 0').replace(b'"number": 2', b'"number": 1')):
         assert desk.refuses(job, RUNS, "run", {one: change}) == f"A job does not change {one}."
+
+
+def test_another_run_of_the_name_is_not_replaced(desk: Desk) -> None:
+    folder = new_run(desk.runs)
+    desk.store.keep(folder)
+    job, before = desk.take("train"), desk.store.copy("run")
+    assert before is not None
+    document = {"format": 1, "number": before.number + 1, "life": "0" * 16, "files": before.files}
+    with pytest.raises(Conflict, match="changed by another machine"):
+        desk._keep(job, Key(RUNS, "run"), json.dumps(document).encode())
+    assert desk.store.copy("run") == before
 
 
 def test_what_a_search_is_about_is_not_changed_by_who_makes_it(desk: Desk) -> None:

@@ -1,7 +1,7 @@
 """Copies of runs in an object store: a server with an empty folder has them again, and any machine can go on with one.
 
-    runs/NAME.json      path, size and SHA-256 of each file, and which copy it is, counted from 1; written last, so a
-                        copy is whole, or the one before
+    runs/NAME.json      path, size and SHA-256 of each file, which copy it is, counted from 1, and of which life of the
+                        name; written last, so a copy is whole, or the one before
     runs/NAME/SHA256    a file's content
     live/NAME           its cars as they drive, while somebody looks
     tracks/SHA256       a track of somebody's own, for jobs that drive on it
@@ -9,7 +9,8 @@
     people/NUMBER/…     the same for each other person of a league
 
 A run folder remembers which copy it was last alike to. So whoever has an older one brings the newer, and nobody who was
-away writes over it.
+away writes over it. A name may be given again when its run was removed, or by another console: copies of another life
+are another run.
 
 The store is S3 (``s3://bucket/prefix``; keys, region and endpoint from AWS's environment variables) or a folder
 (``file:///…``), both through obstore. What comes back is not believed: names, sizes and checksums are checked first.
@@ -22,6 +23,7 @@ import hashlib
 import json
 import os
 import re
+import secrets
 import shutil
 import sqlite3
 import tempfile
@@ -45,8 +47,9 @@ MAX_FILE_BYTES: Final = 1 << 33
 MAX_FILES: Final = 200_000
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}(/[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}){0,20}")
 """Paths of runs: no odd characters, nothing hidden, nothing that leads elsewhere."""
+_LIFE: Final = re.compile(r"[0-9a-f]{0,16}")
 MARK: Final = ".copy"
-"""In a run folder: the number of the copy that it was last alike to."""
+"""In a run folder: number and life of the copy that it was last alike to."""
 RUNS: Final = "runs"
 MANIFEST: Final = "checkpoints/manifest.json"
 SNAPSHOTS: Final = 10
@@ -66,6 +69,8 @@ class Copy:
     number: int = 0
     files: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Size, time and SHA-256 by path."""
+    life: str = ""
+    """Made by chance with the first copy; empty for copies of earlier versions."""
 
 
 class Artifacts:
@@ -121,8 +126,9 @@ class Artifacts:
         """
 
         def copied() -> int:
-            before = self.copy(folder.name) or Copy()
-            if before.number > _mark(folder.path, before.number):
+            before = self.copy(folder.name) or Copy(life=secrets.token_hex(8))
+            number, life = _mark(folder.path, (before.number, before.life))
+            if before.number > 0 and (life != before.life or number < before.number):
                 raise RunError(
                     f"Run {folder.name!r} was changed by another machine, so its copy is newer than {folder.path}."
                 )
@@ -148,9 +154,9 @@ class Artifacts:
             number = before.number
             if files != before.files:
                 number += 1
-                document = {"format": FORMAT, "number": number, "files": files}
+                document = {"format": FORMAT, "number": number, "life": before.life, "files": files}
                 self.objects.put(self.key(f"{folder.name}.json"), json.dumps(document).encode())
-            _remember(folder.path, number)
+            _remember(folder.path, number, before.life)
             gone = {line["sha256"] for line in before.files.values()} - {line["sha256"] for line in files.values()}
             self.objects.delete(self.key(folder.name, digest) for digest in gone)
             return count
@@ -192,7 +198,8 @@ class Artifacts:
                 raise RunError(f"The store has no run {name[:80]!r}.")
             is_here = folder.exists()
             # a run without a mark is older than marks; another folder was left by a job that was killed
-            if is_here and copy.number <= _mark(folder, copy.number if self._shelf == RUNS else 0):
+            number, life = _mark(folder, (copy.number if self._shelf == RUNS else 0, copy.life))
+            if is_here and life == copy.life and copy.number <= number:
                 return False
             target = Path(tempfile.mkdtemp(dir=incoming, prefix=f"{name}-"))
             target.chmod(0o755)
@@ -201,7 +208,7 @@ class Artifacts:
                     path: line for path, line in copy.files.items() if not is_here or not _is_alike(folder / path, line)
                 }
                 self._tried(lambda: self._download(name, wanted, target))  # noqa: B023 - called here and now
-                _remember(target, copy.number)
+                _remember(target, copy.number, copy.life)
                 if not is_here:
                     os.rename(target, folder)
                 else:
@@ -366,9 +373,10 @@ def read_copy(data: bytes, name: str) -> Copy:
                 raise ValueError("name or size")
             files[path] = {"size": size, "time": moment, "sha256": digest}
         number = int(document.get("number", 0))  # copies of earlier versions are not counted
-        if not 0 <= number < 2**62:
-            raise ValueError("number")
-        return Copy(number, files)
+        life = str(document.get("life", ""))
+        if not 0 <= number < 2**62 or not _LIFE.fullmatch(life):
+            raise ValueError("number or life")
+        return Copy(number, files, life)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise RunError(f"The list of files of run {name!r} is not one of Racecraft's.") from error
 
@@ -437,16 +445,17 @@ def _is_alike(file: Path, line: dict[str, Any]) -> bool:
     return (status.st_size, status.st_mtime_ns) == (line["size"], line["time"])
 
 
-def _mark(folder: Path, otherwise: int) -> int:
-    """Which copy a run folder was last alike to; runs from before copies were counted are taken for up to date."""
+def _mark(folder: Path, otherwise: tuple[int, str]) -> tuple[int, str]:
+    """Which copy a folder was last alike to: number and life."""
     try:
-        return int((folder / MARK).read_text(encoding="ascii")[:20])
+        number, _, life = (folder / MARK).read_text(encoding="ascii")[:60].partition(" ")
+        return int(number), life
     except (OSError, ValueError):
         return otherwise
 
 
-def _remember(folder: Path, number: int) -> None:
-    write_file(folder / MARK, str(number).encode())
+def _remember(folder: Path, number: int, life: str) -> None:
+    write_file(folder / MARK, f"{number} {life}".encode())
 
 
 def _moment(path: Path) -> tuple[int, int]:

@@ -185,7 +185,7 @@ class Parcels:
         before = found or Copy()
         if after == before:  # sent again, as its answer was lost
             return
-        if after.number != before.number + 1:
+        if after.number != before.number + 1 or (found is not None and after.life != before.life):
             raise Conflict(f"Run {name!r} was changed by another machine.")
         if sum(line["size"] for line in after.files.values()) > MAX_FOLDER:
             raise RunError(f"All files together may have at most {MAX_FOLDER >> 30} GB.")
