@@ -22,7 +22,7 @@ export const contestName = (contest: Pick<ContestCard, "title" | "models" | "is_
 /** A ghost of a film, by what there is to know of earlier heats. */
 export function ghostName(ghost: Ghost, heats: ContestCard[]): string {
   if (ghost === "best-lap") return t("contests_ghost_best_lap");
-  if ("model" in ghost) return ghost.model;
+  if ("model" in ghost) return ghost.checkpoint === "best" ? ghost.model : `${ghost.model}@${ghost.checkpoint}`;
   const heat = heats.find((one) => one.id === ghost.heat);
   return heat ? contestName(heat) : t("contests_ghost_heats");
 }
