@@ -183,6 +183,8 @@ WARNINGS = [
     ("add = lambda p: p.update(w=1)\n" + body("add(params)", "return params['w']"), 4, "no key 'w'"),
     (body("import time", "return time.time()"), 3, "clock on the wall"),
     ("import numpy as np\nrng = np.random.default_rng()\n" + body(RETURN), 2, "without a seed"),
+    ("import random\nrandom.seed()\n" + body(RETURN), 2, "without a seed"),
+    ("from numpy.random import PCG64, Generator\nrng = Generator(PCG64())\n" + body(RETURN), 2, "without a seed"),
     (body("import logging", "logging.info('x')", RETURN), 2, "'import logging' is refused by AWS; here it is allowed."),
     ("import io\n" + body(RETURN), 1, "'import io' is refused by AWS"),
     ("from pathlib import PurePath\n" + body(RETURN), 1, "'import pathlib' is refused by AWS"),

@@ -71,6 +71,13 @@ LOG_FILES: Final = (
     "logging.handlers.RotatingFileHandler",
     "logging.handlers.TimedRotatingFileHandler",
 )
+SEEDED: Final = (  # by what they are given; without it by the system, and so otherwise in every run
+    *("random.seed", "random.Random"),
+    *(
+        f"numpy.random.{name}"
+        for name in ("seed", "default_rng", "RandomState", "SeedSequence", "PCG64", "MT19937", "Philox", "SFC64")
+    ),
+)
 FORBIDDEN_MODULES: Final = (  # parts of allowed packages that read or write files, or load foreign code
     *(
         "numpy.ctypeslib",
@@ -174,7 +181,7 @@ class ImportRules:
             yield node, message, hint, "warning"
         elif meaning in LOG_FILES or (meaning == "logging.basicConfig" and "filename" in _keywords(node)):
             yield node, "No log file is written.", "Its lines are kept with what the function prints.", "warning"
-        elif meaning in ("numpy.random.default_rng", "random.Random") and not node.args + node.keywords:
+        elif meaning in SEEDED and not node.args + node.keywords:
             yield (
                 node,
                 f"'{meaning}()' without a seed makes runs that cannot be repeated.",
