@@ -115,6 +115,28 @@ def test_what_a_row_refers_to_may_come_later(tmp_path: Path) -> None:
         back_up(ServeSettings(runs=tmp_path / "b"), tmp_path / "a.tar")
 
 
+def test_a_backup_is_private_and_whole_whatever_one_before_it_left(tmp_path: Path) -> None:
+    settings, file = races_of_each_other(tmp_path / "runs"), tmp_path / "a.tar"
+    (tmp_path / "a.tar.partial").write_bytes(b"of one that was killed")
+    (tmp_path / "elsewhere").mkdir()
+    (settings.runs / "moved").symlink_to(tmp_path / "elsewhere")
+    with pytest.warns(UserWarning, match="moved is a link: what it leads to is not in the backup"):
+        back_up(settings, file)
+    assert file.stat().st_mode & 0o077 == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.tar", "a.tar.partial", "elsewhere", "runs"]
+    assert restore(ServeSettings(runs=tmp_path / "b"), file).rows == {"users": 1, "races": 2}
+
+
+def test_a_link_for_a_password_leads_to_an_address(tmp_path: Path) -> None:
+    races_of_each_other(tmp_path / "runs")
+    for address in ("racing.example.org", "https://racing.example.org/console"):
+        done = league_verb("reset", "you", "--runs", str(tmp_path / "runs"), "--address", address)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert "allowed are https://NAME and http://NAME:PORT" in done.stderr
+    done = league_verb("reset", "you", "--runs", str(tmp_path / "runs"), "--address", "http://192.168.1.20:8321")
+    assert done.stdout.startswith("http://192.168.1.20:8321/reset#")
+
+
 def test_the_rows_are_of_one_moment(database_url: str, tmp_path: Path) -> None:
     """Somebody makes a group and comes into it after the groups were read, and before the members are."""
     database = Database(database_url)

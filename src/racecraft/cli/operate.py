@@ -130,7 +130,8 @@ def reset(
         from racecraft.serve.settings import OWNER, ServeSettings
         from racecraft.serve.store.database import Database as Tables
 
-    tables = Tables(ServeSettings(runs=runs, database=database).database_url)
+    settings = ServeSettings(runs=runs, database=database, address=address, league=True, plain_http=True)
+    tables = Tables(settings.database_url)
     tables.require_current()
     person = People(tables).named(name)
     secret = Keys(tables).make_reset(person.id)

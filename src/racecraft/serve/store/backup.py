@@ -13,7 +13,9 @@ import os
 import shutil
 import tarfile
 import tempfile
+import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from io import BytesIO
@@ -70,10 +72,9 @@ def back_up(settings: ServeSettings, to: Path) -> Backup:
     if to.exists():
         raise RunError(f"{to} exists already.", hint="Name another file.")
     database = Database(settings.database_url)
-    partial = to.with_name(f"{to.name}.partial")
     try:
         revision = database.require_current()
-        with tempfile.TemporaryFile() as rows, _private(partial) as stream, tarfile.open(None, "w", stream) as tar:
+        with tempfile.TemporaryFile() as rows, _growing(to) as stream, tarfile.open(None, "w", stream) as tar:
             counts = _write_rows(database, rows)
             about = {"format": 1, "created": now().isoformat(), "racecraft": VERSION, "revision": revision}
             _add(tar, MANIFEST, json.dumps({**about, "rows": counts}).encode())
@@ -82,17 +83,15 @@ def back_up(settings: ServeSettings, to: Path) -> Backup:
             rows.seek(0)
             tar.addfile(described, rows)
             files = 0
-            for name, data in _files(settings.runs, without={to.absolute(), partial.absolute()}):
+            for name, data in _files(settings.runs, without=Path(stream.name).absolute()):
                 _add(tar, f"{FILES}/{name}", data)
                 files += 1
             _add(tar, END, b"")
-        os.replace(partial, to)
     except SQLAlchemyError as error:
         raise RunError(f"The league's database cannot be read: {str(error).splitlines()[0]}.") from error
     except OSError as error:
         raise RunError(f"{to} cannot be written: {error.strerror or error}.") from error
     finally:
-        partial.unlink(missing_ok=True)
         database.close()
     return Backup(about["created"], VERSION, revision, counts, files)  # type: ignore[arg-type]
 
@@ -193,13 +192,16 @@ def _read_rows(connection: sa.Connection, lines: IO[bytes]) -> dict[str, int]:
     return counts
 
 
-def _files(folder: Path, *, without: set[Path]) -> Iterator[tuple[str, bytes]]:
-    """Every file of a folder that is still there when its turn comes."""
+def _files(folder: Path, *, without: Path) -> Iterator[tuple[str, bytes]]:
+    """Every file of a folder that is still there when its turn comes; of links only that they are there is told."""
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
-        if path.absolute() in without or name.startswith(LEFT_OUT) or path.name.startswith(PASSING):
+        if path.absolute() == without or name.startswith(LEFT_OUT) or path.name.startswith(PASSING):
             continue
-        if path.is_symlink() or not path.is_file():
+        if path.is_symlink():
+            warnings.warn(f"{path} is a link: what it leads to is not in the backup.", stacklevel=3)
+            continue
+        if not path.is_file():
             continue
         try:
             yield name, path.read_bytes()
@@ -247,6 +249,15 @@ def _add(tar: tarfile.TarFile, name: str, data: bytes) -> None:
     tar.addfile(described, BytesIO(data))
 
 
-def _private(path: Path) -> IO[bytes]:
-    """A new file that only its owner reads."""
-    return os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb")
+@contextmanager
+def _growing(path: Path) -> Iterator[IO[bytes]]:
+    """A file that only its owner reads, and that has this name once it is whole."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=".partial", delete=False) as file:
+        try:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+            os.replace(file.name, path)
+        except BaseException:
+            Path(file.name).unlink(missing_ok=True)
+            raise
