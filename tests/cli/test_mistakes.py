@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -123,3 +124,25 @@ def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     command = f"{sys.executable} -m racecraft tracks | true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path, check=False)
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "variables", "status", "says"),
+    [
+        ("tracks", {"PYTHONIOENCODING": "ascii"}, 0, ""),
+        ("doctor", {"RACECRAFT_ISA": "sse9"}, 1, "ConfigError: Instruction set 'sse9' cannot run here; choose one of "),
+        ("tracks --json > /dev/full", {}, 1, "OSError: [Errno 28] No space left on device"),
+        ("tracks > /dev/full", {}, 1, "OSError: [Errno 28] No space left on device"),
+    ],
+)
+def test_odd_surroundings_are_no_bug(
+    tmp_path: Path, command: str, variables: dict[str, str], status: int, says: str
+) -> None:
+    done = subprocess.run(
+        ["bash", "-c", f"{sys.executable} -m racecraft {command}"],
+        env={**os.environ, **variables}, capture_output=True, text=True, cwd=tmp_path, check=False,
+    )  # fmt: skip
+    assert done.returncode == status
+    assert done.stderr.startswith(says)
+    assert "Traceback" not in done.stderr
+    assert "bug" not in done.stderr

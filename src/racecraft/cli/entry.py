@@ -9,12 +9,14 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
+from io import TextIOWrapper
 from typing import Any, cast
 
 import typer
 
 from racecraft.cli.app import INTERRUPTED, app, print_json, text
-from racecraft.errors import RacecraftError
+from racecraft.errors import ConfigError, RacecraftError
 from racecraft.extras import not_installed
 
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])  # typer hands out no name for this base
@@ -73,6 +75,9 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # or every package installed is asked for one
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     is_debug, is_json = len(arguments) < len(sys.argv) - 1, "--json" in arguments
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # a terminal that lacks a sign shows another for it
+            stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {message}", err=True)
     try:
         register(arguments)
@@ -87,19 +92,28 @@ def main() -> None:
     except typer.Abort:
         sys.exit(INTERRUPTED)
     except Exception as error:
-        absent = not_installed(error.name or "") if isinstance(error, ModuleNotFoundError) else None
-        told = absent or error
+        told = _known(error) or error
         is_expected = isinstance(told, RacecraftError | OSError)
         code, message = type(told).__name__, str(told)
         hint = getattr(told, "hint", "") if is_expected else "This is a bug in Racecraft. --debug shows where."
         if is_debug:
             traceback.print_exc()
         if is_json:
-            print_error(code, message, hint)
+            with suppress(OSError):  # which may be what is told
+                print_error(code, message, hint)
         if not is_debug:
             text().say_error(code, message, hint)
         sys.exit(1)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _known(error: Exception) -> ConfigError | None:
+    """What an import that failed asks of the user; None of everything else."""
+    if isinstance(error, ModuleNotFoundError):
+        return not_installed(error.name or "")
+    if isinstance(error, ImportError) and str(error).startswith("Instruction set"):
+        return ConfigError(str(error), hint="The variable RACECRAFT_ISA asks for it; without it the best is taken.")
+    return None
 
 
 def print_error(code: str, message: str, hint: str) -> None:
