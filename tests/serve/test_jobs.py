@@ -249,3 +249,11 @@ def test_a_stopped_server_hands_its_training_to_the_next(runs: Path) -> None:
         assert ended["state"] == "done"
         assert ended["result"]["steps"] >= 20_000
         assert ended["attempts"] == 2
+
+
+def test_a_training_that_is_done_leaves_nothing_in_the_log(tmp_path: Path) -> None:
+    with running_console(tmp_path / "runs") as console:
+        console.create(name="a", train=False, track="oval", until="256 steps")
+        job = console.client.post("/api/models/a/train", json={}).json()["id"]
+        assert console.wait_for(console.job_ended(job))["state"] == "done"
+    assert (tmp_path / "runs" / ".racecraft" / "jobs.log").read_text() == ""

@@ -101,6 +101,7 @@ class Worker:
             self._do()
         finally:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            self._stops.clear()  # the heart may beat once more, and would keep what they stop to the end of the process
         kind = KINDS.get(self._job.kind)
         return kind is not None and kind.stays and not self._leaving.is_set()
 
