@@ -272,6 +272,13 @@ def test_cars_are_shown_as_they_were_last(tmp_path: Path) -> None:
     assert (store.shown("a"), store.shown("b")) == (b"second", b"")
 
 
+def test_what_fails_here_is_not_the_stores_fault(tmp_path: Path) -> None:
+    store, folder = Artifacts(f"file://{tmp_path}/store"), make_run(tmp_path / "runs")
+    (folder.path / "study.sqlite").write_text("no database" * 100)
+    with pytest.raises(RunError, match=r"cannot be made on this machine: study\.sqlite cannot be read"):
+        store.keep(folder)
+
+
 def test_a_store_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))

@@ -35,7 +35,7 @@ from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.people.people import add_person
 from racecraft.serve.settings import ServeSettings
-from racecraft.serve.station import work_for
+from racecraft.serve.station import work_for, work_through
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
@@ -347,6 +347,18 @@ def test_two_machines_never_work_on_one_run(postgres: PostgresServer) -> None:
 def test_a_worker_that_cannot_work_says_why(tmp_path: Path, settings: dict[str, str], says: str) -> None:
     with pytest.raises((ConfigError, RunError), match=says):
         work_for(ServeSettings(runs=tmp_path, **settings), on_ready=pytest.fail)
+
+
+def test_a_worker_without_a_place_or_a_token_says_so(tmp_path: Path) -> None:
+    url, store = f"sqlite:///{tmp_path / 'console.db'}", f"file://{tmp_path}/store"
+    database = Database(url)
+    database.migrate()
+    database.close()
+    idle = ServeSettings(runs=tmp_path / "w", database=url, artifacts=store, training_slots=0, other_slots=0)
+    with pytest.raises(ConfigError, match="without a place does nothing"):
+        work_for(idle, on_ready=pytest.fail)
+    with pytest.raises(ConfigError, match=r"token's file .*none\.token cannot be read"):
+        work_through("http://127.0.0.1:1", tmp_path / "none.token", idle, on_ready=pytest.fail)
 
 
 def test_a_worker_of_another_version_changes_nothing(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def work_for(settings: ServeSettings, *, on_ready: Callable[[], None]) -> None:
         on_ready: Called when both have answered.
 
     Raises:
-        ConfigError: There is no database or no store.
+        ConfigError: There is no database, no store, or no place for a job.
         RunError: One of them cannot be reached, or the console is of another version.
     """
     if not settings.database or not settings.artifacts:
@@ -63,7 +63,7 @@ def work_through(
         plain_http: Whether the token may cross a network unencrypted.
 
     Raises:
-        ConfigError: The address is none, the token would be seen, or there is none.
+        ConfigError: The address is none, the token would be seen, or there is none, or no place for a job.
         RunError: The server cannot be reached, does not know the token, or is of another version.
     """
     access = Access(server=server, token_file=str(token_file.absolute()))
@@ -93,6 +93,8 @@ def _work(
     *,
     listen: Callable[[int], int] | None = None,
 ) -> None:
+    if settings.training_slots == settings.other_slots == 0:
+        raise ConfigError("A worker without a place does nothing.", hint="Give --trainings or --others at least 1.")
     settings.state.mkdir(parents=True, exist_ok=True)
     supervisor = Supervisor(settings, office, access, is_home=False)
     if listen is not None:

@@ -153,7 +153,7 @@ class Line:
             self._threads.line = None
 
     def _token(self) -> str:
-        token = read_text(self._token_file, max_bytes=1 << 10, name="The token's file").strip()
+        token = read_text(self._token_file, max_bytes=1 << 10, name=f"The token's file {self._token_file}").strip()
         if not _TOKEN.fullmatch(token):
             raise ConfigError(
                 f"{self._token_file} holds no token.", hint="It is one word, which begins with rc_, and nothing else."

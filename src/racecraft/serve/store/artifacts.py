@@ -340,7 +340,9 @@ class Artifacts:
     def _tried(self, action: Callable[[], T]) -> T:
         try:
             return action()
-        except (NoAnswer, OSError) as error:
+        except OSError as error:
+            raise RunError(f"Copies of runs cannot be made on this machine: {first_line(error)}.") from error
+        except NoAnswer as error:
             raise RunError(
                 f"The object store {self.url} does not answer as it should: {first_line(error)}.",
                 hint="Runs are safe on this machine and are copied later.",
