@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,20 @@ def test_a_sweep_that_cannot_be_made_leaves_no_run(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="s-bold-2 exists"):
         make_sweep(read_sweep(FILE), runs=runs, name="s")
     assert [path.name for path in runs.iterdir()] == ["s-bold-2"], "which it did not make"
+
+
+def test_laps_of_the_run_that_all_begin_with_are_nobodys(tmp_path: Path) -> None:
+    (plan,) = (one.plan for one in read_sweep(FILE).settings if one.name == "plain")
+    folder = plan.start(root=tmp_path, name="child")
+    folder.history.parent.mkdir()
+    first, later = (
+        {"kind": "evaluation", "step": step, "completions": [1.0], "lap_times": [lap]}
+        for step, lap in ((0, 8.0), (256, 9.0))
+    )
+    folder.history.write_text(json.dumps(first) + "\n")
+    assert outcome_of(folder) == Outcome(steps=0, laps_after=None, best_lap=None)
+    folder.history.write_text(json.dumps(first) + "\n" + json.dumps(later) + "\n")
+    assert outcome_of(folder) == Outcome(steps=256, laps_after=256, best_lap=9.0)
 
 
 def outcomes(*values: float | None) -> dict[int, Outcome]:

@@ -69,12 +69,12 @@ class Board:
 
 
 def outcome_of(folder: RunFolder) -> Outcome:
-    """What a training came to so far.
+    """What a training came to so far; what it began with, where another run gave that, is none of it.
 
     Raises:
         RunError: The run cannot be read.
     """
-    driven = [one for one in judged_laps(folder) if one.stamp is None]
+    driven = [one for one in judged_laps(folder) if one.stamp is None and one.step > 0]
     points, _ = read_history(folder.history)
     last = folder.checkpoints.last
     return Outcome(
