@@ -46,3 +46,13 @@ def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None
     assert [note in " ".join(said.err.split()) for note in notes] == [True, True]
     assert "has no effect" not in said.out
     assert racecraft("sweep", "--resume", "s", "--board", "--json").document["notes"] == []
+
+
+def test_what_cannot_train_leaves_no_sweep(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("sweep.toml").write_text(FILE)
+    assert racecraft("sweep", "sweep.toml", "--processes", "-1").status == 2
+    monkeypatch.setattr("racecraft.extras.importlib.util.find_spec", lambda _: None)
+    told = racecraft("sweep", "sweep.toml", "--cluster", "auto")
+    assert told.status == 1
+    assert "--cluster needs ray, which is not installed." in told.err
+    assert not Path("runs").exists()

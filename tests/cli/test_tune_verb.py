@@ -44,3 +44,12 @@ def test_no_number_of_the_table_is_folded(tmp_path: Path, capsys: pytest.Capture
     say_tuned(Outcome(folder=tmp_path, goal="laps", space=space, trials=(trial,), importances={}, is_interrupted=False))
     row = next(line for line in capsys.readouterr().out.splitlines() if "(now)" in line)
     assert row.split()[-5:] == ["-0.00058", "0.1714", "0.000203", "0.9997", "1.23e+05"]
+
+
+@pytest.mark.parametrize("limit", [("--minutes", "nan"), ("--trials", "-1"), ("--processes", "5000")])
+def test_a_limit_that_is_not_allowed_leaves_no_search(racecraft: Run, limit: tuple[str, str]) -> None:
+    pytest.importorskip("optuna")
+    told = racecraft("tune", *SMALL, *limit)
+    assert told.status == 1
+    assert f"{limit[0][2:]} is {limit[1]}; allowed is" in told.err
+    assert not Path("tuning").exists()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from racecraft.cli.app import INTERRUPTED, Json, app, print_json, text
+from racecraft.extras import check_installed
 
 if TYPE_CHECKING:
     from racecraft.tuning.trial import Report
@@ -24,7 +25,7 @@ def sweep(
     ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
     processes: Annotated[
-        int, typer.Option("--processes", help="Trainings at once; 0 for one per core. Same results.")
+        int, typer.Option("--processes", min=0, max=256, help="Trainings at once; 0 for one per core. Same results.")
     ] = 0,
     cluster: Annotated[
         str, typer.Option("--cluster", help="Train on a cluster of Ray: auto, or ray://HOST:10001.")
@@ -41,6 +42,8 @@ def sweep(
         context.fail("Give the file of a new sweep, or --resume NAME.")
     if resume and name is not None:
         context.fail("--name does not go with --resume: a sweep keeps the name that it was made with.")
+    if cluster:
+        check_installed("ray", "--cluster")
     from racecraft.cli import sweep_text
     from racecraft.json_file import read_text
     from racecraft.sweeping import Sweep, make_sweep, read_sweep

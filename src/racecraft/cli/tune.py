@@ -62,8 +62,9 @@ def tune(
                 context.fail(f"{option.opts[0]} does not go with --resume: a search keeps what it was started with.")
     from racecraft.cli import tune_text
     from racecraft.training.plan import make_plan
-    from racecraft.tuning import Tuning, make_tuning
+    from racecraft.tuning import Tuning, check_limits, make_tuning
 
+    check_limits(minutes=minutes, max_trials=trials, processes=processes)
     folder, notes = resume, tuple[str, ...]()
     if folder is None:
         options: dict[str, Any] = {"track": track, "reward": reward, "actions": actions}

@@ -9,7 +9,7 @@ from racecraft.tuning.constants import find_constants, rewrite_constants
 from racecraft.tuning.outcome import Outcome, TrialOutcome
 from racecraft.tuning.space import HYPERPARAMETERS, Parameter, make_space
 from racecraft.tuning.start import make_tuning, plan_of, space_of, start_tuning
-from racecraft.tuning.study import Tuning
+from racecraft.tuning.study import Tuning, check_limits
 
 __all__ = [
     "HYPERPARAMETERS",
@@ -17,6 +17,7 @@ __all__ = [
     "Parameter",
     "TrialOutcome",
     "Tuning",
+    "check_limits",
     "find_constants",
     "make_space",
     "make_tuning",

@@ -118,9 +118,7 @@ class Tuning:
             CheckpointError: The folder takes nothing more.
             RacecraftError: The very first trial, which is what the user has now, cannot be trained.
         """
-        require("minutes", minutes, 0 < minutes <= 30 * 24 * 60, "a number above 0, up to 43,200")
-        check_whole("trials", max_trials, 0, 100_000)
-        check_whole("processes", processes, 0, MAX_WINDOW)
+        check_limits(minutes=minutes, max_trials=max_trials, processes=processes)
         most = processes or (num_cores() if self.plan.settings.device == "cpu" else 1)
         count = min(most, self.window)
         seats: list[Seat] = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
@@ -279,6 +277,17 @@ class Tuning:
         except OSError as error:
             raise RunError(f"{self.folder / 'result.json'} cannot be written: {error.strerror or error}.") from error
         return outcome
+
+
+def check_limits(*, minutes: float, max_trials: int, processes: int) -> None:
+    """Refuse what `Tuning.run` would, before there is a search.
+
+    Raises:
+        ConfigError: A limit is not allowed.
+    """
+    require("minutes", minutes, 0 < minutes <= 30 * 24 * 60, "a number above 0, up to 43,200")
+    check_whole("trials", max_trials, 0, 100_000)
+    check_whole("processes", processes, 0, MAX_WINDOW)
 
 
 @dataclass
