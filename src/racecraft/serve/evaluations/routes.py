@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,17 +21,25 @@ from racecraft.serve.problems import NotFound
 
 router = APIRouter(prefix="/api/models/{name}/evaluations", tags=["evaluations"])
 
-COLUMNS: Final = {
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:40]!r} is no number")
+    return value
+
+
+COLUMNS: Final[dict[str, Callable[[str], float | str]]] = {
     "episode": int,
-    "steps": float,
-    "X": float,
-    "Y": float,
-    "yaw": float,
-    "steer": float,
-    "throttle": float,
-    "reward": float,
-    "progress": float,
-    "tstamp": float,
+    "steps": _number,
+    "X": _number,
+    "Y": _number,
+    "yaw": _number,
+    "steer": _number,
+    "throttle": _number,
+    "reward": _number,
+    "progress": _number,
+    "tstamp": _number,
     "episode_status": str,
 }
 MAX_ROWS: Final = 60_000
@@ -42,7 +53,7 @@ def list_evaluations(name: str, context: InContext) -> list[EvaluationCard]:
     for path in sorted(folder.path.glob("evaluation-*/evaluation.json"), reverse=True)[:200]:
         try:
             found.append(_card(folder, path))
-        except RacecraftError:
+        except (RacecraftError, KeyError, TypeError, ValueError):  # a file of it says something else than it should
             continue
     return found
 
@@ -65,21 +76,22 @@ def evaluate_model(name: str, request: EvaluateModel, context: InContext) -> Job
 
 @router.get("/{stamp}/telemetry")
 def get_telemetry(name: str, stamp: str, context: InContext) -> Telemetry:
-    """Every step of an evaluation, as columns named as AWS names them."""
+    """Every step of an evaluation, as columns named as AWS names them; as far as its file can be read."""
     folder = context.garage.folder(name)
     path = folder.evaluation(stamp) / "evaluation-simtrace" / "0-iteration.csv"
     if not (stamp.isascii() and stamp.isdigit()) or not path.is_file():
         raise NotFound(f"Model {name!r} has no evaluation {stamp[:40]!r}.")
     columns: dict[str, list[Any]] = {column: [] for column in COLUMNS}
-    with path.open(encoding="utf-8") as file:
+    with suppress(OSError, ValueError, IndexError), path.open(encoding="utf-8") as file:
         header = file.readline().strip().split(",")
         places = {column: header.index(column) for column in COLUMNS}
         for number, line in enumerate(file):
             if number >= MAX_ROWS:
                 break
             cells = line.rstrip("\n").split(",")
-            for column, kind in COLUMNS.items():
-                columns[column].append(kind(cells[places[column]]))
+            row = {column: kind(cells[places[column]]) for column, kind in COLUMNS.items()}
+            for column, value in row.items():
+                columns[column].append(value)
     return Telemetry(columns=columns)
 
 
