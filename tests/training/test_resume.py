@@ -253,6 +253,17 @@ def test_without_any_whole_checkpoint_it_says_so(tiny: Train) -> None:
         resume(run)
 
 
+@pytest.mark.parametrize("count", [-1, 0, 2**62])
+def test_a_checkpoint_that_counts_otherwise_than_it_is_called_is_refused(tiny: Train, count: int) -> None:
+    run = tiny(until="64 steps").run
+    store = RunFolder(run).checkpoints
+    saved = store.load()
+    saved.arrays["ppo/counters"][:] = count
+    store.save(saved.step, saved.arrays, metadata=saved.metadata)
+    with pytest.raises(CheckpointError, match="steps"):
+        resume(run, until="128 steps")
+
+
 @pytest.mark.parametrize("name", ["run.json", "model_metadata.json", "reward_function.py"])
 def test_a_missing_file_is_named(tiny: Train, name: str) -> None:
     run = tiny(until="64 steps").run

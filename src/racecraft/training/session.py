@@ -113,6 +113,8 @@ class Session:
         arrays, metadata = saved.arrays, saved.metadata
         try:
             self.algorithm.load_state(arrays)
+            if self.algorithm.total_steps != saved.step:
+                raise ValueError(f"it counts {self.algorithm.total_steps:,} steps")
             self.environment.simulation.load(arrays["simulation"])
             self.logs.counter.rewards[:] = arrays["episode_rewards"]
             if self.opponents is not None:
