@@ -78,6 +78,11 @@ def test_what_is_no_database_is_refused(tmp_path: Path, url: str) -> None:
         ServeSettings(runs=tmp_path, database=url)
 
 
+def test_a_folder_whose_name_is_no_text_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"^runs is .*; allowed is a path in UTF-8\.$"):
+        ServeSettings(runs=tmp_path / "b\udcffd")
+
+
 def test_an_address_of_a_database_that_cannot_be_read_is_told_without_its_password() -> None:
     with pytest.raises(ConfigError, match="address of the console's database cannot be read") as told:
         Database("postgresql+psycopg://racecraft:secret:p@rt@db.local:secret/racecraft")

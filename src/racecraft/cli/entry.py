@@ -76,7 +76,7 @@ def main() -> None:
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     is_debug, is_json = len(arguments) < len(sys.argv) - 1, "--json" in arguments
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # a terminal that lacks a sign shows another for it
+        if isinstance(stream, TextIOWrapper) and stream.errors == "strict":  # who lacks a sign sees another for it
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {message}", err=True)
     try:

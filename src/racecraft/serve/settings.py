@@ -81,6 +81,8 @@ class ServeSettings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "runs", self.runs.absolute())
+        is_text = not any("\ud800" <= mark <= "\udfff" for mark in str(self.runs))  # for bytes that are none
+        require("runs", str(self.runs), is_text, "a path in UTF-8")
         require("port", self.port, 0 <= self.port <= 65535, "0 to 65535, where 0 takes a free one")
         for name in ("training_slots", "other_slots"):
             check_whole(name, getattr(self, name), 0, 64)
