@@ -195,4 +195,6 @@ def test_the_composed_parts_fit_together() -> None:
     assert services["proxy"]["command"][-1] == f"league:{ServeSettings.port}"
     password = re.compile(r"\$\{POSTGRES_PASSWORD(:\?choose one)?\}")
     assert password.search(services["database"]["environment"]["POSTGRES_PASSWORD"])
-    assert password.search(services["league"]["environment"]["RACECRAFT_DATABASE"])
+    league = services["league"]["environment"]
+    assert password.fullmatch(league["PGPASSWORD"])  # which psycopg takes whatever its characters
+    assert league["RACECRAFT_DATABASE"] == "postgresql+psycopg://racecraft@database/racecraft"
