@@ -14,7 +14,7 @@ from racecraft.classic.policy import Table
 from racecraft.classic.recipes import find_recipe
 from racecraft.classic.views import CellView, Cut, VectorView
 from racecraft.classic.worlds import Worlds, to_bounds
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, TrainingError
 
 
 def worlds(name: str, **more: Any) -> Worlds:
@@ -152,6 +152,41 @@ def test_every_world_plays_one_episode() -> None:
 def test_an_episode_without_a_limit_is_cut_off() -> None:
     returns = play(Worlds("CliffWalking-v1", num_envs=2, seed=1, view=CellView), Table(48, 4))  # up, for ever
     assert returns.tolist() == [-1000.0, -1000.0]
+
+
+class Broken(gymnasium.Env[Any, Any]):
+    """Fails, or pays what is no number."""
+
+    observation_space, action_space = spaces.Box(-1.0, 1.0, (1,)), spaces.Discrete(2)
+
+    def __init__(self, at: str) -> None:
+        self.at = at
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        if self.at == "reset":
+            raise AttributeError("no such\nthing")
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action: Any) -> Any:
+        if self.at == "step":
+            raise KeyError("wheel")
+        return np.zeros(1, np.float32), float(self.at), True, False, {}
+
+
+@pytest.mark.parametrize(
+    ("at", "says"),
+    [
+        ("reset", "Broken-v0 has failed while it was played: AttributeError: no such thing"),
+        ("step", "Broken-v0 has failed while it was played: KeyError: 'wheel'"),
+        ("nan", "Broken-v0 has given a reward that is no finite number"),
+        ("-inf", "Broken-v0 has given a reward that is no finite number"),
+    ],
+)
+def test_an_environment_that_fails_is_named(at: str, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gymnasium.envs.registration, "registry", {**gymnasium.registry})
+    gymnasium.register("Broken-v0", Broken)
+    with pytest.raises(TrainingError, match=says):
+        worlds("Broken-v0", make={"at": at}).step(np.zeros(3, np.int64))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from racecraft.classic.views import View
 from racecraft.env import ENV_ID
-from racecraft.errors import ConfigError, RacecraftError, did_you_mean, printable
+from racecraft.errors import ConfigError, RacecraftError, TrainingError, did_you_mean, printable
 from racecraft.extras import check_installed
 
 NO_LIMIT: Final = 1000
@@ -54,6 +54,7 @@ class Worlds:
 
     Raises:
         ConfigError: There is no such environment, or it cannot be made.
+        TrainingError: It fails where it begins.
     """
 
     def __init__(
@@ -78,7 +79,9 @@ class Worlds:
             """Sum of the rewards of every finished episode."""
             self._sums = np.zeros(num_envs)
             seeds = np.random.SeedSequence(seed).generate_state(num_envs, np.uint32)
-            self.observations: NDArray[Any] = self.view(self._players.reset([int(key) for key in seeds]))
+            with _failures_of(name):
+                begun = self._players.reset([int(key) for key in seeds])
+            self.observations: NDArray[Any] = self.view(begun)
             """What the learner sees now (N, ...)."""
         except BaseException:
             self.close()
@@ -90,13 +93,19 @@ class Worlds:
         Args:
             actions: Numbers of choices (N,), or from -1 to 1 over the range of each action (N, A).
             among: Worlds that matter (N,); what others do is not looked at, and they may rest.
+
+        Raises:
+            TrainingError: The environment has failed, or has given a reward that is no finite number.
         """
         space = self.action_space
         if isinstance(space, spaces.Box):
             actions = to_bounds(actions, space)
         else:
             actions = actions + int(getattr(space, "start", 0))
-        raw, rewards, terminated, truncated = self._players.step(actions, among)
+        with _failures_of(self.name):
+            raw, rewards, terminated, truncated = self._players.step(actions, among)
+        if not np.isfinite(rewards).all():
+            raise TrainingError(f"{self.name} has given a reward that is no finite number.")
         over = terminated | truncated
         successors = self.observations = self.view(raw)
         self.steps += self.num_envs
@@ -106,7 +115,9 @@ class Worlds:
             self.returns += self._sums[finished].tolist()
             self._sums[finished] = 0.0
             self.observations = successors.copy()
-            self.observations[finished] = self.view(self._players.begin(finished))
+            with _failures_of(self.name):
+                begun = self._players.begin(finished)
+            self.observations[finished] = self.view(begun)
         return Step(np.asarray(rewards, np.float32), terminated, over, successors)
 
     @property
@@ -248,6 +259,24 @@ def said_plainly(name: str, make: Mapping[str, Any]) -> Iterator[None]:
     except (TypeError, ValueError, KeyError) as error:
         given = ", ".join(f"{key}={value!r}" for key, value in make.items()) or "no arguments"
         raise ConfigError(f"{name} cannot be made with {given}: {one_line(error)}") from error
+
+
+@contextmanager
+def _failures_of(name: str) -> Iterator[None]:
+    """What an environment raises while it is played, as its own failure.
+
+    Raises:
+        TrainingError: It has raised something.
+    """
+    try:
+        yield
+    except RacecraftError:
+        raise
+    except Exception as error:
+        raise TrainingError(
+            f"{name} has failed while it was played: {type(error).__name__}: {one_line(error)}",
+            hint="The mistake is in the environment; --debug shows where.",
+        ) from error
 
 
 def one_line(error: Exception) -> str:
