@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -63,7 +66,7 @@ def blas_threads() -> set[int]:
 
 def test_products_take_one_thread_while_it_learns_and_judges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # with two, CartPole's DQN took another course, and forty times the processor on a busy machine
-    import_module("scipy.linalg")  # brings a library of its own, after the one that was found when learning was imported
+    import_module("scipy.linalg")  # brings a library of its own, after the one found when learning was imported
     seen = []
 
     def judged(*worlds: Any) -> Any:
@@ -186,6 +189,46 @@ def test_an_interrupted_run_is_saved(tmp_path: Path) -> None:
     assert learned.reason == "interrupted"
     assert load(tmp_path / "a")[2] == learned.steps
     assert json.loads((tmp_path / "a" / "learned.json").read_text())["reason"] == "interrupted"
+
+
+def test_who_stops_before_the_first_evaluation_keeps_what_was_learned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(worlds: Worlds, policy: Any, *_: Any) -> Any:
+        policy.actor.parameters[:] = 7.0
+        worlds.steps += 32
+        yield
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(ALGORITHMS, "a2c", replace(ALGORITHMS["a2c"], learn=stop))
+    assert short("a2c", root=tmp_path, name="a").reason == "interrupted"
+    assert {7.0} in [set(array.ravel().tolist()) for array in load(tmp_path / "a")[1].values()]
+
+
+def test_who_does_not_wait_for_the_last_episodes_keeps_what_was_learned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(job, "play", stop)
+    with pytest.raises(KeyboardInterrupt):
+        short("q-table", root=tmp_path, name="a")
+    assert load(tmp_path / "a")[2] > 0
+
+
+def test_processes_of_a3c_leave_ctrl_c_to_their_parent(monkeypatch: pytest.MonkeyPatch) -> None:
+    groups, begin = list[int](), subprocess.Popen
+
+    def watched(*arguments: Any, **options: Any) -> Any:
+        process = begin(*arguments, **options)
+        groups.append(os.getpgid(process.pid))
+        return process
+
+    monkeypatch.setattr(subprocess, "Popen", watched)
+    learn("CartPole-v1", "a3c", until="64 steps")
+    assert groups
+    assert os.getpgid(0) not in groups
 
 
 class Loud(gymnasium.Env[Any, Any]):

@@ -66,6 +66,17 @@ def test_a_saved_run_is_watched_and_goes_on(racecraft: Run, tmp_path: Path) -> N
         assert 10 < container.streams.video[0].frames < 500
 
 
+@pytest.mark.costly
+def test_who_only_watches_a_saved_run_leaves_it_as_it_is(racecraft: Run, tmp_path: Path) -> None:
+    racecraft(*SHORT[:-3], "-15 return", "--name", "a")  # done long before its steps are
+    files = {name: (tmp_path / "runs" / "a" / name).read_bytes() for name in ("learned.json", "policy.safetensors")}
+    outcome = racecraft("learn", "--resume", "runs/a", "--watch", "--json")
+    assert outcome.document == {"run": "runs/a", "film": "runs/a/film.mp4"}
+    assert (tmp_path / "runs" / "a" / "film.mp4").stat().st_size > 1000
+    assert files == {name: (tmp_path / "runs" / "a" / name).read_bytes() for name in files}
+    assert "Film:       runs/a/film.mp4" in racecraft("learn", "--resume", "runs/a", "--watch").out
+
+
 def test_without_an_environment_it_lists_what_is_tuned(racecraft: Run) -> None:
     outcome = racecraft("learn")
     assert all(environment in outcome.out and algorithm in outcome.out for environment, algorithm in RECIPES)

@@ -10,7 +10,7 @@ memory) is beside them. NumPy does all arithmetic, so a run repeats itself on th
 """
 
 from racecraft.classic.algorithms import ALGORITHMS
-from racecraft.classic.job import Learned, Progress, learn, resume
+from racecraft.classic.job import Learned, Progress, learn, recall, resume
 from racecraft.classic.recipes import RECIPES, default_algorithm, find_recipe
 from racecraft.classic.worlds import Worlds
 
@@ -23,5 +23,6 @@ __all__ = [
     "default_algorithm",
     "find_recipe",
     "learn",
+    "recall",
     "resume",
 ]

@@ -84,7 +84,9 @@ def learn(worlds: Worlds, policy: ActorCritic, settings: A3CSettings, rng: np.ra
             for number, seed in enumerate(rng.integers(2**31, size=settings.processes).tolist()):
                 text = json.dumps({**task, "number": number, "seed": seed, "parent": os.getpid()})
                 environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-                workers.append(subprocess.Popen([sys.executable, "-c", PROGRAM, text], env=environment))
+                workers.append(  # in a group of its own, which Ctrl-C at a terminal does not reach
+                    subprocess.Popen([sys.executable, "-c", PROGRAM, text], env=environment, process_group=0)
+                )
             read = [0] * settings.processes
             while True:
                 is_last = all(worker.poll() is not None for worker in workers)

@@ -10,7 +10,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.classic.job import WATCH, Learned, worlds_of
+from racecraft.classic.job import WATCH, worlds_of
+from racecraft.classic.policy import Policy
+from racecraft.classic.saved import Lesson
 from racecraft.errors import ConfigError
 from racecraft.extras import not_installed
 from racecraft.film.encoding import write_video
@@ -22,11 +24,12 @@ QUALITY: Final = 20
 """x264's constant rate factor."""
 
 
-def film_learned(learned: Learned, path: str | Path) -> Path:
+def film_learned(lesson: Lesson, policy: Policy, path: str | Path) -> Path:
     """Write a film of the policy in a world it has not seen.
 
     Args:
-        learned: What came of learning.
+        lesson: What was learned from what.
+        policy: What came of it.
         path: Where to, ending in ``.mp4``.
 
     Raises:
@@ -36,21 +39,21 @@ def film_learned(learned: Learned, path: str | Path) -> Path:
     path = Path(path)
     if path.suffix.lower() != ".mp4":
         raise ConfigError(f"Cannot write a film to {path.name!r}; the name must end in .mp4.")
-    worlds = worlds_of(learned.lesson, num_envs=1, purpose=WATCH, render_mode="rgb_array")
+    worlds = worlds_of(lesson, num_envs=1, purpose=WATCH, render_mode="rgb_array")
     rate = min(max(int(worlds.render_fps), RATES[0]), RATES[1])
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
-        yield picture(worlds.render(), learned.lesson.environment)
+        yield picture(worlds.render(), lesson.environment)
         for _ in range(MAX_SECONDS * rate):
-            step = worlds.step(learned.policy.act(worlds.observations))
+            step = worlds.step(policy.act(worlds.observations))
             if step.over[0]:
                 break
-            yield picture(worlds.render(), learned.lesson.environment)
+            yield picture(worlds.render(), lesson.environment)
 
     try:
         write_video(pictures(), path, rate=rate, quality=QUALITY)
     except gymnasium.error.DependencyNotInstalled as error:
-        raise not_installed("pygame", f"A film of {learned.lesson.environment}") or error from error
+        raise not_installed("pygame", f"A film of {lesson.environment}") or error from error
     finally:
         worlds.close()
     return path

@@ -180,6 +180,19 @@ def resume(run: str | Path, *, until: str = "", on_progress: Callable[[Progress]
         return room.learn(goal, every, folder, on_progress)
 
 
+def recall(run: str | Path) -> tuple[Lesson, Policy]:
+    """What a run has learned, as it was saved.
+
+    Raises:
+        RunError: The folder holds nothing of the kind.
+        ConfigError: Its environment cannot be made.
+    """
+    lesson, arrays, steps = load(run)
+    with _Classroom(lesson, begun=steps) as room:
+        restore(room.policy, arrays)
+        return lesson, room.policy
+
+
 def view_of(lesson: Lesson) -> Callable[[Any], View]:
     """What the algorithm sees, given the space of an observation."""
     if not find_algorithm(lesson.algorithm).has_table:
@@ -257,7 +270,7 @@ class _Classroom:
         finally:
             turns.close()  # type: ignore[attr-defined]
         self._check_finite()
-        if not self.algorithm.has_table:
+        if not self.algorithm.has_table and best > -math.inf:  # who stops before the first evaluation keeps what it has
             restore(self.policy, kept)
         steps, learning = worlds.steps, time.perf_counter() - self.started - self.judging
         outcome = Learned(
@@ -273,6 +286,7 @@ class _Classroom:
             curve=self.curve,
         )
         if folder is not None:
+            self._save(folder, self.policy.arrays, steps, {})  # for those who do not wait for the judgement
             self._save(folder, self.policy.arrays, steps, outcome.to_dict())
         return outcome
 

@@ -28,7 +28,10 @@ def learn(
     name: Annotated[str | None, typer.Option("--name", "-n", help="Name of the run.")] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder that holds the runs.")] = Path("runs"),
     resume: Annotated[Path | None, typer.Option("--resume", help="Go on with what this run has learned.")] = None,
-    watch: Annotated[bool, typer.Option("--watch", help="Film an episode of what was learned.")] = False,
+    watch: Annotated[
+        bool,
+        typer.Option("--watch", help="Film an episode; with --resume, and without --until, only that."),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Learn any Gymnasium environment with readable algorithms."""
@@ -46,6 +49,9 @@ def learn(
             print_json({"tuned": [{"environment": one, "algorithm": other} for one, other in classic.RECIPES]})
         else:
             learn_text.say_tuned()
+        return
+    if resume is not None and watch and not until:
+        _film_saved(resume, as_json=as_json)
         return
     title = f"Racecraft · {resume or environment} · {algorithm}".removesuffix(" · ")
     with learn_text.CurveReporter(title=title, is_quiet=as_json) as reporter:
@@ -69,13 +75,27 @@ def learn(
         from racecraft.classic.film import film_learned
 
         assert learned.run is not None
-        film = film_learned(learned, learned.run / "film.mp4")
+        film = film_learned(learned.lesson, learned.policy, learned.run / "film.mp4")
     if as_json:
         print_json({**learned.to_dict(), **({"film": str(film)} if film is not None else {})})
     else:
         learn_text.say_learned(learned, film)
     if learned.reason == "interrupted":
         raise typer.Exit(INTERRUPTED)
+
+
+def _film_saved(run: Path, *, as_json: bool) -> None:
+    """Film what a run has learned; it learns nothing more."""
+    from racecraft import classic
+    from racecraft.classic.film import film_learned
+    from racecraft.cli import learn_text
+
+    lesson, policy = classic.recall(run)
+    film = film_learned(lesson, policy, run / "film.mp4")
+    if as_json:
+        print_json({"run": str(run), "film": str(film)})
+    else:
+        learn_text.say_film(film)
 
 
 def _pairs(option: str, texts: list[str]) -> dict[str, Any]:

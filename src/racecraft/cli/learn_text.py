@@ -112,9 +112,14 @@ def say_learned(learned: Learned, film: Path | None) -> None:
     )
     _say(console, "Run folder: ", (str(learned.run), "bold"))
     if film is not None:
-        _say(console, "Film:       ", (str(film), "bold"))
+        say_film(film)
     else:
         _say(console, "Watch it:   ", (f"racecraft learn --resume {learned.run} --watch", "bold"))
+
+
+def say_film(film: Path) -> None:
+    """Where a film is."""
+    _say(Console(), "Film:       ", (str(film), "bold"))
 
 
 def say_tuned() -> None:
