@@ -149,6 +149,7 @@ def test_a_name_that_is_given_again_is_another_run_also_to_who_has_the_old_one(t
     store.keep(second)
     with pytest.raises(RunError, match="changed by another machine"):
         store.keep(RunFolder(there / "a"))
+    assert not store.bring("a", there, incoming=incoming, is_home=True)
     assert store.bring("a", there, incoming=incoming)
     assert contents(there / "a") == contents(second.path)
     assert not store.bring("a", there, incoming=incoming)

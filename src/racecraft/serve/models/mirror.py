@@ -139,7 +139,7 @@ class Mirror:
     def _bring(self, artifacts: Artifacts, name: str) -> bool:
         """Whether it is here now; the others are fetched all the same."""
         try:
-            artifacts.bring(name, self._runs, incoming=self._incoming)
+            artifacts.bring(name, self._runs, incoming=self._incoming, is_home=True)
         except (RunError, OSError) as error:
             _LOG.error("%s cannot be fetched: %s", name, error)
             return False

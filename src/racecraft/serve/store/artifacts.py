@@ -173,7 +173,7 @@ class Artifacts:
         found = {path: (file.stat().st_size, file.stat().st_mtime_ns) for path, file in _files(folder.path)}
         return found == {path: (line["size"], line["time"]) for path, line in copy.files.items()}
 
-    def bring(self, name: str, runs: Path, *, incoming: Path, missing_ok: bool = False) -> bool:
+    def bring(self, name: str, runs: Path, *, incoming: Path, missing_ok: bool = False, is_home: bool = False) -> bool:
         """Have a run here as it is in the store, unless what is here is as new; whether anything was brought.
 
         Nothing changes before all of it is here and checked. Then files are replaced one by one, the list of
@@ -184,6 +184,7 @@ class Artifacts:
             runs: Where it lies, or is to lie.
             incoming: Folder on the same disk where it is put together.
             missing_ok: Whether there may be nothing of this name.
+            is_home: Whether another run of the name is to stay, rather than to be taken for what an old job left.
 
         Raises:
             RunError: It is not there, damaged, or the store cannot be reached.
@@ -199,7 +200,7 @@ class Artifacts:
             is_here = folder.exists()
             # a run without a mark is older than marks; another folder was left by a job that was killed
             number, life = _mark(folder, (copy.number if self._shelf == RUNS else 0, copy.life))
-            if is_here and life == copy.life and copy.number <= number:
+            if is_here and (copy.number <= number if life == copy.life else is_home):
                 return False
             target = Path(tempfile.mkdtemp(dir=incoming, prefix=f"{name}-"))
             target.chmod(0o755)
