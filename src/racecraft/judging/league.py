@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
-from racecraft.errors import ConfigError, RacecraftError, RunError
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from racecraft.errors import ConfigError, RacecraftError, RunError, printable
 from racecraft.json_file import parse_json_object, read_json_object
 from racecraft.race.entry_file import pack_entry
 from racecraft.replay.codec import MAX_FILE_BYTES
@@ -28,6 +30,41 @@ MOST: Final = 1 << 25  # bytes of an answer
 WEIGHTS: Final = "application/octet-stream"
 MARK: Final = re.compile(r"[!-~]+")
 """A token is one printable word."""
+
+
+class LoginTold(BaseModel):
+    """What a league has to say of a program that asks to be let in; this and the next may say more."""
+
+    link: str
+    code: str
+    secret: str
+
+
+class TokenTold(BaseModel):
+    """The same when somebody has typed the code, or not yet."""
+
+    token: str
+
+
+class RaceTold(BaseModel):
+    """The same of a race."""
+
+    id: int
+    state: str
+    kind: str
+    track: str
+    title: str
+
+
+class SubmissionTold(BaseModel):
+    """The same of a submission."""
+
+    id: int
+    state: str
+    ahead: int
+    seconds_left: float | None
+    score: float | None
+    error: dict[str, Any] | None
 
 
 class LeagueRefused(RunError):
@@ -63,7 +100,7 @@ class League:
 
     def begin_login(self) -> dict[str, Any]:
         """Ask to be let in: the code to show, and the secret to wait with."""
-        found: dict[str, Any] = self._ask("POST", "/api/door/devices", b"")
+        found: dict[str, Any] = self._ask(LoginTold, "POST", "/api/door/devices", b"")
         return found
 
     def take_token(self, secret: str) -> str:
@@ -73,7 +110,7 @@ class League:
             LeagueRefused: Nobody did in time.
         """
         data = json.dumps({"secret": secret}).encode()
-        return str(self._ask("POST", "/api/door/devices/token", data, kind="application/json")["token"])
+        return str(self._ask(TokenTold, "POST", "/api/door/devices/token", data, kind="application/json")["token"])
 
     def races(self) -> list[dict[str, Any]]:
         """The races of one's groups, newest first.
@@ -81,7 +118,7 @@ class League:
         Raises:
             LeagueRefused: It does not answer, or does not know the token.
         """
-        found: list[dict[str, Any]] = self._ask("GET", "/api/league/races")
+        found: list[dict[str, Any]] = self._ask(list[RaceTold], "GET", "/api/league/races")
         return found
 
     def submit(self, run: RunFolder, race: int, *, checkpoint: str = "best") -> dict[str, Any]:
@@ -92,12 +129,13 @@ class League:
         """
         data = pack_entry(run, checkpoint=checkpoint)
         name = sanitize_name(run.path.resolve().name)
-        found: dict[str, Any] = self._ask("POST", f"/api/league/races/{race}/submissions?model={quote(name)}", data)
+        path = f"/api/league/races/{race}/submissions?model={quote(name)}"
+        found: dict[str, Any] = self._ask(SubmissionTold, "POST", path, data)
         return found
 
     def submission(self, race: int, number: int) -> dict[str, Any]:
         """How a submission stands."""
-        found: dict[str, Any] = self._ask("GET", f"/api/league/races/{race}/submissions/{number}")
+        found: dict[str, Any] = self._ask(SubmissionTold, "GET", f"/api/league/races/{race}/submissions/{number}")
         return found
 
     def published(self, race: int) -> dict[str, Any]:
@@ -125,12 +163,19 @@ class League:
         """
         return self._fetch("GET", f"/api/boards/{race}/duels/{duel}/heats/{heat}/replay", most=MAX_FILE_BYTES + 1)
 
-    def _ask(self, method: str, path: str, data: bytes | None = None, *, kind: str = WEIGHTS) -> Any:
-        told = self._fetch(method, path, data, most=MOST, kind=kind)
+    def _ask(self, expected: Any, method: str, path: str, data: bytes | None = None, *, kind: str = WEIGHTS) -> Any:
+        """An answer, as it is, where it says what is expected of it."""
+        answer = self._fetch(method, path, data, most=MOST, kind=kind)
         try:
-            return json.loads(told)
-        except ValueError as error:
+            told = json.loads(answer)
+            TypeAdapter(expected).validate_python(told)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"])) or "the answer"
+            raise LeagueRefused(f"{self.url} does not answer as a league does: {where}: {first['msg']}.") from error
+        except (ValueError, RecursionError) as error:
             raise LeagueRefused(f"{self.url} does not answer as a league does: {str(error)[:200]}.") from error
+        return _harmless(told)
 
     def _fetch(self, method: str, path: str, data: bytes | None = None, *, most: int, kind: str = WEIGHTS) -> bytes:
         headers = {"Content-Type": kind}
@@ -152,8 +197,17 @@ def _refusal(error: urllib.error.HTTPError, url: str) -> RacecraftError:
     try:
         told: Mapping[str, Any] = json.loads(error.read(1 << 16))["error"]
         return LeagueRefused(str(told["message"])[:500], hint=str(told.get("hint") or "")[:500])
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return LeagueRefused(f"{url} does not answer as a league does: status {error.code}.")
+
+
+def _harmless(told: Any) -> Any:
+    """The same without what could drive a terminal: titles are other people's words."""
+    if isinstance(told, dict):
+        return {_harmless(name): _harmless(value) for name, value in told.items()}
+    if isinstance(told, list):
+        return [_harmless(value) for value in told]
+    return printable(told) if isinstance(told, str) else told
 
 
 def remember_league(league: League) -> Path:
