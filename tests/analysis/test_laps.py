@@ -52,6 +52,8 @@ def test_laps_are_read_back(tmp_path: Path, oval: Track) -> None:
     assert (len(whole.time), whole.time[0], whole.share[0]) == (round(oval.length / 2.0 / DT) + 1, 0.0, 0.0)
     assert (whole.penalty_seconds, part.penalty_seconds) == (0.0, 0.0)
     assert whole.seconds == pytest.approx(oval.length / 2.0, abs=2 * DT)
+    assert whole.seconds == pytest.approx(len(whole.time) * DT, abs=1e-9)  # though the file's times are rounded to ms
+    assert part.seconds == pytest.approx(len(part.time) * DT, abs=1e-9)
     assert np.median(whole.speed) == pytest.approx(2.0, rel=0.02)
     assert part.share[-1] == pytest.approx(0.4, abs=0.01)
     assert whole.time_at(np.array([0.5]))[0] == pytest.approx(oval.length / 4.0, abs=0.1)
@@ -83,7 +85,7 @@ def test_sectors_are_the_whole_lap_and_their_times_add_up(tmp_path: Path, name: 
     whole, part = read_laps(tmp_path / "t.csv")
     found = passages(track, whole, sectors)
     assert all(passage is not None for passage in found)
-    assert sum(p.seconds for p in found if p is not None) == pytest.approx(whole.time[-1], abs=0.01)
+    assert sum(p.seconds for p in found if p is not None) == pytest.approx(whole.seconds, abs=1e-9)
     for passage, sector in zip(found, sectors, strict=True):
         assert passage is not None
         assert passage.seconds == pytest.approx((sector.end - sector.start) / 1.5, abs=0.15)

@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 MAX_ROWS: Final = 60_000
 """Of one file; an evaluation of 20 trials of 20 laps has as many."""
 MIN_ROWS: Final = 5
+ROUNDED: Final = 1e-3  # s by which a file's times may be off
 JUMP: Final = 1.0  # m between two steps: the car was put somewhere else
 
 
@@ -72,8 +73,9 @@ class TracedLap:
         return np.asarray(0.5 * (before + after))
 
     def time_at(self, shares: Floats) -> Floats:
-        """When it reached some shares of the lap, s."""
-        return np.interp(shares, self.share, self.time)
+        """When it reached some shares of the lap, s since it began: a step before its first row."""
+        reached = np.interp(shares, np.append(0.0, self.share), np.append(0.0, self.time + CONTROL_DT))
+        return np.where(shares > 0.0, reached, 0.0)
 
 
 def read_laps(path: str | Path) -> list[TracedLap]:
@@ -97,7 +99,7 @@ def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
         if end - begin < MIN_ROWS:
             continue
         rows = slice(begin, end)
-        time = columns["tstamp"][rows].astype(np.float64)
+        time = _on_steps(columns["tstamp"][rows].astype(np.float64))
         points = np.column_stack([columns["X"][rows], columns["Y"][rows]]).astype(np.float64)
         is_paused = np.zeros(end - begin, bool) if statuses is None else statuses[rows] == "pause"
         is_put = (is_paused[1:] & ~is_paused[:-1]) | (np.hypot(*np.diff(points, axis=0).T) > JUMP)
@@ -117,6 +119,12 @@ def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
             )
         )
     return laps
+
+
+def _on_steps(seconds: Floats) -> Floats:
+    """Times that a trace of ours has rounded to ms, as the steps that they were; another's as they are."""
+    steps = np.round(seconds / CONTROL_DT) * CONTROL_DT
+    return steps if np.abs(steps - seconds).max() < ROUNDED else seconds
 
 
 def start_place(track: Track, lap: TracedLap) -> float:

@@ -188,7 +188,9 @@ def _corners(track: Track, laps: Sequence[TracedLap]) -> str:
             ]
         )
     heads = ["Corner", "Turn", "Time, s", "Lost to the best, s", "In, m/s", "Slowest, m/s", "Out, m/s"]
-    words = f"The best lap, corner by corner. All corners at their best of {len(laps)} laps would make {ideal:.2f} s."
+    words = "The best lap, corner by corner."
+    if len(laps) > 1:
+        words += f" All corners at their best of {len(laps)} laps would make {ideal:.2f} s."
     return section("Corners", f"<p>{words}</p>{table(heads, rows)}")
 
 

@@ -120,7 +120,13 @@ type Placed = Pick<LapTrace, "time" | "share" | "speed" | "start">;
 function passage(road: Road, sector: Sector, { time, share, speed, start }: Placed): Passage | null {
   const parts = partsOf(road, sector, start);
   if (parts.some(([, high]) => high > share.at(-1)! + 1e-3)) return null;
-  const took = parts.map(([low, high]) => interp(high, share, time) - interp(low, share, time));
+  // a lap begins a step before its first row
+  const [reached, when] = [
+    [0, ...share],
+    [0, ...time.map((one) => one + CONTROL_DT)],
+  ];
+  const at = (place: number) => (place > 0 ? interp(place, reached, when) : 0);
+  const took = parts.map(([low, high]) => at(high) - at(low));
   // the standing start and a finish in one sector are no one passage: its speeds are those of the longer part
   const [low, high] = parts.reduce((best, part) => (part[1] - part[0] > best[1] - best[0] ? part : best));
   const speeds = Array.from({ length: PLACES }, (_, place) =>
