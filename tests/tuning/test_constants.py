@@ -65,6 +65,10 @@ def test_what_is_no_constant_is_refused() -> None:
         rewrite_constants(SOURCE, {"C": 1.0})
     with pytest.raises(ConfigError, match="K is inf"):
         rewrite_constants("K = 1.0", {"K": float("inf")})
+    with pytest.raises(
+        ConfigError, match=r"K is 2\.5; allowed is a whole number, as the reward function has one there"
+    ):
+        rewrite_constants("K = 1", {"K": 2.5})
     with pytest.raises(RewardError, match="not Python"):
         find_constants("def reward_function(params:")
     with pytest.raises(RewardError, match="not Python"):

@@ -26,7 +26,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from racecraft.checks import check_choice, check_whole
+from racecraft.checks import check_choice, check_whole, require
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.reward import load_reward
 from racecraft.run.folder import sanitize_name
@@ -39,6 +39,8 @@ WORDS: Final = (
     *("network", "critic", "vehicle", "camera", "direction", "randomize", "num_envs", "evaluate_every"),
 )
 """What a setting may say, as `racecraft train` does."""
+TEXTS: Final = ("reward", "actions", "model_metadata", "hyperparameters", "from", "algorithm", "network")
+"""Those of them that are a name or a file; a track is one, or a list of them."""
 NUMBERS: Final = "numbers"
 MAX_SETTINGS: Final = 64
 MAX_SEEDS: Final = 100
@@ -182,6 +184,18 @@ def _checked(words: Any, name: str) -> dict[str, Any]:
     return words
 
 
+def _check_texts(words: Mapping[str, Any]) -> None:
+    def is_text(value: Any) -> bool:
+        return isinstance(value, str) and "\0" not in value
+
+    for name in filter(words.__contains__, TEXTS):
+        require(name, words[name], is_text(words[name]), "a text")
+    if "track" in words:
+        track = words["track"]
+        is_list = isinstance(track, list) and len(track) > 0
+        require("track", track, all(map(is_text, track)) if is_list else is_text(track), "a text, or a list of them")
+
+
 def _check_names(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     for name in table:
         if name not in known:
@@ -190,6 +204,7 @@ def _check_names(table: Mapping[str, Any], known: tuple[str, ...], where: str) -
 
 
 def _plan(words: Mapping[str, Any], resolve: Callable[[str, Any], Any], load: Callable[[str], Source]) -> Plan:
+    _check_texts(words)
     given = {name: resolve(name, value) for name, value in words.items() if name not in (NUMBERS, "reward")}
     if "from" in given:
         given["parent"] = given.pop("from")

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Mapping
+from numbers import Real
 
 from racecraft.checks import require
 from racecraft.errors import ConfigError, RewardError, did_you_mean
@@ -33,7 +34,7 @@ def rewrite_constants(source: str, values: Mapping[str, float | int]) -> str:
         values: New numbers of some of `find_constants`.
 
     Raises:
-        ConfigError: There is no such constant, or a number is not finite.
+        ConfigError: There is no such constant, or it cannot be this number.
         RewardError: The file is not Python.
     """
     literals = _literals(source)
@@ -44,7 +45,12 @@ def rewrite_constants(source: str, values: Mapping[str, float | int]) -> str:
                 f"The reward function has no constant {name!r} at its top level that is set once, to a number.",
                 hint=did_you_mean(name, literals),
             )
-        require(name, value, math.isfinite(value), "a finite number")
+        is_number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+        require(name, value, is_number, "a finite number")
+        is_whole = isinstance(_value(literals[name]), int)
+        require(
+            name, value, not is_whole or value == int(value), "a whole number, as the reward function has one there"
+        )
     # from the last to the first, so that places further up stay right
     for name, node in sorted(literals.items(), key=lambda item: (item[1].lineno, item[1].col_offset), reverse=True):
         if name in values:
