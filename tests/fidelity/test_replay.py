@@ -238,6 +238,8 @@ def test_an_evaluation_of_ours_with_resets_and_flying_laps(tmp_path):
     assert found["episodes"] == evaluation.laps_begun
     assert found["episode_end_agreement"] == 1.0
     assert found["broken_rows"] == 0
+    assert found["windows"] > 20
+    assert found["position_error_p90_m"]["15"] < 0.05  # of driving: where it stands for a penalty is left out
 
 
 @pytest.mark.costly

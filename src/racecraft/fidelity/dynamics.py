@@ -89,8 +89,10 @@ def windows_of(logs: Iterable[Log], *, stride: int = 1) -> Windows | None:
         durations.append(lasts.astype(np.float32))
         lines.append(log.lines)
         is_step = (lasts >= DURATIONS[0]) & (lasts <= DURATIONS[1])
+        # a car that stands for a penalty was put there, and does not do what it is told
+        stands = log.is_paused | np.append(log.is_paused[1:], False)
         # Windows of drivable steps within one episode: count the steps that are none.
-        faults = np.concatenate([[0], np.cumsum(~is_step | log.is_prepare)])
+        faults = np.concatenate([[0], np.cumsum(~is_step | log.is_prepare | stands)])
         number = np.cumsum(log.is_first)
         starts = np.arange(0, max(0, len(log) - WINDOW_ROWS + 1), stride)
         if len(starts):
