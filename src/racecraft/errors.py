@@ -25,8 +25,8 @@ class RacecraftError(Exception):
     """
 
     def __init__(self, message: str, *, hint: str = "") -> None:
-        super().__init__(_printable_lines(message))
-        self.hint = _printable_lines(hint)
+        super().__init__(printable_lines(message))
+        self.hint = printable_lines(hint)
 
 
 class TrackError(RacecraftError, ValueError):
@@ -115,7 +115,8 @@ def printable(text: str) -> str:
     return "".join(mark if mark.isprintable() else "�" for mark in text)
 
 
-def _printable_lines(text: str) -> str:
+def printable_lines(text: str) -> str:
+    """The same of words that may have several lines."""
     return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 

@@ -59,3 +59,15 @@ def test_a_refusal_is_one_json_object(
     assert status == 1
     assert json.loads(out)["error"]["code"] == "ArchiveError"
     assert not Path("runs").exists()
+
+
+def test_what_a_stranger_calls_things_drives_no_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    params = 'WORLD_NAME: oval\n"X\\e]0;title\\a": 1\n'
+    folder = models.as_folder({**models.MODEL, "training_params.yaml": params}, tmp_path / "m")
+    status, out = racecraft(capsys, monkeypatch, "import", str(folder))
+    assert status == 0
+    assert "X�]0;title" in out
+    assert "\x1b]" not in out

@@ -16,7 +16,7 @@ from typing import Any, cast
 import typer
 
 from racecraft.cli.app import INTERRUPTED, app, print_json, text
-from racecraft.errors import ConfigError, RacecraftError
+from racecraft.errors import ConfigError, RacecraftError, printable_lines
 from racecraft.extras import not_installed
 
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[1])  # typer hands out no name for this base
@@ -78,7 +78,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper) and stream.errors == "strict":  # who lacks a sign sees another for it
             stream.reconfigure(errors="replace")
-    warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {message}", err=True)
+    warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {printable_lines(str(message))}", err=True)
     try:
         register(arguments)
         status = app(arguments, prog_name="racecraft", standalone_mode=False)

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from racecraft.errors import printable
+from racecraft.errors import printable, printable_lines
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -431,5 +431,7 @@ def _table(*, title: str | None = None) -> Table:
 
 
 def _say(console: Console, *parts: str | tuple[str, str]) -> None:
-    """One line, whatever its length: paths and commands must survive copying."""
-    console.print(Text.assemble(*parts), soft_wrap=True)
+    """One line, whatever its length: paths and commands must survive copying. Nothing in it drives a terminal."""
+    line = Text.assemble(*parts)
+    line.plain = printable_lines(line.plain)
+    console.print(line, soft_wrap=True)
