@@ -46,6 +46,22 @@ def test_race_verify_and_ladder(racecraft: Run, trained: Path, tmp_path: Path) -
     assert racecraft("verify", str(tmp_path / "none.replay")).err.startswith("ReplayError")
 
 
+def test_options_that_do_nothing_are_refused(racecraft: Run, tmp_path: Path) -> None:
+    for option in (("--car", "2"), ("--ghost", "best-lap")):
+        refused = racecraft("film", str(tmp_path), *option)
+        assert (refused.status, "--car and --ghost are for a replay file" in refused.err) == (2, True)
+    told = racecraft("share", str(tmp_path), "--language", "fr")
+    assert told.err == "ConfigError: language is 'fr'; allowed are en, de.\n"
+
+
+@pytest.mark.costly
+def test_a_table_of_a_drive_among_boxes_fits_into_80_characters(racecraft: Run, trained: Path) -> None:
+    short = ("--track", "oval", "--laps", "10", "--trials", "1", "--max-resets", "200", "--no-video")
+    told = racecraft("evaluate", str(trained), *short, "--race", "object-avoidance").out
+    assert "crashes" in told
+    assert "…" not in told
+
+
 @pytest.mark.costly
 def test_a_race_of_a_secret_is_announced_held_and_checked(racecraft: Run, trained: Path, tmp_path: Path) -> None:
     short = ("--track", "oval", "--time-limit", "3", "--no-video", "--laps", "1", "--trials", "3")

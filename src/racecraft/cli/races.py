@@ -165,6 +165,7 @@ def ladder(
 
 @app.command()
 def film(
+    context: typer.Context,
     replay: Annotated[Path, typer.Argument(help="Replay file, or a run's folder, of which it shows how it learned.")],
     car: Annotated[int, typer.Option("--car", help="Number of the car to follow, from 1; by default the best.")] = 0,
     ghost: race_options.Ghosts = None,
@@ -178,6 +179,8 @@ def film(
     The latter takes fifteen seconds: laps from its first to its best.
     """
     if replay.is_dir():
+        if car or ghost:
+            context.fail("--car and --ghost are for a replay file; a run's folder is filmed as it learned.")
         from racecraft.judging.evolution import film_evolution
 
         path = film_evolution(replay, output)

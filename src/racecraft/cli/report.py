@@ -45,7 +45,10 @@ def share(
     It opens offline; the replay of that evaluation is inside.
     """
     from racecraft.analysis.share import write_share
+    from racecraft.analysis.share_page import LANGUAGES
+    from racecraft.checks import check_choice
 
+    check_choice("language", language, LANGUAGES)
     path = write_share(run, output, stamp=evaluation, language=language)
     if as_json:
         print_json({"run": str(run), "share": str(path), "bytes": path.stat().st_size})

@@ -114,7 +114,9 @@ def say_evaluated(outcome: RunEvaluation) -> None:
     table = _table(title=f"{outcome.run.name} on {evaluation.track.name}")
     has_objects = evaluation.conditions.objects.count > 0
     crashes = ("crashes",) if has_objects else ()
+    table.collapse_padding = has_objects  # or a terminal of 80 characters has no room for its figures
     for heading in ("trial", "laps", "best lap", "total", "off track", *crashes, "resets", "penalty", "driven"):
+        heading = heading.replace(" ", "\n") if has_objects else heading
         table.add_column(heading, justify="right", no_wrap=True)
     for trial in evaluation.trials:
         table.add_row(
