@@ -243,14 +243,15 @@ class Loud(gymnasium.Env[Any, Any]):
         return np.zeros(1, np.float32), 1e60, True, False, {}
 
 
-def test_numbers_that_leave_all_bounds_are_told() -> None:
+def test_numbers_that_leave_all_bounds_are_told_and_leave_no_run_without_anything(tmp_path: Path) -> None:
     gymnasium.register("Loud-v0", Loud)
     try:
         with pytest.raises(TrainingError, match="a2c has left all bounds") as told:
-            learn("Loud-v0", "a2c", until="500 steps")
+            learn("Loud-v0", "a2c", until="500 steps", root=tmp_path, name="a")
     finally:
         del gymnasium.registry["Loud-v0"]
     assert "learning_rate" in told.value.hint
+    assert not (tmp_path / "a").exists()
 
 
 @pytest.mark.costly

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -152,7 +153,13 @@ def learn(
         folder = None
         if root is not None:
             folder = RunFolder.create(root, name=name, prefix=f"{environment.rpartition(':')[2]}-{algorithm}").path
-        return room.learn(goal, recipe.evaluate_every, folder, on_progress)
+        try:
+            return room.learn(goal, recipe.evaluate_every, folder, on_progress)
+        except BaseException:
+            if folder is not None:
+                with suppress(OSError):
+                    folder.rmdir()  # its name is free again where nothing was saved
+            raise
 
 
 @one_blas_thread()
