@@ -20,8 +20,8 @@ PLACES = (
     *("importing", "sim/objects.py", "training/stop.py", "training/parent.py", "training/start.py"),
     *("training/settings.py", "learn/ppo.py", "learn/sac.py", "learn/distill.py", "learn/saliency.py"),
     *("run/checkpoint.py", "run/lock.py", "run/stretches.py", "race/entry.py", "race/entry_file.py", "race/policy.py"),
-    *("contest", "film/ghost_source.py", "judging/trained.py", "judging/evaluation.py", "reward/sandbox/confinement.py"),
-    *("sweeping/plan.py", "tuning/space.py", "tuning/start.py"),
+    *("contest", "film/ghost_source.py", "judging/trained.py", "judging/evaluation.py"),
+    *("reward/sandbox/confinement.py", "sweeping/plan.py", "tuning/space.py", "tuning/start.py"),
 )
 """Where errors come from that a page shows."""
 OPERATORS = (
