@@ -186,6 +186,22 @@ def test_damaged_progress_is_told(text: str) -> None:
         read_progress()
 
 
+def test_an_answer_is_right_even_where_that_cannot_be_kept() -> None:
+    def backup(table: dict[int, list[tuple[float, int, float, bool]]], values: Any, gamma: float) -> float:
+        worth = [sum(p * (pay + gamma * values[to] * (not over)) for p, to, pay, over in table[a]) for a in table]
+        return max(worth)
+
+    path = progress_file.progress_path()
+    path.parent.mkdir(parents=True)
+    path.write_text("{")
+    with pytest.warns(UserWarning, match="It is right, but that cannot be kept: .*no progress that can be read"):
+        assert check("4.bellman", backup).is_right
+    path.unlink()
+    path.mkdir()
+    with pytest.warns(UserWarning, match="It is right, but that cannot be kept: .*Is a directory"):
+        assert check("4.bellman", backup).is_right
+
+
 def test_pictures_are_saved_where_the_script_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["/somewhere/09_some_lesson.py"])

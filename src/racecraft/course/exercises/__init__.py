@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -42,7 +43,10 @@ def check(exercise: str, answer: Any) -> Verdict:
     except Exception as error:  # somebody else's code
         return wrong(f"It stops with {type(error).__name__}: {printable(' '.join(str(error).split()))}.")
     if verdict.is_right:
-        record_exercise(exercise)
+        try:
+            record_exercise(exercise)
+        except (OSError, ConfigError) as error:  # a full disk or a damaged file makes no answer wrong
+            warnings.warn(f"It is right, but that cannot be kept: {error}", stacklevel=2)
     return verdict
 
 
