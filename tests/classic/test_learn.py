@@ -312,6 +312,17 @@ def test_settings_that_are_not_allowed(settings: dict[str, Any], says: str) -> N
         learn("CartPole-v1", "dqn", settings=settings)
 
 
+def test_cuts_are_no_setting_that_one_could_have_meant() -> None:
+    with pytest.raises(ConfigError, match="There is no setting 'cuts'; there are bins") as told:
+        learn("CartPole-v1", "q-table", settings={"cuts": []})
+    assert told.value.hint == ""
+
+
+def test_no_more_processes_are_begun_than_a_machine_can_have() -> None:
+    with pytest.raises(ConfigError, match="processes is 65; allowed is a whole number from 1 to 64"):
+        learn("CartPole-v1", "a3c", settings={"processes": 65})
+
+
 @pytest.mark.parametrize("seed", [-1, 1.5, "a", True])
 def test_seeds_that_are_not_allowed(seed: Any) -> None:
     with pytest.raises(ConfigError, match="seed is"):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final, Self
 
-from racecraft.checks import check_number, check_whole
+from racecraft.checks import MAX_COUNT, check_number, check_whole
 from racecraft.errors import ConfigError, did_you_mean
 
 SHARES: Final = {
@@ -15,6 +15,8 @@ SHARES: Final = {
     "learning_rate", "final_learning_rate", "critic_learning_rate",
 }  # fmt: skip
 """From 0 to 1."""
+MOST: Final = {"steps": 10**12, "num_envs": 4096, "processes": 64}
+"""Of what is counted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,12 +31,8 @@ class Settings:
     def __post_init__(self) -> None:
         for field in fields(self):
             value, kind = getattr(self, field.name), typing.get_type_hints(type(self))[field.name]
-            if field.name == "steps":
-                check_whole("steps", value, 1, 10**12, is_plain=True)
-            elif field.name == "num_envs":
-                check_whole("num_envs", value, 1, 4096, is_plain=True)
-            elif kind is int:
-                check_whole(field.name, value, 1, is_plain=True)
+            if kind is int:
+                check_whole(field.name, value, 1, MOST.get(field.name, MAX_COUNT), is_plain=True)
             elif kind is float:
                 low = 0.0 if field.name not in ("initial", "reward_shift") else -1e6
                 check_number(field.name, value, low, 1.0 if field.name in SHARES else 1e6, is_plain=True)
@@ -51,11 +49,12 @@ class Settings:
         Raises:
             ConfigError: A name is not known, or a value not allowed.
         """
-        known = {field.name: field for field in fields(self)}
+        known = sorted({field.name for field in fields(self)} - {"cuts"})
         for name in values:
-            if name not in known or name == "cuts":
-                names = ", ".join(sorted(set(known) - {"cuts"}))
-                raise ConfigError(f"There is no setting {name!r}; there are {names}.", hint=did_you_mean(name, known))
+            if name not in known:
+                raise ConfigError(
+                    f"There is no setting {name!r}; there are {', '.join(known)}.", hint=did_you_mean(name, known)
+                )
         kinds = typing.get_type_hints(type(self))
         plain: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else float(value) if _is_whole(value, kinds[name]) else value
