@@ -58,6 +58,9 @@ def test_what_varies_makes_every_combination() -> None:
     assert [setting.name for setting in read_sweep("").settings] == ["plain"]
 
 
+FIVE = ("gamma", "learning_rate", "update_epochs", "clip_coef", "gae_lambda")
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -87,6 +90,12 @@ def test_what_varies_makes_every_combination() -> None:
             "seeds = '1..100'\n[vary]\ngamma = [0.9, 0.91, 0.92, 0.93, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 0.995]",
             "1000",
         ),
+        ("[vary]\n" + "\n".join(f"{name} = {list(range(30))}" for name in FIVE), "24300000 settings are more than 64"),
+        ("[settings]\n" + "\n".join(f"a{number} = {{}}" for number in range(65)), "65 settings are more than 64"),
+        ("a = " + 5000 * "[", "nested too deeply"),
+        ("[all]\n" + ".".join(5000 * "a") + " = 1", "nested too deeply"),
+        (f"seeds = [{5000 * '9'}]", "not TOML"),
+        (100_001 * "#", "has 100,001 characters"),
     ],
 )
 def test_what_is_no_sweep_is_refused_in_a_sentence(text: str, says: str) -> None:

@@ -20,6 +20,7 @@ critic = ["privileged", "camera"]
 from __future__ import annotations
 
 import itertools
+import math
 import re
 import tomllib
 from collections.abc import Callable, Mapping
@@ -43,6 +44,8 @@ TEXTS: Final = ("reward", "actions", "model_metadata", "hyperparameters", "from"
 """Those of them that are a name or a file; a track is one, or a list of them."""
 NUMBERS: Final = "numbers"
 MAX_SETTINGS: Final = 64
+MAX_CHARACTERS: Final = 100_000
+"""Of the file: hundreds of settings in full."""
 MAX_SEEDS: Final = 100
 MAX_TRAININGS: Final = 1000
 _SEEDS: Final = re.compile(r"(\d{1,10})\.\.(\d{1,10})")
@@ -100,10 +103,7 @@ def read_sweep(
     Raises:
         RacecraftError: The file is not a sweep, or a setting cannot be trained.
     """
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"The sweep is not TOML: {error}.") from error
+    document = _parsed(text)
     _check_names(document, ("seeds", "goal", "all", "settings", "vary"), "a sweep")
     goal = document.get("goal", "laps")
     check_choice("goal", goal, GOALS)
@@ -130,6 +130,19 @@ def _seeds(value: Any) -> tuple[int, ...]:
     return tuple(value)
 
 
+def _parsed(text: str) -> dict[str, Any]:
+    if len(text) > MAX_CHARACTERS:
+        raise ConfigError(f"The sweep has {len(text):,} characters; allowed are {MAX_CHARACTERS:,}.")
+    try:
+        document = tomllib.loads(text)
+        repr(document)  # which a message may quote
+    except RecursionError as error:
+        raise ConfigError("The sweep is nested too deeply to be read.") from error
+    except ValueError as error:  # among them a number of thousands of digits
+        raise ConfigError(f"The sweep is not TOML: {error}.") from error
+    return document
+
+
 def _rows(document: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Every setting with all that it says, by name."""
     common = _table(document, "all")
@@ -139,6 +152,9 @@ def _rows(document: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     for name, values in vary.items():
         if not isinstance(values, list) or not values:
             raise ConfigError(f"vary.{name} is {values!r}; allowed is a list of what it may be.")
+    count = len(named) * math.prod(map(len, vary.values()))
+    if count > MAX_SETTINGS:
+        raise ConfigError(f"{count} settings are more than {MAX_SETTINGS}.")
     rows: dict[str, dict[str, Any]] = {}
     for name, words in named.items():
         for choice in itertools.product(*vary.values()):
@@ -150,8 +166,6 @@ def _rows(document: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
             if full in rows:
                 raise ConfigError(f"Two settings would be called {full!r}.", hint="Give them names under [settings].")
             rows[full] = row
-    if len(rows) > MAX_SETTINGS:
-        raise ConfigError(f"{len(rows)} settings are more than {MAX_SETTINGS}.")
     return rows
 
 
