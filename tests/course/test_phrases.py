@@ -56,6 +56,14 @@ def test_every_sentence_of_a_check_is_there_in_german_and_no_other() -> None:
     assert sorted(set(GERMAN) - said) == []
 
 
+@pytest.mark.parametrize(
+    ("filled_in", "german"),
+    [("0.02, 0.5, 1,000.25", "0,02; 0,5; 1.000,25"), ("3, 4, 5", "3, 4, 5"), ("0.5", "0,5"), ("a, 0.5", "a, 0.5")],
+)
+def test_several_numbers_are_written_as_germans_do(filled_in: str, german: str) -> None:
+    assert Phrases({"It pays {}.": "Sie zahlt {}."}).translated(f"It pays {filled_in}.") == f"Sie zahlt {german}."
+
+
 @pytest.mark.parametrize("english", GERMAN)
 def test_what_is_filled_in_is_filled_in_there_too(english: str) -> None:
     german = GERMAN[english]

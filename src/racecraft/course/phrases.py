@@ -82,7 +82,10 @@ class Phrases:
         )
 
     def _gap(self, text: str) -> str:
-        return _german_number(text) if _NUMBER.fullmatch(text) else self.translated(text) or text
+        numbers = text.split(", ")
+        if all(map(_NUMBER.fullmatch, numbers)):
+            return ("; " if "." in text else ", ").join(map(_german_number, numbers))
+        return self.translated(text) or text
 
 
 def _german_number(text: str) -> str:

@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+from racecraft.course.phrases import learner_language, said_in
 from racecraft.course.progress import record_exercise
 from racecraft.course.verdict import Verdict, wrong
 from racecraft.errors import ConfigError, RacecraftError, did_you_mean, printable
@@ -46,7 +47,8 @@ def check(exercise: str, answer: Any) -> Verdict:
         try:
             record_exercise(exercise)
         except (OSError, ConfigError) as error:  # a full disk or a damaged file makes no answer wrong
-            warnings.warn(f"It is right, but that cannot be kept: {error}", stacklevel=2)
+            told = said_in(learner_language(), f"It is right, but that cannot be kept: {error}")
+            warnings.warn(told, stacklevel=2)
     return verdict
 
 
