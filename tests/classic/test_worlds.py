@@ -220,7 +220,8 @@ def test_atari_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "racecraft[atari]" in refused.value.hint
 
 
-def test_atari_is_learned_from_memory_and_judged_seldom() -> None:
-    pong, other = find_recipe("ALE/Pong-v5", "dqn"), find_recipe("Taxi-v4", "dqn")
+@pytest.mark.parametrize("algorithm", ["dqn", "ppo"])
+def test_atari_is_learned_from_memory_and_judged_seldom(algorithm: str) -> None:
+    pong, other = find_recipe("ALE/Pong-v5", algorithm), find_recipe("Taxi-v4", algorithm)
     assert pong.make == {"obs_type": "ram"}
     assert pong.evaluate_every == 10 * other.evaluate_every

@@ -142,6 +142,18 @@ RECIPES: Final[Mapping[tuple[str, str], Recipe]] = {
         goal=-86.0,
         evaluate_every=10_000,
     ),
+    ("ALE/Pong-v5", "ppo"): Recipe(
+        settings=PPOSettings(
+            steps=2_000_000,
+            num_envs=16,
+            hidden=(128, 128),
+            learning_rate=5e-4,
+            length=128,
+            batch=256,
+            entropy=0.01,
+        ),
+        evaluate_every=ATARI_EVERY,
+    ),
     ("Pendulum-v1", "sac"): Recipe(settings=SACSettings(steps=20_000), goal=-165.0, evaluate_every=1_000),
 }
 """By id and algorithm."""
