@@ -102,11 +102,13 @@ def test_a_supervisor_learns_whether_it_works_and_nothing_else(league: RunningLe
     with league.stranger() as stranger:
         found = stranger.get("/api/health")
         assert (found.status_code, found.content) == (204, b"")
+        assert stranger.head("/api/health").status_code == 204
         refused(stranger.post("/api/health"), 401)
         assert stranger.get("/api/health", headers={"host": "evil.example"}).status_code == 421
         with sqlite3.connect(league.console.runs / ".racecraft" / "console.db") as database:
             database.execute("ALTER TABLE alembic_version RENAME TO away")
         assert "does not answer" in refused(stranger.get("/api/health"), 503)
+        assert stranger.head("/api/health").status_code == 503
         with sqlite3.connect(league.console.runs / ".racecraft" / "console.db") as database:
             database.execute("ALTER TABLE away RENAME TO alembic_version")
         ok(stranger.get("/api/health"), 204)

@@ -27,6 +27,7 @@ def get_machine(context: InContext) -> Machine:
     return describe_machine(context.settings)
 
 
+@router.head("/health", status_code=204, include_in_schema=False)  # as many monitors ask
 @router.get("/health", status_code=204)
 def get_health(consoles: InConsoles) -> Response:
     """Whether the server works, for a supervisor, who needs no account: 204, and 503 where its database fails."""
