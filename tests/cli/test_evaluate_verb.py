@@ -66,3 +66,12 @@ def test_a_wrong_option_of_evaluate_writes_nothing(racecraft: Run, trained: Path
     assert outcome.status == 1, outcome.err
     assert says in outcome.err
     assert set(trained.rglob("*")) == before
+
+
+@pytest.mark.costly
+def test_many_tracks_have_no_film_which_may_be_said(racecraft: Run, trained: Path) -> None:
+    arguments = ("evaluate", str(trained), "--tracks", "oval", "--trials", "1")
+    assert racecraft(*arguments, "--no-video").status == 0
+    refused = racecraft(*arguments, "--video")
+    assert refused.status == 2
+    assert "--video does not go with --tracks" in refused.err

@@ -116,7 +116,8 @@ def evaluate(
 def _generalize(context: typer.Context, run: Path, *, as_json: bool, **settings: Any) -> None:
     """One lap on each of many tracks; the rules of a race do not apply."""
     for option in context.command.params:
-        if option.name in RACE_ONLY and is_given(context, str(option.name)):
+        asks_nothing = option.name == "video" and not context.params["video"]  # there is none anyway
+        if option.name in RACE_ONLY and is_given(context, str(option.name)) and not asks_nothing:
             context.fail(f"{option.opts[0]} does not go with --tracks: each track is one lap without a reset.")
     from racecraft.judging.generalization import generalize_run
 
