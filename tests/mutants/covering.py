@@ -194,10 +194,7 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "serve/provider/provider.py": (4, PROVIDER),
     "serve/provider/visits.py": (4, PROVIDER),
     "serve/quotas/quotas.py": (6, ("tests/serve/test_quotas.py", "-k", "not postgresql")),
-    "serve/groups/groups.py": (
-        5,
-        ("tests/serve/test_homes.py", PEOPLE, "-k", "not postgresql and (homes or names_can or code_has or new_cards)"),
-    ),
+    "serve/groups/groups.py": (5, GROUPS),
     "serve/submissions/admission.py": (3, ENTRIES),
     "serve/submissions/board.py": (4, (BOARD,)),
     "serve/submissions/copies.py": (2, ("tests/serve/test_copies.py",)),

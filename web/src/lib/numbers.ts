@@ -35,23 +35,23 @@ export const plain = (value: Value): string =>
   isKnown(value) ? write(value, "plain", { maximumSignificantDigits: 15, useGrouping: false }) : NONE;
 
 /** Numbers and their units stay on one line: what stands between them is no place to break it. */
-const NARROW = "\u00a0";
+const NO_BREAK = "\u00a0";
 const UNITS = "m/s|km/h|ms|s|min|h|mm|cm|m|km|°C|°|%|B|kB|MB|GB|TB|Hz|px";
 const PARTED = new RegExp(`(\\d) (?=(?:${UNITS})(?![\\p{L}\\d]))`, "gu");
 
 /** A text in which no line ends between a number and its unit. */
-export const bound = (text: string): string => text.replace(PARTED, `$1${NARROW}`);
+export const bound = (text: string): string => text.replace(PARTED, `$1${NO_BREAK}`);
 
 /** The same with ordinary spaces, as people type them. */
-export const loose = (text: string): string => text.replaceAll(NARROW, " ");
+export const loose = (text: string): string => text.replaceAll(NO_BREAK, " ");
 
 /** A number as it is, with its unit: 0.5, "m/s" → 0.5 m/s. */
 export const withUnit = (value: Value, unit: string): string =>
-  isKnown(value) ? `${plain(value)}${NARROW}${unit}` : NONE;
+  isKnown(value) ? `${plain(value)}${NO_BREAK}${unit}` : NONE;
 
 /** 9.274, "m" → 9.27 m. */
 export const measured = (value: Value, unit: string, digits = 2): string =>
-  isKnown(value) ? `${fixed(value, digits)}${NARROW}${unit}` : NONE;
+  isKnown(value) ? `${fixed(value, digits)}${NO_BREAK}${unit}` : NONE;
 
 /** Of a road: 0.6 m → 60 cm. */
 export const centimetres = (metres: Value): string => measured(metres == null ? metres : 100 * metres, "cm", 0);
@@ -69,10 +69,10 @@ export const signed = (value: Value, digits = 2): string =>
     : NONE;
 
 /** How far behind somebody is: +0.23 s. */
-export const behind = (value: Value): string => (isKnown(value) ? `${signed(value)}${NARROW}s` : NONE);
+export const behind = (value: Value): string => (isKnown(value) ? `${signed(value)}${NO_BREAK}s` : NONE);
 
 /** A share: 0.982 → 98 %. */
-export const percent = (value: Value): string => (isKnown(value) ? `${fixed(100 * value, 0)}${NARROW}%` : NONE);
+export const percent = (value: Value): string => (isKnown(value) ? `${fixed(100 * value, 0)}${NO_BREAK}%` : NONE);
 
 export const count = (value: Value): string => fixed(value, 0);
 
