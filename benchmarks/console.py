@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from drawn_frames import COUNT_FRAMES
 
 PAGES = Path(__file__).parents[1] / "src" / "racecraft" / "serve" / "pages"
 COOKIE = "racecraft_session"
@@ -159,22 +160,6 @@ def garage() -> list[Figure]:
         Figure(what, statistics.median(times[1:]), "ms", 300),
         Figure(f"{what}, never seen before", times[0], "ms", 15_000),
     ]
-
-
-COUNT_FRAMES = """
-    window.drawnFrames = 0;
-    let last = -1;
-    for (const name of ["drawElementsInstanced", "drawArraysInstanced"]) {
-      const draw = WebGL2RenderingContext.prototype[name];
-      WebGL2RenderingContext.prototype[name] = function (...all) {
-        const now = document.timeline.currentTime; // of the frame
-        window.drawnFrames += now !== last;
-        last = now;
-        draw.apply(this, all);
-      };
-    }
-"""
-"""Counts the frames in which cars were drawn: a page that is painted without them is none."""
 
 
 def browser() -> list[Figure]:

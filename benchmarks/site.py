@@ -25,6 +25,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from drawn_frames import COUNT_FRAMES
+
 PARTS = ["page", "pace", "threads", "python", "slow", "bits"]
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "build" / "site"
@@ -33,13 +35,6 @@ BROTLI = "process.stdout.write(String(require('zlib').brotliCompressSync(require
 PATIENCE = 180_000  # ms
 SLOWER = 4  # times, like a cheap Chromebook
 PERIOD = 0.04  # s, in which a slowed browser runs for a part
-COUNT_FRAMES = """() => {
-  const began = performance.now();
-  let frames = 0, isCounting = true;
-  const count = () => isCounting && (frames++, requestAnimationFrame(count));
-  requestAnimationFrame(count);
-  window.stopCounting = () => ((isCounting = false), (1000 * frames) / (performance.now() - began));
-}"""
 TURNS = 3  # of the trainings whose pace is compared, without an evaluation
 NATIVE = """
 import shutil, sys, time
@@ -134,6 +129,7 @@ def in_the_tab(seeds: int) -> dict[str, Any]:
     """Press Train on the page as it opens, once a seed."""
     with browsing() as (browser, address):
         page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.add_init_script(COUNT_FRAMES)
         opened = time.monotonic()
         page.goto(address)
         button = page.get_by_role("button", name="Train", exact=True)
@@ -148,10 +144,10 @@ def in_the_tab(seeds: int) -> dict[str, Any]:
             button.click()
             page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
             before = before or list(dict.fromkeys(Files.asked))
-            page.evaluate(COUNT_FRAMES)
+            learning, drawn = time.monotonic(), page.evaluate("drawnFrames")
             page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
             wall.append(time.monotonic() - began)
-            frames.append(page.evaluate("stopCounting()"))
+            frames.append((page.evaluate("drawnFrames") - drawn) / (time.monotonic() - learning))
         version = browser.version
     laps, rate = statistics.median(wall), statistics.median(frames)
     loaded = [SITE / (path.lstrip("/") or "index.html") for path in before if path != "/favicon.ico"]
@@ -160,7 +156,7 @@ def in_the_tab(seeds: int) -> dict[str, Any]:
     print(f"Chromium {version}: the page is usable after {usable:.2f} s, a car drives after {driving:.2f} s")
     print(f"5 of 5 laps after {laps:.1f} s (worst {max(wall):.1f} s), {seeds} seeds")
     print(f"{core:,} bytes the core, {needed:,} all before the first car, by Brotli")
-    print(f"{rate:.0f} frames/s while 64 cars learn, WebGL by the processor")
+    print(f"{rate:.0f} frames/s drawn while 64 cars learn, WebGL by the processor")
     return {
         "chromium": version,
         "usable_seconds": usable,

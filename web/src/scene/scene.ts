@@ -9,6 +9,7 @@ import { carGeometry } from "./car";
 import { standBack } from "./fit";
 import { RISE, roadGeometry } from "./ground";
 import { DAY, landscapeGeometry, NIGHT, skyGeometry } from "./landscape";
+import { Pace } from "./pace";
 import { Paint } from "./paint";
 import { between, halfway, type Look } from "./poses";
 import { Sharpness } from "./sharpness";
@@ -44,6 +45,7 @@ const BOT = new three.Color(0xd9dde3);
 const BOX = new three.Color(0xffffff);
 const COARSEST = 0.7; // pixels per CSS pixel, along a side
 const LATE = 1.4; // times the usual, after which the next look at the latest is expected
+const SPARING = 25; // ms between two frames that the processor draws
 const STILL = 400; // ms without a change, after which the picture is drawn as sharp as it can be
 
 /** Whether WebGL is drawn by the processor: smooth edges would cost it more than everything else. */
@@ -67,6 +69,7 @@ export class Scene {
   private readonly land: three.Mesh;
   private readonly sky: three.Mesh;
   private readonly paints = new Paint();
+  private readonly pace: Pace;
   private readonly sharpness: Sharpness;
   private readonly middle = new three.Vector3();
   private readonly size: number;
@@ -83,6 +86,7 @@ export class Scene {
   private isDirty = true;
   private drawn = 0; // when, in ms
   private isSharp = false;
+  private isTimed = false; // the frame drawn last, by the next one of the screen
   private placed: PlacedCar[] | undefined;
   private readonly trails = new three.Group();
 
@@ -94,6 +98,7 @@ export class Scene {
     const isSlow = isSoftware();
     const finest = Math.min(devicePixelRatio, 2);
     this.renderer = new three.WebGLRenderer({ canvas, antialias: !isSlow, powerPreference: "high-performance" });
+    this.pace = new Pace(isSlow ? SPARING : 0);
     this.sharpness = new Sharpness(finest, COARSEST, isSlow ? 0.85 : finest);
     this.renderer.setPixelRatio(this.sharpness.ratio);
     this.camera.up.set(0, 0, 1);
@@ -291,11 +296,13 @@ export class Scene {
     const share = this.share(time);
     const isMoving = this.now !== undefined && !this.isCalm && time - this.arrived < LATE * this.interval + 50;
     if (isMoving || this.isDirty) {
-      const isSteady = !this.isSharp && time - this.drawn < STILL;
-      if ((isSteady && this.sharpness.took(time - this.drawn)) || this.isSharp) this.sharpen(this.sharpness.ratio);
-      this.isSharp = false;
-      this.render(share);
-      this.drawn = time;
+      if (this.isTimed && time - this.drawn < STILL) this.sharpness.took(time - this.drawn);
+      this.isTimed = this.isSharp = false;
+      if (this.pace.isDue(time)) {
+        this.sharpen(this.sharpness.ratio);
+        this.render(share);
+        [this.drawn, this.isTimed] = [time, true];
+      }
     } else if (!this.isSharp && time - this.drawn > STILL) {
       this.sharpen(this.sharpness.finest);
       this.isSharp = true;

@@ -26,26 +26,22 @@ export class Sharpness {
     this.ratio = Math.min(Math.max(start, coarsest), finest);
   }
 
-  /** Learn how long a frame took, in ms; true when the ratio has changed. */
-  took(time: number): boolean {
-    if (time > ABSENT) return false;
+  /** Learn how long a frame took, in ms. */
+  took(time: number): void {
+    if (time > ABSENT) return;
     this.times.push(time);
-    if (this.times.length < WINDOW) return false;
+    if (this.times.length < WINDOW) return;
     const median = this.times.sort((a, b) => a - b)[WINDOW / 2]!;
     this.times = [];
     this.fast = median < FAST ? this.fast + 1 : 0;
     if (median > SLOW) {
       if (this.isTrying) this.patience = Math.min(2 * this.patience, MOST_PATIENCE);
-      return this.change(this.ratio * STEP, false);
-    }
-    if (this.fast >= this.patience) return this.change(this.ratio / STEP, true);
-    return false;
+      this.change(this.ratio * STEP, false);
+    } else if (this.fast >= this.patience) this.change(this.ratio / STEP, true);
   }
 
-  private change(wanted: number, isTrying: boolean): boolean {
-    const before = this.ratio;
+  private change(wanted: number, isTrying: boolean): void {
     this.ratio = Math.min(Math.max(wanted, this.coarsest), this.finest);
     [this.fast, this.isTrying] = [0, isTrying];
-    return this.ratio !== before;
   }
 }
