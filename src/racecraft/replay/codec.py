@@ -30,8 +30,11 @@ MAGIC: Final = b"RACECRAFTREPLAY\0"
 VERSION: Final = 2
 """Of what is written; version 1, which knows no race, is read as well."""
 MAX_FILE_BYTES: Final = 256 << 20
-MAX_BODY_BYTES: Final = 512 << 20
+MAX_BODY_BYTES: Final = 256 << 20
 MAX_HEADER_BYTES: Final = 16 << 20
+DENSE_BYTES: Final = 16 << 20
+MAX_DENSITY: Final = 16
+"""A body may have `DENSE_BYTES` and, for each byte of its file, `MAX_DENSITY` more; races have 2 to 4."""
 TYPES: Final = {"u1": 1, "i2": 2, "i4": 4, "f4": 4, "f8": 8}
 """Column types, smallest first, and their bytes."""
 
@@ -57,8 +60,8 @@ def pack_column(values: NDArray[Any]) -> tuple[str, bytes]:
     return kind, bits.view(np.uint8).reshape(-1, TYPES[kind]).T.tobytes()
 
 
-def unpack_column(kind: str, data: bytes | memoryview) -> NDArray[np.float64]:
-    """A column from its bytes (T,).
+def unpack_column(kind: str, data: bytes | memoryview) -> NDArray[Any]:
+    """A column from its bytes, in the type that it is stored in (T,).
 
     Raises:
         ReplayError: A number is NaN or infinite.
@@ -66,8 +69,7 @@ def unpack_column(kind: str, data: bytes | memoryview) -> NDArray[np.float64]:
     width = TYPES[kind]
     sorted_bytes = np.frombuffer(data, dtype=np.uint8).reshape(width, -1)
     bits = np.ascontiguousarray(sorted_bytes.T).view(f"<u{width}").reshape(-1)
-    with np.errstate(invalid="ignore"):  # what is not a number is refused below
-        values = np.bitwise_xor.accumulate(bits).view(f"<{kind}").astype(np.float64)
+    values = np.bitwise_xor.accumulate(bits).view(f"<{kind}")
     if not np.isfinite(values).all():
         raise ReplayError(f"A replay's number is {values[~np.isfinite(values)][0]}; allowed are finite ones.")
     return values
@@ -80,7 +82,16 @@ def pack(header: dict[str, Any], columns: list[bytes]) -> bytes:
     if len(text) > MAX_HEADER_BYTES or len(body) > MAX_BODY_BYTES:
         raise ReplayError(f"A replay of {len(body):,} bytes is too long; allowed are {MAX_BODY_BYTES:,}.")
     prefix = _PREFIX.pack(MAGIC, VERSION, len(body), hashlib.sha256(body).digest())
-    return prefix + zlib.compress(body, 9)
+    packed = zlib.compress(body, 9)
+    if len(body) > most_in(len(packed)):  # a car stood for hours; without repetitions a byte takes a bit or more
+        deflater = zlib.compressobj(9, strategy=zlib.Z_HUFFMAN_ONLY)
+        packed = deflater.compress(body) + deflater.flush()
+    return prefix + packed
+
+
+def most_in(file_bytes: int) -> int:
+    """Bytes that the body of a file of so many bytes may have."""
+    return min(MAX_BODY_BYTES, DENSE_BYTES + MAX_DENSITY * file_bytes)
 
 
 def unpack(data: bytes, *, name: str) -> tuple[dict[str, Any], memoryview]:
@@ -101,8 +112,8 @@ def unpack(data: bytes, *, name: str) -> tuple[dict[str, Any], memoryview]:
             f"{name} is a replay of version {version}; this Racecraft reads up to {VERSION}.",
             hint="Update Racecraft." if version > VERSION else "",
         )
-    if not 4 <= size <= MAX_BODY_BYTES:
-        raise ReplayError(f"{name} says it holds {size:,} bytes; allowed are 4 to {MAX_BODY_BYTES:,}.")
+    if not 4 <= size <= (most := most_in(len(data))):
+        raise ReplayError(f"{name} says it holds {size:,} bytes; allowed are 4 to {most:,} in a file of its size.")
     inflater = zlib.decompressobj()
     try:
         body = inflater.decompress(memoryview(data)[_PREFIX.size :], size + 1)

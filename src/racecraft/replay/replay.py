@@ -33,11 +33,14 @@ from racecraft.track.validate import check_rows
 from racecraft.version import VERSION
 
 SUFFIX: Final = ".replay"
-MAX_CELLS: Final = 64_000_000
-"""Numbers in all rows of a replay: half a gigabyte in memory."""
+MAX_CELLS: Final = 40_000_000
+"""Numbers in all rows of a replay: 30 hours of driving, a third of a gigabyte in memory."""
 MAX_NUMBER: Final = 1e9
 """Of any number in a row, whatever its unit."""
 ACTION_COLUMNS: Final = 2
+BLOCK: Final = 4096
+TOGETHER: Final = 8
+"""Rows and columns that are put together at a time: what a processor's cache holds, and one line of it in each row."""
 
 _STEPS, _TIME, _STATUS = (ROW_COLUMNS.index(name) for name in ("steps", "time", "status"))
 _FIRST_KIND: Final = len(ROW_COLUMNS) + len(OBJECT_HEADER) + OBJECT_COLUMNS.index("object_kind")
@@ -188,9 +191,10 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
     for index, car in enumerate(header.cars):
         if len(car.types) != ACTION_COLUMNS + width:  # the reward takes the place of the time
             raise ReplayError(f"Car {index} of {name} has {len(car.types)} columns; its objects ask for {width + 2}.")
-        table = columns.table(car.steps, car.types)
-        cars.append(_trial(index, car, table, driven, name=name, number=index % conditions.cars_per_race))
-        rewards.append(np.ascontiguousarray(table[:, ACTION_COLUMNS]))
+        actions = columns.table(car.steps, car.types[:ACTION_COLUMNS])
+        rewards.append(columns.table(car.steps, car.types[ACTION_COLUMNS : ACTION_COLUMNS + 1])[:, 0])
+        rows = columns.table(car.steps, car.types[ACTION_COLUMNS + 1 :], left_out=_TIME)
+        cars.append(_trial(index, car, actions, rows, driven, name=name, number=index % conditions.cars_per_race))
     columns.check_end()
     return Replay(
         title=_printable(header.title),
@@ -208,17 +212,22 @@ def _printable(words: str) -> str:
     return "".join(mark if mark.isprintable() else "�" for mark in words)
 
 
-def _trial(index: int, car: CarHeader, table: NDArray[np.float64], track: Track, *, name: str, number: int) -> Trial:
-    rows = np.insert(table[:, ACTION_COLUMNS + 1 :], _TIME, 0.0, axis=1)
+def _trial(
+    index: int,
+    car: CarHeader,
+    actions: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    track: Track,
+    *,
+    name: str,
+    number: int,
+) -> Trial:
     rows[:, _TIME] = rows[:, _STEPS] * (1.0 / 15.0)  # as the core counts it
     status = rows[:, _STATUS]
-    if car.status not in STATUS_NAMES or not np.isin(status, np.arange(len(STATUS_NAMES))).all():
+    if car.status not in STATUS_NAMES or not _are_below(len(STATUS_NAMES), status):
         raise ReplayError(f"Car {index} of {name} has a status that does not exist.")
-    if not np.isin(rows[:, _FIRST_KIND :: len(OBJECT_COLUMNS)], np.arange(len(OBJECT_KINDS))).all():
+    if not all(_are_below(len(OBJECT_KINDS), kinds) for kinds in rows[:, _FIRST_KIND :: len(OBJECT_COLUMNS)].T):
         raise ReplayError(f"Car {index} of {name} meets an object of a kind that does not exist.")
-    largest = max(table.max(), -table.min())  # without another half a gigabyte
-    if largest > MAX_NUMBER:
-        raise ReplayError(f"Car {index} of {name} has the number {largest:g}; allowed is {MAX_NUMBER:g}.")
     if status[0] != _PREPARE:
         raise ReplayError(f"Car {index} of {name} does not begin with its start.")
     rows.flags.writeable = False
@@ -227,8 +236,13 @@ def _trial(index: int, car: CarHeader, table: NDArray[np.float64], track: Track,
         laps=tuple(lap_of(lap) for lap in car.laps),
         status=car.status,
         completion=car.completion,
-        recording=Recording(track, rows, _clock(rows), table[:, :ACTION_COLUMNS].astype(np.float32), number),
+        recording=Recording(track, rows, _clock(rows), actions.astype(np.float32), number),
     )
+
+
+def _are_below(count: int, column: NDArray[np.float64]) -> bool:
+    """Whether all are whole, and from 0 to below count."""
+    return bool(((column >= 0) & (column < count) & (column == np.rint(column))).all())
 
 
 def _clock(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -252,15 +266,28 @@ class _Columns:
         self._rest = body
         self._name = name
 
-    def table(self, length: int, kinds: list[Any]) -> NDArray[np.float64]:
+    def table(self, length: int, kinds: list[Any], *, left_out: int | None = None) -> NDArray[np.float64]:
+        """The next columns side by side, with one of zeros at `left_out`, which the file does not have  (length, K)."""
         size = length * sum(TYPES[kind] for kind in kinds)
         if size > len(self._rest):
             raise ReplayError(f"{self._name} ends before its numbers do: {size - len(self._rest):,} bytes are missing.")
-        out = np.empty((length, len(kinds)))
-        for index, kind in enumerate(kinds):
-            column, self._rest = self._rest[: length * TYPES[kind]], self._rest[length * TYPES[kind] :]
-            out[:, index] = unpack_column(kind, column)
+        out = np.zeros((length, len(kinds) + (left_out is not None)))
+        places = [place for place in range(out.shape[1]) if place != left_out]
+        for first in range(0, len(kinds), TOGETHER):
+            columns = [self._column(length, kind) for kind in kinds[first : first + TOGETHER]]
+            for row in range(0, length, BLOCK):
+                rows = slice(row, row + BLOCK)
+                for place, column in zip(places[first : first + TOGETHER], columns, strict=True):
+                    out[rows, place] = column[rows]
         return out
+
+    def _column(self, length: int, kind: str) -> NDArray[Any]:
+        data, self._rest = self._rest[: length * TYPES[kind]], self._rest[length * TYPES[kind] :]
+        column = unpack_column(kind, data)
+        largest = max(float(column.max()), -float(column.min()))
+        if largest > MAX_NUMBER:
+            raise ReplayError(f"{self._name} holds the number {largest:g}; allowed is {MAX_NUMBER:g}.")
+        return column
 
     def check_end(self) -> None:
         if len(self._rest):
