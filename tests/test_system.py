@@ -106,6 +106,20 @@ except RacecraftError as error:
     ]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="limits of processes")
+def test_limits_are_set_and_those_that_are_lower_already_stay() -> None:
+    program = """
+import resource, sys
+from racecraft import system
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, int(sys.argv[1])))
+system.limit(seconds=60, written=5000)
+print(*(resource.getrlimit(kind) for kind in (resource.RLIMIT_CPU, resource.RLIMIT_FSIZE, resource.RLIMIT_CORE)))
+"""
+    for hard, written in (("-1", 5000), ("9000", 5000), ("3000", 3000)):
+        done = subprocess.run([sys.executable, "-c", program, hard], capture_output=True, text=True, check=True)
+        assert done.stdout.split() == f"(60, 60) ({written}, {written}) (0, 0)".split()
+
+
 @pytest.mark.skipif(os.name != "posix", reason="groups of processes")
 def test_a_process_ends_with_all_that_it_started() -> None:
     program = "import subprocess, sys; print(subprocess.Popen(['sleep', '60']).pid, flush=True); input()"

@@ -117,6 +117,8 @@ def end_of(status: int) -> str:
 def limit(*, seconds: int, written: int) -> None:
     """Have the system end this process, and what it starts, beyond hard limits; and leave no image of it behind.
 
+    Limits that are lower already, as those of a service, stay.
+
     Args:
         seconds: Of a core.
         written: Bytes of any file.
@@ -129,7 +131,9 @@ def limit(*, seconds: int, written: int) -> None:
     except ImportError:
         raise RacecraftError("This system limits no process.", hint="Use WSL.") from None
     for kind, most in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_FSIZE, written), (resource.RLIMIT_CORE, 0)):
-        resource.setrlimit(kind, (most, most))
+        hard = resource.getrlimit(kind)[1]
+        least = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(kind, (least, least))
 
 
 # ---- memory
