@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from tiny_runs import Recorder, Train, assert_same
 
@@ -86,6 +87,28 @@ def test_a_reward_that_fails_before_the_first_checkpoint_says_how_to_go_on(tiny:
     assert "checkpoint is good" not in caught.value.hint
     (tmp_path / "runs" / "mine" / "reward_function.py").write_text(LATER.replace("20", "-1"))
     assert resume(tmp_path / "runs" / "mine").steps == 512
+
+
+FAULTY_ARRAYS: dict[str, tuple[str, Any, str]] = {
+    "int8": ("optimizer/moment1/policy.head.bias", lambda array: array.astype(np.int8), "is int8 instead of float32"),
+    "float64": ("weights/policy.head.bias", lambda array: array.astype(np.float64), "is float64 instead of float32"),
+    "the mean": ("average/policy.head.bias", lambda array: array.astype(np.int8), "averaged weights"),
+    "NaN": ("weights/policy.head.bias", lambda array: array * np.float32(np.nan), "holds NaN or infinity"),
+    "infinity": ("ppo/episode_returns", lambda array: array + np.inf, "holds NaN or infinity"),
+    "counters": ("ppo/counters", lambda array: array.astype(np.float64), "is float64 instead of int64"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTY_ARRAYS)
+def test_a_checkpoint_of_other_types_or_without_numbers_is_not_gone_on_with(tiny: Train, fault: str) -> None:
+    name, change, says = FAULTY_ARRAYS[fault]
+    run = RunFolder.open(tiny(until="256 steps", evaluate_every=128).run)
+    store = run.checkpoints
+    saved = store.load("last")
+    arrays = {**saved.arrays, name: change(saved.arrays[name])}
+    store.save(saved.step, arrays, metadata=saved.metadata, metrics={}, score=saved.score)
+    with pytest.raises(CheckpointError, match=says):
+        resume(run.path, until="512 steps")
 
 
 PRINTS = """\

@@ -66,9 +66,9 @@ class WeightAverage:
         self.learner.load_weights(below("weights/", state))
         if self.share > 0:
             mean = below("average/", state)
-            shapes, expected = ({n: a.shape for n, a in part.items()} for part in (mean, self.learner.weights()))
-            if shapes not in ({}, expected):
+            kinds, expected = ({n: (a.shape, a.dtype) for n, a in p.items()} for p in (mean, self.learner.weights()))
+            if kinds not in ({}, expected):
                 raise CheckpointError("The averaged weights are not of the same network as the others.")
-            self._mean = {name: np.array(array, np.float32) for name, array in mean.items()}
+            self._mean = {name: array.copy() for name, array in mean.items()}
             self.learner.load_weights(below("learning/", state))
         self.learner.load_optimizer_state(below("optimizer/", state))

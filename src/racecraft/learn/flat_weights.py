@@ -14,7 +14,7 @@ def join_weights(weights: Weights, spec: NetworkSpec) -> NDArray[np.float32]:
     """The arrays one after the other, new  (P,).
 
     Raises:
-        CheckpointError: Names or shapes differ from the network's.
+        CheckpointError: Names or shapes differ from the network's, or numbers are not float32.
     """
     expected = networks.weight_shapes(spec)
     given = {name: tuple(array.shape) for name, array in weights.items()}
@@ -24,7 +24,10 @@ def join_weights(weights: Weights, spec: NetworkSpec) -> NDArray[np.float32]:
             f"The weights do not fit the network {spec.name}: {', '.join(dict.fromkeys(different))} "
             "are missing, superfluous or of another shape."
         )
-    return np.concatenate([np.asarray(weights[name], np.float32).ravel() for name in expected])
+    for name, array in weights.items():
+        if array.dtype != np.float32:
+            raise CheckpointError(f"The weights {name} are {array.dtype}; allowed is float32.")
+    return np.concatenate([weights[name].ravel() for name in expected])
 
 
 def split_weights(flat: NDArray[np.float32], spec: NetworkSpec) -> Weights:

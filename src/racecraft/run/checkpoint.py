@@ -76,6 +76,21 @@ class Checkpoint:
     score: tuple[float, ...] | None
     path: Path
 
+    def check_arrays(self, own: Mapping[str, NDArray[Any]]) -> None:
+        """Refuse arrays of another type than those of the same name that a training has, and NaN and infinity in any.
+
+        Shapes are for those to check who take the arrays: some grow with a training.
+
+        Raises:
+            CheckpointError: Names the array.
+        """
+        for name, array in self.arrays.items():
+            expected = own[name].dtype if name in own else array.dtype
+            if array.dtype != expected:
+                raise CheckpointError(f"{self.path} cannot be resumed: {name} is {array.dtype} instead of {expected}.")
+            if array.dtype.kind == "f" and not np.isfinite(array).all():
+                raise CheckpointError(f"{self.path} cannot be resumed: {name} holds NaN or infinity.")
+
 
 @dataclass(frozen=True, eq=False)
 class StoredCheckpoint:

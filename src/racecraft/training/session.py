@@ -111,6 +111,7 @@ class Session:
             CheckpointError: It is not of this run.
         """
         arrays, metadata = saved.arrays, saved.metadata
+        saved.check_arrays(self.state())
         try:
             self.algorithm.load_state(arrays)
             if self.algorithm.total_steps != saved.step:
