@@ -31,6 +31,12 @@ def test_it_is_on_disk_at_once(tmp_path: Path) -> None:
     log.close()
 
 
+def test_nothing_printed_drives_the_terminal_that_shows_the_file(tmp_path: Path) -> None:
+    with PrintLog(tmp_path / "reward.log") as log:
+        log.write("\x1b]0;mine\x07\x1b[2J\ta tab, ü\u202e\x9b1m\r\ud800\n\nlast")
+    assert log.path.read_bytes().decode() == "�]0;mine��[2J\ta tab, ü��1m��\n\nlast"
+
+
 def test_what_was_lost_is_told_where_it_was_lost(tmp_path: Path) -> None:
     with PrintLog(tmp_path / "reward.log") as log:
         log.write("before\n")

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import ConfigError, RacecraftError, ReplayError
+from racecraft.errors import ConfigError, RacecraftError, ReplayError, printable
 from racecraft.json_file import read_bytes
 from racecraft.race.announcement import Announcement
 from racecraft.race.conditions import Conditions
@@ -197,19 +197,14 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
         cars.append(_trial(index, car, actions, rows, driven, name=name, number=index % conditions.cars_per_race))
     columns.check_end()
     return Replay(
-        title=_printable(header.title),
+        title=printable(header.title),
         conditions=conditions,
-        names=tuple(_printable(car.name) for car in header.cars),
+        names=tuple(printable(car.name) for car in header.cars),
         cars=tuple(cars),
         rewards=tuple(rewards),
         race=race_of(header, name=name),
-        written_by=_printable(header.racecraft),
+        written_by=printable(header.racecraft),
     )
-
-
-def _printable(words: str) -> str:
-    """Somebody else's words, without what could drive a terminal."""
-    return "".join(mark if mark.isprintable() else "�" for mark in words)
 
 
 def _trial(

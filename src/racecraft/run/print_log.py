@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from racecraft.errors import RunError
+from racecraft.errors import RunError, printable
 from racecraft.run.closing import Closing
 
 MAX_BYTES: Final = 4 * 2**20
@@ -35,16 +35,16 @@ class PrintLog(Closing):
         return self.path.with_suffix(".1.log")
 
     def write(self, text: str, *, lost: int = 0) -> None:
-        """Append.
+        """Append, without what could drive the terminal in which somebody reads it.
 
         Args:
-            text: What was printed.
+            text: What was printed; a stranger's reward function prints what it likes.
             lost: How many bytes were printed before it, and were not kept.
 
         Raises:
             RunError: The disk does not take it.
         """
-        data = text.encode("utf-8", "replace")
+        data = "\n".join(map(_harmless, text.split("\n"))).encode()
         if lost:
             data = f"\n[{lost:,} bytes printed here were too many at once and are not kept]\n".encode() + data
         if not data:
@@ -67,3 +67,7 @@ class PrintLog(Closing):
         if self._file is not None:
             self._file.close()
             self._file = None
+
+
+def _harmless(line: str) -> str:
+    return "\t".join(map(printable, line.split("\t")))
