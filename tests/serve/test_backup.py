@@ -111,6 +111,10 @@ def test_what_a_row_refers_to_may_come_later(tmp_path: Path) -> None:
     assert (made.files, found) == (0, [("first", 2, None, {}), ("second", None, None, {})])
     with pytest.raises(RunError, match="cannot be written: No such file"):
         back_up(ServeSettings(runs=tmp_path / "b"), tmp_path / "nowhere" / "a.tar")
+    for inside in (tmp_path / "b" / "b.tar", tmp_path / "b" / ".racecraft" / "b.tar"):
+        with pytest.raises(RunError, match="lies in the league's folder"):
+            back_up(ServeSettings(runs=tmp_path / "b"), inside)
+        assert not inside.exists()
     with pytest.raises(RunError, match="exists already"):
         back_up(ServeSettings(runs=tmp_path / "b"), tmp_path / "a.tar")
 

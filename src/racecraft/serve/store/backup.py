@@ -37,7 +37,7 @@ FILES: Final = "files"
 END: Final = "end"
 """The last member, by which a file that broke off is known."""
 LEFT_OUT: Final = (f"{STATE_FOLDER}/console.db", f"{STATE_FOLDER}/{INCOMING}/", f"{STATE_FOLDER}/uploads/")
-"""Beginnings of paths: the database is in the backup by its rows, and the rest was on its way."""
+"""Paths in the folder, or in that of a person: the database is in the backup by its rows, the rest was on its way."""
 MAX_MANIFEST: Final = 1 << 20
 """Bytes."""
 NOT_OURS: Final = (
@@ -67,10 +67,12 @@ def back_up(settings: ServeSettings, to: Path) -> Backup:
         to: The file, which only its owner may read, for it holds what races keep secret.
 
     Raises:
-        RunError: The file exists or cannot be written, or the database cannot be read.
+        RunError: The file exists, lies in the league's folder or cannot be written, or the database cannot be read.
     """
     if to.exists():
         raise RunError(f"{to} exists already.", hint="Name another file.")
+    if to.resolve().is_relative_to(settings.runs.resolve()):
+        raise RunError(f"{to} lies in the league's folder, of which it is.", hint="Name a file outside of it.")
     database = Database(settings.database_url)
     try:
         revision = database.require_current()
@@ -83,7 +85,7 @@ def back_up(settings: ServeSettings, to: Path) -> Backup:
             rows.seek(0)
             tar.addfile(described, rows)
             files = 0
-            for name, data in _files(settings.runs, without=Path(stream.name).absolute()):
+            for name, data in _files(settings.runs):
                 _add(tar, f"{FILES}/{name}", data)
                 files += 1
             _add(tar, END, b"")
@@ -192,11 +194,15 @@ def _read_rows(connection: sa.Connection, lines: IO[bytes]) -> dict[str, int]:
     return counts
 
 
-def _files(folder: Path, *, without: Path) -> Iterator[tuple[str, bytes]]:
+def _is_left_out(name: str) -> bool:
+    return any(f"/{part}" in f"/{name}" for part in LEFT_OUT)
+
+
+def _files(folder: Path) -> Iterator[tuple[str, bytes]]:
     """Every file of a folder that is still there when its turn comes; of links only that they are there is told."""
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
-        if path.absolute() == without or name.startswith(LEFT_OUT) or path.name.startswith(PASSING):
+        if _is_left_out(name) or path.name.startswith(PASSING):
             continue
         if path.is_symlink():
             warnings.warn(f"{path} is a link: what it leads to is not in the backup.", stacklevel=3)
