@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import shutil
 import tarfile
 import zipfile
@@ -17,6 +18,9 @@ from running_consoles import RunningConsole
 
 from racecraft.importing import import_run
 from racecraft.run import RunFolder, archive_chunks
+from racecraft.serve.app import create_app
+from racecraft.serve.models.archives import UPLOADS
+from racecraft.serve.settings import ServeSettings
 
 pytestmark = pytest.mark.costly
 
@@ -199,6 +203,24 @@ def test_hostile_uploads_are_refused(console: RunningConsole) -> None:
     error(console.client.post("/api/models/import", content=REWARD.encode()), 422)
     assert {model["name"] for model in console.client.get("/api/models").json()} == before
     assert not list((console.runs / ".racecraft" / "uploads").iterdir())
+
+
+def test_a_second_server_leaves_what_the_first_is_taking_in(tmp_path: Path) -> None:
+    settings = ServeSettings(runs=tmp_path)
+    pupil = settings.of(7).state / UPLOADS
+    for uploads in (settings.state / UPLOADS, pupil):
+        (uploads / "left").mkdir(parents=True)
+        (uploads / "coming").mkdir()
+        for path in (uploads / "left" / "a.zip", uploads / "left-file", uploads / "left", uploads / "coming"):
+            if not path.exists():
+                path.write_bytes(b"PK")
+            os.utime(path, (0, 0))
+        (uploads / "coming" / "b.zip").write_bytes(b"PK")
+        (uploads / "coming-file").write_bytes(b"PK")
+        os.utime(uploads / "coming", (0, 0))
+    create_app(settings, hosts=set()).state.context.database.close()
+    for uploads in (settings.state / UPLOADS, pupil):
+        assert sorted(path.name for path in uploads.iterdir()) == ["coming", "coming-file"]
 
 
 def test_a_huge_upload_is_refused_before_it_comes(console: RunningConsole) -> None:

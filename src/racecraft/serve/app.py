@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-import shutil
 import threading
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
@@ -110,7 +109,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     """
     settings.state.mkdir(parents=True, exist_ok=True)
     settings.tracks.mkdir(exist_ok=True)
-    shutil.rmtree(settings.state / archives.UPLOADS, ignore_errors=True)  # of a server that was killed
+    archives.remove_abandoned_uploads(settings)
     database = Database(settings.database_url)
     database.migrate()
     queue = JobQueue(database)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import shutil
 import tempfile
+import time
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Final
 
@@ -19,11 +21,13 @@ from racecraft.serve.context import Context, InConsoles, InContext, InUser
 from racecraft.serve.models.schemas import ImportedModel
 from racecraft.serve.problems import Conflict
 from racecraft.serve.schemas import RunName
+from racecraft.serve.settings import PEOPLE, STATE_FOLDER, ServeSettings
 
 router = APIRouter(prefix="/api/models", tags=["archives"])
 
 ENDINGS: Final = (".tar.gz", ".tgz", ".tar", ".zip", ".py")
 UPLOADS: Final = "uploads"  # inside the state folder
+ABANDONED: Final = 3600.0  # s without a byte after which an upload is one of a server that was killed
 RESERVE: Final = 1_000_000_000  # bytes of the disk that uploads leave to everybody else
 
 
@@ -69,6 +73,16 @@ async def import_model(
         raise RunError(f"The file cannot be kept: {error.strerror or error}.", hint="Free disk space.") from error
     finally:
         await run_in_threadpool(shutil.rmtree, place, ignore_errors=True)
+
+
+def remove_abandoned_uploads(settings: ServeSettings) -> None:
+    """Clear away uploads that killed servers left, not those that another one on the same folder is taking in."""
+    before = time.time() - ABANDONED
+    for state in (settings.state, *settings.state.glob(f"{PEOPLE}/*/{STATE_FOLDER}")):
+        for path in state.glob(f"{UPLOADS}/*"):
+            with suppress(OSError):  # its server has just removed it
+                if max(part.stat().st_mtime for part in (path, *path.glob("*"))) < before:
+                    shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def require_disk(folder: Path) -> None:
