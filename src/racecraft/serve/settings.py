@@ -96,11 +96,12 @@ class ServeSettings:
                 f"artifacts is {self.artifacts.split('://')[0]!r}; allowed are s3://BUCKET/PREFIX and file:///FOLDER."
             )
         self._check_address()
-        is_file = self.database.startswith("sqlite:///") and self.database != "sqlite:///"
+        # a database in memory would be another one for every process
+        is_file = self.database.startswith("sqlite:///") and self.database[10:] not in ("", ":memory:")
         if self.database and not is_file and not self.database.startswith("postgresql+psycopg://"):
+            told = self.database if self.database.startswith("sqlite") else self.database.split(":")[0]  # no password
             raise ConfigError(
-                f"database is {self.database.split(':')[0][:40]!r}; allowed are sqlite:///FILE and "
-                "postgresql+psycopg://USER@HOST/NAME."
+                f"database is {told[:40]!r}; allowed are sqlite:///FILE and postgresql+psycopg://USER@HOST/NAME."
             )
 
     def _check_address(self) -> None:
