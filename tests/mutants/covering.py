@@ -41,6 +41,7 @@ GROUPS: Final[Tests] = (
     "not postgresql and (homes or names_can or code_has or new_cards)",
 )
 ENTRIES: Final[Tests] = ("tests/serve/test_submission_limits.py", "-k", "not postgresql")
+VERDICTS: Final[Tests] = ("tests/serve/test_judge.py", "tests/serve/test_benches.py", "tests/serve/test_verdicts.py")
 BOARD: Final = "tests/serve/test_boards.py::test_the_board_places_by_the_rules_of_every_race"
 TOKENS: Final[Tests] = (
     "tests/serve/test_token_workers.py",
@@ -196,6 +197,9 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "serve/quotas/quotas.py": (6, ("tests/serve/test_quotas.py", "-k", "not postgresql")),
     "serve/groups/groups.py": (5, GROUPS),
     "serve/submissions/admission.py": (3, ENTRIES),
+    "serve/submissions/bench.py": (8, VERDICTS),
+    "serve/submissions/judge.py": (12, VERDICTS),
+    "serve/submissions/walls.py": (3, VERDICTS),
     "serve/submissions/board.py": (4, (BOARD,)),
     "serve/submissions/copies.py": (2, ("tests/serve/test_copies.py",)),
     "serve/submissions/league.py": (6, (*ENTRIES, BOARD)),

@@ -51,6 +51,16 @@ def environment(tree: Path) -> dict[str, str]:
     return {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
 
 
+def lead_into(tree: Path) -> None:
+    """Have processes that a test starts with an environment of their own import the package of a tree, too."""
+    begin = subprocess.Popen.__init__
+
+    def begin_there(self: Any, *args: Any, env: Any = None, **more: Any) -> None:
+        begin(self, *args, env=env if env is None else {**env, **environment(tree)}, **more)
+
+    subprocess.Popen.__init__ = begin_there  # type: ignore[method-assign]
+
+
 class FirstFailure:
     """A pytest plugin that remembers the first test that failed."""
 
@@ -97,6 +107,7 @@ def run_tests(tree: Path, tests: Tests, *, keeps_bytecode: bool = False) -> tupl
                 os.dup2(os.open(tree / "output.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
             resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
             os.environ.update(environment(tree))
+            lead_into(tree)
             sys.dont_write_bytecode = not keeps_bytecode
             failure = FirstFailure()
             options = ["-x", "-p", "no:cacheprovider", "-m", "not slow", "--basetemp", f"{tree}-tmp"]

@@ -24,7 +24,7 @@ from racecraft.race.rules import race_rules
 from racecraft.replay.replay import read_replay
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.submissions import judge, tasks
-from racecraft.serve.submissions.bench import RESULTS, Bench
+from racecraft.serve.submissions.bench import RESULTS, Bench, DriverFailed
 from racecraft.serve.submissions.judge import ENTRY, FAILED
 
 Told = dict[str, Any]
@@ -103,6 +103,39 @@ def test_a_judge_waits_for_no_child_that_nobody_asks_for(is_silent: bool, monkey
     assert time.monotonic() - began < GONE
     with pytest.raises(ProcessLookupError):
         os.kill(children[0], 0)
+
+
+# ---- a judge after another
+
+
+@pytest.mark.costly
+def test_a_bench_keeps_its_judge_but_one_that_drives_for_too_long(
+    entry: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / ENTRY).write_bytes(entry)
+    bench, judges = Bench(), list[int]()
+
+    def judge_one() -> None:
+        with bench.asked(asked(2.0, trials=1), folder=tmp_path):
+            assert bench._process is not None
+            judges.append(bench._process.pid)
+
+    try:
+        judge_one()
+        judge_one()
+        with monkeypatch.context() as patched:
+            patched.setattr("racecraft.serve.submissions.bench.PATIENCE", 1.0)
+            with (
+                pytest.raises(DriverFailed, match=r"^It drove for more than 1 s and was stopped\.$"),
+                bench.asked(asked(600.0, trials=50), folder=tmp_path),
+            ):
+                pass
+        assert not lives(judges[0])
+        judge_one()
+    finally:
+        bench.close()
+    assert judges[0] == judges[1] != judges[2]
+    assert not lives(judges[2])
 
 
 # ---- two at the same submission
