@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -116,5 +117,19 @@ def test_a_lesson_that_stops_is_told(racecraft: Run, tmp_path: Path, monkeypatch
     (tmp_path / "course" / "01_stops.py").write_text("import os\nprint(os.environ['RACECRAFT_LANGUAGE'])\n")
     told = racecraft("lessons", "run", "1", "--language", "de", "--json").document
     assert (told["output"], told["pictures"]) == ("de\n", [])
+    assert re.search(r"^Lektion 1 brauchte \d+,\d s; ihre Bilder", racecraft("lessons", "run", "1", "-l", "de").out)
+    assert re.search(r"^Lesson 1 took \d+\.\d s; its pictures", racecraft("lessons", "run", "1").out)
     assert racecraft("lessons", "run", "1", "--json").document["output"] == "en\n"
     assert racecraft("lessons", "run", "1", "--language", "fr").status == 1
+
+
+def test_where_a_file_lies_in_the_way_is_told_before_a_lesson_begins(racecraft: Run, tmp_path: Path) -> None:
+    (tmp_path / "runs").write_text("mine")
+    outcome = racecraft("lessons", "run", "1", "--json")
+    assert outcome.status == 1
+    says = f"The folder runs/{find_lesson(1).path.stem} for pictures cannot be made: Not a directory."
+    assert outcome.document["error"]["message"] == says
+    assert "Traceback" not in outcome.err
+    opened = racecraft("lessons", "open", "1", "--no-start", "--folder", "runs")
+    assert (opened.status, opened.err) == (1, "FileExistsError: runs cannot be used: File exists.\n")
+    assert (tmp_path / "runs").read_text() == "mine"

@@ -216,6 +216,9 @@ def test_pictures_are_saved_where_the_script_runs(tmp_path: Path, monkeypatch: p
     for name in ("", "a/b", "../up", "a b"):
         with pytest.raises(ConfigError, match="picture's name"):
             show(Picture(frames), name)
+    (tmp_path / "runs/09_some_lesson/taken.webp").mkdir()
+    with pytest.raises(ConfigError, match=r"taken\.webp cannot be written: Is a directory"):
+        show(Picture(frames), "taken")
 
 
 def colored(picture: Picture, color: tuple[int, int, int]) -> int:

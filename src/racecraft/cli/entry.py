@@ -10,10 +10,13 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import copy
 from io import TextIOWrapper
 from typing import Any, cast
 
 import typer
+from typer.main import get_command_name
+from typer.models import CommandInfo
 
 from racecraft.cli.app import INTERRUPTED, app, print_json, text
 from racecraft.errors import ConfigError, RacecraftError, printable_lines
@@ -43,26 +46,38 @@ VERBS = (
     "machine",
 )
 """Files of verbs in the order of ``--help``; to import one is to register its verbs."""
-ALONE = frozenset({"train", "evaluate", "report", "export", "learn", "perceive", "sweep", "tune"})
-"""Verbs that are all that the file of their name holds: who types one waits for no other."""
-
+VERSION_OPTIONS = frozenset({"--version", "--json"})
 
 GARBAGE = 50_000, 10, 10
 """New objects before they are searched for garbage: by the default of 700 a start looks through what it has just
 imported over and over, a tenth of its time."""
 
 
-def register(arguments: Sequence[str]) -> None:
-    """Register the verb that the arguments begin with, where it stands alone, or else every verb."""
-    verb = arguments[0] if arguments else ""
-    for name in [verb] if verb in ALONE else VERBS:
-        importlib.import_module(f"racecraft.cli.{name}")
-
-
 def every_verb() -> typer.Typer:
     """The application with all its verbs."""
-    register(())
+    for name in VERBS:
+        importlib.import_module(f"racecraft.cli.{name}")
     return app
+
+
+def application(arguments: Sequence[str]) -> typer.Typer:
+    """The application with the verb that the arguments begin with, or with all of them where that is none.
+
+    Typer builds the options of every verb that it is given before it looks at what was typed: half of a short verb's
+    time. The version asks for none of them.
+    """
+    if "--version" in arguments and VERSION_OPTIONS.issuperset(arguments):
+        return app
+    whole = every_verb()
+    asked = copy(whole)
+    asked.registered_commands = [one for one in whole.registered_commands if _word(one) in arguments[:1]]
+    asked.registered_groups = [one for one in whole.registered_groups if one.name in arguments[:1]]
+    return asked if asked.registered_commands or asked.registered_groups else whole
+
+
+def _word(verb: CommandInfo) -> str:
+    """What is typed for a verb."""
+    return verb.name or get_command_name(verb.callback.__name__ if verb.callback is not None else "")
 
 
 def main() -> None:
@@ -80,8 +95,7 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {printable_lines(str(message))}", err=True)
     try:
-        register(arguments)
-        status = app(arguments, prog_name="racecraft", standalone_mode=False)
+        status = application(arguments)(arguments, prog_name="racecraft", standalone_mode=False)
     except UsageError as error:
         usage: Any = error
         if is_json:
@@ -94,7 +108,7 @@ def main() -> None:
     except Exception as error:
         told = _known(error) or error
         is_expected = isinstance(told, RacecraftError | OSError)
-        code, message = type(told).__name__, str(told)
+        code, message = type(told).__name__, _sentence(told)
         hint = getattr(told, "hint", "") if is_expected else "This is a bug in Racecraft. --debug shows where."
         if is_debug:
             traceback.print_exc()
@@ -114,6 +128,13 @@ def _known(error: Exception) -> ConfigError | None:
     if isinstance(error, ImportError) and str(error).startswith("Instruction set"):
         return ConfigError(str(error), hint="The variable RACECRAFT_ISA asks for it; without it the best is taken.")
     return None
+
+
+def _sentence(error: Exception) -> str:
+    """What an error says; of a file that cannot be used, its path and the system's reason."""
+    if isinstance(error, OSError) and isinstance(error.filename, str) and error.strerror:
+        return f"{error.filename} cannot be used: {error.strerror}."
+    return str(error)
 
 
 def print_error(code: str, message: str, hint: str) -> None:

@@ -47,15 +47,17 @@ def lessons(context: typer.Context, language: LanguageOption = "en", as_json: Js
 def run_lesson(number: Number, language: LanguageOption = "en", as_json: Json = False) -> None:
     """Run a lesson from top to bottom; its pictures go to runs/."""
     from racecraft.checks import check_choice
+    from racecraft.cli.lessons_text import WORDS
     from racecraft.course import find_lesson
     from racecraft.course.phrases import LANGUAGE
     from racecraft.course.quiz import LANGUAGES
+    from racecraft.course.show import picture_folder
     from racecraft.errors import TrainingError
 
     check_choice("language", language, LANGUAGES)
     lesson = find_lesson(number)
+    words, folder = WORDS[language], picture_folder(lesson.path.stem)  # before minutes of learning
     begun = time.perf_counter()
-    folder = Path("runs") / lesson.path.stem
     command = [sys.executable, str(lesson.path)]
     environment = os.environ | {LANGUAGE: language}
     output = subprocess.PIPE if as_json else None
@@ -64,12 +66,13 @@ def run_lesson(number: Number, language: LanguageOption = "en", as_json: Json = 
     if done.returncode in (-2, INTERRUPTED):
         raise typer.Exit(INTERRUPTED)
     if done.returncode:
-        raise TrainingError(f"Lesson {number} stopped with exit status {done.returncode}; what it said stands above.")
+        raise TrainingError(words["stopped"].format(number, done.returncode))
     if as_json:
         pictures = sorted(str(path) for path in folder.glob("*") if path.suffix in (".png", ".webp"))
         print_json({"lesson": number, "wall_seconds": seconds, "pictures": pictures, "output": done.stdout})
     else:
-        typer.echo(f"Lesson {number} took {seconds:.1f} s; its pictures are in {folder}.")
+        told = f"{seconds:.1f}"
+        typer.echo(words["ran"].format(number, told.replace(".", ",") if language == "de" else told, folder))
 
 
 @lessons_app.command("open")

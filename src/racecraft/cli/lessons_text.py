@@ -1,4 +1,4 @@
-"""What `racecraft lessons` shows: the list, and a quiz."""
+"""What `racecraft lessons` shows: the list, a quiz, how a lesson ended."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "to": "to",
         "letter": "A letter from {} to {}, please.",
         "right": "{} of {} right.",
+        "ran": "Lesson {} took {} s; its pictures are in {}.",
+        "stopped": "Lesson {} stopped with exit status {}; what it said stands above.",
     },
     "de": {
         "headings": "Lektion läuft Übungen Fragen",
@@ -36,6 +38,8 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "to": "bis",
         "letter": "Bitte einen Buchstaben von {} bis {}.",
         "right": "{} von {} richtig.",
+        "ran": "Lektion {} brauchte {} s; ihre Bilder sind in {}.",
+        "stopped": "Lektion {} endete mit dem Status {}; was sie sagte, steht darüber.",
     },
 }
 """What is said around the lessons' own words."""

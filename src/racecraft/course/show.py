@@ -66,7 +66,7 @@ def show(picture: Picture, name: str) -> Path | None:
         The file; None in a notebook.
 
     Raises:
-        ConfigError: The name is not one of a file.
+        ConfigError: The name is not one of a file, or the file cannot be written.
     """
     if not re.fullmatch(r"[\w-]+", name):
         raise ConfigError(f"A picture's name is {name!r}; allowed are letters, digits, - and _.")
@@ -74,9 +74,24 @@ def show(picture: Picture, name: str) -> Path | None:
     if shell is not None and shell.get_ipython() is not None:
         import_module("IPython.display").display(picture)
         return None
-    folder = Path("runs") / (Path(sys.argv[0]).stem or "lesson")
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{name}{picture.suffix}"
-    path.write_bytes(picture.encoded())
+    path = picture_folder(Path(sys.argv[0]).stem or "lesson") / f"{name}{picture.suffix}"
+    try:
+        path.write_bytes(picture.encoded())
+    except OSError as error:
+        raise ConfigError(f"The picture {path} cannot be written: {error.strerror or error}.") from error
     sys.stdout.write(f"[picture: {path}]\n")
     return path
+
+
+def picture_folder(script: str) -> Path:
+    """Where the pictures of a script go, by its name; made where it is missing.
+
+    Raises:
+        ConfigError: It cannot be made.
+    """
+    folder = Path("runs") / script
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"The folder {folder} for pictures cannot be made: {error.strerror or error}.") from error
+    return folder
