@@ -231,6 +231,40 @@ def test_processes_of_a3c_leave_ctrl_c_to_their_parent(monkeypatch: pytest.Monke
     assert os.getpgid(0) not in groups
 
 
+FAILING = """
+import gymnasium
+from gymnasium.envs.classic_control import CartPoleEnv
+from gymnasium.envs.registration import register
+
+class Failing(CartPoleEnv):
+    steps = 0
+    def step(self, action):
+        self.steps += 1
+        if self.steps > 40:
+            raise KeyError("wheel")
+        return super().step(action)
+
+register("Failing-v0", entry_point=Failing, max_episode_steps=100)
+"""
+
+
+def test_a_process_of_a3c_whose_world_fails_is_told_in_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "failing_world.py").write_text(FAILING)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    try:
+        with pytest.raises(
+            TrainingError, match=r"Failing-v0 has failed while it was played: KeyError: 'wheel'$"
+        ) as told:
+            learn("failing_world:Failing-v0", "a3c", until="2000 steps")
+    finally:
+        gymnasium.registry.pop("Failing-v0", None)
+    assert "mistake is in the environment" in told.value.hint
+    assert capfd.readouterr().err == ""
+
+
 class Loud(gymnasium.Env[Any, Any]):
     """Pays more than a number can hold."""
 

@@ -30,7 +30,8 @@ from racecraft.classic.policy import ActorCritic
 from racecraft.classic.rollout import collect
 from racecraft.classic.views import VectorView
 from racecraft.classic.worlds import Worlds
-from racecraft.errors import TrainingError
+from racecraft.errors import RacecraftError, TrainingError
+from racecraft.run.atomic import write_json
 
 __all__ = ["A3CSettings", "begin", "learn"]
 
@@ -97,7 +98,7 @@ def learn(worlds: Worlds, policy: ActorCritic, settings: A3CSettings, rng: np.ra
                     read[number] += len(returns)
                     worlds.returns += returns
                 if any(worker.returncode for worker in workers):
-                    raise TrainingError("A process of A3C has ended early; what it said stands above.")
+                    raise _failure(folder)
                 yield
                 if is_last:
                     return
@@ -119,9 +120,27 @@ def _returns(folder: Path, number: int, *, skip: int) -> list[float]:
     return np.fromfile(path, np.float64, offset=8 * skip).tolist() if path.exists() else []
 
 
+def _failure(folder: Path) -> TrainingError:
+    """What the first of the processes said that could not go on."""
+    for path in sorted(folder.glob("failure-*")):
+        said = json.loads(path.read_text(encoding="utf-8"))
+        return TrainingError(said["message"], hint=said["hint"])
+    return TrainingError("A process of A3C has ended early; what it said stands above.")
+
+
 def work() -> None:
-    """What each process does: copy the weights, play, work out a gradient, add it; wait for the parent now and then."""
+    """What each process does; what an environment or a setting is to blame for, it leaves to its parent to tell."""
     task = json.loads(sys.argv[1])
+    try:
+        _play(task)
+    except RacecraftError as error:
+        said = {"message": str(error), "hint": error.hint}
+        write_json(Path(task["folder"]) / f"failure-{task['number']}", said)
+        sys.exit(1)
+
+
+def _play(task: dict[str, Any]) -> None:
+    """Copy the weights, play, work out a gradient, add it; wait for the parent now and then."""
     number, values = task["number"], task["settings"]
     settings = A3CSettings(**{**values, "hidden": tuple(values["hidden"])})
     rng = np.random.default_rng(task["seed"])
