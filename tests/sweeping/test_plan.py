@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from racecraft.errors import ConfigError, RacecraftError
-from racecraft.sweeping import read_sweep
+from racecraft.errors import ConfigError, RacecraftError, RewardError
+from racecraft.sweeping import make_sweep, read_sweep
 from racecraft.tuning import find_constants
 
 FILE = """
@@ -110,3 +112,14 @@ def test_who_reads_it_may_refuse_a_word() -> None:
 
     with pytest.raises(ConfigError, match="Setting 'a': track is nobody's"):
         read_sweep("[settings.a]\ntrack = 'oval'", resolve=refuse)
+
+
+def test_a_reward_that_is_none_is_told_with_its_setting(tmp_path: Path) -> None:
+    (tmp_path / "none.py").write_text("def reward(params):\n    return 1.0\n")
+    text = f"[settings.a]\n[settings.b]\nreward = '{tmp_path / 'none.py'}'"
+    with pytest.raises(RewardError, match=r"^Setting 'b': ") as told:
+        make_sweep(read_sweep(text), runs=tmp_path, name="s")
+    assert "reward_function" in str(told.value)
+    with pytest.raises(RewardError, match=r"^Setting 'b': .*'racign'") as told:
+        read_sweep("[settings.a]\n[settings.b]\nreward = 'racign'")
+    assert "racing" in told.value.hint

@@ -114,11 +114,11 @@ def test_a_sweep_that_cannot_be_made_leaves_no_run(tmp_path: Path) -> None:
     reward.write_text("def reward_function(params):\n    return params['sped']\n")
     text = FILE.replace("numbers = { learning_rate = 0.002 }", f"reward = '{reward}'")
     runs = tmp_path / "runs"
-    with pytest.raises(RewardError, match="no key 'sped'"):
+    with pytest.raises(RewardError, match=r"^Setting 'bold': (.|\n)*no key 'sped'"):
         make_sweep(read_sweep(text), runs=runs, name="s")
     assert list(runs.iterdir()) == []
     RunFolder.create(runs, name="s-bold-2")
-    with pytest.raises(RunError, match="s-bold-2 exists"):
+    with pytest.raises(RunError, match=r"^Setting 'bold': .*s-bold-2 exists"):
         make_sweep(read_sweep(FILE), runs=runs, name="s")
     assert [path.name for path in runs.iterdir()] == ["s-bold-2"], "which it did not make"
 

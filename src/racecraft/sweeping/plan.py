@@ -23,12 +23,13 @@ import itertools
 import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from racecraft.checks import check_choice, check_whole, require
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.errors import ConfigError, RacecraftError, did_you_mean
 from racecraft.reward import load_reward
 from racecraft.run.folder import sanitize_name
 from racecraft.training.plan import Plan, make_plan
@@ -112,11 +113,19 @@ def read_sweep(
         raise ConfigError(f"{len(rows)} settings with {len(seeds)} seeds are more than {MAX_TRAININGS} trainings.")
     settings = []
     for name, words in rows.items():
-        try:
+        with faults_of(name):
             settings.append(Setting(name=name, words=words, plan=_plan(words, resolve, load)))
-        except ConfigError as error:
-            raise ConfigError(f"Setting {name!r}: {error}", hint=error.hint) from error
     return SweepPlan(goal=goal, seeds=seeds, settings=tuple(settings))
+
+
+@contextmanager
+def faults_of(setting: str) -> Iterator[None]:
+    """Within, every error says which setting of the sweep it is of."""
+    try:
+        yield
+    except RacecraftError as error:
+        error.args = (f"Setting {setting!r}: {error}",)
+        raise
 
 
 def _seeds(value: Any) -> tuple[int, ...]:

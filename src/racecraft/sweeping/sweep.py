@@ -28,7 +28,7 @@ from racecraft.run.atomic import write_json
 from racecraft.run.folder import MAX_NAME, checked_name
 from racecraft.run.lock import exclusive_lock
 from racecraft.sweeping.board import Board, Outcome, board_of, outcome_of
-from racecraft.sweeping.plan import SweepPlan
+from racecraft.sweeping.plan import SweepPlan, faults_of
 from racecraft.system import num_cores
 from racecraft.training.interruption import interruptible
 from racecraft.tuning.seats import HereSeat, ProcessSeat, Seat, SeatLost
@@ -71,13 +71,15 @@ def make_sweep(plan: SweepPlan, *, runs: str | Path = "runs", name: str | None =
         "goal": plan.goal,
         "seeds": list(plan.seeds),
         "settings": {setting.name: setting.words for setting in plan.settings},
+        "notes": list(plan.notes),
     }
     made: list[RunFolder] = []
     try:
         for setting in plan.settings:
             for seed in plan.seeds:
                 seeded = replace(setting.plan, settings=replace(setting.plan.settings, seed=seed))
-                made.append(seeded.start(root=runs, name=_run(name, setting.name, seed)))
+                with faults_of(setting.name):
+                    made.append(seeded.start(root=runs, name=_run(name, setting.name, seed)))
         file.parent.mkdir(parents=True, exist_ok=True)
         write_json(file, document)
     except BaseException as error:
@@ -113,6 +115,7 @@ class Sweep:
             self.settings: dict[str, dict[str, Any]] = {
                 str(setting): dict(words) for setting, words in document["settings"].items()
             }
+            self.notes = tuple(str(note) for note in document.get("notes", ()))  # older ones have none
         except (ConfigError, KeyError, TypeError, ValueError, AttributeError) as error:
             raise RunError(f"{self.file} cannot be read: {error}") from error
         self._stop = threading.Event()
