@@ -46,6 +46,8 @@ VERBS = (
     "machine",
 )
 """Files of verbs in the order of ``--help``; to import one is to register its verbs."""
+ALONE = frozenset({"train", "evaluate", "report", "export", "learn", "perceive", "sweep", "tune"})
+"""Verbs that are all that the file of their name holds: who types one waits for no other file."""
 VERSION_OPTIONS = frozenset({"--version", "--json"})
 
 GARBAGE = 50_000, 10, 10
@@ -55,7 +57,12 @@ imported over and over, a tenth of its time."""
 
 def every_verb() -> typer.Typer:
     """The application with all its verbs."""
-    for name in VERBS:
+    return _with(VERBS)
+
+
+def _with(names: Sequence[str]) -> typer.Typer:
+    """The application, the verbs of these files among its own."""
+    for name in names:
         importlib.import_module(f"racecraft.cli.{name}")
     return app
 
@@ -68,10 +75,11 @@ def application(arguments: Sequence[str]) -> typer.Typer:
     """
     if "--version" in arguments and VERSION_OPTIONS.issuperset(arguments):
         return app
-    whole = every_verb()
+    verb = arguments[0] if arguments else ""
+    whole = _with([verb]) if verb in ALONE else every_verb()
     asked = copy(whole)
-    asked.registered_commands = [one for one in whole.registered_commands if _word(one) in arguments[:1]]
-    asked.registered_groups = [one for one in whole.registered_groups if one.name in arguments[:1]]
+    asked.registered_commands = [one for one in whole.registered_commands if _word(one) == verb]
+    asked.registered_groups = [one for one in whole.registered_groups if one.name == verb]
     return asked if asked.registered_commands or asked.registered_groups else whole
 
 
