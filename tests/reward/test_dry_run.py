@@ -250,14 +250,22 @@ def test_objects_are_told_as_the_simulation_tells_them(name, among):
     assert math.dist((x, y), (crash_params["x"], crash_params["y"])) < 0.5
 
 
+RELIES_ON_OBJECTS = (
+    "def reward_function(params):\n    return params['objects_location'][params['closest_objects'][1]][0]\n"
+)
+
+
 @pytest.mark.parametrize("among", AMONG)
 def test_a_function_may_rely_on_objects(track, among):
-    source = "def reward_function(params):\n    return params['objects_location'][params['closest_objects'][1]][0]\n"
-    assert all(outcome.error is None for outcome in dry_run(source, track, **AMONG[among]))
-    assert all("IndexError" in str(outcome.error) for outcome in dry_run(source, track))
+    assert all(outcome.error is None for outcome in dry_run(RELIES_ON_OBJECTS, track, **AMONG[among]))
     remembering = REMEMBERING["every step"] + "    params['objects_location'][0]\n"
-    outcomes = dry_run(source + remembering, track, **AMONG[among])
+    outcomes = dry_run(RELIES_ON_OBJECTS + remembering, track, **AMONG[among])
     assert [str(outcome.error) for outcome in outcomes if outcome.error is not None] == []
+
+
+@pytest.mark.costly
+def test_where_nothing_stands_it_may_not(track):
+    assert all("IndexError" in str(outcome.error) for outcome in dry_run(RELIES_ON_OBJECTS, track))
 
 
 def test_one_failing_situation_does_not_hide_the_others(track):
