@@ -2,9 +2,17 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from racecraft.agent import ContinuousActionSpace, LidarConfig, ModelMetadata, action_space
+from racecraft.agent import (
+    PRESETS,
+    ContinuousActionSpace,
+    DiscreteActionSpace,
+    LidarConfig,
+    ModelMetadata,
+    action_space,
+)
 from racecraft.errors import ConfigError
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -81,6 +89,28 @@ def test_continuous_and_lidar_round_trip():
 
 LIDAR = [*CAMERA, "DISCRETIZED_SECTOR_LIDAR"]
 CARS = {"num_values": 64, "min_angle": -150, "max_angle": 150, "min_distance": 0.15, "max_distance": 1}
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        *map(action_space, PRESETS),
+        DiscreteActionSpace([(0.018440668993009002, 1.0 / 3.0), (-0.3, 2.0)]),
+        ContinuousActionSpace([-0.018440668993009002, 1.0 / 3.0], [0.3, 2.0]),
+    ],
+    ids=repr,
+)
+def test_what_a_file_will_say_is_known_before_it_is_read(space):
+    """To the bit: of some angles in radians there is no decimal in degrees that would be them again."""
+    given = ModelMetadata(action_space=space, sensors=("LIDAR", "observation"))
+    filed = given.as_filed
+    read = ModelMetadata.from_dict(given.to_dict())
+    assert filed == read
+    ends = [
+        (one.action_space.table,) if space.kind == "discrete" else (one.action_space.low, one.action_space.high)
+        for one in (filed, read)
+    ]
+    np.testing.assert_array_equal(*ends)
 
 
 def test_unknown_fields_are_told_at_any_depth():

@@ -92,7 +92,7 @@ def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:
         assert shown[name] == getattr(settings, name)
 
 
-HEAVY = ("torch", "gymnasium", "scipy", "shapely", "PIL", "av", "tensorboard")
+HEAVY = ("torch", "gymnasium", "scipy", "shapely", "PIL", "av", "tensorboard", "pydantic", "importlib.metadata")
 
 
 @pytest.mark.costly
@@ -105,7 +105,7 @@ HEAVY = ("torch", "gymnasium", "scipy", "shapely", "PIL", "av", "tensorboard")
         (["--version"], (*HEAVY, "numpy", "rich", "racecraft._native")),
         (
             ["train", "--track", "oval", "--until", "1 steps", "--num-envs", "2", "--json"],
-            (*HEAVY, "casadi", "fastapi", "numba", "rich", "racecraft.cli.serve"),
+            (*HEAVY, "casadi", "fastapi", "numba", "rich", "yaml", "email", "racecraft.cli.serve"),
         ),
         (["tracks"], ("torch", "av", "PIL", "gymnasium", "scipy", "casadi")),
         (["reward", "check", "centerline"], ("torch", "av", "PIL", "gymnasium")),

@@ -46,6 +46,23 @@ def test_a_source_that_hangs_while_it_loads(track):
     assert caught.value.line == 2
 
 
+def test_a_worker_that_nobody_waits_for_comes_up_by_itself(track, rows):
+    with RewardWorker(function("return 2.0"), track, waits=False) as worker:
+        assert worker(rows[:2]).tolist() == [2.0, 2.0]
+        worker.wait()  # again, for nothing
+        assert worker(rows[:1]).tolist() == [2.0]
+
+
+@pytest.mark.parametrize("waited", ["wait", "call"])
+def test_a_worker_that_nobody_waits_for_tells_what_is_wrong_later(track, rows, waited):
+    with RewardWorker("x = 1\nraise ValueError('no')\n", track, waits=False) as worker:
+        with pytest.raises(RewardError, match=r"ValueError: no(.|\n)*before the first call") as caught:
+            worker.wait() if waited == "wait" else worker(rows)
+        assert caught.value.line == 2
+        with pytest.raises(RewardError, match=r"cannot be called again(.|\n)*ValueError: no"):
+            worker(rows)
+
+
 def test_racecraft_and_the_environment_are_out_of_reach(track, rows, monkeypatch):
     monkeypatch.setenv("RACECRAFT_TEST_SECRET", "1")
     source = function(

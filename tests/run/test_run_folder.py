@@ -1,5 +1,8 @@
 import json
+from importlib.metadata import version
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,7 +10,7 @@ from hypothesis import strategies as st
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError, RunError
 from racecraft.run import RunFolder, RunInfo, list_runs
-from racecraft.run.folder import checked_name, sanitize_name
+from racecraft.run.folder import _installed_version, checked_name, sanitize_name
 from racecraft.run.training_params import TrainingParams
 
 
@@ -32,6 +35,11 @@ def test_a_run_comes_back_as_it_was_made(tmp_path):
     assert again.evaluation("20250102030405").name == "evaluation-20250102030405"
     assert list_runs(tmp_path / "runs") == [run]
     assert {"python", "numpy", "machine"} <= info.versions.keys()
+
+
+@pytest.mark.parametrize("place", [Path(np.__file__).parent, Path("/nowhere/numpy")], ids=["beside", "elsewhere"])
+def test_the_version_of_a_package_is_what_was_installed(place):
+    assert _installed_version("numpy", beside=place) == version("numpy")
 
 
 def test_optional_files_may_be_missing(tmp_path):

@@ -1,4 +1,7 @@
 import pytest
+import yaml
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from racecraft.errors import ConfigError
 from racecraft.run.training_params import TrainingParams
@@ -32,6 +35,21 @@ def test_aws_file_with_strings_and_lists():
         "MODEL_METADATA_FILE_S3_KEY": ["model/model_metadata.json"],
     }
     assert TrainingParams.from_yaml(params.to_yaml()) == params
+
+
+scalars = st.text(max_size=12) | st.booleans() | st.integers() | st.floats() | st.none() | st.lists(st.integers())
+
+
+@given(
+    name=st.text(min_size=1, max_size=12), share=st.floats(0, 1), extra=st.dictionaries(st.text(max_size=6), scalars)
+)
+@example(name="No", share=0.05, extra={})
+@example(name="oval", share=1e-5, extra={})
+@example(name="oval", share=0.05, extra={"on": "e1", "Null": -0.0, "A": float("inf"), "B": "", "C": "a b", "D": 1e22})
+def test_the_text_is_that_of_a_writer_of_yaml(name, share, extra):
+    params = TrainingParams(world_name=name, round_robin_advance_dist=share, extra=extra)
+    own = {field.upper(): getattr(params, field) for field in vars(params) if field not in ("extra", "given")}
+    assert params.to_yaml() == yaml.safe_dump({**own, **extra}, sort_keys=False)
 
 
 def test_defaults(tmp_path):

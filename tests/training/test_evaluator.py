@@ -180,7 +180,9 @@ def test_of_many_tracks_as_many_are_driven_as_there_are_trials(monkeypatch: pyte
     monkeypatch.setattr(evaluator, "trial_simulation", remember)
     settings = replace(SETTINGS, direction=direction, evaluation_trials=5)
     learner = make_learner(NetworkSpec(num_actions=5), num_threads=1)
-    Evaluator(NetworkPolicy(learner, action_space("default")), tracks, settings)
+    judge = Evaluator(NetworkPolicy(learner, action_space("default")), tracks, settings)
+    assert not opened  # as the first step of a training does not wait for it
+    judge.evaluate(step=0, seconds=0.0, counter=EpisodeCounter(5))
     ((driven, simulation),) = opened
     assert [track.name for track in driven] == ["oval", "oval", "bowtie", "bowtie", "hairpin"]
     for trial, track in enumerate(driven):

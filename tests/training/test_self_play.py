@@ -18,7 +18,8 @@ from racecraft.sim.objects import NO_OBJECTS, Objects, Obstacles
 from racecraft.track import load_track
 from racecraft.training import resume
 from racecraft.training.job import Training
-from racecraft.training.opponents import BESIDE_REACH, BESIDE_SPEED, CURRENT, OpponentPool, Opponents
+from racecraft.training.opponent_pool import BESIDE_REACH, BESIDE_SPEED, CURRENT, OpponentPool
+from racecraft.training.opponents import Opponents
 from racecraft.training.regimes import DUEL
 
 SELF = Opponents(cars=3, pool_size=4, snapshot_every=64)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, create_model
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from racecraft.errors import ConfigError, did_you_mean
 
@@ -33,6 +33,9 @@ Whole = Annotated[int, BeforeValidator(_not_a_bool)]
 """An integer, or a string or float that holds one."""
 
 
+_NAMES = {"BeforeValidator": BeforeValidator, "Field": Field, "Number": Number, "Whole": Whole}
+
+
 class AwsModel(BaseModel):
     """Base of the file models: numbers may come as strings, unknown fields are kept in ``model_extra``.
 
@@ -50,11 +53,13 @@ class AwsModel(BaseModel):
 def file_model(settings: type[Any], *, rename: Callable[[str], str] = str) -> type[AwsModel]:
     """The file model of a dataclass: its ``Annotated`` fields, which say what a file may hold.
 
+    Its module need not import the names that they say it with, and so can be there before pydantic is.
+
     Args:
         settings: The dataclass.
         rename: From a field's name to the file's name for it.
     """
-    hints = get_type_hints(settings, include_extras=True)
+    hints = get_type_hints(settings, localns=_NAMES, include_extras=True)
     from_file = {
         rename(f.name): (hints[f.name], f.default) for f in fields(settings) if get_origin(hints[f.name]) is Annotated
     }

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field
-
-from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, unknown_fields, validate
 from racecraft.json_file import read_json_object, write_json_object
+
+if TYPE_CHECKING:  # `file_model` knows these names: pydantic is for whom a file is there
+    from pydantic import BeforeValidator, Field
+
+    from racecraft.agent.aws_file import AwsModel, Number, Whole
 
 BATCH_SIZES = (32, 64, 128, 256, 512)  # those of AWS's console
 GAE_LAMBDA = 0.95  # AWS's, fixed
@@ -91,6 +93,8 @@ class Hyperparameters:
     """Sentences for the user about what in the file has no effect or is unusual."""
 
     def __post_init__(self) -> None:
+        from racecraft.agent.aws_file import validate
+
         given = {name: getattr(self, name) for name in _file().model_fields}
         checked = validate(_file(), given, name="hyperparameters")
         for name in given:
@@ -108,6 +112,8 @@ class Hyperparameters:
     @classmethod
     def from_dict(cls, document: Mapping[str, Any], *, name: str = "hyperparameters") -> Hyperparameters:
         """From the file's content; ``name`` is what messages call it. Missing fields get AWS's defaults."""
+        from racecraft.agent.aws_file import unknown_fields, validate
+
         checked = validate(_file(), document, name=name)
         notes = list(unknown_fields(checked, name=name))
         if "stack_size" in document and document["stack_size"] not in (1, "1"):
@@ -201,4 +207,6 @@ class Hyperparameters:
 
 @cache
 def _file() -> type[AwsModel]:
+    from racecraft.agent.aws_file import file_model
+
     return file_model(Hyperparameters)

@@ -17,7 +17,8 @@ from typing import Any, Final
 
 from numpy.typing import NDArray
 
-from racecraft.agent.model_metadata import CONFIGURED, ModelMetadata
+from racecraft.agent.metadata_words import CONFIGURED
+from racecraft.agent.model_metadata import ModelMetadata
 from racecraft.agent.sensors import LidarConfig
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.learn import NetworkSpec

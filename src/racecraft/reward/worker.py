@@ -83,6 +83,8 @@ class RewardWorker:
         foreign: The source is somebody else's: it runs completely locked in or not at all, and is not compiled, as
             the compiler would need files while user code runs.
         confinement: The walls around the process; by default all that this machine offers.
+        waits: Until the source is loaded. Otherwise the process comes up beside what the caller does meanwhile, and
+            `wait`, or else the first call, raises what is wrong with the source.
 
     Raises:
         RewardError: The source cannot be loaded, or is foreign and cannot be locked in.
@@ -102,6 +104,7 @@ class RewardWorker:
         compiled: bool = False,
         foreign: bool = False,
         confinement: Confinement | None = None,
+        waits: bool = True,
     ) -> None:
         for name, value in (("timeout_s", timeout_s), ("start_timeout_s", start_timeout_s), ("num_cars", num_cars)):
             require(name, value, value > 0, "a number above 0")
@@ -182,7 +185,18 @@ class RewardWorker:
             "kernel_path": str(launch.PROGRAM.with_name("kernel.py")),
             "trace_signal": system.TRACE,
         }
-        self._start(marshal.dumps(setup), start_timeout_s)
+        self._start_timeout_s = start_timeout_s
+        self._is_ready = False
+        try:
+            with contextlib.suppress(BrokenPipeError), os.fdopen(os.dup(self._requests), "wb") as pipe:
+                data = marshal.dumps(setup)
+                pipe.write(protocol.SIZE.pack(len(data)) + data)
+            os.set_blocking(self._requests, False)
+        except BaseException:
+            self._finalizer()
+            raise
+        if waits:
+            self.wait()
 
     def _rewrite(self, source: str) -> str:
         """The source to compile, or nothing and the reason."""
@@ -194,18 +208,23 @@ class RewardWorker:
             self.interpreted_because = str(reason)
             return ""
 
-    def _start(self, setup: bytes, timeout_s: float) -> None:
+    def wait(self) -> None:
+        """Wait until the source is loaded; calling again does nothing.
+
+        Raises:
+            RewardError: It cannot be loaded, or its process not be locked in; the worker has ended.
+        """
+        if self._is_ready or self._failure:
+            return
         try:
-            with contextlib.suppress(BrokenPipeError), os.fdopen(os.dup(self._requests), "wb") as pipe:
-                pipe.write(protocol.SIZE.pack(len(setup)) + setup)
-            os.set_blocking(self._requests, False)
             for expected in (protocol.LOCKED, protocol.READY):
-                if not self._replies_within(timeout_s):
-                    raise self._stalled(None, timeout_s)
+                if not self._replies_within(self._start_timeout_s):
+                    raise self._stalled(None, self._start_timeout_s)
                 self._read_reply(None, 0, expected)
-        except BaseException:
-            self._finalizer()
+        except BaseException as error:
+            self._end(str(error) if isinstance(error, RewardError) else "its start was interrupted.")
             raise
+        self._is_ready = True
 
     def __call__(self, rows: Rows) -> npt.NDArray[np.float64]:
         """The rewards of a batch of rows.
@@ -220,6 +239,7 @@ class RewardWorker:
         Raises:
             RewardError: The function raised, returned no number, hung or crashed; the worker has ended.
         """
+        self.wait()
         if self._failure:
             raise RewardError(
                 f"The reward worker ended after an error and cannot be called again: {self._failure}",

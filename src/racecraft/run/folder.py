@@ -419,8 +419,16 @@ def _versions() -> dict[str, str]:
         "racecraft": VERSION,
         "numpy": np.__version__,
     }
-    if find_spec("torch") is not None:
-        from importlib.metadata import version  # late, as it takes its time
-
-        versions["torch"] = version("torch")
+    torch = find_spec("torch")
+    if torch is not None and torch.origin is not None:
+        versions["torch"] = _installed_version("torch", beside=Path(torch.origin).parent)
     return versions
+
+
+def _installed_version(package: str, *, beside: Path) -> str:
+    """The version that a package's folder has beside it, as installers write it there."""
+    for folder in beside.parent.glob(f"{package}-*.dist-info"):
+        return folder.name.removeprefix(f"{package}-").removesuffix(".dist-info")
+    from importlib.metadata import version  # knows every other way to install one, and takes its time
+
+    return version(package)

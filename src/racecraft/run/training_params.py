@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import Field
-
-from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, validate
 from racecraft.errors import ConfigError
 from racecraft.json_file import read_text
 from racecraft.run.atomic import write_file
+
+if TYPE_CHECKING:  # `file_model` knows these names: pydantic and YAML's reader are for whom a file is there
+    from pydantic import Field
+
+    from racecraft.agent.aws_file import AwsModel, Number, Whole
 
 MAX_BYTES = 1 << 18
 MAX_DEPTH = 20  # of nested YAML
 MAX_PLAIN = 1000  # characters of a value without quotes, which may be read as a number
 _REFUSED = {"AliasToken": "a YAML alias (*...)", "TagToken": "a YAML tag (!...)"}
+_WORD: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
+_DECIMAL: Final = re.compile(r"-?\d+\.\d+")
+_WORDS_OF_YAML: Final = frozenset(("yes", "no", "true", "false", "on", "off", "null", "y", "n"))
 RaceType = Literal["TIME_TRIAL", "OBJECT_AVOIDANCE", "HEAD_TO_BOT", "HEAD_TO_MODEL", "F1"]
 _YES_NO = "true or false"
 
@@ -70,6 +76,8 @@ class TrainingParams:
         """From the file's text; ``name`` is what messages call it. A list of one is taken for its element."""
         import yaml
 
+        from racecraft.agent.aws_file import validate
+
         try:
             depth = 0
             for token in yaml.scan(text, Loader=yaml.SafeLoader):
@@ -101,10 +109,13 @@ class TrainingParams:
 
     def to_yaml(self) -> str:
         """The text of AWS's file."""
-        import yaml
-
         own = {f.name.upper(): getattr(self, f.name) for f in fields(self) if f.name not in ("extra", "given")}
-        return str(yaml.safe_dump({**own, **self.extra}, sort_keys=False))
+        document = {**own, **self.extra}
+        if all(_is_plain(key) and _is_plain(value) for key, value in document.items()):
+            return "".join(f"{key}: {_scalar(value)}\n" for key, value in document.items())
+        import yaml  # a start in which it has nothing to quote does not wait for it
+
+        return str(yaml.safe_dump(document, sort_keys=False))
 
     def save(self, path: str | Path) -> None:
         """Write AWS's file."""
@@ -114,6 +125,19 @@ class TrainingParams:
             raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
+def _is_plain(value: object) -> bool:
+    """Whether YAML writes it as one does by hand: a flag, a short number, or a word that could be nothing else."""
+    if isinstance(value, str):
+        return bool(_WORD.fullmatch(value)) and value.lower() not in _WORDS_OF_YAML
+    return isinstance(value, bool | int) or (isinstance(value, float) and bool(_DECIMAL.fullmatch(repr(value))))
+
+
+def _scalar(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 @cache
 def _file() -> type[AwsModel]:
+    from racecraft.agent.aws_file import file_model
+
     return file_model(TrainingParams, rename=str.upper)

@@ -415,9 +415,6 @@ def ground_map(track: Track, *, texel: float = 0.01) -> _native.GroundMap:
     return _native.GroundMap(track.centerline, track.inner, track.outer, track.is_closed, texel)
 
 
-atexit.register(ground_map.cache_clear)  # native objects must go before the module that made them
-
-
 def native_camera(camera: CameraSpec) -> _native.CameraSpec:
     """The core's form of a camera."""
     return _native.CameraSpec(
@@ -431,9 +428,14 @@ def native_camera(camera: CameraSpec) -> _native.CameraSpec:
     )
 
 
+@functools.lru_cache(maxsize=32)
 def native_track(track: Track) -> _native.NativeTrack:
     """The core's form of a track: both directions, with tables of width and curvature."""
     return _native.NativeTrack(**track_arrays(track))
+
+
+for _kept in (ground_map, native_track):
+    atexit.register(_kept.cache_clear)  # native objects must go before the module that made them
 
 
 def track_arrays(track: Track) -> dict[str, Any]:

@@ -116,7 +116,8 @@ def train(
     if reporter is not None:
         for note in plan.notes:
             reporter.note(note)
-    return Training(run, reporter=reporter, aws_log=aws_log, started=started, is_checked=True).run()
+    metadata = plan.metadata.as_filed
+    return Training(run, reporter=reporter, aws_log=aws_log, started=started, is_checked=True, metadata=metadata).run()
 
 
 def resume(

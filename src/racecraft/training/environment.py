@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,10 @@ from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.track import Track
 from racecraft.training.lap_place import lap_place
-from racecraft.training.opponents import OpponentPool
 from racecraft.training.settings import TrainSettings
+
+if TYPE_CHECKING:
+    from racecraft.training.opponent_pool import OpponentPool
 
 _STATUS: Final = ROW_COLUMNS.index("status")
 _LAP_COMPLETE: Final = STATUS_NAMES.index("lap_complete")

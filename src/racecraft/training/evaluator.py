@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -53,7 +54,6 @@ class Evaluator:
         self._driven = _evenly(tracks, settings) if self._is_of_many else tracks[:1]
         self._settings = settings
         self._patience = max(track.length for track in self._driven) / SLOWEST
-        self._trials = self._simulation(settings.evaluation_trials)
         self._alone: Simulation | None = None  # for looks, made with the first
         self._good = regime_of(objects=settings.objects).good
         self.last: EvaluationReport | None = None
@@ -64,6 +64,11 @@ class Evaluator:
         self.gained_at = 0
         """Camera steps of training behind the first evaluation that was as good as the best."""
         self.best_lap: float | None = None
+
+    @cached_property
+    def _trials(self) -> Simulation:
+        """Made with the first evaluation, as the first step of training does not wait for it."""
+        return self._simulation(self._settings.evaluation_trials)
 
     @property
     def evaluated_at(self) -> int:

@@ -17,6 +17,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from racecraft.agent import ModelMetadata
 from racecraft.errors import CheckpointError, RacecraftError, RewardError
 from racecraft.run import CheckpointWarning, RunFolder
 from racecraft.scoped_warnings import scoped_warnings
@@ -40,6 +41,7 @@ class Training:
         started: When this training began, in `time.monotonic()` seconds; a command gives its process's start.
         is_checked: The reward function has just been checked and tried; otherwise that comes first, as the user may
             have edited it, or the run was imported.
+        metadata: What the folder's file says, where that is known; it takes pydantic, a sixth of a start, to read it.
     """
 
     looks_on = False
@@ -54,10 +56,12 @@ class Training:
         aws_log: str | Path | None = None,
         started: float | None = None,
         is_checked: bool = False,
+        metadata: ModelMetadata | None = None,
     ) -> None:
         self.aws_log = aws_log
         self.folder = folder
         self.is_checked = is_checked
+        self.metadata = metadata
         self.reporter = reporter or SilentReporter()
         settings = read_settings(folder)
         self.settings = settings if until is None else replace(settings, until=until)
@@ -78,6 +82,7 @@ class Training:
                     self.meter,
                     aws_log=self.aws_log,
                     is_checked=self.is_checked,
+                    metadata=self.metadata,
                     note=self.reporter.note,
                     on_step=self.reporter.step,
                 ) as session:

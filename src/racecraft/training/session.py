@@ -13,12 +13,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
 from racecraft.learn import Algorithm, Learner, make_learner
-from racecraft.race.policy import NetworkPolicy
 from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import (
     AwsLog,
@@ -37,19 +36,22 @@ from racecraft.run.history import HistoryWriter
 from racecraft.scoped_warnings import scoped_warnings
 from racecraft.sim import CudaSimulation, Simulation
 from racecraft.track import Track, joint_digest, load_tracks
-from racecraft.training.algorithms import make_algorithm, teacher_environment
-from racecraft.training.cuda_environment import CudaTrainingEnvironment
 from racecraft.training.environment import TrainingEnvironment, open_simulation
-from racecraft.training.evaluator import Evaluator
 from racecraft.training.meter import Meter
-from racecraft.training.opponents import OpponentPool
 from racecraft.training.parent import begin_from, is_weights_only, origin_of
 from racecraft.training.settings import TrainSettings
 from racecraft.training.start import aws_hyperparameters, require_trainable, require_valid_reward
 
+if TYPE_CHECKING:
+    from racecraft.race.policy import NetworkPolicy
+    from racecraft.training.cuda_environment import CudaTrainingEnvironment
+    from racecraft.training.evaluator import Evaluator
+    from racecraft.training.opponent_pool import OpponentPool
+
+    Environment = TrainingEnvironment | CudaTrainingEnvironment
+
 AWS_EPISODES = 20  # between two trainings at AWS; its metrics and sim-traces are numbered by it
 
-Environment = TrainingEnvironment | CudaTrainingEnvironment
 Note = Callable[[str], None]
 
 
@@ -158,6 +160,7 @@ def open_session(
     *,
     aws_log: str | Path | None,
     is_checked: bool,
+    metadata: ModelMetadata | None,
     note: Note,
     on_step: Callable[[], None],
 ) -> Iterator[Session]:
@@ -169,42 +172,43 @@ def open_session(
     Raises:
         RacecraftError: The training cannot begin.
     """
-    metadata = folder.read_model_metadata()
+    metadata = metadata or folder.read_model_metadata()
     require_trainable(settings, metadata)
     saved, begun = _beginning(folder, note)
 
     with ExitStack() as stack:
-        # The learner's backend takes longest to import, so it starts first. The cars come beside the process of the
-        # reward function, which takes as long to start as the ground to be painted.
-        with ThreadPoolExecutor(2) as pool:
-            spec = settings.network_spec(metadata)
-            learner_to_be = pool.submit(
-                make_learner,
-                spec,
+        run = _Run(
+            folder=folder,
+            settings=settings,
+            metadata=metadata,
+            hyperparameters=folder.read_hyperparameters(),
+            source=folder.read_reward_function(),
+            is_foreign=folder.read_info().foreign,
+            tracks=_load_tracks(folder, settings),
+            saved=saved,
+        )
+        if not is_checked:
+            require_valid_reward(run.source, settings, run.tracks, foreign=run.is_foreign)
+        # The reward's process takes longest to come up, and then the ground to be painted, each on a core of its own.
+        # What is not needed before is imported meanwhile.
+        worker = _open_worker(run, stack)
+        with ThreadPoolExecutor(1) as pool:
+            open_cars = partial(open_simulation, settings, run.tracks, metadata.suite)
+            cars_to_be = pool.submit(open_cars) if settings.device == "cpu" else None  # a GPU stays with its thread
+            learner = make_learner(
+                settings.network_spec(metadata),
                 seed=settings.seed,
                 initial_weights=settings.initial_weights,
                 num_threads=settings.num_threads,
                 device=settings.device,
             )
-            run = _Run(
-                folder=folder,
-                settings=settings,
-                metadata=metadata,
-                hyperparameters=folder.read_hyperparameters(),
-                source=folder.read_reward_function(),
-                is_foreign=folder.read_info().foreign,
-                tracks=_load_tracks(folder, settings),
-                saved=saved,
-            )
-            open_cars = partial(open_simulation, settings, run.tracks, metadata.suite)
-            cars_to_be = pool.submit(open_cars) if settings.device == "cpu" else None  # a GPU stays with its thread
-            if not is_checked:
-                require_valid_reward(run.source, settings, run.tracks, foreign=run.is_foreign)
-            worker = _open_worker(run, stack)
+            from racecraft.training.algorithms import make_algorithm, teacher_environment
+            from racecraft.training.evaluator import Evaluator
+
             simulation = open_cars() if cars_to_be is None else cars_to_be.result()
-            learner = learner_to_be.result()
-            if begun is not None:
-                begin_from(learner, begun)
+        if begun is not None:
+            begin_from(learner, begun)
+        worker.wait()
 
         since = _begin_stretch(run, note)
         logs = _open_logs(run, stack, aws_log=aws_log)
@@ -281,6 +285,7 @@ def _open_worker(run: _Run, stack: ExitStack) -> RewardWorker:
         num_cars=run.copies,
         num_objects=run.settings.num_objects,
         foreign=run.is_foreign,
+        waits=False,
     )
     return stack.enter_context(worker)
 
@@ -335,6 +340,8 @@ def _open_logs(run: _Run, stack: ExitStack, *, aws_log: str | Path | None) -> Lo
 
 
 def _policy(run: _Run, learner: Learner) -> NetworkPolicy:
+    from racecraft.race.policy import NetworkPolicy
+
     return NetworkPolicy(learner, run.metadata.action_space, sensors=run.metadata.suite)
 
 
@@ -349,10 +356,14 @@ def _make_environment(
 ) -> Environment:
     settings, metadata = run.settings, run.metadata
     if not isinstance(simulation, Simulation):
+        from racecraft.training.cuda_environment import CudaTrainingEnvironment
+
         space = metadata.action_space
         return CudaTrainingEnvironment(simulation, worker, run.source, space, counter=logs.counter, note=note)
     opponents = None
     if settings.opponents is not None:
+        from racecraft.training.opponent_pool import OpponentPool
+
         own, threads = _policy(run, learner), settings.num_threads
         opponents = OpponentPool(settings.opponents, simulation, own, seed=settings.seed, num_threads=threads)
     return TrainingEnvironment(
