@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from racecraft.run import RunFolder, RunInfo, best_of, judged_laps
+from racecraft.track import joint_digest, load_tracks
 
 
 @pytest.fixture
@@ -54,6 +55,19 @@ def test_the_road_decides_and_not_its_name(run: RunFolder) -> None:
     race(run, "20260101000001", best_lap_seconds=9.0, track="oval-copied", track_digest="as it was")
     race(run, "20260101000002", best_lap_seconds=9.5)  # of an earlier version
     assert [one.best_lap for one in judged_laps(run)] == [9.0, 9.5]
+
+
+def test_of_several_tracks_a_lap_on_any_counts(run: RunFolder) -> None:
+    tracks = load_tracks("oval + reinvent_2018")
+    run.write_info(RunInfo(seed=1, track="oval + reinvent_2018", track_digest=joint_digest(tracks)))
+    for number, (digest, lap) in enumerate([(tracks[0].digest, 9.0), (tracks[1].digest, 12.0), ("redrawn", 5.0)]):
+        race(run, f"2026010100000{number}", best_lap_seconds=lap, track_digest=digest)
+    race(run, "20260101000003", best_lap_seconds=13.0, track="reinvent_2018")  # of an earlier version
+    assert [one.best_lap for one in judged_laps(run)] == [9.0, 12.0, 13.0]
+    (run.evaluation("20260101000003") / "evaluation.json").unlink()
+    for names in ("oval + hairpin", "oval + nobody's"):  # others by now, or gone
+        run.write_info(RunInfo(seed=1, track=names, track_digest=joint_digest(tracks)))
+        assert judged_laps(run) == []
 
 
 def test_a_completion_is_the_mean_of_its_trials_and_what_is_no_number_counts_nowhere(run: RunFolder) -> None:

@@ -1,7 +1,7 @@
 """A run's evaluations, during training and afterwards, and with them its best lap.
 
 The best lap of a run is the fastest whole lap, penalties included, that it drove in any evaluation on the track it
-learns on: those during training, and those by the rules of a race afterwards.
+learns on, or on one of several: those during training, and those by the rules of a race afterwards.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-from racecraft.errors import ConfigError, RunError
+from racecraft.errors import ConfigError, RacecraftError, RunError
 from racecraft.json_file import parse_json_line, read_json_object
 from racecraft.run.folder import RunFolder, RunInfo
 from racecraft.run.history import MAX_LINE
@@ -89,8 +90,25 @@ def _is_own_track(summary: dict[str, Any], info: RunInfo) -> bool:
     """Whether an evaluation was driven on the road the run learns on; an older one tells its name alone."""
     told = summary.get("track_digest")
     if told is not None:
-        return bool(told == info.track_digest)
-    return Path(str(summary.get("track", ""))).stem in {Path(part).stem for part in info.track.split(",")}
+        with suppress(RacecraftError):  # tracks that are gone, or others by their names
+            return told == info.track_digest or told in _roads(info.track, info.track_digest)
+        return False
+    return Path(str(summary.get("track", ""))).stem in {Path(part).stem for part in info.track.split(" + ")}
+
+
+@lru_cache(maxsize=64)
+def _roads(names: str, digest: str) -> frozenset[str]:
+    """Digests of the tracks that a run learns on, of which it keeps the joint one.
+
+    Raises:
+        RacecraftError: There are none of these names now, or others.
+    """
+    from racecraft.track import joint_digest, load_tracks  # which few runs ask for
+
+    tracks = load_tracks(names)
+    if joint_digest(tracks) != digest:
+        raise RunError(f"Track {names!r} has changed since.")
+    return frozenset(track.digest for track in tracks)
 
 
 def _number(value: Any) -> float | None:
