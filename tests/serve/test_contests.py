@@ -285,6 +285,82 @@ def test_ghosts_accompany_the_film_of_a_heat(console: RunningConsole, cars: list
     assert post("/api/contests/heats", json=settings | {"ghosts": ["best-lap"] * 17}).status_code == 422
 
 
+@pytest.fixture(scope="module")
+def evaluation(console: RunningConsole, cars: list[dict[str, str]]) -> dict[str, str]:
+    """One of Ada's on the oval, as a ghost is asked for."""
+    assert cars
+    job = console.client.post("/api/models/ada/evaluations", json={"laps": 1, "num_trials": 2, "seed": 9}).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    (card,) = console.client.get("/api/models/ada/evaluations").json()
+    return {"model": "ada", "evaluation": card["stamp"]}
+
+
+def test_the_best_trial_of_an_evaluation_is_a_ghost(
+    console: RunningConsole, cars: list[dict[str, str]], evaluation: dict[str, str]
+) -> None:
+    (listed,) = console.client.get("/api/contests/ghosts?track=oval").json()
+    assert {name: listed[name] for name in evaluation} == evaluation
+    assert console.client.get("/api/contests/ghosts?track=bowtie").json() == []
+    assert console.client.get("/api/contests/ghosts?track=nowhere").status_code == 404
+
+    settings: dict[str, Any] = {"models": cars, "track": "oval", "seed": 5, "max_resets": 0}
+    before = started(console, "heats", **settings)
+    haunted = console.client.post("/api/contests/heats", json=settings | {"ghosts": [evaluation, "best-lap"]})
+    assert haunted.status_code == 202, haunted.text
+    folder = console.runs / ".racecraft" / "contests" / haunted.json()["id"]
+    replay = console.runs / "ada" / f"evaluation-{evaluation['evaluation']}" / "evaluation.replay"
+    kept = replay.read_bytes()
+    assert (folder / "ghosts" / "0.replay").read_bytes() == kept
+    replay.unlink()  # as when the model is removed before the heat is driven
+    try:
+        heat = console.wait_for(over(console, haunted.json()["id"]))
+        gone = console.client.post("/api/contests/heats", json=settings | {"ghosts": [evaluation]})
+        assert console.client.get("/api/contests/ghosts?track=oval").json() == []
+    finally:
+        replay.write_bytes(kept)
+    assert heat["ghosts"] == [evaluation, "best-lap"]
+    assert heat["heat"] == before["heat"]
+    films = [console.client.get(f"/api/contests/{one['id']}/video").content for one in (before, heat)]
+    assert films[0] != films[1]
+
+    stamp = evaluation["evaluation"]
+    assert (gone.status_code, gone.json()["error"]) == (
+        409,
+        gone.json()["error"]
+        | {"message": f"Evaluation '{stamp}' of model 'ada' has no replay.", "hint": "Evaluate the model once more."},
+    )
+    refused: list[tuple[dict[str, Any], int, str]] = [
+        ({"ghosts": [{"model": "nobody", "evaluation": stamp}]}, 404, "There is no model 'nobody'."),
+        ({"ghosts": [{"model": "bob", "evaluation": stamp}]}, 404, f"Model 'bob' has no evaluation '{stamp}'."),
+        ({"ghosts": [{"model": "ada", "evaluation": "../x"}]}, 404, "Model 'ada' has no evaluation '../x'."),
+        (
+            {"ghosts": [evaluation], "track": "bowtie"},
+            422,
+            "The ghost 'ada' drove on oval, in another direction or of another form than bowtie.",
+        ),
+    ]
+    for change, status, message in refused:
+        reply = console.client.post("/api/contests/heats", json=settings | change)
+        assert (reply.status_code, reply.json()["error"]["message"]) == (status, message)
+    known = {one["id"] for one in console.client.get("/api/contests").json()}
+    assert {path.name for path in folder.parent.iterdir()} <= known  # what was refused left nothing
+
+
+def test_a_heat_whose_ghost_is_gone_says_so(
+    console: RunningConsole, cars: list[dict[str, str]], evaluation: dict[str, str]
+) -> None:
+    """As one that waited while its folder was lost."""
+    from racecraft.errors import ConfigError
+    from racecraft.serve.contests.ghosts import keep, sources_of
+    from racecraft.serve.problems import Conflict
+
+    with pytest.raises(ConfigError, match=r"The replay of ghost 2 is not there\."):
+        sources_of(["best-lap", evaluation], folder=console.runs / "nowhere", runs=console.runs)
+    with pytest.raises(Conflict, match=r"The replay of ghost 1 cannot be copied: No such file"):
+        keep({0: console.runs / "nowhere"}, console.runs / "begun")
+    assert not (console.runs / "begun").exists()
+
+
 def test_a_removed_contest_leaves_nothing(console: RunningConsole, cars: list[dict[str, str]]) -> None:
     heat = started(console, "heats", models=cars, track="oval", max_resets=0)
     assert heat["kind"] == "head-to-model"

@@ -6,8 +6,10 @@ from typing import Any
 
 import httpx
 import pytest
-from leagues import ok
+from leagues import ok, untrained_run
 from schools import RACE, School, label_of
+
+from racecraft.judging.evaluation import evaluate_run
 
 pytestmark = pytest.mark.costly
 
@@ -98,6 +100,7 @@ ROWS: dict[str, tuple[str, Any]] = {
             "GET /api/races/{race_id}/entries/{entry_id}/video": None,
             "GET /api/races/{race_id}/entries/{entry_id}/replay": None,
             "GET /api/races/{race_id}/replay": "?entries=1",
+            "GET /api/contests/ghosts": "?track=adas-track",
             "GET /api/contests/{contest}": None,
             "DELETE /api/contests/{contest}": None,
             "GET /api/contests/{contest}/video": None,
@@ -305,6 +308,28 @@ def test_what_is_hers_ada_finds(school: School) -> None:
         "GET /api/events/{name}",
     ):
         assert request(school, school.people["ada"], label).status_code == 200, label
+
+
+def test_nobody_haunts_a_heat_with_what_anothers_model_drove(school: School) -> None:
+    people = school.league.console.runs / ".racecraft" / "people"
+    homes = {who: people / str(school.league.number(school.people[who])) for who in ("ada", "bob")}
+    evaluate_run(homes["ada"] / "adas-model", laps=1, num_trials=1, max_resets=0, video=False)
+    (evaluation,) = ok(school.people["ada"].get("/api/contests/ghosts?track=oval"))
+    ghost = {name: evaluation[name] for name in ("model", "evaluation")}
+    untrained_run(homes["bob"], "bobs-model")
+    assert ok(school.people["bob"].get("/api/contests/ghosts?track=oval")) == []
+    heats = {
+        who: school.people[who].post(
+            "/api/contests/heats",
+            json={"models": [{"model": f"{who}s-model"}] * 2, "track": "oval", "max_resets": 0, "ghosts": [ghost]},
+        )
+        for who in homes
+    }
+    assert heats["ada"].status_code == 202
+    assert (heats["bob"].status_code, heats["bob"].json()["error"]["message"]) == (
+        404,
+        "There is no model 'adas-model'.",
+    )
 
 
 def test_strangers_are_sent_to_the_door(school: School) -> None:

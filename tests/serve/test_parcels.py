@@ -16,7 +16,7 @@ from racecraft.errors import RunError
 from racecraft.reward import load_preset
 from racecraft.run import RunFolder, begin_stretch, change_reward
 from racecraft.serve.jobs.cargo import Cargo
-from racecraft.serve.jobs.queue import JobQueue
+from racecraft.serve.jobs.queue import KINDS, JobQueue
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.people.people import add_person
 from racecraft.serve.problems import Conflict
@@ -45,9 +45,9 @@ class Desk:
         self.parcels, self.lease = Parcels(store), Lease(queue, token=1, worker="0123456789abcdef")
         self.store = store.of(queue.user_id)
 
-    def take(self, kind: str, **payload: Any) -> Job:
-        self.queue.add(kind, "run", payload, cargo=Cargo(runs=("run",)))
-        job = self.lease.take("training", [kind], machine="lab", places=1, of_version=VERSION)
+    def take(self, kind: str, *, job_id: str | None = None, **payload: Any) -> Job:
+        self.queue.add(kind, "run", payload, cargo=Cargo(runs=("run",)), job_id=job_id)
+        job = self.lease.take(KINDS[kind].slot, [kind], machine="lab", places=1, of_version=VERSION)
         assert job is not None
         return job
 
@@ -160,6 +160,21 @@ def test_what_a_search_is_about_is_not_changed_by_who_makes_it(desk: Desk) -> No
     made: dict[str, bytes | None] = {"result.json": b"{}", f"{trial}/run.json": b"{}", "study.sqlite": b"SQLite"}
     desk.send(job, FOLDER, TUNING, {**made, f"{trial}/reward_function.py": OTHER.encode()})
     desk.send(job, FOLDER, TUNING, {"result.json": b'{"trials": []}', "study.sqlite": b"SQLite 2"})
+
+
+def test_ghosts_of_a_heat_are_those_that_were_asked_for(desk: Desk) -> None:
+    heat = "fedcba9876543210"
+    folder = desk.runs / heat
+    (folder / "ghosts").mkdir(parents=True)
+    (folder / "ghosts" / "0.replay").write_bytes(b"a replay")
+    desk.store.shelf("contests").keep(RunFolder(folder))
+    job = desk.take("heat", job_id=heat)
+    (line,) = (desk.store.shelf("contests").copy(heat) or Copy()).files.values()
+    assert desk.parcels.fetch(job, Key("contests", heat, line["sha256"])).read() == b"a replay"
+    for change in (b"another", None):
+        refusal = desk.refuses(job, "contests", heat, {"ghosts/0.replay": change})
+        assert refusal == "A job does not change ghosts/0.replay."
+    desk.send(job, "contests", heat, {"race.replay": b"what was driven"})
 
 
 def test_a_guests_search_is_made_as_a_guests_whatever_its_folder_says(

@@ -222,6 +222,62 @@ def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> 
     assert page.get_by_text(told, exact=True).is_visible()
 
 
+DIFFERENCE = """async ([films, at]) => {
+  const frames = await Promise.all(films.map(async (film) => {
+    const video = Object.assign(document.createElement("video"), { muted: true, src: film });
+    const heard = (event) => new Promise((done) => video.addEventListener(event, done, { once: true }));
+    await heard("loadeddata");
+    const sought = heard("seeked");
+    video.currentTime = at;
+    await sought;
+    const canvas = new OffscreenCanvas(video.videoWidth, video.videoHeight).getContext("2d");
+    canvas.drawImage(video, 0, 0);
+    return canvas.getImageData(0, 130, video.videoWidth, video.videoHeight - 130); // below the names
+  }));
+  const [one, other] = frames.map((frame) => frame.data);
+  const found = [];
+  for (let at = 0; at < one.length; at += 4)
+    if ([0, 1, 2].some((channel) => Math.abs(one[at + channel] - other[at + channel]) > 40)) found.push(at / 4);
+  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+  const width = frames[0].width;
+  return [found.length, mean(found.map((at) => at % width)), mean(found.map((at) => Math.floor(at / width)))];
+}"""
+"""How many pixels of two films differ in a moment, and where: in the middle of them."""
+
+
+def test_an_evaluation_drives_along_as_a_ghost(visit: Visit) -> None:
+    client, console = visit.console.client, visit.console
+    job = client.post("/api/models/bob/evaluations", json={"laps": 1, "num_trials": 1}).json()["id"]
+    assert console.wait_for(console.job_ended(job))["state"] == "done"
+    (stamp,) = (card["stamp"] for card in client.get("/api/models/bob/evaluations").json())
+    asked = {"models": [{"model": "ada"}, {"model": "bob"}], "track": "oval", "seed": 1, "max_resets": 1}
+    alone = client.post("/api/contests/heats", json=asked).json()["id"]
+    page = visit.open("/contests/new")
+    for name in ("ada", "bob"):
+        page.get_by_role("combobox", name="Add a model").select_option(name)
+    ghost = page.get_by_role("combobox", name="Add a ghost")
+    page.get_by_role("combobox", name="Track").select_option("oval")
+    ghost.select_option(f"evaluation bob {stamp}")
+    page.get_by_role("combobox", name="Track").select_option("bowtie")  # where it did not drive
+    page.get_by_role("button", name="Take out the ghost: bob").wait_for(state="detached")
+    assert ghost.locator("option[value^=evaluation]").count() == 0
+    page.get_by_role("combobox", name="Track").select_option("oval")
+    ghost.select_option(f"evaluation bob {stamp}")
+    page.get_by_role("button", name="Take out the ghost: bob").wait_for()
+    page.get_by_label("Seed").fill("1")
+    page.get_by_label("Resets allowed").fill("1")
+    page.get_by_role("button", name="Start the heat with 2").click()
+    page.get_by_role("heading", name="The heat in 3D").wait_for()
+    assert page.locator("dd", has_text="bob · ").count() == 1
+    film = str(page.get_by_role("link", name="Video").get_attribute("href"))
+    assert console.wait_for(console.job_ended(alone))["state"] == "done"
+
+    films = [film, f"/api/contests/{alone}/video"]
+    (begin, *place), (later, *next_place) = (page.evaluate(DIFFERENCE, [films, at]) for at in (0.5, 1.5))
+    assert min(begin, later) > 10  # on the map, and on the road when it is in view
+    assert max(abs(a - b) for a, b in zip(place, next_place, strict=True)) > 2  # it is elsewhere a second later
+
+
 def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
     page = visit.open("/races")
     page.get_by_role("link", name="New heat or ladder").click()

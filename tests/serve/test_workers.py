@@ -182,6 +182,32 @@ def test_races_and_searches_and_own_tracks_travel_too(place: Place) -> None:
 
 
 @pytest.mark.costly
+def test_the_ghosts_of_a_heat_travel_with_it(place: Place) -> None:
+    """An evaluation's and an earlier heat's, also where both are removed before anybody drives."""
+    console, client = place.console, place.console.client
+    console.create(name="haunter", track="oval", until="512 steps", seed=3)
+    asked: dict[str, Any] = {"models": [{"model": "haunter"}] * 2, "track": "oval", "max_resets": 0, "seed": 1}
+    with place.worker("lab-3"):
+        (job,) = client.get("/api/jobs", params={"run": "haunter"}).json()
+        place.done(job["id"])
+        place.done(client.post("/api/models/haunter/evaluations", json={"laps": 1, "num_trials": 1}).json()["id"])
+        earlier = client.post("/api/contests/heats", json=asked).json()["id"]
+        place.done(earlier)
+    (card,) = client.get("/api/contests/ghosts?track=oval").json()
+    ghosts = [{"heat": earlier}, "best-lap", {"model": "haunter", "evaluation": card["evaluation"]}]
+    with busy_at_home(place):
+        heat = client.post("/api/contests/heats", json=asked | {"ghosts": ghosts}).json()["id"]
+        assert client.delete(f"/api/contests/{earlier}").status_code == 204
+        (console.runs / "haunter" / f"evaluation-{card['evaluation']}" / "evaluation.replay").unlink()
+        unwanted = client.post("/api/contests/heats", json=asked | {"ghosts": ghosts[1:]})
+        assert unwanted.json()["error"]["message"].endswith("has no replay.")
+        with place.worker("lab-4"):
+            assert place.done(heat)["machine"] == "lab-4"
+        assert client.get(f"/api/contests/{heat}/video").status_code == 200
+    assert Artifacts(place.artifacts).shelf("contests").names() == []
+
+
+@pytest.mark.costly
 def test_a_guests_training_on_an_own_track_against_another_run_travels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

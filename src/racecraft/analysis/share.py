@@ -97,7 +97,7 @@ def draw_share(folder: RunFolder, stamp: str, path: Path, *, language: str = "en
 
 
 def _driven(folder: RunFolder, stamp: str) -> tuple[Replay, Recording]:
-    path = folder.evaluation(stamp) / "evaluation.replay"
+    path = folder.evaluation_replay(stamp)
     if not (stamp.isascii() and stamp.isdigit()) or not path.is_file():
         raise RunError(f"{folder.name} has no evaluation {stamp[:40]!r} with a replay.", hint="Evaluate it once more.")
     replay = read_replay(path)
@@ -140,4 +140,4 @@ def _reward(folder: RunFolder, step: int) -> str:
 
 
 def _file(folder: RunFolder, stamp: str) -> bytes:
-    return (folder.evaluation(stamp) / "evaluation.replay").read_bytes()
+    return folder.evaluation_replay(stamp).read_bytes()

@@ -89,14 +89,15 @@ def _check_number(sources: Sequence[str]) -> None:
 
 def _from_replay(path: Path, track: Track, rules: RaceRules, color: Color) -> Ghost:
     replay = read_replay(path)
+    best = replay.evaluation.best_trial
+    name = replay.title or replay.names[best.index]
     theirs, ours = driven_track(replay.conditions.track, replay.conditions.rules), driven_track(track, rules)
     if theirs.digest != ours.digest:
         raise ConfigError(
-            f"The ghost {path.name} drove on {theirs.name}, in another direction or of another form than {ours.name}.",
+            f"The ghost {name!r} drove on {theirs.name}, in another direction or of another form than {ours.name}.",
             hint="Choose a replay of the same track and direction.",
         )
-    best = replay.evaluation.best_trial
-    return ghost_of(best.recording, name=replay.title or replay.names[best.index], color=color)
+    return ghost_of(best.recording, name=name, color=color)
 
 
 def _from_model(source: str, conditions: Conditions, color: Color, *, run: Path | None, trial: int) -> Ghost:

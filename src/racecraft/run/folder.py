@@ -228,6 +228,10 @@ class RunFolder:
         """Folder of the evaluation begun at ``stamp`` (YYYYmmddHHMMSS)."""
         return self.path / f"evaluation-{stamp}"
 
+    def evaluation_replay(self, stamp: str) -> Path:
+        """Every trial of that evaluation, to be shown and driven again."""
+        return self.evaluation(stamp) / "evaluation.replay"
+
     def new_evaluation(self) -> tuple[str, Path]:
         """Make the folder of an evaluation that begins now; its time stamp and its path."""
         return dated_folder(self.path, prefix="evaluation-")

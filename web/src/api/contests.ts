@@ -8,12 +8,14 @@ export type ContestCard = Schemas["ContestCard"];
 export type ContestDetail = Schemas["ContestDetail"];
 export type LadderMatch = Schemas["LadderMatch"];
 export type Starter = Required<Schemas["Starter"]>;
-export type Ghost = Starter | Required<Schemas["EarlierHeat"]> | "best-lap";
+export type EvaluatedCard = Schemas["EvaluatedCard"];
+export type Ghost = Starter | Schemas["Evaluated"] | Required<Schemas["EarlierHeat"]> | "best-lap";
 export type NewHeat = Partial<Schemas["NewHeat"]> & { models: Starter[] };
 export type NewLadder = Partial<Schemas["NewLadder"]> & { models: Starter[]; tracks: string[] };
 
 export const contestApi = {
   list: () => ask<ContestCard[]>("GET", "/contests"),
+  evaluated: (track: string) => ask<EvaluatedCard[]>("GET", `/contests/ghosts?track=${encodeURIComponent(track)}`),
   get: (id: string) => ask<ContestDetail>("GET", `/contests/${id}`),
   heat: (heat: NewHeat) => ask<ContestDetail>("POST", "/contests/heats", heat),
   ladder: (ladder: NewLadder) => ask<ContestDetail>("POST", "/contests/ladders", ladder),

@@ -2,6 +2,7 @@
 import type { ContestCard, Ghost } from "../api/contests";
 import type { Key } from "../i18n/en";
 import { t } from "../i18n/index.svelte";
+import { ofStamp } from "./dates";
 
 /** How they race: a heat by its cars, a ladder by what it compares by. */
 export const kindOf = (contest: Pick<ContestCard, "kind" | "models">): string =>
@@ -22,6 +23,7 @@ export const contestName = (contest: Pick<ContestCard, "title" | "models" | "is_
 /** A ghost of a film, by what there is to know of earlier heats. */
 export function ghostName(ghost: Ghost, heats: ContestCard[]): string {
   if (ghost === "best-lap") return t("contests_ghost_best_lap");
+  if ("evaluation" in ghost) return `${ghost.model} · ${ofStamp(ghost.evaluation)}`;
   if ("model" in ghost) return ghost.checkpoint === "best" ? ghost.model : `${ghost.model}@${ghost.checkpoint}`;
   const heat = heats.find((one) => one.id === ghost.heat);
   return heat ? contestName(heat) : t("contests_ghost_heats");

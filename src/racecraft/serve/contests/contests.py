@@ -12,6 +12,7 @@ import secrets
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import sqlalchemy as sa
@@ -22,10 +23,13 @@ from racecraft.errors import ConfigError
 from racecraft.race.announcement import draw_secret
 from racecraft.race.conditions import Conditions
 from racecraft.serve.contests.files import REPLAY, VIDEO, contest_folder, count_matches, entry_name
+from racecraft.serve.contests.ghosts import evaluated, evaluation_replay, keep
 from racecraft.serve.contests.schemas import (
     ContestCard,
     ContestDetail,
     EarlierHeat,
+    Evaluated,
+    EvaluatedCard,
     Ghost,
     HeatRow,
     LadderMatch,
@@ -35,7 +39,7 @@ from racecraft.serve.contests.schemas import (
     Starter,
 )
 from racecraft.serve.contests.terms import Terms, settle, terms_of
-from racecraft.serve.jobs.queue import ENDED, JobQueue
+from racecraft.serve.jobs.queue import ENDED, JobQueue, new_job_id
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.problems import Conflict, NotFound
@@ -100,7 +104,11 @@ class Contests:
             minimum_laps=request.minimum_laps,
             secret=draw_secret() if request.secret else None,
         ).announcement
-        self._check_ghosts(request.ghosts, conditions)
+        replays = self._replays(request.ghosts)
+        if replays:
+            from racecraft.film.ghost_source import check_sources
+
+            check_sources([str(path) for path in replays.values()], conditions.track, conditions.rules, run=None)
         payload = request.model_dump() | {
             "kind": kind,
             "tracks": [request.track],
@@ -108,7 +116,8 @@ class Contests:
             "secret": announced.secret,
             "commitment": announced.commitment if request.secret else "",
         }
-        return self._add("heat", payload, request.models, terms, ghosts=request.ghosts)
+        driving = [*request.models, *(ghost for ghost in request.ghosts if isinstance(ghost, Starter))]
+        return self._add("heat", payload, driving, terms, replays=replays)
 
     def start_ladder(self, request: NewLadder) -> str:
         """Queue a ladder; its id.
@@ -129,6 +138,10 @@ class Contests:
             raise ConfigError(f"objects go with the ladder head-to-model; a {request.kind} has its own.")
         payload = request.model_dump() | {"paths": [self._courses.path_or_name(name) for name in request.tracks]}
         return self._add("ladder", payload, request.models, settle(request))
+
+    def evaluated(self, track: str) -> list[EvaluatedCard]:
+        """Evaluations on a track that may be ghosts of a heat there."""
+        return evaluated(self._garage.runs, self._courses.load(track))
 
     def cards(self) -> list[ContestCard]:
         """All of them, newest first."""
@@ -204,18 +217,30 @@ class Contests:
         found = [job for kind in KINDS for job in self._queue.list(kind=kind, limit=MAX_CONTESTS)]
         return sorted(found, key=lambda job: job.created, reverse=True)
 
-    def _check_ghosts(self, ghosts: Sequence[Ghost], conditions: Conditions) -> None:
-        """Refuse those of an earlier heat that there is not, or that was on another road."""
-        earlier = [str(self.file(ghost.heat, REPLAY)) for ghost in ghosts if isinstance(ghost, EarlierHeat)]
-        if earlier:
-            from racecraft.film.ghost_source import check_sources
+    def _replays(self, ghosts: Sequence[Ghost]) -> dict[int, Path]:
+        """The replays of those that drove before, by their places among the ghosts.
 
-            check_sources(earlier, conditions.track, conditions.rules, run=None)
+        Raises:
+            NotFound: There is no such heat, model or evaluation.
+            Conflict: An evaluation has no replay.
+        """
+        found = {}
+        for number, ghost in enumerate(ghosts):
+            if isinstance(ghost, EarlierHeat):
+                found[number] = self.file(ghost.heat, REPLAY)
+            elif isinstance(ghost, Evaluated):
+                found[number] = evaluation_replay(self._garage.folder(ghost.model), ghost.evaluation)
+        return found
 
     def _add(
-        self, kind: str, payload: dict[str, Any], starters: list[Starter], terms: Terms, *, ghosts: Sequence[Ghost] = ()
+        self,
+        kind: str,
+        payload: dict[str, Any],
+        driving: Sequence[Starter],
+        terms: Terms,
+        *,
+        replays: Mapping[int, Path] = MappingProxyType({}),
     ) -> str:
-        driving = [*starters, *(ghost for ghost in ghosts if isinstance(ghost, Starter))]
         for starter in driving:
             self._garage.require_checkpoint(starter.model, starter.checkpoint)
         if len(self._jobs()) >= MAX_CONTESTS:
@@ -224,9 +249,11 @@ class Contests:
         if payload["seed"] is None and not _is_secret(payload):
             payload["seed"] = secrets.randbelow(2**32)
         folders = [self._garage.folder(starter.model) for starter in driving]
-        is_here = any(isinstance(ghost, EarlierHeat) for ghost in ghosts)  # its replay does not travel
-        cargo = None if is_here else self._mirror.share(*folders, tracks=payload["paths"])
-        return self._queue.add(kind, starters[0].model, payload, cargo=cargo).id
+        contest = new_job_id()
+        keep(replays, self.folder(contest))
+        filled = self.folder(contest) if replays else None
+        cargo = self._mirror.share(*folders, tracks=payload["paths"], filled=filled)
+        return self._queue.add(kind, driving[0].model, payload, cargo=cargo, job_id=contest).id
 
     def _card(self, job: Job) -> ContestCard:
         payload, result = job.payload, job.result or {}

@@ -1,6 +1,7 @@
 """The files of a heat or a ladder.
 
 .racecraft/contests/<job>/race.replay    a heat, to be driven again by anybody
+                          ghosts/0.replay  ghosts of its film that drove before, by their places among its ghosts
                           video.mp4      of its winner, the others beside it
                           matches.zip    what both cars of every race of a ladder drove, a JSON document each
 
@@ -31,6 +32,11 @@ def entry_name(starter: dict[str, Any]) -> str:
 def contest_folder(state: Path, contest: str) -> Path:
     """Where they lie."""
     return state / FOLDER / contest
+
+
+def ghost_file(number: int) -> str:
+    """Of the replay of a heat's ghost, inside the heat's folder."""
+    return f"ghosts/{number}.replay"
 
 
 def count_matches(folder: Path) -> int:

@@ -12,7 +12,7 @@ from fastapi.responses import FileResponse
 
 from racecraft.contest.terms import TOGETHER
 from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
-from racecraft.serve.contests.schemas import ContestCard, ContestDetail, NewHeat, NewLadder
+from racecraft.serve.contests.schemas import ContestCard, ContestDetail, EvaluatedCard, NewHeat, NewLadder
 from racecraft.serve.context import Computes, InContext, TakesPlace
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.replays import car_of, replay_of, road_of
@@ -48,6 +48,12 @@ def start_ladder(request: NewLadder, context: InContext) -> ContestDetail:
     return context.contests.get(contest)
 
 
+@router.get("/ghosts")
+def list_evaluated(track: Annotated[str, Query(max_length=200)], context: InContext) -> list[EvaluatedCard]:
+    """Evaluations on a track whose best trial may be a ghost of a heat there, model by model, the newest first."""
+    return context.contests.evaluated(track)
+
+
 @router.get("/{contest}")
 def get_contest(contest: Id, context: InContext) -> ContestDetail:
     """A heat or a ladder with its result."""
@@ -58,6 +64,7 @@ def get_contest(contest: Id, context: InContext) -> ContestDetail:
 @router.delete("/{contest}", status_code=204)
 def delete_contest(contest: Id, context: InContext) -> Response:
     """Remove a heat or a ladder with its files."""
+    context.follower.see(context.contests.job(contest))
     context.contests.remove(contest)
     return Response(status_code=204)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder, entry_name
+from racecraft.serve.contests.ghosts import sources_of
 from racecraft.serve.contests.terms import terms_of
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.settings import STATE_FOLDER
@@ -58,7 +59,7 @@ def heat(task: Task) -> dict[str, Any]:
     )
     if payload.get("commitment") not in (None, "", terms.announcement.commitment):
         raise ConfigError(f"The track {conditions.track.name!r} is not the one that the race was announced on.")
-    sources = _ghosts(task)
+    sources = sources_of(payload.get("ghosts", ()), folder=folder, runs=task.runs)
     check_sources(sources, conditions.track, conditions.rules, run=None)
     contest = hold_race(entries, terms)
     ((_, replay),) = contest.replays()
@@ -144,19 +145,6 @@ def _driven(trial: Trial) -> dict[str, Any]:
 def _models(task: Task) -> list[str]:
     """Their best checkpoint unless another is asked for, which their names then say."""
     return [str(task.runs / entry_name(one)) for one in task.job.payload["models"]]
-
-
-def _ghosts(task: Task) -> list[str]:
-    """Of the film, as `load_ghosts` takes them."""
-    state = task.runs / STATE_FOLDER
-    return [
-        one
-        if isinstance(one, str)
-        else str(contest_folder(state, one["heat"]) / REPLAY)
-        if "heat" in one
-        else str(task.runs / entry_name(one))
-        for one in task.job.payload.get("ghosts", ())
-    ]
 
 
 def _folder(task: Task) -> Path:

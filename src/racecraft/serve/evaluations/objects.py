@@ -23,7 +23,7 @@ RACERS: Final = ("racer", "frozen_racer", "gone_racer")
 
 def objects_of(folder: RunFolder, stamp: str, laps: Sequence[TracedLap]) -> dict[int, list[RoadObject]]:
     """What was on the road in each lap, by the lap's number; nothing where no replay says it."""
-    path = folder.evaluation(stamp) / "evaluation.replay"
+    path = folder.evaluation_replay(stamp)
     if not path.is_file():
         return {}
     try:

@@ -125,12 +125,23 @@ def folder_of(job: Job) -> tuple[str, str] | None:
     return (shelf, name.format(job=job.id, tuning=job.payload.get("tuning", ""))) if name else None
 
 
+def new_job_id() -> str:
+    """An id that no job has."""
+    return secrets.token_hex(8)
+
+
 def new_job(
-    kind: str, run: str, payload: Mapping[str, Any], *, cargo: Cargo | None = None, user_id: int = OWNER
+    kind: str,
+    run: str,
+    payload: Mapping[str, Any],
+    *,
+    cargo: Cargo | None = None,
+    user_id: int = OWNER,
+    job_id: str | None = None,
 ) -> Job:
     """A job that is at the end of the queue once a session adds it."""
     return Job(
-        id=secrets.token_hex(8),
+        id=job_id or new_job_id(),
         kind=kind,
         run=run,
         payload=dict(payload),
@@ -160,9 +171,25 @@ class JobQueue:
         """Whose jobs these are."""
         return self._user_id
 
-    def add(self, kind: str, run: str, payload: Mapping[str, Any], *, cargo: Cargo | None = None) -> Job:
-        """Put a job at the end of the queue; any machine may do one whose cargo is in the store."""
-        job = new_job(kind, run, payload, cargo=cargo, user_id=self._user_id)
+    def add(
+        self,
+        kind: str,
+        run: str,
+        payload: Mapping[str, Any],
+        *,
+        cargo: Cargo | None = None,
+        job_id: str | None = None,
+    ) -> Job:
+        """Put a job at the end of the queue; any machine may do one whose cargo is in the store.
+
+        Args:
+            kind: Of `KINDS`.
+            run: That it is about.
+            payload: What is to be done.
+            cargo: What the store has for it.
+            job_id: From `new_job_id`, of one whose folder was begun already.
+        """
+        job = new_job(kind, run, payload, cargo=cargo, user_id=self._user_id, job_id=job_id)
         with self._database.transaction() as session:
             session.add(job)
         return job

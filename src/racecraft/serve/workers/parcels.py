@@ -39,7 +39,7 @@ MAX_WAITING: Final = 1 << 30
 """Bytes of content that no list names yet."""
 FIXED: Final = re.compile(
     r"(run|tuning|model_metadata|hyperparameters|race_rules)\.json"
-    r"|reward_function\.py|training_params\.yaml|parent/.*"
+    r"|reward_function\.py|training_params\.yaml|parent/.*|ghosts/.*"
 )
 """Files that say what is to be done: a job reads them and never changes them."""
 STRETCH: Final = re.compile(r"stretches/([1-9]\d{0,3})\.json")

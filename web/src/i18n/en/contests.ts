@@ -43,6 +43,8 @@ export const contests = {
   contests_ghost_add: "Add a ghost",
   contests_ghost_best_lap: "The fastest lap, again with every lap",
   contests_ghost_models: "Models, each alone in the same race",
+  contests_ghost_evaluations: "The best trial of an evaluation",
+  contests_ghost_no_lap: "no whole lap",
   contests_ghost_heats: "The best car of an earlier heat",
   contests_ghost_leave: "Take out the ghost: {name}",
   contests_schedule: "Who meets whom",

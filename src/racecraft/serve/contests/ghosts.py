@@ -1,0 +1,113 @@
+"""Ghosts of a heat's film: evaluations that can be some, and the replays of those that drove before.
+
+request ──replays_of──▶ replays ──keep──▶ the heat's own copies ──sources_of──▶ what `load_ghosts` takes
+
+The copies are made when the heat is asked for: they travel with it to whoever drives it, and what they were copied from
+may be removed meanwhile.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from racecraft.errors import ConfigError, RacecraftError
+from racecraft.json_file import read_json_object
+from racecraft.run import RunFolder, list_runs
+from racecraft.serve.contests.files import entry_name, ghost_file
+from racecraft.serve.contests.schemas import EvaluatedCard
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.track import Track
+
+NEWEST: Final = 20
+"""Evaluations of a model that are listed."""
+MAX_LISTED: Final = 500
+
+
+def evaluated(runs: Path, track: Track) -> list[EvaluatedCard]:
+    """Evaluations on a track that have a replay, model by model, the newest first.
+
+    Of those whose files do not tell their road only its name is known here; a replay itself is looked at by who starts
+    a heat with it.
+    """
+    found = []
+    for folder in list_runs(runs):
+        paths = sorted(folder.path.glob("evaluation-*/evaluation.json"), reverse=True)
+        own = (card for path in paths if (card := _card(folder, path, track)) is not None)
+        found += [card for card, _ in zip(own, range(NEWEST), strict=False)]
+    return found[:MAX_LISTED]
+
+
+def _card(folder: RunFolder, path: Path, track: Track) -> EvaluatedCard | None:
+    stamp = path.parent.name.removeprefix("evaluation-")
+    if not (stamp.isascii() and stamp.isdigit()) or not folder.evaluation_replay(stamp).is_file():
+        return None
+    try:
+        summary = read_json_object(path)
+    except RacecraftError:
+        return None
+    if summary.get("track") != track.name or summary.get("track_digest", track.digest) != track.digest:
+        return None
+    best = summary.get("best_lap_seconds")
+    return EvaluatedCard(
+        model=folder.name, evaluation=stamp, best_lap=float(best) if isinstance(best, int | float) else None
+    )
+
+
+def evaluation_replay(folder: RunFolder, stamp: str) -> Path:
+    """The replay of a model's evaluation.
+
+    Raises:
+        NotFound: There is no such evaluation.
+        Conflict: It has no replay.
+    """
+    if not (stamp.isascii() and stamp.isdigit()) or not folder.evaluation(stamp).is_dir():
+        raise NotFound(f"Model {folder.name!r} has no evaluation {stamp[:40]!r}.")
+    path = folder.evaluation_replay(stamp)
+    if not path.is_file():
+        raise Conflict(
+            f"Evaluation {stamp!r} of model {folder.name!r} has no replay.", hint="Evaluate the model once more."
+        )
+    return path
+
+
+def keep(replays: Mapping[int, Path], folder: Path) -> None:
+    """Copy replays of ghosts into a heat's folder, by their places among its ghosts.
+
+    Raises:
+        Conflict: One cannot be copied.
+    """
+    for number, path in replays.items():
+        kept = folder / ghost_file(number)
+        try:
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, kept)
+        except OSError as error:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise Conflict(f"The replay of ghost {number + 1} cannot be copied: {error.strerror}.") from error
+
+
+def sources_of(ghosts: Sequence[str | dict[str, Any]], *, folder: Path, runs: Path) -> list[str]:
+    """The ghosts of a heat as `load_ghosts` takes them.
+
+    Args:
+        ghosts: As the heat's payload has them.
+        folder: Of the heat.
+        runs: Folder of the models.
+
+    Raises:
+        ConfigError: The copy of a replay is not there.
+    """
+    found = []
+    for number, ghost in enumerate(ghosts):
+        if isinstance(ghost, str):
+            found.append(ghost)
+        elif "checkpoint" in ghost:
+            found.append(str(runs / entry_name(ghost)))
+        elif (kept := folder / ghost_file(number)).is_file():
+            found.append(str(kept))
+        else:
+            raise ConfigError(f"The replay of ghost {number + 1} is not there.", hint="Start the heat again.")
+    return found
