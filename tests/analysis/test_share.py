@@ -99,6 +99,7 @@ def test_a_medal_is_told(run: RunFolder, stamp: str, monkeypatch: pytest.MonkeyP
     assert "<dt>Medal</dt><dd>Author</dd>" in share(run, stamp)
 
 
+@pytest.mark.costly
 def test_a_picture_has_the_reward_and_the_replay_inside(run: RunFolder, stamp: str, tmp_path: Path) -> None:
     path = draw_share(run, stamp, tmp_path / "sent.png")
     plain = draw_racing_line(
@@ -122,6 +123,7 @@ def test_a_picture_has_the_reward_and_the_replay_inside(run: RunFolder, stamp: s
         read_replay(cut)
 
 
+@pytest.mark.costly
 def test_a_long_line_and_a_long_function_end_on_the_paper(tmp_path: Path) -> None:
     heights = []
     for lines in (10, 60, 61, 5000):

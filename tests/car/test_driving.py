@@ -121,6 +121,7 @@ def test_the_evaluation_drives_what_the_car_makes_of_it_and_says_so(run: Path) -
     assert verify(read_replay(outcome.files["replay"])).is_genuine
 
 
+@pytest.mark.costly
 def test_of_a_car_that_is_faster_than_the_simulator_the_picture_shows_what_was_driven(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -52,6 +52,7 @@ def test_learning(racecraft: Run) -> None:
     Perceiver(Path("w.safetensors"), num_threads=1)
 
 
+@pytest.mark.costly
 def test_driving(racecraft: Run) -> None:
     document = racecraft("perceive", "--drive", "oval", "--speed", "1.6", "--randomize", "light", "--json").document
     assert (document["laps"], document["trials"], document["speed"]) == (2, 2, 1.6)

@@ -168,6 +168,7 @@ def test_interpreted_and_translated_rewards_train_alike():
         np.testing.assert_allclose(theirs[name], weights, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.costly
 def test_advantages_are_those_of_the_reference():
     ppo, _ = open_ppo(config=PPOConfig(num_envs=16, num_steps=44, minibatch_size=64, normalize_returns=False))
     ppo._generator.manual_seed(1)

@@ -31,6 +31,7 @@ def make(name: str, *, config: SB3Config = CONFIG, seed: int = 0, is_discrete: b
     return SB3(name, config, learner, StripeWorld(config.num_envs, time_limit=12), seed=seed, num_threads=1)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", SB3_ALGORITHMS)
 def test_what_is_published_is_what_the_library_would_drive(name: str) -> None:
     """Native forward passes against the library's own best action."""

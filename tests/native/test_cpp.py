@@ -2,7 +2,7 @@
 
 The golden hashes are also compared without any optimisation nor vectors, and on an ARM processor, which is emulated.
 
-    pytest tests/native -m "not slow"     only the release build
+    pytest tests/native -m "not slow"     only the release build, of which make test-fast runs the short programs
 
 As users get it means in the very folder in which the installed core was built, whose objects are linked here. The other
 builds lie beside it in build/ and are kept as well, so that only what changed is compiled again. Sides of this suite
@@ -34,18 +34,21 @@ EMULATED = {  # and the word that chooses the tests: all but those that take an 
 }
 EMULATOR = ("qemu-aarch64", "-L", "/usr/aarch64-linux-gnu")
 CROSS_COMPILER = "aarch64-linux-gnu-g++"
+LONG = ("camera_test", "engine_test", "network_test", "vehicle_test")
+"""Programs that take half a second and more as users get the core."""
+SHORT = tuple(name for name in PROGRAMS if name not in LONG)
 THREADED = ("engine_test", "thread_pool_test")
 TOOLS = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))  # cmake and ninja of this environment
 JOBS = max(1, (os.cpu_count() or 1) // int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
 
 
 @cache
-def release() -> Path:
-    """The folder of the programs beside the installed core's own objects."""
+def release(programs: tuple[str, ...]) -> Path:
+    """The folder of the installed core's own objects, with these programs beside them."""
     python = "cp312-abi3" if sys.version_info >= (3, 12) else f"cp{sys.version_info.major}{sys.version_info.minor}-*"
     folders = [path.parent for path in (ROOT / "build").glob(f"{python}-*/build.ninja")]
     assert folders, "make build compiles the core"
-    return compiled(folders[0])
+    return compiled(folders[0], programs)
 
 
 @cache
@@ -112,9 +115,10 @@ def runs(folder: Path, programs: tuple[str, ...] = PROGRAMS, *words: str, **envi
         return {name: pool.submit(run, [folder / name, *words], **environment) for name in programs}
 
 
-@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("program", [*SHORT, *(pytest.param(name, marks=pytest.mark.costly) for name in LONG)])
 def test_release(program):
-    runs(release())[program].result()
+    programs = LONG if program in LONG else SHORT
+    runs(release(programs), programs)[program].result()
 
 
 @pytest.mark.slow
@@ -168,7 +172,7 @@ def test_kernels_bring_no_code_that_another_instruction_set_could_link():
     nm = shutil.which("nm")
     if nm is None:
         pytest.skip("nm is not installed")
-    folder = release()
+    folder = release(SHORT)
     objects = [p for isa in ("avx2", "avx512") for p in folder.glob(f"CMakeFiles/racecraft_kernels_{isa}.dir/**/*.o")]
     if not objects:
         pytest.skip("this machine's build has one instruction set")

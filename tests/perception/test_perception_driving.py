@@ -38,6 +38,7 @@ def commands_of(belief: Belief) -> tuple[float, float]:
     return float(steering), float(speed)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("randomize", ["strong", "real"])
 def test_it_laps_roads_that_perception_never_learned_from(randomize: str) -> None:
     found = generalize(

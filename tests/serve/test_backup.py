@@ -131,6 +131,7 @@ def test_a_backup_is_private_and_whole_whatever_one_before_it_left(tmp_path: Pat
     assert restore(ServeSettings(runs=tmp_path / "b"), file).rows == {"users": 1, "races": 2}
 
 
+@pytest.mark.costly
 def test_a_link_for_a_password_leads_to_an_address(tmp_path: Path) -> None:
     races_of_each_other(tmp_path / "runs")
     for address in ("racing.example.org", "https://racing.example.org/console"):

@@ -259,6 +259,7 @@ def test_a_stopped_server_hands_its_training_to_the_next(runs: Path) -> None:
         assert ended["attempts"] == 2
 
 
+@pytest.mark.costly
 def test_a_training_that_is_done_leaves_nothing_in_the_log(tmp_path: Path) -> None:
     with running_console(tmp_path / "runs") as console:
         console.create(name="a", train=False, track="oval", until="256 steps")

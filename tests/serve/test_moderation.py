@@ -42,6 +42,7 @@ def test_who_was_given_a_name_does_not_take_the_old_one_again(court: Court) -> N
     assert people.get(ADA).name == "Ada"
 
 
+@pytest.mark.costly
 def test_an_entry_that_was_given_a_name_keeps_it_on_the_board_and_in_its_replay(court: Court, tmp_path: Path) -> None:
     def names() -> tuple[str, list[str]]:
         _, board, _ = court.league.board(RACE, user_id=ADA, top=10)

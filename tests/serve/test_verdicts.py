@@ -215,6 +215,7 @@ def with_weights(entry: bytes, values: tuple[float, ...], tmp_path: Path) -> byt
     return b"".join(tensor_file(arrays, {HEADER_KEY: json.dumps(header_of(path)[0], sort_keys=True)}))
 
 
+@pytest.mark.costly
 def test_a_driver_that_never_arrives_is_over_in_simulated_time(entry: bytes, tmp_path: Path) -> None:
     """By deepracer-for-cloud's rules, which have no limit of time, with all the resets of a race; it turns left."""
     track = load_track("oval")

@@ -58,6 +58,7 @@ def test_of_several_tracks_a_car_draws_one_for_every_episode(names):
     assert {index for indices in drawn for index in indices} == set(range(len(names)))
 
 
+@pytest.mark.costly
 def test_a_reward_is_tried_on_every_track_that_is_learned_on(tmp_path, tiny: Train):
     source = tmp_path / "short.py"
     source.write_text(

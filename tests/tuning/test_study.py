@@ -147,6 +147,7 @@ def test_who_is_ready_first_does_not_matter(tmp_path: Path, monkeypatch: pytest.
     assert len(set(found[0])) == 7
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("window", [1, 3])
 def test_numbers_of_now_that_lie_outside_the_bounds_are_the_first_trial_and_teach_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recwarn: pytest.WarningsRecorder, window: int

@@ -109,6 +109,7 @@ def test_files_are_opened_for_reading_alone_and_only_while_loading(machine):
         assert answer(machine, "loading", "open", 0, O_RDONLY) == ALLOW
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("machine", MACHINES)
 def test_a_judge_may_read_and_have_threads_and_nothing_else(machine):
     names = {number: name for name, number in maker.NUMBERS[machine].items()}
