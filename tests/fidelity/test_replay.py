@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from racecraft.agent import action_space
+from racecraft.cli.text import say_calibrated, say_replayed
 from racecraft.errors import ConfigError, RunError
 from racecraft.fidelity import calibrate, draw_comparison, read_logs, replay
 from racecraft.fidelity.dynamics import clock_of, step_durations
@@ -150,6 +151,33 @@ def test_another_cars_drive_is_told_apart_and_calibrated(tmp_path):
     assert fitted < 0.25 * preset
     result.vehicle.save(tmp_path / "car.json")
     assert replay(path, track="oval", vehicle=str(tmp_path / "car.json")).to_dict()["position_error_m"]["15"] < 0.05
+
+
+def test_a_car_that_is_moved_by_hand_starts_anew(tmp_path, lines, capfd):
+    def whole(number: str) -> list[list[str]]:
+        return [[*fields] for fields in lines if fields[0] == number]
+
+    moved, jumps = [], 0
+    for number in sorted({fields[0] for fields in lines}, key=int):
+        rows = whole(number)
+        if len(rows) > 90:
+            rows, jumps = rows[:40] + rows[60:], jumps + 1  # 20 rows that nobody drove
+            for step, fields in enumerate(rows[40:], start=41):
+                fields[1], fields[14] = repr(float(step)), repr(float(rows[39][14]) + (step - 40) / 15)
+        moved += rows
+    assert jumps > 5
+    path = write(tmp_path / "moved.csv", moved)
+    found = replay(path, track="oval")
+    assert (found.moved, found.to_dict()["moved_by_hand"]) == (jumps, jumps)
+    assert found.to_dict()["progress_agreement"] == 1.0
+    assert found.errors[:, :, 0].max() < 0.3, "no window reaches across a jump, of a metre"
+    say_replayed(found, None)
+    assert f"The car was moved by hand {jumps} times" in capfd.readouterr().out
+    fitted = calibrate(path, iterations=1)
+    assert fitted.to_dict()["moved_by_hand"] == jumps
+    say_calibrated(fitted, tmp_path / "car.json")
+    assert f"The car was moved by hand {jumps} times" in capfd.readouterr().out
+    assert replay(write(tmp_path / "driven.csv", lines), track="oval").moved == 0
 
 
 def test_time_stamps_of_the_next_row_are_recognised(tmp_path, lines):

@@ -349,6 +349,7 @@ def say_replayed(result: Comparison, picture: Path | None) -> None:
         _say_errors(console, {"median": _medians(found), "90 %": _medians(found, "_p90")})
     for note in (*result.differences.shown(10), *result.faults.notes[:5]):
         _say(console, (f"  {note}", "dim"))
+    _say_moved(console, result.moved)
     if result.faults.count:
         _say(console, (f"{result.faults.count:,} rows could not be read.", "bold yellow"))
     if picture is not None:
@@ -385,8 +386,16 @@ def say_calibrated(result: Calibration, output: Path) -> None:
     console, found = Console(), result.to_dict()
     _say(console, f"Fitted to {result.windows:,} windows, judged on {result.held_out_windows:,} others.")
     _say_errors(console, {"started from": found["preset"], "fitted": found["held_out"]})
+    _say_moved(console, result.moved)
     _say(console, "Vehicle file: ", (str(output), "bold"))
     _say(console, "Drive it:     ", (f"racecraft train --vehicle {output}", "bold"))
+
+
+def _say_moved(console: Console, moved: int) -> None:
+    """Of jumps in logs."""
+    if moved:
+        times = "once" if moved == 1 else f"{moved:,} times"
+        _say(console, (f"The car was moved by hand {times}, as no car drives; it starts anew there.", "bold yellow"))
 
 
 def _harmless(line: str, *, width: int = SHOWN_WIDTH) -> str:

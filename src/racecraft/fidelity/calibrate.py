@@ -59,12 +59,14 @@ class Calibration:
     errors: NDArray[np.float64]  # m and rad after REPORTED_STEPS on held-out windows   (W, 3, 2)
     preset_errors: NDArray[np.float64]
     fitted: tuple[str, ...]  # names of the parameters that were free
+    moved: int  # times that somebody moved the car by hand
 
     def to_dict(self) -> dict[str, Any]:
         """What ``racecraft calibrate --json`` prints."""
         return {
             "windows": self.windows,
             "held_out_windows": self.held_out_windows,
+            "moved_by_hand": self.moved,
             "vehicle": {name: getattr(self.vehicle, name) for name in LIMITS},
             "fitted": list(self.fitted),
             "held_out": _medians(self.errors),
@@ -98,7 +100,7 @@ def calibrate(
     check_number("held_out", held_out, 0.05, 0.9)
     start = load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
     road = load_track(track) if isinstance(track, str) else track
-    windows = _load([logs] if isinstance(logs, str | Path) else list(logs), road)
+    windows, moved = _load([logs] if isinstance(logs, str | Path) else list(logs), road)
     fit, judged = _split(windows, held_out, num_windows)
     car = _fit(start, fit, iterations)
     return Calibration(
@@ -109,10 +111,12 @@ def calibrate(
         errors=reported_errors(judged, car),
         preset_errors=reported_errors(judged, start),
         fitted=tuple(SEARCHED),
+        moved=moved,
     )
 
 
-def _load(paths: Sequence[str | Path], track: Track | None) -> Windows:
+def _load(paths: Sequence[str | Path], track: Track | None) -> tuple[Windows, int]:
+    """Windows, and how often somebody moved the car by hand."""
     read: list[Log] = []
     rows = 0
     for log in read_logs(paths, Faults()):
@@ -129,7 +133,7 @@ def _load(paths: Sequence[str | Path], track: Track | None) -> Windows:
             f"The logs hold {found} windows of 21 rows in a row; a fit needs {2 * MIN_WINDOWS} at least.",
             hint="Give more logs, or longer ones.",
         )
-    return windows
+    return windows, sum(int(log.is_moved.sum()) for log in read)
 
 
 def _split(windows: Windows, held_out: float, num_windows: int) -> tuple[Windows, Windows]:

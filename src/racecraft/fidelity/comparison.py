@@ -49,6 +49,7 @@ class Comparison:
     differences: Differences
     errors: NDArray[np.float64]  # m and rad after REPORTED_STEPS   (W, 3, 2)
     clocks: tuple[str, ...]  # readings of the time stamps that were met
+    moved: int = 0  # times that somebody moved the car by hand
     rewards: int = 0  # rows whose reward was compared
     good_rewards: int = 0
     examples: tuple[Example, ...] = ()  # the median and the worst window
@@ -66,6 +67,7 @@ class Comparison:
             "episodes": rules.episodes,
             "windows": len(self.errors),
             "broken_rows": self.faults.count,
+            "moved_by_hand": self.moved,
             "progress_agreement": _share(rules.progress, rules.rows),
             "all_wheels_agreement": _share(rules.all_wheels, rules.rows),
             "closest_waypoint_agreement": _share(rules.closest_waypoint, rules.rows),
@@ -134,6 +136,7 @@ def replay(
                 first.add(rules, log, judged, Differences())
                 require_agreement(rules, log, first)
             agreement.add(rules, log, judged, differences)
+            result.moved += int(log.is_moved.sum())
             if worker is not None:
                 _compare_rewards(result, log, worker(judged[~log.is_prepare & ~log.is_paused]))
             windows = windows_of([log], stride=stride)

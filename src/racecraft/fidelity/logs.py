@@ -3,7 +3,8 @@
     for log in read_logs(paths):  # some ten thousand rows at a time
         ...
 
-Memory does not grow with the file. Rows that cannot be read are counted and named, and end their episode.
+Memory does not grow with the file. Rows that cannot be read are counted and named, and end their episode; so does a
+jump that no car can drive, where somebody moved it by hand.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from racecraft.errors import RunError
 from racecraft.run.simtrace import COLUMNS, READABLE
+from racecraft.sim.simulation import CONTROL_DT
 
 MARK: Final = "SIM_TRACE_LOG:"
 BATCH_ROWS: Final = 20_000
@@ -33,6 +35,8 @@ MAX_LINE: Final = 10_000  # characters; a row has 300
 MAX_STATUS: Final = 20  # characters
 MAX_NUMBER: Final = 1e12
 MAX_NOTES: Final = 20
+FASTEST: Final = 8.0
+"""m/s that no car drives: twice what the fastest is asked for. The original's logs of driving have 3.7 at the most."""
 _NEEDED: Final = COLUMNS[:14]  # up to track_len; tstamp is the fifteenth of all eras
 _NUMBERS: Final = ("episode", "steps", "X", "Y", "yaw", "steer", "throttle", "reward", "progress", "tstamp")
 _BRACKETS: Final = re.compile(r"\[[^\]]*\]")
@@ -57,6 +61,7 @@ class Log:
     is_first: NDArray[np.bool_]  # the row begins an episode
     is_prepare: NDArray[np.bool_]
     is_paused: NDArray[np.bool_]  # the car stands for a penalty
+    is_moved: NDArray[np.bool_]  # somebody put the car there, without a word: the row begins an episode, too
     episode: NDArray[np.int64]
     x: NDArray[np.float64]  # 0.14 m ahead of the car's origin
     y: NDArray[np.float64]
@@ -241,12 +246,17 @@ def _convert(source: str, rows: list[tuple[int, Sequence[str]]], faults: Faults)
     new[1:] = (np.diff(number) != 0) | (np.diff(steps) != 1)
     status = [fields[14].strip()[:MAX_STATUS] for _, fields in taken]
     is_prepare = np.array([s == "prepare" if s else n == 1 for s, n in zip(status, steps.tolist(), strict=True)])
+    is_paused = np.array([s in ("pause", "park") for s in status], dtype=np.bool_)
+    is_moved = _jumps(x, y, time) & ~new
+    for told in (is_prepare, is_paused):
+        is_moved[told] = is_moved[1:][told[:-1]] = False
     yield Log(
         source=source,
         lines=lines,
-        is_first=new | is_prepare,
+        is_first=new | is_prepare | is_moved,
         is_prepare=is_prepare,
-        is_paused=np.array([s in ("pause", "park") for s in status], dtype=np.bool_),
+        is_paused=is_paused,
+        is_moved=is_moved,
         episode=number.astype(np.int64),
         x=x,
         y=y,
@@ -263,6 +273,14 @@ def _convert(source: str, rows: list[tuple[int, Sequence[str]]], faults: Faults)
         done=np.array([fields[13].strip() in ("True", "1") for _, fields in taken]),
         status=status,
     )
+
+
+def _jumps(x: NDArray[np.float64], y: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Rows that no car can have driven to from the one before, whichever stamps its step lasted between   (R,)."""
+    lasted = np.diff(time, prepend=time[:1])
+    longest = np.maximum.reduce([lasted, np.roll(lasted, 1), np.roll(lasted, -1), np.full(len(x), CONTROL_DT)])
+    moved = np.hypot(np.diff(x, prepend=x[:1]), np.diff(y, prepend=y[:1]))
+    return np.asarray(moved > FASTEST * longest)
 
 
 def _numbers(taken: list[tuple[int, Sequence[str]]]) -> NDArray[np.float64]:
