@@ -10,7 +10,7 @@ import math
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, Final, NoReturn
 
 from racecraft.errors import ConfigError
 
@@ -68,13 +68,7 @@ def parse_json_object(data: bytes | str, *, name: str) -> dict[str, Any]:
     """As :func:`read_json_object`, from memory; ``name`` is what messages call it."""
     text = decode_text(data, name=name) if isinstance(data, bytes) else data
     try:
-        document = json.loads(
-            text,
-            object_pairs_hook=_unique,
-            parse_constant=_no_constant,
-            parse_float=_finite_float,
-            parse_int=_finite_int,
-        )
+        document = _DECODER.decode(text)
         if "\\u" in text:
             _check_pairs(document)
     except RecursionError as error:
@@ -110,11 +104,13 @@ def write_json_object(path: str | Path, document: Mapping[str, Any]) -> None:
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    document: dict[str, Any] = {}
-    for key, value in pairs:
-        if key in document:
-            raise ValueError(f"field {key!r} is given twice")
-        document[key] = value
+    document = dict(pairs)
+    if len(document) < len(pairs):
+        seen: set[str] = set()
+        for name, _ in pairs:
+            if name in seen:
+                raise ValueError(f"field {name!r} is given twice")
+            seen.add(name)
     return document
 
 
@@ -134,6 +130,11 @@ def _finite_int(text: str) -> int:
     if abs(value) > sys.float_info.max:  # who computes with it would have infinity
         raise ValueError("a whole number is too large for a number")
     return value
+
+
+_DECODER: Final = json.JSONDecoder(
+    object_pairs_hook=_unique, parse_constant=_no_constant, parse_float=_finite_float, parse_int=_finite_int
+)
 
 
 def _check_pairs(document: object) -> None:
