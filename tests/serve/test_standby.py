@@ -18,6 +18,7 @@ from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.supervisor import Standby
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.database import Database
+from racecraft.training import train
 
 PATIENCE = 120.0  # s; the machine may be busy
 
@@ -120,3 +121,22 @@ def test_without_a_server_nobody_waits(standby: Standby) -> None:
 def test_a_worker_does_not_load_the_server() -> None:
     said = "import sys; from racecraft.serve.jobs.worker import load; load(); sys.exit('fastapi' in sys.modules)"
     subprocess.run([sys.executable, "-c", said], check=True)
+
+
+@pytest.mark.costly
+def test_a_worker_that_waited_has_all_that_a_training_needs(tmp_path: Path) -> None:
+    run = train("oval", until="1 steps", num_envs=2, num_threads=1, root=tmp_path, name="calm").run
+    said = f"""
+import sys
+from pathlib import Path
+from racecraft.serve.jobs.worker import load
+load()
+before = set(sys.modules)
+from racecraft.run import RunFolder
+from racecraft.training import Until
+from racecraft.training.job import Training
+Training(RunFolder(Path({str(run)!r})), until=Until(steps=2000)).run()
+print(sorted(name for name in set(sys.modules) - before if name.startswith(("racecraft", "pydantic"))))
+"""
+    done = subprocess.run([sys.executable, "-c", said], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"

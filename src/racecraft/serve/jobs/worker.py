@@ -6,6 +6,7 @@ its lease runs out and somebody starts it again; a training then continues from 
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import threading
@@ -28,6 +29,8 @@ from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
 
 HEARTBEAT: Final = 1.0  # s
+LATE: Final = ("agent.metadata_file", "training.algorithms", "training.evaluator")
+"""What a training itself imports late, as who types a command waits for its first step."""
 
 
 def work(task: Task) -> dict[str, Any]:
@@ -54,6 +57,8 @@ def load() -> None:
     """Import what any job may need."""
     for kind in KINDS.values():
         function_named(kind.work)
+    for name in LATE:
+        importlib.import_module(f"racecraft.{name}")
 
 
 class Worker:
