@@ -149,7 +149,7 @@ def test_a_replay_shows_what_the_driver_saw(tmp_path: Path, sensor: str, camera:
         load_track("oval"),
         rules=replace(RULE_SETS["first_lap"], time_limit=1.0),
         num_trials=1,
-        camera=replace(CAMERAS[camera], age=0.0),  # poses are those of the steps
+        camera=CAMERAS[camera],
         sensors=SensorSuite((sensor,)),
         randomize="none",
         num_threads=1,

@@ -157,7 +157,7 @@ def _from_replay(path: Path) -> Iterator[Picture]:
     lens = (replay.conditions.camera or CameraSpec()).left_lens
     camera = replace(lens, width=SHOWN[0], height=SHOWN[1])
     view = Scene(recording.track, palette=camera.palette).driver_view(camera, lit_walls=False)
-    for step, (x, y, heading) in enumerate(recording.poses.tolist()):
+    for step, (x, y, heading) in enumerate(recording.seen_from(camera.age).tolist()):
         yield _picture(path, view.draw(x, y, heading, cars=recording.objects(step)), frame=step)
 
 

@@ -16,6 +16,8 @@ from racecraft.track.track import Track
 
 REFERENCE_AHEAD = 0.14
 """m from the car's origin to the point that x and y speak of."""
+SUBSTEPS = 8
+"""Of physics in a control step, as `Simulation` has them unless it is told otherwise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +63,14 @@ class Recording:
     def poses(self) -> NDArray[np.float64]:
         """X [m], y [m] and heading [rad] of the car's origin  (T, 3)."""
         return np.column_stack([self.origins, self.column("heading")])
+
+    def seen_from(self, age: float) -> NDArray[np.float64]:
+        """Poses, as `poses`, in which pictures of a camera of this age (s) were taken, between two steps  (T, 3)."""
+        before, moved = self.poses[:-1], np.diff(self.poses, axis=0)
+        moved[:, 2] = np.arctan2(np.sin(moved[:, 2]), np.cos(moved[:, 2]))
+        stands = np.isin(self.column("status")[1:], [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")])
+        share = np.where(stands, 0.0, round(age / CONTROL_DT * SUBSTEPS) / SUBSTEPS)  # who was put somewhere did not drive there
+        return np.vstack([self.poses[:1], before + (1.0 - share[:, None]) * moved])
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:
