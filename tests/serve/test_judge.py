@@ -19,6 +19,7 @@ from racecraft.race.announcement import Announcement, draw_secret
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry_file import pack_entry
 from racecraft.race.rules import RaceRules
+from racecraft.replay.replay import read_replay
 from racecraft.reward.sandbox import Confinement, find_confinement
 from racecraft.serve.submissions import judge, walls
 from racecraft.serve.submissions.judge import AGAIN, DROVE, ENTRY, FAILED, JUDGED
@@ -160,6 +161,50 @@ def test_without_walls_the_same_attacks_get_through(prey: Prey, told: Told, monk
     monkeypatch.setattr(walls, "lock_in", lambda **_: None)
     found = tried(prey, told, monkeypatch)
     assert {name: why for name, why in found.items() if why} == {}
+
+
+def test_a_child_has_nothing_of_its_judge_s_to_read_from_or_to_speak_through(
+    told: Told, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The judge's own output is where a verdict is read from."""
+
+    def speak(*_: object, **__: object) -> tuple[dict[str, Any], bytes]:
+        for file in (1, 2):
+            os.write(file, b"a verdict of its own\n")
+        return {"heard": os.read(0, 9).decode(), "place": os.getcwd()}, b""
+
+    monkeypatch.setattr(judge, "_drive", speak)
+    mouth, pen = os.pipe()
+    os.write(pen, b"a secret")
+    before = os.dup(0)
+    os.dup2(mouth, 0)
+    try:
+        status, said = judge._by_a_child(told, number=1)
+    finally:
+        os.dup2(before, 0)
+        for file in (before, mouth, pen):
+            os.close(file)
+    assert (status, json.loads(said)) == (DROVE, {"heard": "", "place": "/"})
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_heat_s_two_drive_from_their_own_files_under_their_own_names(told: Told, tmp_path: Path) -> None:
+    conditions = Conditions(
+        track=load_track("oval"), rules=RaceRules(laps=1, max_resets=1, time_limit=2.0), cars_per_race=2
+    )
+    announced = Announcement.of(
+        conditions, kind="head-to-model", ranking="total", minimum_laps=1, num_trials=1, secret=draw_secret()
+    )
+    folder, results = Path(told["folder"]), Path(told["results"])
+    grid = []
+    for name, seed in (("second", 2), ("first", 1)):
+        (folder / f"{seed}.safetensors").write_bytes(pack_entry(untrained_run(tmp_path, name, seed=seed)))
+        grid.append({"file": f"{seed}.safetensors", "name": name})
+    about = {"document": dict(announced.document), "commitment": announced.commitment, "track": "oval", "seed": 7}
+    status, said = judge.judge({**about, "grid": grid, "folder": str(folder), "results": str(results)})
+    assert said == json.dumps({"steps": [128, 64]})
+    assert status == DROVE
+    assert read_replay(results / JUDGED).names == ("second", "first")
 
 
 @locked
