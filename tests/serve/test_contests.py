@@ -232,7 +232,7 @@ def test_what_cannot_be_driven_is_refused(console: RunningConsole, cars: list[di
 def test_a_heat_may_start_where_a_secret_says(
     console: RunningConsole, cars: list[dict[str, str]], tmp_path: Path
 ) -> None:
-    asked = {"models": cars, "track": "oval", "secret": True}
+    asked = {"models": cars, "track": "oval", "secret": True, "max_resets": 1}
     told = console.client.post("/api/contests/heats", json=asked).json()
     assert (len(told["commitment"]), told["secret"], told["seed"]) == (64, "", None)
     file = console.runs / ".racecraft" / "contests" / told["id"] / "race.replay"
@@ -254,13 +254,13 @@ def test_a_heat_may_start_where_a_secret_says(
     both = console.client.post("/api/contests/heats", json=asked | {"seed": 3})
     assert both.status_code == 422
     assert both.json()["error"]["message"] == "secret and seed are two ways to say where the heat starts; give one."
-    known = console.client.post("/api/contests/heats", json={"models": cars, "track": "oval", "seed": 3}).json()
+    known = console.client.post("/api/contests/heats", json=asked | {"secret": False, "seed": 3}).json()
     assert (known["commitment"], known["secret"], known["seed"]) == ("", "", 3)
     assert console.wait_for(over(console, known["id"]))["secret"] == ""
 
 
 def test_ghosts_accompany_the_film_of_a_heat(console: RunningConsole, cars: list[dict[str, str]]) -> None:
-    settings: dict[str, Any] = {"models": cars, "track": "oval", "seed": 5}
+    settings: dict[str, Any] = {"models": cars, "track": "oval", "seed": 5, "max_resets": 1}
     before = started(console, "heats", **settings)
     ghosts = [{"model": "bob", "checkpoint": "last"}, "best-lap", {"heat": before["id"]}]
     heat = started(console, "heats", **settings, ghosts=ghosts)

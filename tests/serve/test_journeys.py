@@ -99,6 +99,7 @@ def test_a_racer_lets_both_meet_and_a_spectator_watches(visit: Visit, tmp_path: 
     page = visit.open("/contests/new")
     page.get_by_role("button", name="Add all").click()
     page.get_by_label("Title").fill("Final")
+    page.get_by_label("Resets allowed").fill("1")  # beginners: the film is short
     page.get_by_role("button", name="Start the heat with 2").click()
     page.get_by_role("heading", name="The heat in 3D").wait_for()
     (heat,) = visit.console.client.get("/api/contests").json()

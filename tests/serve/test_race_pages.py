@@ -186,7 +186,7 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
 def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> None:
     client, console = visit.console.client, visit.console
     models = [{"model": "ada"}, {"model": "bob"}]
-    asked = {"models": models, "title": "Before", "seed": 1}
+    asked = {"models": models, "title": "Before", "seed": 1, "max_resets": 1}  # beginners: the film is short
     before = client.post("/api/contests/heats", json=asked).json()["id"]
     away = client.post("/api/contests/heats", json=asked | {"title": "Away", "track": "oval"}).json()["id"]
     for heat in (before, away):
@@ -195,6 +195,7 @@ def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> 
     for name in ("ada", "bob"):
         page.get_by_role("combobox", name="Add a model").select_option(name)
     page.get_by_role("combobox", name="Track").select_option("reinvent_2018")
+    page.get_by_label("Resets allowed").fill("1")
     assert page.get_by_label("Seed").is_visible()
     page.get_by_role("checkbox", name="From a secret").check()
     assert page.get_by_label("Seed").count() == 0
