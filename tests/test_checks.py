@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, require
+from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, is_number, require
 from racecraft.errors import ConfigError
 
 COLOURS = ("red", "green")
@@ -36,6 +36,14 @@ def test_other_than_numbers_are_refused(value: object) -> None:
     with pytest.raises(ConfigError) as error:
         check_number("share", value, 0.0, 1.0)
     assert str(error.value) == f"share is {value!r}; allowed is a number from 0 to 1."
+
+
+def test_what_a_finite_number_is() -> None:
+    numbers, others = [0, -1, 0.5, -1e308, 10**300], [True, "1", None, math.nan, math.inf, -math.inf, 10**400, 1j, [1]]
+    assert all(map(is_number, numbers))
+    assert not any(map(is_number, [*others, np.int64(1), np.float32(1.0)]))
+    assert all(is_number(value, is_plain=False) for value in [*numbers, np.int64(1), np.float32(1.0)])
+    assert not any(is_number(value, is_plain=False) for value in [*others, np.float32(math.inf), np.bool_(True)])
 
 
 @pytest.mark.parametrize("value", [-0.5, math.nan, math.inf, 10**400])

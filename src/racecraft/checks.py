@@ -23,6 +23,19 @@ def require(name: str, value: Any, is_met: bool, allowed: str) -> None:
         raise ConfigError(f"{name} is {shown(value)}; allowed is {allowed}.")
 
 
+def is_number(value: Any, *, is_plain: bool = True) -> bool:
+    """Whether a value is a finite number, which True and False are not.
+
+    Args:
+        value: Any object.
+        is_plain: Whether NumPy's numbers are none, too.
+    """
+    kinds = int | float if is_plain else int | float | np.integer | np.floating
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        return False
+    return abs(value) <= sys.float_info.max if isinstance(value, int) else math.isfinite(value)
+
+
 def check_whole(name: str, value: Any, low: int, high: int = MAX_COUNT, *, is_plain: bool = False) -> None:
     """Refuse what is not a whole number from low to high.
 
@@ -39,9 +52,7 @@ def check_whole(name: str, value: Any, low: int, high: int = MAX_COUNT, *, is_pl
 
 def check_number(name: str, value: Any, low: float, high: float = math.inf, *, is_plain: bool = False) -> None:
     """Refuse what is not a finite number from low to high; the arguments are those of `check_whole`."""
-    kinds = int | float if is_plain else int | float | np.integer | np.floating
-    is_number = isinstance(value, kinds) and not isinstance(value, bool)
-    is_within = is_number and low <= value <= min(high, sys.float_info.max)
+    is_within = is_number(value, is_plain=is_plain) and low <= value <= high
     require(name, value, is_within, f"a number from {low:g}" + (f" to {high:g}" if high < math.inf else ""))
 
 

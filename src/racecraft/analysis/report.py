@@ -21,6 +21,7 @@ from racecraft.analysis.learned import bands, checkpoint_table, rewards, stretch
 from racecraft.analysis.maps import draw_maps, iterations_of
 from racecraft.analysis.report_page import page, pairs, section, table
 from racecraft.analysis.svg import Chart, Curve, action_fan, cell_map, line_chart, racing_line
+from racecraft.checks import is_number
 from racecraft.errors import RacecraftError, RunError
 from racecraft.json_file import read_json_object
 from racecraft.judging.trained import is_road_of
@@ -317,8 +318,7 @@ def _column(points: Iterable[dict[str, Any]], name: str) -> NDArray[np.float64]:
 
 
 def _number(value: Any) -> float:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if is_number else math.nan
+    return float(value) if is_number(value) else math.nan
 
 
 def _seconds(value: Any) -> str:

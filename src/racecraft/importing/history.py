@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from racecraft.checks import is_number
 from racecraft.errors import RacecraftError, RunError
 from racecraft.fidelity.logs import Faults, read_logs
 from racecraft.importing.layout import Role, is_plain, role
@@ -79,7 +79,7 @@ def _count_metrics(path: Path) -> int:
     for number, line in enumerate(lines, 1):
         for key in _NUMBERS:
             value = line.get(key)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            if not is_number(value):
                 raise RunError(f"{key} of trial {number} is not a number.")
         if not isinstance(line.get("episode_status"), str):
             raise RunError(f"trial {number} has no episode_status.")

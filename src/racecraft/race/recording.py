@@ -68,8 +68,8 @@ class Recording:
         """Poses, as `poses`, in which pictures of a camera of this age (s) were taken, between two steps  (T, 3)."""
         before, moved = self.poses[:-1], np.diff(self.poses, axis=0)
         moved[:, 2] = np.arctan2(np.sin(moved[:, 2]), np.cos(moved[:, 2]))
-        stands = np.isin(self.column("status")[1:], [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")])
-        share = np.where(stands, 0.0, round(age / CONTROL_DT * SUBSTEPS) / SUBSTEPS)  # who was put somewhere did not drive there
+        placed = [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")]  # who did not drive there
+        share = np.where(np.isin(self.column("status")[1:], placed), 0.0, round(age / CONTROL_DT * SUBSTEPS) / SUBSTEPS)
         return np.vstack([self.poses[:1], before + (1.0 - share[:, None]) * moved])
 
     @cached_property

@@ -20,11 +20,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import is_number
 from racecraft.errors import CheckpointError, did_you_mean
 from racecraft.json_file import parse_json_object
 from racecraft.run.atomic import TEMPORARY, write_file, write_json
@@ -392,9 +393,9 @@ def _whole(value: object) -> int:
 
 
 def _number(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):  # a text may say "nan"
+    if not is_number(value):  # a text may say "nan"
         raise ValueError(f"{str(value)[:40]!r} is no number")
-    return float(value)
+    return float(cast(float, value))
 
 
 def _encode(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> list[memoryview]:

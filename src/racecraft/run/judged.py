@@ -14,6 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
+from racecraft.checks import is_number
 from racecraft.errors import ConfigError, RacecraftError, RunError
 from racecraft.json_file import parse_json_line, read_json_object
 from racecraft.run.folder import RunFolder, RunInfo
@@ -112,5 +113,4 @@ def _roads(names: str, digest: str) -> frozenset[str]:
 
 
 def _number(value: Any) -> float | None:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if is_number and math.isfinite(value) and value >= 0 else None
+    return float(value) if is_number(value) and value >= 0 else None

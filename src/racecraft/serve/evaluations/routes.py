@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any, Final
 
 from fastapi import APIRouter
 
+from racecraft.checks import is_number
 from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
 from racecraft.race.rules import RULE_SETS
@@ -24,7 +24,7 @@ router = APIRouter(prefix="/api/models/{name}/evaluations", tags=["evaluations"]
 
 def _number(text: str) -> float:
     value = float(text)
-    if not math.isfinite(value):
+    if not is_number(value):
         raise ValueError(f"{text[:40]!r} is no number")
     return value
 
