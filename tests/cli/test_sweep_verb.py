@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from command_line import Run
 
+from racecraft.sweeping import Sweep
+
 FILE = "seeds = [1]\n[all]\ntrack = 'oval'\nuntil = '256 steps'\nnum_envs = 8\n"
 ACTIONS = [{"steering_angle": angle, "speed": 1.0} for angle in (-20, 0, 20)]
 
@@ -42,6 +44,7 @@ def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None
     told = racecraft("sweep", "sweep.toml", "--name", "s", "--processes", "1", "--json")
     assert told.status == 0, told.err
     assert told.document["notes"] == notes
+    assert Sweep("runs", "s").notes == tuple(notes)  # the console tells them, too
     said = racecraft("sweep", "sweep.toml", "--name", "t", "--processes", "1")
     assert [note in " ".join(said.err.split()) for note in notes] == [True, True]
     assert "has no effect" not in said.out

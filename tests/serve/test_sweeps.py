@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
 from browsers import needs_axe, needs_browser, needs_pages, visiting
 from running_consoles import RunningConsole
+
+from racecraft.sweeping import Sweep
 
 pytestmark = pytest.mark.costly
 
@@ -107,6 +110,11 @@ def test_the_page_starts_a_sweep_and_shows_its_board(console: RunningConsole) ->
         page.get_by_text("4 of 4 trained").wait_for(timeout=120_000)
         assert page.get_by_role("link", name="Seed 2 · trained").count() == 2
         assert page.locator("tr.begun").count() == 2
+        file = Sweep(console.runs, "paged").file  # as one that was made of files, by the command line
+        told = {"notes": ["Setting 'bold': one.json: unknown field 'preview' has no effect."]}
+        file.write_text(json.dumps(json.loads(file.read_text()) | told))
+        tab.open("/sweeps/paged").get_by_text("What to know of its files").click()
+        page.get_by_text("unknown field 'preview' has no effect.").wait_for()
         assert tab.complaints == []
         for theme, language in (("light", "en"), ("dark", "de")):
             tab.look(theme, language)

@@ -47,6 +47,18 @@ def test_what_may_be_searched(console: RunningConsole, model: str) -> None:
     refused(console.client.get("/api/models/nobody/tunings/space"), 404)
 
 
+def test_a_search_tells_what_of_the_models_files_has_no_effect(console: RunningConsole) -> None:
+    actions = [{"steering_angle": angle, "speed": 1.0, "index": index} for index, angle in enumerate((-30, 30))]
+    metadata = {"action_space": actions, "neural_network": "RACECRAFT_SMALL", "preview": 1}
+    name = console.create(name="noted", track="oval", reward=REWARD, train=False, model_metadata=metadata)
+    path = f"/api/models/{name}/tunings"
+    job = console.client.post(path, json={"search": [GAMMA], "trials": 1, "trial_steps": 500}).json()
+    (card,) = console.client.get(path).json()
+    assert card["notes"] == ["model_metadata.json: unknown field 'preview' has no effect."]
+    console.client.post(f"/api/jobs/{job['id']}/cancel")
+    console.wait_for(console.job_ended(job["id"]))
+
+
 @pytest.mark.slow
 def test_a_search_whose_best_trial_becomes_a_model(console: RunningConsole, model: str) -> None:
     client, path = console.client, f"/api/models/{model}/tunings"

@@ -130,6 +130,7 @@ def make_tuning(
                 "settings": plan.settings.to_dict(),
                 "parent": None if plan.parent is None else plan.parent.address,
                 "foreign": plan.foreign,
+                "notes": list(plan.notes),
             },
         )
     except FileExistsError as error:

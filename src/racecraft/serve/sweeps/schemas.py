@@ -71,3 +71,5 @@ class SweepDetail(SweepCard):
 
     places: list[SweepPlace]
     runs: list[SweepRun]
+    notes: list[str]
+    """What was said of files and parents when it was made."""

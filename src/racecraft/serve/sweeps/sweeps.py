@@ -123,7 +123,7 @@ class Sweeps:
                         )
                     )
         places = [SweepPlace.model_validate(place) for place in sweep.board().to_dict()["places"]]
-        return SweepDetail(**self._card(sweep, jobs).model_dump(), places=places, runs=runs)
+        return SweepDetail(**self._card(sweep, jobs).model_dump(), places=places, runs=runs, notes=list(sweep.notes))
 
     def _sweep(self, name: str) -> Sweep:
         if name not in sweep_names(self._garage.runs):

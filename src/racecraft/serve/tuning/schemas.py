@@ -85,6 +85,8 @@ class TuningCard(Message):
     """Number of the best trial."""
     importances: dict[str, float]
     """How much each number mattered, adding up to 1; empty with too few trials."""
+    notes: list[str]
+    """What was said of the model's files when it began."""
     error: str
 
 

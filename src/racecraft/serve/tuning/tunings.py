@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 FOLDER: Final = "tunings"  # inside the state folder
 _ID: Final = re.compile(r"[0-9a-f]{16}")
+_WHERE: Final = re.compile(r"^.*/(?=model_metadata\.json: )")
+"""Where a file of the model lies, which is nobody's business."""
 
 
 class Tunings:
@@ -205,6 +207,7 @@ class Tunings:
             trials=[_trial(folder, trial) for trial in found["trials"]],
             best=found["best"]["number"] if found["best"] else None,
             importances=found["importances"],
+            notes=[_WHERE.sub("", str(note)) for note in document.get("notes", ())],  # older ones have none
             error=str((job.error or {}).get("message", "")),
         )
 

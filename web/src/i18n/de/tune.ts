@@ -29,6 +29,7 @@ export const tune: Record<keyof typeof english, string> = {
   tune_state_cancelled: "Abgebrochen",
   tune_trials: "Versuche",
   tune_trial: "Versuch",
+  tune_notes: "Was zu seinen Dateien zu wissen ist",
   tune_all: "Alle {count} Versuche",
   tune_best: "Bester",
   tune_yours: "Deine Zahlen",

@@ -27,6 +27,7 @@ export const tune = {
   tune_state_cancelled: "Cancelled",
   tune_trials: "Trials",
   tune_trial: "Trial",
+  tune_notes: "What to know of its files",
   tune_all: "All {count} trials",
   tune_best: "Best",
   tune_yours: "Your numbers",
