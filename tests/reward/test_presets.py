@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from racecraft.reward.painting import OFFSETS, paint_presets, paint_reward
 from racecraft.reward.params import TEMPLATE
 from racecraft.reward.source import load_preset, preset_names
+from racecraft.sim.objects import objects_for_race
 from racecraft.track import load_track
 
 EAST = {"waypoints": [(0.0, 0.0), (1.0, 0.0), (0.0, 0.0)], "closest_waypoints": [0, 1]}
@@ -226,6 +228,24 @@ def test_overtake_is_lap_time_with_something_for_passing():
     assert overtake(0.2, is_offtrack=True, **AHEAD) == -1.0
     assert overtake(0.2, is_crashed=True, is_offtrack=True, **AHEAD) == -2.0
     assert reward("overtake", steps=7.0, progress=50.0, **AHEAD) == 0.0  # the first step it sees
+
+
+@pytest.mark.costly
+def test_a_reward_is_painted_among_the_objects_that_it_asks_for():
+    """Most where the nearest is close, and the nearest of them by the grid is where it stands."""
+    closeness = "def reward_function(params):\n    return 1 / (0.1 + min(params['objects_distance']))\n"
+    away = "def reward_function(params):\n    return -min(abs(x) + abs(y) for x, y in AWAY(params))\n"
+    away = away.replace("AWAY(params)", "[(a - params['x'], b - params['y']) for a, b in params['objects_location']]")
+    track = load_track("oval")
+    assert np.isnan(paint_reward(closeness, track).rewards).all()  # nothing is there
+    for road in ({"objects": objects_for_race("object-avoidance", settings={})}, {"cars_per_race": 3}):
+        assert np.isfinite(paint_reward(closeness, track, **road).rewards).all()
+        painting = paint_reward(away, track, **road)
+        for place in painting.objects:
+            nearest = np.abs(painting.points - place).sum(axis=-1)
+            assert painting.rewards[nearest < 0.2].min() > painting.rewards.mean()
+        most = painting.points[np.unravel_index(painting.rewards.argmax(), painting.rewards.shape)]
+        assert np.abs(painting.objects - most).sum(axis=-1).min() == pytest.approx(-painting.rewards.max(), abs=1e-6)
 
 
 @pytest.mark.costly

@@ -68,11 +68,20 @@ def test_a_reward_is_checked_and_painted(console: RunningConsole) -> None:
     alone = client.post("/api/rewards/check", json=among).json()
     assert not alone["ok"]
     assert "IndexError" in alone["problems"][0]["message"]
-    for race in ({"race": "object-avoidance"}, {"race": "head-to-bot", "objects": 1}, {"race": "head-to-head"}):
-        assert client.post("/api/rewards/check", json={**among, **race}).json()["ok"], race
+    assert verdict["painting"]["objects"] == []
+    for race, count in (
+        ({"race": "object-avoidance"}, 6),
+        ({"race": "head-to-bot", "objects": 1}, 1),
+        ({"race": "head-to-head"}, 1),
+    ):
+        told = client.post("/api/rewards/check", json={**among, **race}).json()
+        assert told["ok"], race
+        assert len(told["painting"]["objects"]) == count  # and what it pays is known everywhere
+        assert all(value is not None for row in told["painting"]["rewards"] for value in row)
     boxes = {"name": "among-boxes", "train": False, "track": "oval", "race": "object-avoidance"}
     assert client.post("/api/models", json=boxes).status_code == 201
-    assert client.post("/api/rewards/check", json={**among, "of": "among-boxes"}).json()["ok"]
+    told = client.post("/api/rewards/check", json={**among, "of": "among-boxes"}).json()
+    assert (told["ok"], len(told["painting"]["objects"])) == (True, 6)
     nowhere = client.post("/api/rewards/check", json={**among, "race": "downhill"})
     assert (nowhere.status_code, "downhill" in nowhere.json()["error"]["message"]) == (422, True)
     broken = client.post("/api/rewards/check", json={"source": "def reward_function(p:\n", "track": "oval"}).json()

@@ -159,9 +159,9 @@ def situations(track: Track, *, objects: Objects = NO_OBJECTS, cars_per_race: in
     found = _situations(track)
     if not objects.count + cars_per_race - 1:
         return found
-    placed = [_place_objects(track, objects, cars_per_race, direction) for direction in ("forward", "reverse")]
+    placed = [place_objects(track, objects, cars_per_race, direction) for direction in ("forward", "reverse")]
     track_index = ROW_COLUMNS.index("track_index")
-    found = [replace(one, row=_among(one.row, placed[int(one.row[track_index])])) for one in found]
+    found = [replace(one, row=among(one.row, placed[int(one.row[track_index])])) for one in found]
     return [*found[:-1], *_beside_objects(track, placed[0]), found[-1]]
 
 
@@ -235,7 +235,7 @@ def _situations(track: Track) -> list[Situation]:
     ]
 
 
-def _place_objects(track: Track, objects: Objects, cars_per_race: int, direction: str) -> npt.NDArray[np.float64]:
+def place_objects(track: Track, objects: Objects, cars_per_race: int, direction: str) -> npt.NDArray[np.float64]:
     """Where the simulation puts objects and other cars at the beginning of an episode  (objects, columns)."""
     simulation = Simulation(
         track,
@@ -262,26 +262,25 @@ def _beside_objects(track: Track, objects: npt.NDArray[np.float64]) -> list[Situ
     near = moment(track, place - NEAR, steps=110, offset=offset)
     crash = moment(track, place - 0.5 * NEAR, steps=112, offset=offset, status="crashed")
     return [
-        Situation("near an object", "Straight towards an object.", _among(near, objects)),
-        Situation("crash", "Into an object, end of the episode.", _among(crash, objects)),
+        Situation("near an object", "Straight towards an object.", among(near, objects)),
+        Situation("crash", "Into an object, end of the episode.", among(crash, objects)),
     ]
 
 
-def _among(row: npt.NDArray[np.float64], objects: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """The row of a car among objects."""
-    values = dict(zip(ROW_COLUMNS, row.tolist(), strict=True))
+def among(rows: npt.NDArray[np.float64], objects: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Rows of a car among objects, as `place_objects` has them  (…, columns with theirs)."""
+    values = {name: rows[..., index, None] for index, name in enumerate(ROW_COLUMNS)}
     ahead = (objects[:, _DISTANCE] - values["projection_distance"]) % values["track_length"]
     x, y = objects[:, _X] - values["x"], objects[:, _Y] - values["y"]
     angle = np.arctan2(y, x) - values["heading"]
-    is_seen = (np.cos(angle) > math.cos(HALF_VIEW)).any()
     header = {
-        "closest_object_prev": ahead.argmax(),
-        "closest_object_next": ahead.argmin(),
-        "object_in_camera": is_seen,
-        "crashed_object": np.hypot(x, y).argmin() if values["is_crashed"] else -1,
+        "closest_object_prev": ahead.argmax(axis=-1),
+        "closest_object_next": ahead.argmin(axis=-1),
+        "object_in_camera": (np.cos(angle) > math.cos(HALF_VIEW)).any(axis=-1),
+        "crashed_object": np.where(values["is_crashed"][..., 0], np.hypot(x, y).argmin(axis=-1), -1),
     }
-    told = [float(header[name]) for name in OBJECT_HEADER]
-    return np.concatenate((row, told, objects.ravel()))
+    told = np.stack([header[name].astype(np.float64) for name in OBJECT_HEADER], axis=-1)
+    return np.concatenate((rows, told, np.broadcast_to(objects.ravel(), (*rows.shape[:-1], objects.size))), axis=-1)
 
 
 def moment(

@@ -2,7 +2,7 @@
 
 The car drives laps at a usual speed, each at its own distance from the centre line and step after step, so that
 functions that remember something, or pay for progress between two calls, answer as they do in a training. Some of the
-steps are painted.
+steps are painted. Objects and other cars stand where an episode has them at its beginning.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import RewardError
-from racecraft.reward.dry_run import HALF_CAR, STEP_SECONDS, TYPICAL_SPEED, moment
+from racecraft.reward.dry_run import HALF_CAR, STEP_SECONDS, TYPICAL_SPEED, among, moment, place_objects
 from racecraft.reward.params import make_params
 from racecraft.reward.source import load_preset, preset_names
 from racecraft.reward.worker import RewardWorker, waypoints_of
-from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
+from racecraft.sim import NO_OBJECTS, Objects
+from racecraft.sim.columns import OBJECT_COLUMNS, ROW_COLUMNS, STATUS_NAMES
 from racecraft.track.track import Track
 
 PLACES: Final = 96
@@ -38,14 +39,26 @@ class Painting:
     """x, y in m  (P, O, 2)."""
     rewards: NDArray[np.float64]
     """NaN where the function failed  (P, O)."""
+    objects: NDArray[np.float64]
+    """x, y in m of what stands on the road besides  (K, 2)."""
 
 
-def paint_reward(source: str, track: Track, *, timeout_s: float = 0.5, foreign: bool = False) -> Painting:
+def paint_reward(
+    source: str,
+    track: Track,
+    *,
+    objects: Objects = NO_OBJECTS,
+    cars_per_race: int = 1,
+    timeout_s: float = 0.5,
+    foreign: bool = False,
+) -> Painting:
     """Ask a reward function what it pays everywhere on a track.
 
     Args:
         source: Text of a ``reward_function.py`` that has been checked.
         track: Where.
+        objects: What stands and drives there: the run's own, as a function may rely on them.
+        cars_per_race: Cars that share the track; the others are objects, too.
         timeout_s: How long one call may take, s; after a failure the rest stays NaN.
         foreign: The source is somebody else's; see `RewardWorker`.
 
@@ -54,8 +67,13 @@ def paint_reward(source: str, track: Track, *, timeout_s: float = 0.5, foreign: 
     """
     rows, between = _laps(track)
     painted = slice(1, None, between)
+    placed = np.empty((0, len(OBJECT_COLUMNS)))
+    if num_objects := objects.count + cars_per_race - 1:
+        placed = place_objects(track, objects, cars_per_race, "forward")
+        rows = among(rows, placed)
     rewards = np.full(rows.shape[:2], np.nan)
-    with RewardWorker(source, track, timeout_s=timeout_s, foreign=foreign) as worker:
+    options: dict[str, Any] = {"timeout_s": timeout_s, "foreign": foreign, "num_objects": num_objects}
+    with RewardWorker(source, track, **options) as worker:
         for across in range(len(OFFSETS)):
             try:
                 rewards[:, across] = worker(rows[:, across])
@@ -63,7 +81,13 @@ def paint_reward(source: str, track: Track, *, timeout_s: float = 0.5, foreign: 
                 break
     places = np.linspace(0.0, track.length, PLACES, endpoint=not track.is_closed)
     points = rows[painted][..., [_X, _Y]]
-    return Painting(places=places, offsets=np.array(OFFSETS), points=points, rewards=rewards[painted])
+    return Painting(
+        places=places,
+        offsets=np.array(OFFSETS),
+        points=points,
+        rewards=rewards[painted],
+        objects=placed[:, [OBJECT_COLUMNS.index("object_x"), OBJECT_COLUMNS.index("object_y")]],
+    )
 
 
 def paint_presets(track: Track) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]]]:

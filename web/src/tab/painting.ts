@@ -58,6 +58,7 @@ export async function paint(
     offsets: OFFSETS,
     points: rows.map((row) => laps.map((lap) => [rounded(lap[row]![x]!), rounded(lap[row]![y]!)])),
     rewards: rows.map((_, place) => paid.map((lap) => lap[place]!)),
+    objects: [],
   };
 }
 

@@ -133,12 +133,13 @@ def check(request: RewardCheck, context: InContext) -> RewardVerdict:
     ]
     if error is not None:
         return RewardVerdict(ok=False, problems=found, situations=situations, painting=None)
-    painted = paint_reward(request.source, track, foreign=foreign)
+    painted = paint_reward(request.source, track, objects=objects, cars_per_race=cars, foreign=foreign)
     painting = RewardPainting(
         places=painted.places.round(3).tolist(),
         offsets=painted.offsets.tolist(),
         points=painted.points.round(3).tolist(),
         rewards=[[value if math.isfinite(value) else None for value in row] for row in painted.rewards.tolist()],
+        objects=painted.objects.round(3).tolist(),
     )
     laps = _laps(context, request, foreign=foreign) if request.run is not None else []
     return RewardVerdict(ok=True, problems=found, situations=situations, painting=painting, laps=laps)

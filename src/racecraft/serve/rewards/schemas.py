@@ -82,7 +82,7 @@ class RewardSituation(Message):
 
 
 class RewardPainting(Message):
-    """What the function pays along a track: at places on a grid along and across, driving ahead at a usual speed."""
+    """What the function pays along a track: on a grid along and across, driving ahead at a usual speed."""
 
     places: list[float]
     """Metres along the centre line  (P,)."""
@@ -92,6 +92,8 @@ class RewardPainting(Message):
     """x, y of each  (P, O, 2)."""
     rewards: list[list[float | None]]
     """(P, O)"""
+    objects: list[list[float]]
+    """x, y of the boxes and other cars, which stand where an episode has them at its beginning  (K, 2)."""
 
 
 class RewardLap(Message):

@@ -158,6 +158,7 @@ export const create: Record<keyof typeof english, string> = {
   painting: "Was sie entlang der Strecke zahlt",
   painting_lead: "Geradeaus mit 1,5 m/s, an jeder Stelle quer über die Straße.",
   painting_low: "wenig",
+  painting_objects: "Dunkle Quadrate sind die Kisten und Autos, wo sie zu Beginn einer Episode stehen.",
   painting_high: "viel",
   checking: "Prüft …",
   reward_good: "Die Funktion ist in Ordnung.",

@@ -155,6 +155,7 @@ export const create = {
   painting: "What it pays along the track",
   painting_lead: "Driving ahead at 1.5 m/s, at every place across the road.",
   painting_low: "least",
+  painting_objects: "Dark squares are the boxes and cars, where an episode has them at its beginning.",
   painting_high: "most",
   checking: "Checking…",
   reward_good: "The function is fine.",
