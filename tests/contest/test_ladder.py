@@ -15,9 +15,11 @@ import pytest
 from made_up_trials import trial
 
 from racecraft.contest import ladder as ladders
-from racecraft.contest.ladder import Ladder, Match, hold_ladder
+from racecraft.contest.ladder import Ladder, Match, check_ladder, hold_ladder
 from racecraft.contest.ratings import Rating, rate
 from racecraft.contest.schedule import swiss_round
+from racecraft.contest.terms import check_kind
+from racecraft.errors import ConfigError
 from racecraft.race import RaceRules, Trial
 from racecraft.race.conditions import Conditions
 from racecraft.track import load_track
@@ -234,3 +236,12 @@ def test_a_ladder_as_json_names_its_models(driven: Driven) -> None:
     assert (best["name"], best["place"], best["wins"], best["losses"]) == ("model 1", 1, 1, 0)
     assert best["floor"] == best["rating"] - 3 * best["deviation"] < best["rating"]
     assert worst["rating"] < 25.0 < best["rating"]
+
+
+def test_one_model_is_too_few_in_a_sentence_that_reads_well() -> None:
+    with pytest.raises(ConfigError, match=r"^A ladder is of 2 to \d+ models; this one has 1\.$"):
+        check_ladder(1, kind="head-to-model", schedule="round-robin", starts=1, rounds=0)
+    with pytest.raises(ConfigError, match=r"^A grid race is of 2 to \d models; this one has 1\.$"):
+        check_kind("grid", 1)
+    with pytest.raises(ConfigError, match=r"^A head-to-model race is of 2 models; this one has 1\.$"):
+        check_kind("head-to-model", 1)

@@ -76,7 +76,7 @@ def test_widths_follow_the_points() -> None:
 @pytest.mark.parametrize(
     ("points", "widths", "message"),
     [
-        (((0, 0), (1, 1)), (1, 1), "allowed are 3 to 200"),
+        (((0, 0), (1, 1)), (1, 1), "A drawing has 3 to 200 points; this one has 2."),
         (((0, 0), (1, 1), (2, 0)), (1, 1), "each point has one"),
         (((0, 0), (math.nan, 1), (2, 0)), (1, 1, 1), "Point 2"),
         (((0, 0), (1e9, 1), (2, 0)), (1, 1, 1), "Point 2"),

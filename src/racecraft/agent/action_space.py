@@ -45,7 +45,7 @@ class DiscreteActionSpace:
             raise ShapeError(f"table has shape {self.table.shape}, expected (actions, 2): steering_angle, speed.")
         if not MIN_ACTIONS <= len(self.table) <= MAX_ACTIONS:
             count = len(self.table)
-            raise ConfigError(f"action_space has {count} actions; allowed is {MIN_ACTIONS} to {MAX_ACTIONS}.")
+            raise ConfigError(f"action_space has {MIN_ACTIONS} to {MAX_ACTIONS} actions; this one has {count}.")
         for index, (steering, speed) in enumerate(self.to_degrees()):
             _check(
                 f"action_space[{index}].steering_angle",

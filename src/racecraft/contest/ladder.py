@@ -296,7 +296,7 @@ def check_ladder(num_entries: int, *, kind: str, schedule: str, starts: int, rou
         ConfigError: Says what is allowed, or that OpenSkill is not installed.
     """
     if not 2 <= num_entries <= MAX_ENTRIES:
-        raise ConfigError(f"A ladder has {num_entries} models; allowed are 2 to {MAX_ENTRIES}.")
+        raise ConfigError(f"A ladder is of 2 to {MAX_ENTRIES} models; this one has {num_entries}.")
     check_choice("Race type of a ladder", kind, LADDER_KINDS)
     check_choice("schedule", schedule, SCHEDULES)
     check_whole("starts", starts, 1, MAX_STARTS)

@@ -140,7 +140,7 @@ def check_kind(kind: str, num_entries: int) -> None:
     low, high = {"head-to-model": (2, 2), "grid": (2, MAX_GRID)}.get(kind, (1, MAX_ENTRIES))
     if not low <= num_entries <= high:
         allowed = str(low) if low == high else f"{low} to {high}"
-        raise ConfigError(f"A {kind} race has {num_entries} models; allowed are {allowed}.")
+        raise ConfigError(f"A {kind} race is of {allowed} models; this one has {num_entries}.")
 
 
 def check_trials(kind: str, num_trials: int | None) -> int:

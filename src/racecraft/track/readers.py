@@ -194,7 +194,8 @@ def _parse_csv(content: bytes, path: Path) -> Floats:
             raise TrackError(f"{path.name} has more than {MAX_WAYPOINTS:,} waypoints.", hint="Resample it.")
         if len(fields) <= max(columns) or (columns == (0, 1, 2, 3) and len(fields) != 4):
             raise TrackError(
-                f"{path.name}, line {number} has {len(fields)} columns; a centre line has {', '.join(CSV_COLUMNS)}.",
+                f"{path.name}, line {number}: a centre line has the columns {', '.join(CSV_COLUMNS)}; "
+                f"this has {len(fields)}.",
                 hint="Other columns are allowed when the first line names them.",
             )
         try:

@@ -44,7 +44,7 @@ class Sketch:
     def __post_init__(self) -> None:
         count = len(self.points)
         if not MIN_POINTS <= count <= MAX_POINTS:
-            raise TrackError(f"The drawing has {count} points; allowed are {MIN_POINTS} to {MAX_POINTS}.")
+            raise TrackError(f"A drawing has {MIN_POINTS} to {MAX_POINTS} points; this one has {count}.")
         if len(self.widths) != count:
             raise TrackError(f"The drawing has {count} points and {len(self.widths)} widths; each point has one.")
         for number, (point, width) in enumerate(zip(self.points, self.widths, strict=True), start=1):

@@ -54,7 +54,7 @@ export const en = {
   bandit_run: "100 pulls",
   bandit_other: "Other machines",
   bandit_show: "Show the true chances",
-  bandit_said: "{count} pulls; regret {regret}",
+  bandit_said: "{count} {count|pull|pulls}; regret {regret}",
   bandit_curve: "Regret over the pulls",
   bandit_pulls: "{count} pulls",
   clip: "PPO's clip, by hand",

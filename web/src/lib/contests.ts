@@ -14,7 +14,7 @@ export const ladderKind = (kind: string): string =>
   t(kind === "head-to-model" ? "contests_kind_head_to_model" : (`races_kind_${kind.replaceAll("-", "_")}` as Key));
 
 /** How many laps, in words. */
-export const lapsOf = (count: number): string => t(count === 1 ? "races_one_lap" : "races_laps_count", { count });
+export const lapsOf = (count: number): string => t("races_laps_count", { count });
 
 /** What a heat or a ladder is called. */
 export const contestName = (contest: Pick<ContestCard, "title" | "models" | "is_ladder">): string =>

@@ -29,7 +29,8 @@ export const replay: Record<keyof typeof english, string> = {
   moment: "Moment der Runde",
   time_delta: "Rückstand auf die gewählte Runde, s",
   corner_report: "Kurven",
-  corner_lead: "Runde {lap} gegen die beste Durchfahrt aller {count} Runden. Jede Kurve in Bestzeit ergäbe {ideal}.",
+  corner_lead:
+    "Runde {lap} gegen die beste Durchfahrt der {count} {count|gefahrenen Runde|gefahrenen Runden}. Jede Kurve in Bestzeit ergäbe {ideal}.",
   corner: "Kurve",
   corner_best: "Beste",
   corner_lost: "Verloren",

@@ -12,7 +12,7 @@ export const sweeps: Record<keyof typeof english, string> = {
   sweeps_text_lead:
     "Unter [all] steht, was alle Trainings haben, unter [settings.…], was jede Einstellung dazu hat. Eine Belohnung ist eine Vorlage oder die eines Modells; numbers sind Hyperparameter und Konstanten der Belohnung.",
   sweeps_start: "Reihe starten",
-  sweeps_size: "{settings} Einstellungen × {seeds} Startwerte",
+  sweeps_size: "{settings} {settings|Einstellung|Einstellungen} × {seeds} {seeds|Startwert|Startwerte}",
   sweeps_goal_laps: "wenigste Schritte, bis alle Runden gefahren sind",
   sweeps_goal_lap_time: "schnellste Runde",
   sweeps_done: "{done} von {all} trainiert",
@@ -24,7 +24,7 @@ export const sweeps: Record<keyof typeof english, string> = {
   sweeps_setting: "Einstellung",
   sweeps_laps_after: "Alle Runden nach, Schritte",
   sweeps_range: "{mean} ({low} bis {high})",
-  sweeps_came: "{count} von {all} Startwerten kamen so weit",
+  sweeps_came: "{count} von {all} {all|Startwert|Startwerten} {count|kam|kamen} so weit",
   sweeps_tied: "gleichauf",
   sweeps_runs: "Trainings",
   sweeps_seed: "Startwert {seed}",

@@ -31,7 +31,7 @@ export const tracks: Record<keyof typeof english, string> = {
   tracks_edit: "Bearbeiten",
   tracks_copy: "Kopie bearbeiten",
   tracks_download: "Herunterladen",
-  tracks_count: "{count} Strecken",
+  tracks_count: "{count} {count|Strecke|Strecken}",
   tracks_surprise: "Überrasch mich",
   tracks_own_badge: "deine",
   tracks_found_none: "Keine Strecke passt zu diesen Filtern.",

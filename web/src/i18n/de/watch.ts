@@ -30,7 +30,7 @@ export const watch: Record<keyof typeof english, string> = {
   log_event: "Ereignis",
   log_whole: "Ganzes Protokoll: {count}",
   log_found: "{count} von {all}",
-  log_more: "{count} ältere stehen im Download.",
+  log_more: "{count} {count|älterer steht|ältere stehen} im Download.",
   stretch_branch: "Von Abschnitt {number} abzweigen",
   stretch_branch_lead:
     "Ein neues Modell mit den Gewichten, der Belohnung und den Zahlen von damals; dieses bleibt, wie es ist.",
@@ -67,9 +67,11 @@ export const watch: Record<keyof typeof english, string> = {
   tracks_many_lead:
     "Es lernt auf {count} Strecken zugleich, jedes Auto auf einer anderen. Eine Auswertung zeigt es auf einer davon.",
   starting_long: "Autos, Netz und Belohnung werden vorbereitet, seit {time}",
-  cars_wait: "{count} Autos warten, während das Netz aus ihren Fahrten lernt: seit {time}",
-  cars_teacher: "Zuerst lernt ein Lehrer, dem alles gesagt wird: seit {time}. Von ihm lernen dann {count} Autos",
-  cars: "{count} Autos lernen zugleich",
+  cars_wait:
+    "{count} {count|Auto wartet|Autos warten}, während das Netz aus {count|seiner Fahrt|ihren Fahrten} lernt: seit {time}",
+  cars_teacher:
+    "Zuerst lernt ein Lehrer, dem alles gesagt wird: seit {time}. Von ihm {count|lernt|lernen} dann {count} {count|Auto|Autos}",
+  cars: "{count} {count|Auto lernt|Autos lernen zugleich}",
   on_machine: "{told} · auf {machine}",
   not_live: "Gerade wird nicht trainiert.",
   no_scene: "Dieser Browser zeichnet hier kein 3D (WebGL fehlt oder ist ausgeschaltet). Alles andere geht.",
@@ -96,8 +98,8 @@ export const watch: Record<keyof typeof english, string> = {
   smoothing: "Glättung",
   as_table: "Als Tabelle",
   log: "Protokoll",
-  log_best: "Neues bestes Modell: {laps} von {trials} Runden, {completion}{lap}",
-  log_evaluation: "Auswertung: {laps} von {trials} Runden, {completion}{lap}",
+  log_best: "Neues bestes Modell: {laps} von {trials} {trials|Runde|Runden}, {completion}{lap}",
+  log_evaluation: "Auswertung: {laps} von {trials} {trials|Runde|Runden}, {completion}{lap}",
   hint_entropy:
     "Das Auto hat sich zu früh festgelegt: Es probiert kaum noch Neues. Ein größerer Entropie-Bonus oder ein neuer Anfang hilft.",
   hint_value: "Die Vorhersage der Belohnung läuft davon. Kleinere Belohnungen oder eine kleinere Lernrate helfen.",

@@ -55,7 +55,7 @@ export const contests = {
   contests_rounds_hint: "0: as many as find the best.",
   contests_more_tracks: "One more track",
   contests_no_track: "none",
-  contests_races_driven: "{count} races driven",
+  contests_races_driven: "{count} {count|race|races} driven",
   contests_state_queued: "Waiting",
   contests_state_running: "Driving",
   contests_state_done: "Decided",

@@ -25,7 +25,8 @@ export const replay = {
   moment: "Moment of the lap",
   time_delta: "Time behind the chosen lap, s",
   corner_report: "Corners",
-  corner_lead: "Lap {lap} against the best passage of all {count} laps. Every corner at its best would make {ideal}.",
+  corner_lead:
+    "Lap {lap} against the best passage of the {count} {count|lap|laps} driven. Every corner at its best would make {ideal}.",
   corner: "Corner",
   corner_best: "Best",
   corner_lost: "Lost",

@@ -9,7 +9,7 @@ export const sweeps = {
   sweeps_text_lead:
     "[all] holds what all trainings have, each [settings.…] what it has besides. A reward is a preset's name or a model's; numbers are hyperparameters and constants of the reward.",
   sweeps_start: "Start the sweep",
-  sweeps_size: "{settings} settings × {seeds} seeds",
+  sweeps_size: "{settings} {settings|setting|settings} × {seeds} {seeds|seed|seeds}",
   sweeps_goal_laps: "fewest steps until all laps are driven",
   sweeps_goal_lap_time: "fastest lap",
   sweeps_done: "{done} of {all} trained",
@@ -21,7 +21,7 @@ export const sweeps = {
   sweeps_setting: "Setting",
   sweeps_laps_after: "All laps after, steps",
   sweeps_range: "{mean} ({low} to {high})",
-  sweeps_came: "{count} of {all} seeds came so far",
+  sweeps_came: "{count} of {all} {all|seed|seeds} came so far",
   sweeps_tied: "tied",
   sweeps_runs: "Trainings",
   sweeps_seed: "Seed {seed}",

@@ -29,7 +29,7 @@ export const tracks = {
   tracks_edit: "Edit",
   tracks_copy: "Edit a copy",
   tracks_download: "Download",
-  tracks_count: "{count} tracks",
+  tracks_count: "{count} {count|track|tracks}",
   tracks_surprise: "Surprise me",
   tracks_own_badge: "yours",
   tracks_found_none: "No track fits these filters.",

@@ -27,7 +27,7 @@ export const watch = {
   log_event: "Event",
   log_whole: "Whole log: {count}",
   log_found: "{count} of {all}",
-  log_more: "{count} older ones are in the download.",
+  log_more: "{count} older {count|one is|ones are} in the download.",
   stretch_branch: "Branch from stretch {number}",
   stretch_branch_lead: "A new model with the weights, the reward and the numbers of then; this one stays as it is.",
   log_empty: "Nothing yet: evaluations and events appear here.",
@@ -63,9 +63,11 @@ export const watch = {
   tracks_many_lead:
     "It learns on {count} tracks at once, each car on another one. An evaluation shows it on one of them.",
   starting_long: "Preparing cars, network and reward, for {time}",
-  cars_wait: "{count} cars wait while the network learns from what they drove: {time} so far",
-  cars_teacher: "A teacher, told where everything is, learns first: {time} so far. {count} cars will learn from it",
-  cars: "{count} cars learning at once",
+  cars_wait:
+    "{count} {count|car waits|cars wait} while the network learns from what {count|it|they} drove: {time} so far",
+  cars_teacher:
+    "A teacher, told where everything is, learns first: {time} so far. {count} {count|car|cars} will learn from it",
+  cars: "{count} {count|car learning|cars learning at once}",
   on_machine: "{told} · on {machine}",
   not_live: "No training is running.",
   no_scene: "This browser draws no 3D here (WebGL is missing or switched off). All else works.",
@@ -92,8 +94,8 @@ export const watch = {
   smoothing: "Smoothing",
   as_table: "As a table",
   log: "Log",
-  log_best: "New best: {laps} of {trials} laps, {completion}{lap}",
-  log_evaluation: "Evaluation: {laps} of {trials} laps, {completion}{lap}",
+  log_best: "New best: {laps} of {trials} {trials|lap|laps}, {completion}{lap}",
+  log_evaluation: "Evaluation: {laps} of {trials} {trials|lap|laps}, {completion}{lap}",
   hint_entropy:
     "The car has made up its mind too early: it hardly tries anything new. A larger entropy bonus, or a fresh start, helps.",
   hint_value: "The forecast of future reward is running away. Smaller rewards or a smaller learning rate help.",

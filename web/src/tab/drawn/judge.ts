@@ -61,7 +61,7 @@ const between = (a: Line, b: Line, at: number) => Math.hypot(a[2 * at]! - b[2 * 
 function sketchTrouble({ points, is_closed: isClosed }: Sketch): Trouble | undefined {
   const count = points.length;
   if (count < MIN_POINTS || count > MAX_POINTS)
-    return { message: `The drawing has ${count} points; allowed are ${MIN_POINTS} to ${MAX_POINTS}.` };
+    return { message: `A drawing has ${MIN_POINTS} to ${MAX_POINTS} points; this one has ${count}.` };
   for (const [at, { x, y, width }] of points.entries()) {
     if (![x, y].every((value) => Math.abs(value) <= FARTHEST))
       return { message: `Point ${at + 1} is (${x}, ${y}); points lie within ${FARTHEST} m of the origin.` };
