@@ -205,6 +205,23 @@ def test_models_are_compared(studio: tuple[RunningConsole, Any]) -> None:
     assert page.get_by_role("region", name="Results").locator("tbody tr").count() == 2
 
 
+def test_models_that_are_compared_are_asked_for_once(studio: tuple[RunningConsole, Any]) -> None:
+    """Also where one answer comes before the other."""
+    page = studio[1]
+    asked: list[str] = []
+
+    def note(request: Any) -> None:
+        path = request.url.partition("/api/models/")[2]
+        asked.extend([path] if path in ("left", "right") or path.endswith("history?offset=0") else [])
+
+    page.on("request", note)
+    visit(studio, "/compare/left/right")
+    page.get_by_role("region", name="Results").locator("tbody tr").nth(1).wait_for()
+    page.wait_for_timeout(500)
+    page.remove_listener("request", note)
+    assert sorted(asked) == ["left", "left/history?offset=0", "right", "right/history?offset=0"]
+
+
 def test_a_model_is_compared_with_another_that_is_still_chosen(studio: tuple[RunningConsole, Any]) -> None:
     page = visit(studio, "/compare/left/right")
     code = page.get_by_role("region", name="Reward code")
