@@ -289,7 +289,8 @@ def test_ghosts_accompany_the_film_of_a_heat(console: RunningConsole, cars: list
 def evaluation(console: RunningConsole, cars: list[dict[str, str]]) -> dict[str, str]:
     """One of Ada's on the oval, as a ghost is asked for."""
     assert cars
-    job = console.client.post("/api/models/ada/evaluations", json={"laps": 1, "num_trials": 2, "seed": 9}).json()
+    asked = {"laps": 1, "num_trials": 2, "seed": 9, "rules": "first_lap"}  # or a beginner is filmed for minutes
+    job = console.client.post("/api/models/ada/evaluations", json=asked).json()
     assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
     (card,) = console.client.get("/api/models/ada/evaluations").json()
     return {"model": "ada", "evaluation": card["stamp"]}

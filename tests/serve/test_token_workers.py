@@ -166,7 +166,7 @@ def test_a_token_and_an_address_are_enough(place: Place) -> None:
         same_bits(calm, here := RunFolder(place.console.runs / "away"))
         assert here.history.read_bytes() == RunFolder(place.folder / "lab-1" / "away").history.read_bytes()
         with busy_at_home(place):
-            asked = {"laps": 1, "num_trials": 1}
+            asked = {"laps": 1, "num_trials": 1, "rules": "first_lap"}  # or a beginner is filmed for minutes
             evaluated = ok(client.post("/api/models/away/evaluations", json=asked), 202)["id"]
             assert place.done(evaluated)["machine"].startswith("lab-1#")
         (card,) = ok(client.get("/api/models/away/evaluations"))
