@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import resource
 import shutil
 import socket
 import sys
@@ -186,6 +187,17 @@ def test_a_child_has_nothing_of_its_judge_s_to_read_from_or_to_speak_through(
             os.close(file)
     assert (status, json.loads(said)) == (DROVE, {"heard": "", "place": "/"})
     assert capfd.readouterr() == ("", "")
+
+
+@locked
+def test_a_child_may_have_memory_beyond_what_its_judge_has_loaded(told: Told, monkeypatch: pytest.MonkeyPatch) -> None:
+    def look(*_: object, **__: object) -> tuple[dict[str, int], bytes]:
+        return {"most": resource.getrlimit(resource.RLIMIT_AS)[0]}, b""
+
+    monkeypatch.setattr(judge, "_drive", look)
+    status, said = judge._by_a_child(told, number=1)
+    assert status == DROVE
+    assert json.loads(said)["most"] - walls._taken() == pytest.approx(walls.MOST_MEMORY, rel=0.01)
 
 
 def test_a_heat_s_two_drive_from_their_own_files_under_their_own_names(told: Told, tmp_path: Path) -> None:
