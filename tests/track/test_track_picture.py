@@ -98,6 +98,15 @@ def test_wrong_endings(tmp_path: Path, name: str) -> None:
         draw_track(load_track("oval"), tmp_path / name)
 
 
+def test_a_picture_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / "taken.png").mkdir()
+    for name, why in (("nowhere/a.png", "No such file"), ("taken.png", "Is a directory")):
+        with pytest.raises(TrackError, match=rf"{name} cannot be written: {why}"):
+            draw_track(load_track("oval"), tmp_path / name)
+        with pytest.raises(TrackError, match=rf"{name} cannot be written: {why}"):
+            draw_contact_sheet([load_track("oval")], tmp_path / name)
+
+
 @pytest.mark.parametrize("width_px", [0, -5, 100, 10**9])
 def test_wrong_sizes(tmp_path: Path, width_px: int) -> None:
     with pytest.raises(TrackError, match="allowed are 320 to 6000"):

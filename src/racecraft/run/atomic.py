@@ -24,7 +24,7 @@ def write_file(path: Path, data: bytes | Iterable[bytes | memoryview], *, durabl
         durable: Wait until it survives a power cut; a rename alone survives a killed process.
 
     Raises:
-        OSError: Nothing was changed, or only the folder could not be synced.
+        OSError: Nothing was changed, or only the folder could not be synced; it names the file.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY}")
     try:
@@ -39,9 +39,11 @@ def write_file(path: Path, data: bytes | Iterable[bytes | memoryview], *, durabl
         finally:
             os.close(descriptor)
         os.replace(temporary, path)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):
             temporary.unlink()
+        if isinstance(error, OSError):  # of a full disk the system does not say where it was
+            error.filename, error.filename2 = str(path), None
         raise
     if durable:
         sync_folder(path.parent)

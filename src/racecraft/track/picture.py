@@ -133,10 +133,10 @@ class TrackPicture:
         """Writes the picture; the file's ending says how (.png, .jpg, .webp).
 
         Raises:
-            TrackError: The ending is not one of an image.
+            TrackError: The ending is not one of an image, or the file cannot be written.
         """
         path = _image_path(path)
-        self.image().save(path)
+        _write(self.image(), path)
         return path
 
     def _number_corners(self) -> None:
@@ -255,8 +255,15 @@ def draw_contact_sheet(
     for index, track in enumerate(tracks):
         row, column = divmod(index, columns)
         sheet.paste(_cell(track, (cell, height)), (margin + column * cell, head + row * height))
-    sheet.save(path)
+    _write(sheet, path)
     return path
+
+
+def _write(image: Image.Image, path: Path) -> None:
+    try:
+        image.save(path)
+    except OSError as error:
+        raise TrackError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def describe(track: Track) -> tuple[str, str]:
