@@ -72,6 +72,11 @@ def test_a_league_that_says_anything_is_shown_without_harm_or_refused(
     assert done.exit_code == 0 or isinstance(done.exception, league.LeagueRefused)
 
 
+def test_nobody_at_an_address_is_told_in_words() -> None:
+    with pytest.raises(league.LeagueRefused, match=r"does not answer as a league does: Connection refused\.$"):
+        league.League("http://127.0.0.1:1").begin_login()
+
+
 @pytest.mark.parametrize("answer", ["{}", '{"link": 1, "code": "", "secret": ""}', "[]", "NaN"])
 def test_what_is_no_league_lets_nobody_in(monkeypatch: pytest.MonkeyPatch, answer: str) -> None:
     monkeypatch.setattr(league.League, "_fetch", lambda *_, **__: answer.encode())

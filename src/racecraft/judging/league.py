@@ -190,6 +190,7 @@ class League:
                 raise _refusal(error, self.url) from error
         except (OSError, HTTPException, ValueError) as error:
             reason = getattr(error, "reason", error)
+            reason = getattr(reason, "strerror", None) or reason  # without its number
             raise LeagueRefused(f"{self.url} does not answer as a league does: {str(reason)[:200]}.") from error
 
 
