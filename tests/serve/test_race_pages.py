@@ -96,6 +96,18 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     page.get_by_role("link", name="ada", exact=True).wait_for()
 
 
+def test_a_moment_has_room_for_its_time_of_day(visit: Visit) -> None:
+    for width in (1440, 1000, 390):
+        page = visit.open("/races/new", width=width)
+        for name in ("Opens", "Closes"):
+            field = page.get_by_label(name)
+            box, around = field.bounding_box(), field.locator("xpath=..").bounding_box()
+            assert box is not None
+            assert around is not None
+            assert box["width"] >= 220  # mm/dd/yyyy, --:-- --
+            assert box["x"] + box["width"] <= around["x"] + around["width"] + 0.5  # not in the next one
+
+
 def test_a_race_for_practice_shows_everything_and_opens_again(visit: Visit) -> None:
     page = visit.open("/races/new")
     page.get_by_label("Title").fill("Practice")
@@ -320,6 +332,7 @@ def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
     ladder = page.url
     page.get_by_role("navigation").get_by_role("link", name="Races").click()
     page.get_by_role("link", name="Sunday ladder").wait_for()
+    assert page.get_by_text("Ladder · Two on one road").count() == 1
     page.goto(ladder)
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("heading", name="Models against models").wait_for()

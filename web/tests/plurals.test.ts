@@ -12,7 +12,7 @@ import { en as tabEn } from "../src/tab/en";
 
 const MANY: Record<string, RegExp> = {
   en: /(?<![\d.,])1 (?:[a-z]+ )?(?:laps|races|cars|tracks|racers|cards|people|seeds|settings|iterations|episodes|exits|boxes|pulls)\b/,
-  de: /(?<![\d.,])1 (?!der )(?:\p{Ll}+ )?(?:Runden|Autos|Bot-Autos|Strecken|Karten|Leute|Startwerte|Einstellungen|Iterationen|Episoden|Abflüge|Kisten)(?!\p{L})/u,
+  de: /(?<![\d.,])1 (?!der )(?:\p{Ll}+ )?(?:Runden|Autos|Bot-Autos|Strecken|Karten|Leute|Startwerte|Einstellungen|Iterationen|Episoden|Abflüge|Kisten|Fahrende)(?!\p{L})/u,
 };
 /** Of these there are never fewer than two. */
 const SEVERAL = ["tracks_many", "tracks_many_lead", "replay_same", "bandit_pulls"];

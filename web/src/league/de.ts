@@ -65,7 +65,7 @@ export const de: Record<LeagueKey, string> = {
   groups: "Gruppen",
   groups_none: "Du bist noch in keiner Gruppe.",
   group_organiser: "Du leitest sie",
-  group_racers: "{count} Fahrende",
+  group_racers: "{count} {count|Person|Fahrende}",
   group_new: "Neue Gruppe",
   group_title: "Name der Gruppe",
   group_title_example: "Klasse 7b",
