@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import json
 import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import pytest
 from racecraft import evaluate, train
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
 from racecraft.film.replay_film import film_replay
+from racecraft.judging import evaluation
 from racecraft.learn import PPOConfig
 from racecraft.run import RunFolder
 from racecraft.sim import CameraSpec, Vehicle
@@ -122,6 +125,33 @@ def test_a_folder_with_a_file_in_the_way_is_an_error_of_ours(tmp_path: Path) -> 
     (run / "mp4").write_text("in the way")
     with pytest.raises(RunError, match="cannot be written"):
         evaluate(run, **{**QUICK, "video": True})
+
+
+def test_two_evaluations_at_once_have_a_film_each_and_one_without_still_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, filming = trained(tmp_path), threading.Barrier(2, timeout=60.0)
+    film_it = evaluation.film
+
+    def together(*arguments: Any, **settings: Any) -> Path:
+        filming.wait()
+        return film_it(*arguments, **settings)
+
+    monkeypatch.setattr(evaluation, "film", together)
+    with ThreadPoolExecutor(2) as pool:
+        found = [one.result() for one in [pool.submit(evaluate, run, **{**QUICK, "video": True}) for _ in range(2)]]
+    assert sorted(one.files["video"].name for one in found) == ["0-video.mp4", "1-video.mp4"]
+    assert all(one.files["video"].stat().st_size > 1000 for one in found)
+
+    def full(*_: Any, **__: Any) -> Path:
+        raise RunError("No space left on device.")
+
+    monkeypatch.setattr(evaluation, "film", full)
+    with pytest.raises(RunError, match="No space left"):
+        evaluate(run, **{**QUICK, "video": True})
+    summaries = [json.loads(path.read_text()) for path in sorted(run.glob("evaluation-*/evaluation.json"))]
+    assert [summary["video"] is None for summary in summaries] == [False, False, True]
+    assert sorted(path.name for path in (run / "mp4/camera-pip").iterdir()) == ["0-video.mp4", "1-video.mp4"]
 
 
 def test_a_checkpoint_that_does_not_describe_its_network_is_refused(

@@ -53,7 +53,7 @@ def write_video(
         ConfigError: There is no encoder.
         RunError: The file cannot be written.
     """
-    unfinished = path.with_name(f".{path.stem}.part.mp4")
+    unfinished = path.with_name(f".{path.stem}.{os.getpid()}.part.mp4")
     write = _write_h264 if encoder() == H264 else write_av1
     try:
         write(pictures, unfinished, rate=rate, quality=quality)

@@ -10,8 +10,8 @@ mp4/camera-pip/<n>-video.mp4                             the best trial, filmed
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -265,24 +265,45 @@ def _write(
         "racing line": draw_racing_line(best.recording, inside / "racing-line.png", subtitle=folder.name),
     }
     write_replay(Replay.of(evaluation, title=folder.name), files["replay"])
-    if is_filmed:
-        videos = folder.videos / "camera-pip"
-        videos.mkdir(parents=True, exist_ok=True)
-        number = next(n for n in range(10**6) if not (videos / f"{n}-video.mp4").exists())
-        path = videos / f"{number}-video.mp4"
-        files["video"] = film(
-            best.recording,
-            path,
-            laps=evaluation.rules.laps,
-            name=folder.name,
-            palette=evaluation.conditions.palette,
-            ghosts=ghosts,
-            sensors=policy.sensors,
-        )
-    video = files["video"].relative_to(folder.path).as_posix() if is_filmed else None
     driven = provenance(evaluation.conditions).to_dict()
     vehicle = vehicle_note(evaluation.conditions.vehicle)
-    told = {"track_digest": evaluation.track.digest, "vehicle": vehicle, "driven": driven, "step": step, "video": video}
-    summary = {**evaluation.summary(), **told, **about}
-    write_json(inside / "evaluation.json", summary)
+    told = {"track_digest": evaluation.track.digest, "vehicle": vehicle, "driven": driven, "step": step, "video": None}
+    try:
+        if is_filmed:
+            with _new_video(folder.videos / "camera-pip") as path:
+                files["video"] = film(
+                    best.recording,
+                    path,
+                    laps=evaluation.rules.laps,
+                    name=folder.name,
+                    palette=evaluation.conditions.palette,
+                    ghosts=ghosts,
+                    sensors=policy.sensors,
+                )
+            told["video"] = path.relative_to(folder.path).as_posix()
+    finally:  # what was driven counts without its film, too
+        write_json(inside / "evaluation.json", {**evaluation.summary(), **told, **about})
     return files
+
+
+@contextmanager
+def _new_video(videos: Path) -> Iterator[Path]:
+    """The next free name, which an empty file holds against another evaluation until the video is in its place.
+
+    Raises:
+        RunError: The folder cannot be written.
+    """
+    try:
+        videos.mkdir(parents=True, exist_ok=True)
+        for number in range(10**6):
+            path = videos / f"{number}-video.mp4"
+            with suppress(FileExistsError):
+                path.touch(exist_ok=False)
+                break
+    except OSError as error:
+        raise RunError(f"{videos} cannot be written: {error.strerror or error}.") from error
+    try:
+        yield path
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
