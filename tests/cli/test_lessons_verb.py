@@ -63,6 +63,18 @@ def test_a_quiz_says_why(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> Non
         assert (outcome.status, "a letter for each" in outcome.err) == (1, True)
 
 
+@pytest.mark.filterwarnings("default")  # no errors, which they are in tests alone
+def test_a_quiz_is_told_where_its_score_cannot_be_kept(
+    racecraft: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "taken").write_text("mine")
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "taken"))
+    outcome = racecraft("lessons", "quiz", "1", "-a", letters(1))
+    assert outcome.status == 0
+    assert "right." in outcome.out
+    assert outcome.err == "warning: The score cannot be kept: Not a directory.\n"
+
+
 def test_notebooks_are_made_once(racecraft: Run, tmp_path: Path) -> None:
     told = racecraft("lessons", "open", "--no-start", "--json").document
     assert len(told["notebooks"]) == len(lessons())
