@@ -90,7 +90,7 @@ FIVE = ("gamma", "learning_rate", "update_epochs", "clip_coef", "gae_lambda")
         ("[settings.a]\nnumbers = { BORDER_LOSS = true }", "BORDER_LOSS is True; allowed is a finite number"),
         (
             "seeds = '1..100'\n[vary]\ngamma = [0.9, 0.91, 0.92, 0.93, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 0.995]",
-            "1000",
+            "A sweep of 1100 trainings, settings times seeds, is too long; allowed are 1000.",
         ),
         ("[vary]\n" + "\n".join(f"{name} = {list(range(30))}" for name in FIVE), "24300000 settings are more than 64"),
         ("[settings]\n" + "\n".join(f"a{number} = {{}}" for number in range(65)), "65 settings are more than 64"),

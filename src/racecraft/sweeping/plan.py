@@ -109,8 +109,10 @@ def read_sweep(
     goal = document.get("goal", "laps")
     check_choice("goal", goal, GOALS)
     seeds, rows = _seeds(document.get("seeds", "1..5")), _rows(document)
-    if len(rows) * len(seeds) > MAX_TRAININGS:
-        raise ConfigError(f"{len(rows)} settings with {len(seeds)} seeds are more than {MAX_TRAININGS} trainings.")
+    if (trainings := len(rows) * len(seeds)) > MAX_TRAININGS:
+        raise ConfigError(
+            f"A sweep of {trainings} trainings, settings times seeds, is too long; allowed are {MAX_TRAININGS}."
+        )
     settings = []
     for name, words in rows.items():
         with faults_of(name):
