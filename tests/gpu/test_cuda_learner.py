@@ -206,6 +206,7 @@ def test_training_goes_on_from_its_state():
         assert (second.learner.weights()[name] == weights).all()
 
 
+@pytest.mark.costly
 def test_what_a_gpu_does_not_train_is_refused():
     with pytest.raises(ConfigError, match="whole episodes"):
         open_ppo(config=PPOConfig(num_envs=32, episodes_per_iteration=20, minibatch_size=64))

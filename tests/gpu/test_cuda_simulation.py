@@ -106,6 +106,7 @@ def test_states_go_from_one_to_the_other(name, device):
         kernels.load(engine.save()[:-1])
 
 
+@pytest.mark.costly
 def test_seeds_and_finished_cars(device):
     kernels, engine = pair("small camera", device, cars=12)
     seeds = np.arange(100, 112, dtype=np.uint64)
@@ -123,6 +124,7 @@ def test_seeds_and_finished_cars(device):
         assert_same(kernels, engine, step)
 
 
+@pytest.mark.costly
 def test_only_frames_that_changed_are_drawn():
     kernels, _ = pair("small camera", cars=4)
     kernels.frames[:] = 7
@@ -150,6 +152,7 @@ def test_wrong_arguments_are_refused():
         _ = pair("boxes", cars=2)[0].rows
 
 
+@pytest.mark.costly
 def test_a_state_may_not_lead_a_kernel_astray():
     kernels, _ = pair("no camera", cars=2)
     saved = kernels.save()

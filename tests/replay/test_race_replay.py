@@ -304,6 +304,7 @@ def test_a_body_that_is_larger_than_races_of_its_file_are_is_refused_before_it_t
     )  # not too many of it
 
 
+@pytest.mark.costly
 def test_a_car_that_stands_for_half_a_day_is_written_so_that_it_is_read(clean: Path, tmp_path: Path) -> None:
     replay = read_replay(clean)
     car = replay.cars[0]
