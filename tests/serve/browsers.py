@@ -111,8 +111,9 @@ def visiting(console: RunningConsole) -> Iterator[Visit]:
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
-        page = browser.new_context().new_page()
-        page.add_init_script(FEW_FRAMES)
+        context = browser.new_context()
+        context.add_init_script(FEW_FRAMES)  # of every tab
+        page = context.new_page()
         page.set_default_timeout(1000 * PATIENCE)
         cookie = console.client.cookies["racecraft_session"]
         page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
