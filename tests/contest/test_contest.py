@@ -109,7 +109,7 @@ def test_a_total_needs_all_laps_and_the_other_rankings_as_many_as_are_asked_for(
     ("settings", "words"),
     [
         ({"kind": "time-trail"}, "time-trial"),
-        ({"kind": "head-to-model", "models": 3}, "allowed are 2"),
+        ({"kind": "head-to-model", "models": 3}, "is of 2 models; this one has 3"),
         ({"kind": "grid", "models": 9}, "2 to 8"),
         ({"ranking": "luck"}, "ranking"),
         ({"minimum_laps": 2}, "1 to 1"),
