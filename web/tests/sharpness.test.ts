@@ -3,7 +3,11 @@ import { Sharpness } from "../src/scene/sharpness";
 
 const draw = (sharpness: Sharpness, frames: number, time: (frame: number) => number): number => {
   let changes = 0;
-  for (let frame = 0; frame < frames; frame++) changes += Number(sharpness.took(time(frame)));
+  for (let frame = 0; frame < frames; frame++) {
+    const before = sharpness.ratio;
+    sharpness.took(time(frame));
+    changes += Number(sharpness.ratio !== before);
+  }
   return changes;
 };
 

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { Pace } from "./pace";
+import { Pace } from "../src/scene/pace";
 
 /** Frames drawn of those of a screen over a second. */
 function drawn(period: number, rate: number, from = 0): number[] {
