@@ -46,7 +46,7 @@ def test_a_learner_goes_through_three_lessons(visit: Visit) -> None:
     page.get_by_role("link", name="Explore or exploit?").click()
     page.get_by_role("button", name="Pull machine 2").focus()
     page.keyboard.press("Enter")
-    expect(page.get_by_text("1 pulls; regret")).to_be_visible()
+    expect(page.get_by_text("1 pull; regret")).to_be_visible()
     page.get_by_role("button", name="100 pulls").click()
     expect(page.get_by_text("101 pulls; regret")).to_be_visible()
     answer(page, 3)

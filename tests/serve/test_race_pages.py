@@ -336,7 +336,7 @@ def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
     page.goto(ladder)
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("heading", name="Models against models").wait_for()
-    page.get_by_role("link", name="Heat: ").wait_for()
+    page.get_by_role("link", name="Heat: bob, ada, ada@last", exact=True).wait_for()
     assert page.get_by_role("link", name="Sunday ladder").count() == 0
 
 
