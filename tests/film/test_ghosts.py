@@ -56,6 +56,20 @@ def test_the_best_lap_starts_again_with_every_lap() -> None:
     assert best_lap_ghost([recording.until(1.0)], color=BLUE) is None
 
 
+def test_a_ghost_accompanies_another_car_step_by_step_and_a_lap_does_so_again_and_again() -> None:
+    slow, fast = SLOW.trials[0].recording, FAST.trials[0].recording
+    beside = ghost_of(fast, name="fast", color=BLUE).beside(slow)
+    assert len(beside) == len(slow)
+    assert beside[len(fast) - 1] == ghost_of(fast, name="fast", color=BLUE).at(float(slow.clock[len(fast) - 1]))
+    assert beside[-1] is None  # it is home
+    lap = best_lap_ghost([fast], color=BLUE)
+    assert lap is not None
+    again = lap.beside(slow)
+    begins = [step for step in range(1, len(slow)) if slow.lap_numbers[step] != slow.lap_numbers[step - 1]]
+    assert begins
+    assert all(again[step] == lap.at(slow.lap_clock[0]) for step in begins)
+
+
 def test_the_driver_does_not_see_ghosts_and_people_do() -> None:
     recording = SLOW.trials[0].recording.until(1.5)
     ghost = ghost_of(FAST.trials[0].recording, name="fast", color=BLUE)

@@ -268,6 +268,17 @@ def test_ghosts_accompany_the_film_of_a_heat(console: RunningConsole, cars: list
     assert heat["heat"] == before["heat"]  # nobody who drives sees them
     films = [console.client.get(f"/api/contests/{one['id']}/video").content for one in (before, heat)]
     assert films[0] != films[1]
+    told = [console.client.get(f"/api/contests/{one['id']}/replay").json() for one in (before, heat)]
+    assert told[0] == told[1] | {"ghosts": []}
+    alone, *lap, again = told[1]["ghosts"]  # nobody may have driven a lap
+    first, longest = told[1]["cars"][0], max((car["trace"] for car in told[1]["cars"]), key=len)
+    assert (alone["name"], alone["is_lap"], len(alone["trace"])) == ("bob@last", False, len(longest))
+    assert len(alone["trace"][0]) == 3
+    assert again["name"] == before["heat"][0]["name"]
+    driven = [place for place in again["trace"] if place]
+    for there, here in zip(driven, first["trace"], strict=False):  # it was the best car of the very same heat
+        assert there == pytest.approx(here, abs=1)
+    assert len(lap) == any(row["best"] for row in heat["heat"])
     post = console.client.post
     for ghost, status in (
         ({"model": "nobody"}, 404),

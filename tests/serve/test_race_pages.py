@@ -282,6 +282,7 @@ def test_an_evaluation_drives_along_as_a_ghost(visit: Visit) -> None:
     page.get_by_role("button", name="Start the heat with 2").click()
     page.get_by_role("heading", name="The heat in 3D").wait_for()
     assert page.locator("dd", has_text="bob · ").count() == 1
+    assert page.locator(".stage li").all_inner_texts()[2:] == ["bob\nghost"]
     film = str(page.get_by_role("link", name="Video").get_attribute("href"))
     assert console.wait_for(console.job_ended(alone))["state"] == "done"
 

@@ -53,6 +53,11 @@ class Ghost:
         x, y, heading = self.poses[step].tolist()
         return CarView(x, y, heading, float(self.steering[step]), self.color, GHOST_ALPHA)
 
+    def beside(self, recording: Recording) -> list[CarView | None]:
+        """Where it is in every step of the car that it accompanies; None for steps in which it is not there  (T,)."""
+        clock = recording.lap_clock if self.is_lap else recording.clock
+        return [self.at(seconds) for seconds in clock.tolist()]
+
 
 @dataclass(frozen=True, eq=False)
 class Rival:

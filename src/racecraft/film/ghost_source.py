@@ -90,7 +90,8 @@ def _check_number(sources: Sequence[str]) -> None:
 def _from_replay(path: Path, track: Track, rules: RaceRules, color: Color) -> Ghost:
     replay = read_replay(path)
     best = replay.evaluation.best_trial
-    name = replay.title or replay.names[best.index]
+    driver = replay.names[best.index]
+    name = driver if replay.race else replay.title or driver  # of an evaluation only its title says who drove
     theirs, ours = driven_track(replay.conditions.track, replay.conditions.rules), driven_track(track, rules)
     if theirs.digest != ours.digest:
         raise ConfigError(

@@ -91,17 +91,15 @@ class Overlay:
     ) -> None:
         self._recording = recording
         self._laps = laps
-        numbers = recording.lap_numbers
-        self._lap = numbers.tolist()
-        first = np.concatenate(([True], np.diff(numbers) != 0))
-        began = recording.clock[np.flatnonzero(first)][np.cumsum(first) - 1] - CONTROL_DT
-        self._lap_time = (recording.clock - began).tolist()
+        self._lap = recording.lap_numbers.tolist()
+        self._lap_time = recording.lap_clock.tolist()
         self._best = _best_so_far(recording)
         self._speed = np.abs(recording.column("actual_speed")).tolist()
         self._steering = recording.column("actual_steering_angle").tolist()
         self._progress = recording.column("progress").clip(0.0, 1.0).tolist()
         self._mistake, self._remaining = _penalties(recording)
         self._ghosts = ghosts
+        self._beside = [ghost.beside(recording) for ghost in ghosts]
         self._map, self._pixels = _map(recording)
         self._places = self._pixels(recording.origins)
         field = [Rival(name, color, recording), *rivals] if rivals else []
@@ -114,8 +112,7 @@ class Overlay:
 
     def ghosts_at(self, step: int) -> list[CarView | None]:
         """Where every ghost is when the car is in a step; None for one that is no longer there."""
-        race, lap = float(self._recording.clock[step]), self._lap_time[step]
-        return [ghost.at(lap if ghost.is_lap else race) for ghost in self._ghosts]
+        return [views[step] for views in self._beside]
 
     def draw(self, frame: NDArray[np.uint8], step: int, *, is_over: bool = False) -> None:
         """Draw over the frame of a step.

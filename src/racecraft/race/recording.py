@@ -110,6 +110,13 @@ class Recording:
         return np.asarray(completed + 1 - is_last)
 
     @cached_property
+    def lap_clock(self) -> NDArray[np.float64]:
+        """Seconds since the lap of every step began, of its first step already one step  (T,)."""
+        first = np.concatenate(([True], np.diff(self.lap_numbers) != 0))
+        began = self.clock[np.flatnonzero(first)][np.cumsum(first) - 1] - CONTROL_DT
+        return np.asarray(self.clock - began)
+
+    @cached_property
     def lap_times(self) -> dict[int, float]:
         """Times of the laps completed in this recording by their number, s."""
         times = {}

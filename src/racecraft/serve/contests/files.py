@@ -2,6 +2,7 @@
 
 .racecraft/contests/<job>/race.replay    a heat, to be driven again by anybody
                           ghosts/0.replay  ghosts of its film that drove before, by their places among its ghosts
+                          ghosts.json    where all its ghosts were, beside the cars of the heat
                           video.mp4      of its winner, the others beside it
                           matches.zip    what both cars of every race of a ladder drove, a JSON document each
 
@@ -19,6 +20,7 @@ from racecraft.serve.problems import NotFound
 
 FOLDER: Final = "contests"
 REPLAY, VIDEO, MATCHES = "race.replay", "video.mp4", "matches.zip"
+BESIDE: Final = "ghosts.json"
 DRIVEN: Final = "driven.txt"
 """How many races of a ladder are decided."""
 

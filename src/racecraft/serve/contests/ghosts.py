@@ -1,6 +1,7 @@
-"""Ghosts of a heat's film: evaluations that can be some, and the replays of those that drove before.
+"""Ghosts of a heat: evaluations that can be some, the replays of those that drove before, and where they were.
 
 request ──replays_of──▶ replays ──keep──▶ the heat's own copies ──sources_of──▶ what `load_ghosts` takes
+                                          ghosts ──write_beside──▶ a file of the heat ──read_beside──▶ its page
 
 The copies are made when the heat is asked for: they travel with it to whoever drives it, and what they were copied from
 may be removed meanwhile.
@@ -8,22 +9,32 @@ may be removed meanwhile.
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from racecraft.errors import ConfigError, RacecraftError
 from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder, list_runs
-from racecraft.serve.contests.files import entry_name, ghost_file
+from racecraft.run.atomic import write_file
+from racecraft.serve.contests.files import BESIDE, entry_name, ghost_file
 from racecraft.serve.contests.schemas import EvaluatedCard
 from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.races.schemas import ReplayGhost
 from racecraft.track import Track
+
+if TYPE_CHECKING:
+    from racecraft.film.ghost import Ghost
+    from racecraft.race.recording import Recording
+    from racecraft.sim.views import CarView
 
 NEWEST: Final = 20
 """Evaluations of a model that are listed."""
 MAX_LISTED: Final = 500
+MAX_BESIDE: Final = 64 << 20
+"""Bytes of the file that says where a heat's ghosts were."""
 
 
 def evaluated(runs: Path, track: Track) -> list[EvaluatedCard]:
@@ -111,3 +122,41 @@ def sources_of(ghosts: Sequence[str | dict[str, Any]], *, folder: Path, runs: Pa
         else:
             raise ConfigError(f"The replay of ghost {number + 1} is not there.", hint="Start the heat again.")
     return found
+
+
+def write_beside(ghosts: Sequence[Ghost], recordings: Sequence[Recording], *, first: int, folder: Path) -> None:
+    """Keep where the ghosts of a heat were.
+
+    Args:
+        ghosts: As its film has them.
+        recordings: Of all its cars.
+        first: Number of the car that the film is about, with whose laps the fastest lap starts anew.
+        folder: Of the heat.
+    """
+    longest = max(recordings, key=len)
+    told = [
+        {
+            "name": ghost.name,
+            "is_lap": ghost.is_lap,
+            "trace": [_whole(view) for view in ghost.beside(recordings[first] if ghost.is_lap else longest)],
+        }
+        for ghost in ghosts
+    ]
+    write_file(folder / BESIDE, json.dumps({"ghosts": told}, separators=(",", ":")).encode(), durable=False)
+
+
+def read_beside(folder: Path) -> list[ReplayGhost]:
+    """Where the ghosts of a heat were; none in folders from before that was kept.
+
+    Raises:
+        ConfigError: The file is damaged.
+    """
+    path = folder / BESIDE
+    if not path.is_file():
+        return []
+    return [ReplayGhost(**ghost) for ghost in read_json_object(path, max_bytes=MAX_BESIDE)["ghosts"]]
+
+
+def _whole(view: CarView | None) -> list[int]:
+    """Pose of a car in mm and mrad; nothing of one that is not there."""
+    return [] if view is None else [round(1000 * value) for value in (view.x, view.y, view.heading)]

@@ -12,6 +12,7 @@ from fastapi.responses import FileResponse
 
 from racecraft.contest.terms import TOGETHER
 from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
+from racecraft.serve.contests.ghosts import read_beside
 from racecraft.serve.contests.schemas import ContestCard, ContestDetail, EvaluatedCard, NewHeat, NewLadder
 from racecraft.serve.context import Computes, InContext, TakesPlace
 from racecraft.serve.problems import NotFound
@@ -126,21 +127,21 @@ def get_contest_replay(
     if not found.is_ladder:
         driven = [car.recording for car in read_replay(context.contests.file(contest, REPLAY)).cars]
         cars = [car_of(row.car, row.name, driven[row.car], is_alone=False) for row in found.heat]
-        track, road = found.tracks[0], road_of(*driven)
+        track, road, ghosts = found.tracks[0], road_of(*driven), read_beside(context.contests.folder(contest))
     else:
         document = read_match(context.contests.file(contest, MATCHES), match or 0)
         row = next((one for one in found.matches if one.number == (match or 0)), None)
         if row is None:
             raise NotFound(f"The ladder has no race {match}.")
         order = sorted(range(len(row.models)), key=lambda car: row.places[car])
-        two, road = document["cars"], []
+        two, road, ghosts = document["cars"], [], []
         before: dict[str, Any] = {"objects": []}  # in files from before they were kept
         cars = [ReplayCar(entry=car, model=row.models[car], **(before | two[car])) for car in order]
         if found.kind in TOGETHER:  # what stood there stood there for both, as whoever drove longer saw it
             road = max(cars, key=lambda car: len(car.trace)).objects
             cars = [car.model_copy(update={"objects": []}) for car in cars]
         track = document["track"]
-    return replay_of(track, context.courses.load(track), cars, trial=0, objects=road)
+    return replay_of(track, context.courses.load(track), cars, trial=0, objects=road, ghosts=ghosts)
 
 
 def _title(contest: ContestDetail) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder, entry_name
-from racecraft.serve.contests.ghosts import sources_of
+from racecraft.serve.contests.ghosts import sources_of, write_beside
 from racecraft.serve.contests.terms import terms_of
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.settings import STATE_FOLDER
@@ -66,6 +66,8 @@ def heat(task: Task) -> dict[str, Any]:
     write_replay(replay, folder / REPLAY)
     rows, first = contest.to_dict()["results"], contest.standings[0].car
     recordings = [trials[0].recording for trials in contest.trials]
+    ghosts = load_ghosts(sources, terms.conditions, recordings=recordings, colors=LIVERY[len(entries) % len(LIVERY) :])
+    write_beside(ghosts, recordings, first=first, folder=folder)
     film(
         recordings[first].until(FILMED),
         folder / VIDEO,
@@ -77,9 +79,7 @@ def heat(task: Task) -> dict[str, Any]:
             for car, name in enumerate(contest.names)
             if car != first
         ],
-        ghosts=load_ghosts(
-            sources, terms.conditions, recordings=recordings, colors=LIVERY[len(entries) % len(LIVERY) :]
-        ),
+        ghosts=ghosts,
         sensors=entries[first].sensors,
     )
     return {

@@ -12,7 +12,7 @@ from racecraft.race.recording import Recording
 from racecraft.replay.replay import read_replay
 from racecraft.serve.evaluations.objects import objects_in
 from racecraft.serve.evaluations.schemas import RoadObject
-from racecraft.serve.races.schemas import RaceReplay, ReplayCar
+from racecraft.serve.races.schemas import RaceReplay, ReplayCar, ReplayGhost
 from racecraft.serve.tracks.courses import geometry
 from racecraft.serve.tracks.schemas import TrackSector
 from racecraft.track import Track
@@ -55,6 +55,7 @@ def replay_of(
     trial: int,
     is_coarse: bool = False,
     objects: Sequence[RoadObject] = (),
+    ghosts: Sequence[ReplayGhost] = (),
 ) -> RaceReplay:
     """The same trial of some cars.
 
@@ -65,6 +66,7 @@ def replay_of(
         trial: From 0.
         is_coarse: Whether the poses are rounded so that nobody reads a driver's choices off them.
         objects: Boxes and bot cars of a road that all share.
+        ghosts: Cars beside them that were not there.
     """
     driven = driven_direction(track, [np.array(car.trace, float).reshape(-1, 3)[:, :2] / 1000 for car in cars])
     return RaceReplay(
@@ -74,4 +76,5 @@ def replay_of(
         sectors=[] if is_coarse else [TrackSector.of(sector) for sector in sectors_of(driven)],
         objects=list(objects),
         cars=cars,
+        ghosts=list(ghosts),
     )

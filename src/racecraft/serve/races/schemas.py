@@ -202,6 +202,16 @@ class ReplayCar(Message):
     """Boxes and bot cars of its own road, step by step; none where all share one."""
 
 
+class ReplayGhost(Message):
+    """A car that was not there, to be compared with those that were."""
+
+    name: str
+    is_lap: bool
+    """Whether it is the fastest lap of what is shown, again with every lap of the first car."""
+    trace: list[list[int]]
+    """x, y, heading every 1/15 s in whole mm and mrad, from the cars' first step on; nothing while it is not there."""
+
+
 class RaceReplay(Message):
     """The same trial of some entries side by side."""
 
@@ -215,3 +225,4 @@ class RaceReplay(Message):
     objects: list[RoadObject]
     """Boxes and bot cars of the road that all share, step by step; none where each drove on its own."""
     cars: list[ReplayCar]
+    ghosts: list[ReplayGhost]

@@ -97,6 +97,7 @@ export const races: Record<keyof typeof english, string> = {
   races_replay: "Wiederholung",
   races_replay_all: "Alle zusammen zeigen",
   races_play: "Abspielen",
+  races_ghost: "Geist",
   races_pause: "Pause",
   races_scrub: "Zeitpunkt im Rennen",
   races_pace: "Tempo",

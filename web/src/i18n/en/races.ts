@@ -94,6 +94,7 @@ export const races = {
   races_replay: "Replay",
   races_replay_all: "Replay all together",
   races_play: "Play",
+  races_ghost: "ghost",
   races_pause: "Pause",
   races_scrub: "Moment of the race",
   races_pace: "Pace",
