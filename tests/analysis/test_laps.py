@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,21 @@ def test_laps_are_read_back(tmp_path: Path, oval: Track) -> None:
     assert driven_direction(oval, [whole.points, part.points]) is oval
     backwards = driven_direction(oval.reversed(), [whole.points])
     assert backwards.point_at(1.0) == pytest.approx(oval.point_at(1.0), abs=0.05)
+
+
+def test_an_old_picture_was_taken_on_the_way_to_where_the_car_is(tmp_path: Path, oval: Track) -> None:
+    path = tmp_path / "0-iteration.csv"
+    write_trace(path, oval, [(2.0, "lap_complete", 1.0)])
+    (lap,) = read_laps(path)
+    now, then = lap.seen_from(0.0), lap.seen_from(DT / 2)
+    ahead = 0.14 * np.column_stack([np.cos(lap.heading), np.sin(lap.heading)])
+    assert now[:, :2] == pytest.approx(lap.points - ahead)
+    assert (now[:, 2] == lap.heading).all()
+    assert (then[0] == now[0]).all()  # nothing is known of before
+    assert then[1:, :2] == pytest.approx((now[1:, :2] + now[:-1, :2]) / 2)
+    put = replace(lap, puts=(7,)).seen_from(DT / 2)
+    assert (put[7] == now[7]).all()
+    assert (np.delete(put, 7, axis=0) == np.delete(then, 7, axis=0)).all()
 
 
 def test_steps_that_a_car_stands_are_its_penalty(tmp_path: Path, oval: Track) -> None:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import av
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from racecraft.film.overlay import HEIGHT, INSET, WIDTH, Overlay
 from racecraft.film.video import END_SECONDS, blink, film, follow, frames
 from racecraft.race import Autopilot, RaceRules, Recording, evaluate
 from racecraft.sim import CameraSpec
+from racecraft.sim.camera import CAMERAS
 from racecraft.sim.views import Scene
 from racecraft.track import load_track
 
@@ -64,6 +67,16 @@ def test_the_drivers_view_stays_as_the_camera_saw_it():
     for step, frame in zip(range(20), frames(CLUMSY), strict=False):
         seen = driver.draw(*CLUMSY.origins[step], heading[step])
         np.testing.assert_array_equal(frame[y : y + height, x : x + width], seen)
+
+
+def test_the_drivers_view_is_that_of_the_cars_own_camera_and_as_old():
+    x, y, width, height = INSET
+    lens = replace(CAMERAS["2026"], left=0.03, age=0.05)
+    driver = Scene(OVAL, palette="2026").driver_view(replace(lens, width=width, height=height))
+    poses = CLUMSY.seen_from(lens.age)
+    assert np.abs(poses - CLUMSY.poses)[:20, :2].max() > 0.03  # m
+    for pose, frame in zip(poses[:20], frames(CLUMSY, camera=lens), strict=False):
+        np.testing.assert_array_equal(frame[y : y + height, x : x + width], driver.draw(*pose))
 
 
 def test_the_car_blinks_while_it_stands():

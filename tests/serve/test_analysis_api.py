@@ -16,10 +16,13 @@ from model_requests import BESIDE, REQUESTS
 from running_consoles import RunningConsole
 
 from racecraft import load_track
+from racecraft.analysis import read_laps
 from racecraft.car.export import read_exported
 from racecraft.race.policy import load_policy
 from racecraft.run import RunFolder
 from racecraft.serve.models.schemas import NewModel
+from racecraft.sim.camera import CAMERAS
+from racecraft.sim.views import driver_frames
 
 pytestmark = pytest.mark.costly
 
@@ -99,12 +102,23 @@ def test_saliency_of_one_moment(raced: tuple[RunningConsole, str, str]) -> None:
     assert other["target"] == 0
     document = (console.runs / name / "run.json").read_text()
     (console.runs / name / "run.json").write_text(document.replace('"camera": "2018"', '"camera": "2026"'))
+    lap = read_laps(console.runs / name / f"evaluation-{stamp}" / "evaluation-simtrace" / "0-iteration.csv")[0]
+    fast = int(lap.speed.argmax())
     try:
         in_2026 = console.client.get(path, params={"lap": 1, "row": 3}).json()
+        aged = [
+            console.client.get(path.replace("saliency", what), params={"lap": 1, "row": fast}).json()["frame"]
+            for what in ("saliency", "belief")
+        ]
     finally:
         (console.runs / name / "run.json").write_text(document)
     looks = [np.frombuffer(pixels, np.uint8).astype(int) for pixels in (frame, base64.b64decode(in_2026["frame"]))]
     assert np.abs(looks[0] - looks[1]).mean() > 4.0  # of 255
+    camera = CAMERAS["2026"]
+    then, now = (driver_frames(load_track("oval"), [lap.seen_from(age)[fast]], camera) for age in (camera.age, 0.0))
+    taken, colours = (np.frombuffer(base64.b64decode(one), np.uint8).reshape(then[0].shape).astype(int) for one in aged)
+    assert (taken == then[0]).all()
+    assert np.abs(colours - then[0]).mean() < 1.0 < np.abs(colours - now[0]).mean()
     refused(console.client.get(path, params={"lap": 9, "row": 3}), 404, "no step 3 in lap 9")
     refused(console.client.get(path, params={"lap": 1, "row": 10**6}), 404)
     refused(console.client.get(path, params={"lap": 1, "row": 3, "target": 50}), 404, "no output 50")

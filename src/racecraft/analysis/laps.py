@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.race.recording import REFERENCE_AHEAD, poses_seen
 from racecraft.run.simtrace import read_simtrace
 from racecraft.sim.simulation import CONTROL_DT
 from racecraft.track import Track
@@ -71,6 +72,12 @@ class TracedLap:
         for row in self.puts:
             after[row - 1], before[row] = before[row - 1], 0.0
         return np.asarray(0.5 * (before + after))
+
+    def seen_from(self, age: float) -> Floats:
+        """X [m], y [m] and heading [rad] of the car's origin when pictures of this age (s) were taken  (R, 3)."""
+        ahead = REFERENCE_AHEAD * np.stack([np.cos(self.heading), np.sin(self.heading)], axis=1)
+        is_put = np.isin(np.arange(len(self.time)), self.puts)
+        return poses_seen(np.column_stack([self.points - ahead, self.heading]), age, is_put=is_put)
 
     def time_at(self, shares: Floats) -> Floats:
         """When it reached some shares of the lap, s since it began: a step before its first row."""

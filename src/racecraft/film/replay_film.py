@@ -44,7 +44,7 @@ def film_replay(
         name=replay.names[index],
         laps=replay.conditions.rules.laps,
         color=LIVERY[index % size % len(LIVERY)],
-        palette=replay.conditions.palette,
+        camera=replay.conditions.camera,
         ghosts=shown,
         rivals=rivals,
     )

@@ -43,7 +43,7 @@ def film(
     name: str = "",
     laps: int = 0,
     color: Color = LIVERY[0],
-    palette: str = "2018",
+    camera: CameraSpec | None = None,
     ghosts: Sequence[Ghost] = (),
     rivals: Sequence[Rival] = (),
     sensors: SensorSuite = FRONT_CAMERA,
@@ -56,13 +56,13 @@ def film(
         name: The racer's, or the run's.
         laps: Laps that the race has; 0 if that is not known.
         color: Of the car.
-        palette: Colours of the world: ``2018``, ``2020`` or ``2026``.
+        camera: What the driver sees through, and in which colours; by default the usual one of the sensors.
         ghosts: Translucent cars that drove at another time; the driver does not see them.
         rivals: The other cars of the race, for the table of who is ahead and for the map.
         sensors: Of the car: its driver's view, of a stereo camera an anaglyph, the left lens in red; its LIDAR's beams.
 
     Raises:
-        ConfigError: Nothing was recorded, the palette is unknown, or the path does not end in .mp4.
+        ConfigError: Nothing was recorded, or the path does not end in .mp4.
         RunError: The file cannot be written.
     """
     path = Path(path)
@@ -73,7 +73,7 @@ def film(
         name=name,
         laps=laps,
         color=color,
-        palette=palette,
+        camera=camera,
         ghosts=ghosts,
         rivals=rivals,
         sensors=sensors,
@@ -87,22 +87,22 @@ class DriverView:
 
     Args:
         scene: The track.
-        sensors: Of the car.
+        camera: Of the car.
         width: Pixels.
         height: Pixels.
     """
 
-    def __init__(self, scene: Scene, sensors: SensorSuite, *, width: int, height: int) -> None:
-        camera = sensors.camera(CameraSpec(width=width, height=height))
+    def __init__(self, scene: Scene, camera: CameraSpec, *, width: int, height: int) -> None:
+        camera = replace(camera, width=width, height=height)
         sides = (0.5, -0.5) if camera.baseline > 0.0 else (0.0,)
         lenses = [replace(camera, left=camera.left + side * camera.baseline, baseline=0.0) for side in sides]
         self._views = [scene.driver_view(lens) for lens in lenses]
         self._pictures = [np.empty((height, width, 3), dtype=np.uint8) for _ in lenses]
 
-    def draw(self, x: float, y: float, heading: float, objects: Sequence[ObjectView]) -> NDArray[np.uint8]:
-        """The picture of a car with its origin at (x, y) m, RGB (height, width, 3); the next call overwrites it."""
+    def draw(self, pose: Sequence[float], objects: Sequence[ObjectView]) -> NDArray[np.uint8]:
+        """The picture of a car with its origin at a pose, RGB (height, width, 3); the next call overwrites it."""
         for view, picture in zip(self._views, self._pictures, strict=True):
-            view.draw(x, y, heading, cars=objects, out=picture)
+            view.draw(*pose, cars=objects, out=picture)
         seen = self._pictures[-1]
         if len(self._views) == 2:
             left, right = (np.asarray(picture @ np.array(LUMA), np.uint8) for picture in self._pictures)
@@ -116,7 +116,7 @@ def frames(
     name: str = "",
     laps: int = 0,
     color: Color = LIVERY[0],
-    palette: str = "2018",
+    camera: CameraSpec | None = None,
     ghosts: Sequence[Ghost] = (),
     rivals: Sequence[Rival] = (),
     sensors: SensorSuite = FRONT_CAMERA,
@@ -124,28 +124,29 @@ def frames(
     """The frames of `film`, RGB (480, 640, 3), each in the same array: copy what must last.
 
     Raises:
-        ConfigError: Nothing was recorded, or the palette is unknown.
+        ConfigError: Nothing was recorded.
     """
     if not len(recording):
         raise ConfigError("Nothing was recorded, so there is nothing to film.")
     left, top, width, height = INSET
-    scene = Scene(recording.track, palette=palette)
+    camera = camera or sensors.camera()
+    scene = Scene(recording.track, palette=camera.palette)
     chase = scene.chase_view(width=WIDTH, height=HEIGHT)
-    driver = DriverView(scene, sensors, width=width, height=height)
+    driver = DriverView(scene, camera, width=width, height=height)
     overlay = Overlay(recording, name=name, laps=laps, color=color, ghosts=ghosts, rivals=rivals)
-    places, headings = recording.origins, recording.column("heading")
+    poses, lens_poses = recording.poses.tolist(), recording.seen_from(camera.age).tolist()
     steering = recording.column("actual_steering_angle")
     directions, alphas, waves = follow(recording), blink(recording), wave(recording)
     frame = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
     step = 0
     for step in range(len(recording)):
-        (x, y), heading = places[step].tolist(), float(headings[step])
+        x, y, heading = poses[step]
         car = CarView(x, y, heading, float(steering[step]), color, float(alphas[step]))
         objects = recording.objects(step, alpha=float(waves[step]))
         around = [view for view in overlay.ghosts_at(step) if view is not None]
         scan = ScanView(x, y, heading, objects) if sensors.lidar_name else None
         chase.draw(x, y, float(directions[step]), cars=[car, *objects, *around], scan=scan, out=frame)
-        frame[top : top + height, left : left + width] = driver.draw(x, y, heading, objects)
+        frame[top : top + height, left : left + width] = driver.draw(lens_poses[step], objects)
         if step == len(recording) - 1:
             break
         overlay.draw(frame, step)

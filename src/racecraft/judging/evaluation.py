@@ -276,7 +276,7 @@ def _write(
                     path,
                     laps=evaluation.rules.laps,
                     name=folder.name,
-                    palette=evaluation.conditions.palette,
+                    camera=evaluation.conditions.camera,
                     ghosts=ghosts,
                     sensors=policy.sensors,
                 )

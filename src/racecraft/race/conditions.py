@@ -39,11 +39,6 @@ class Conditions:
     """Cars that share a road; with one, each has the road for itself."""
 
     @property
-    def palette(self) -> str:
-        """Colours of the world, as the driver sees them."""
-        return "2018" if self.camera is None else self.camera.palette
-
-    @property
     def num_objects(self) -> int:
         """Around every car: boxes, bots and the other cars of its race."""
         return self.objects.count + self.cars_per_race - 1

@@ -20,6 +20,20 @@ SUBSTEPS = 8
 """Of physics in a control step, as `Simulation` has them unless it is told otherwise."""
 
 
+def poses_seen(poses: NDArray[np.float64], age: float, *, is_put: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Poses in which pictures of a camera of this age (s) were taken, between two steps  (T, 3).
+
+    Args:
+        poses: X [m], y [m] and heading [rad] of every step  (T, 3).
+        age: Of the pictures, s.
+        is_put: Whether the car did not drive to where it is in a step  (T,).
+    """
+    moved = np.diff(poses, axis=0)
+    moved[:, 2] = np.arctan2(np.sin(moved[:, 2]), np.cos(moved[:, 2]))
+    share = np.where(is_put[1:], 0.0, round(age / CONTROL_DT * SUBSTEPS) / SUBSTEPS)
+    return np.vstack([poses[:1], poses[1:] - share[:, None] * moved])
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """The judged rows of a trial, one per control step, prepare steps included; T steps."""
@@ -66,11 +80,8 @@ class Recording:
 
     def seen_from(self, age: float) -> NDArray[np.float64]:
         """Poses, as `poses`, in which pictures of a camera of this age (s) were taken, between two steps  (T, 3)."""
-        before, moved = self.poses[:-1], np.diff(self.poses, axis=0)
-        moved[:, 2] = np.arctan2(np.sin(moved[:, 2]), np.cos(moved[:, 2]))
         placed = [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")]  # who did not drive there
-        share = np.where(np.isin(self.column("status")[1:], placed), 0.0, round(age / CONTROL_DT * SUBSTEPS) / SUBSTEPS)
-        return np.vstack([self.poses[:1], before + (1.0 - share[:, None]) * moved])
+        return poses_seen(self.poses, age, is_put=np.isin(self.column("status"), placed))
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:

@@ -54,8 +54,6 @@ router = APIRouter(prefix="/api/models/{name}", tags=["analysis"])
 
 MAX_FILES: Final = 24
 """Iterations that one map is drawn from; of more, every so many-th."""
-AHEAD: Final = 0.14
-"""m from a car's origin to the point that a trace speaks of."""
 
 
 @router.get("/evaluations/{stamp}/laps", dependencies=[Computes])
@@ -105,10 +103,8 @@ def get_saliency(
         raise NotFound(f"Evaluation {stamp} of {name!r} has no step {row} in lap {lap}.")
     summary = read_json_object(folder.evaluation(stamp) / "evaluation.json")
     step, spec, weights = _network(folder, summary.get("step"))
-    heading = float(found.heading[row])
-    origin = found.points[row] - AHEAD * np.array([math.cos(heading), math.sin(heading)])
-    driven = driven_direction(track, [found.points])
-    frame = driver_frames(driven, [[*origin.tolist(), heading]], lens_of(folder))[0]
+    driven, camera = driven_direction(track, [found.points]), lens_of(folder)
+    frame = driver_frames(driven, [found.seen_from(camera.age)[row]], camera)[0]
     if target is not None and target >= spec.num_actions:
         raise NotFound(f"The policy of {name!r} has no output {target}; allowed are 0 to {spec.num_actions - 1}.")
     seen = grad_cam(spec, weights, frame, target=target)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import functools
-import math
 import threading
 from typing import TYPE_CHECKING, Final
 
@@ -13,7 +12,7 @@ from fastapi import APIRouter, Query
 
 from racecraft.analysis import driven_direction, read_laps
 from racecraft.serve.context import Computes, InContext
-from racecraft.serve.evaluations.analysis import AHEAD, evaluation_track, lens_of, trace_of
+from racecraft.serve.evaluations.analysis import evaluation_track, lens_of, trace_of
 from racecraft.serve.evaluations.objects import objects_of
 from racecraft.serve.evaluations.schemas import RoadBelief, RoadObject
 from racecraft.serve.problems import NotFound
@@ -47,12 +46,11 @@ def get_belief(
     found = next((traced for traced in laps if traced.number == lap), None)
     if found is None or row >= len(found.time):
         raise NotFound(f"Evaluation {stamp} of {name!r} has no step {row} in lap {lap}.")
-    heading = float(found.heading[row])
-    x, y = found.points[row] - AHEAD * np.array([math.cos(heading), math.sin(heading)])
     camera = lens_of(folder)
+    x, y, heading = found.seen_from(camera.age)[row].tolist()
     view = Scene(driven_direction(track, [found.points]), palette=camera.palette).driver_view(camera, lit_walls=False)
     there = [_view(one, row) for one in objects_of(folder, stamp, laps).get(lap, [])]
-    picture = view.draw(float(x), float(y), heading, cars=there)
+    picture = view.draw(x, y, heading, cars=there)
     frame = (picture @ np.array(LUMA) + 0.5).astype(np.uint8)
     with _LOOKING:
         belief = _perceiver()(frame[None])
