@@ -138,7 +138,10 @@ async function check(core, { source, track: of, among }) {
   if (!among) return python.check(source, of);
   const { momentsAmong } = await load("src/tab/among.ts");
   const situations = momentsAmong(core, of, among);
-  return { moments: situations, ...python.check(source, { ...of, situations }) };
+  return {
+    moments: situations,
+    ...python.check(source, { ...of, situations }),
+  };
 }
 
 function train(
@@ -347,21 +350,27 @@ async function drawings(core, { sketches, statuses }) {
 }
 
 /** What rewards pay along tracks: presets by name, and one in Python. */
-async function paintings(core, { tracks, statuses, rewards, presets, source }) {
+async function paintings(core, { tracks, among, rewards, presets, source }) {
   const { paint } = await load("src/tab/painting.ts");
   const { payWith } = await load("src/tab/trainer.ts");
   const address = `data:text/javascript,${encodeURIComponent(rewards)}`;
   const made = (await import(address)).rewards;
-  const words = { columns: core.names("row"), statuses };
   const always = async () => true;
   const found = [];
   for (const of of tracks) {
-    for (const name of presets)
+    for (const about of among) {
+      const on = [core, of, about, always];
+      for (const name of presets)
+        found.push(await paint(() => payWith(made[name], of, 1), ...on));
+      const { obstacles, bots } = about.objects;
+      const count = (obstacles?.count ?? 0) + (bots?.count ?? 0);
+      const { header, each } = about.objectColumns;
+      const extra = count && header.length + each.length * count;
+      const width = core.names("row").length + extra;
       found.push(
-        await paint(() => payWith(made[name], of, 1), of, words, always),
+        await paint(() => python.open(source, of, 1, width, 0).pay, ...on),
       );
-    const open = () => python.open(source, of, 1, words.columns.length, 0).pay;
-    found.push(await paint(open, of, words, always));
+    }
   }
   return found;
 }

@@ -339,6 +339,7 @@ def test_a_reward_of_ones_own_is_tried_among_the_objects_of_its_race(page: Page)
     page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
     page.get_by_text("near an object", exact=True).wait_for()
     page.get_by_text("crash", exact=True).wait_for()
+    page.get_by_text("Dark squares are the boxes and cars").wait_for(timeout=PATIENCE)  # and painted among them
 
 
 def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Page) -> None:

@@ -1,4 +1,5 @@
-/** The moments that a reward is tried in, among what stands and drives on the road: racecraft.reward.dry_run. */
+/** Rows of a car among what stands and drives on the road, and the moments that a reward is tried in there:
+ * racecraft.reward.dry_run. */
 import type { Core, Settings } from "./core";
 import { momentOn } from "./moments";
 import { toldObjects } from "./objects";
@@ -23,15 +24,15 @@ const DIRECTIONS = [0, 1]; // forward, reversed
 /** What an object's row says, by its name. */
 type Thing = Record<string, number>;
 
-/** The same moments among objects, where there are any, and two more beside one of them. */
-export function momentsAmong(core: Core, track: TrackFile, about: Among): Moments {
+/** What is on a road at the beginning of an episode, in a direction, and rows of a car among it; undefined where nothing
+ * is there besides. */
+export function thingsOn(core: Core, track: TrackFile, about: Among) {
   const told = toldObjects(about.objects);
-  if (!told) return track.situations;
+  if (!told) return undefined;
   const columns = core.names("row");
   const at = Object.fromEntries(columns.map((name, index) => [name, index]));
   const { header, each } = about.objectColumns;
 
-  /** Where the core puts them at the beginning of an episode. */
   function placed(direction: number): Thing[] {
     const road = core.track(arraysOf(track));
     const once = { num_envs: 1, seed: 0, seed_high: 0, start_offset: 0, direction, has_camera: 0, has_lidar: 0 };
@@ -44,7 +45,6 @@ export function momentsAmong(core: Core, track: TrackFile, about: Among): Moment
     );
   }
 
-  /** The row of a car among them. */
   function among(row: ArrayLike<number>, things: Thing[]): number[] {
     const value = (name: string) => row[at[name]!]!;
     const length = value("track_length");
@@ -65,6 +65,17 @@ export function momentsAmong(core: Core, track: TrackFile, about: Among): Moment
     return [...Array.from(row), ...header.map((name) => heads[name]!), ...numbers];
   }
 
+  return { placed, among };
+}
+
+/** The same moments among objects, where there are any, and two more beside one of them. */
+export function momentsAmong(core: Core, track: TrackFile, about: Among): Moments {
+  const found = thingsOn(core, track, about);
+  if (!found) return track.situations;
+  const { placed, among } = found;
+  const columns = core.names("row");
+  const at = Object.fromEntries(columns.map((name, index) => [name, index]));
+
   /** Moments that only a road with objects has, at the one that is nearest to half a lap. */
   function beside(things: Thing[]): Moments {
     const on = momentOn(track, false, { columns, statuses: about.statuses });
@@ -82,8 +93,11 @@ export function momentsAmong(core: Core, track: TrackFile, about: Among): Moment
   }
 
   const sides = DIRECTIONS.map(placed);
-  const found = track.situations.map((one) => ({ ...one, row: among(one.row, sides[one.row[at["track_index"]!]!]!) }));
-  return [...found.slice(0, -1), ...beside(sides[0]!), found.at(-1)!];
+  const moments = track.situations.map((one) => ({
+    ...one,
+    row: among(one.row, sides[one.row[at["track_index"]!]!]!),
+  }));
+  return [...moments.slice(0, -1), ...beside(sides[0]!), moments.at(-1)!];
 }
 
 const modulo = (value: number, length: number) => ((value % length) + length) % length;

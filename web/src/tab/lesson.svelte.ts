@@ -9,6 +9,7 @@ import type { Judgement, TrainingState } from "./trainer";
 import type { Plan, RaceType, TrackFile } from "./plan";
 import { policyFor } from "./policy";
 import type { Objects } from "./verify/header";
+import type { Among } from "./among";
 import type { Check, Hide, Load, Paint, Report, Show, Start } from "./worker";
 import { openWorker } from "./open";
 
@@ -130,8 +131,7 @@ export class Lesson {
       const question = (this.painted = ++this.questions);
       const post = () => {
         clearTimeout(this.asked?.timer);
-        const { vehicle, statuses, objectColumns, races } = this.plan;
-        const among = { objects, trials: races[type].trials, vehicle, statuses, objectColumns };
+        const among = this.among(type, objects);
         const asked = { kind: "check", question, source, track: $state.snapshot(track), among } satisfies Check;
         this.workers.python!.postMessage(asked);
         this.asked!.timer = window.setTimeout(() => {
@@ -147,10 +147,15 @@ export class Lesson {
     });
   }
 
-  /** Paint what a preset pays along a track, while nothing trains. */
-  paint(reward: string, track: TrackFile): void {
-    const [question, { statuses }] = [(this.painted = ++this.questions), this.plan];
-    const asked = { kind: "paint", question, reward, track: $state.snapshot(track), statuses } satisfies Paint;
+  private among(type: RaceType, objects: Objects): Among {
+    const { vehicle, statuses, objectColumns, races } = this.plan;
+    return { objects, trials: races[type].trials, vehicle, statuses, objectColumns };
+  }
+
+  /** Paint what a preset pays along a track among the objects of a race, while nothing trains. */
+  paint(reward: string, track: TrackFile, type: RaceType, objects: Objects): void {
+    const [question, among] = [(this.painted = ++this.questions), this.among(type, objects)];
+    const asked = { kind: "paint", question, reward, track: $state.snapshot(track), among } satisfies Paint;
     this.workers.plain!.postMessage(asked);
   }
 

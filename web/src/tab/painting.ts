@@ -1,6 +1,8 @@
 /** What a reward pays along a track: racecraft.reward.painting, with the same laps. A car drives them beside each other at
- * a usual speed, step after step, and some of the steps are painted. */
+ * a usual speed, step after step, and some of the steps are painted. Objects stand where an episode begins with them. */
 import type { RewardPainting } from "../api/client";
+import { thingsOn, type Among } from "./among";
+import type { Core } from "./core";
 import { HALF_CAR, momentOn, SPEED, STEP, type Words } from "./moments";
 import type { TrackFile } from "./plan";
 import { RewardFailure, type Pay } from "./python";
@@ -31,21 +33,25 @@ export function lapsBeside(track: TrackFile, words: Words): { laps: Float64Array
   return { laps, rows: Array.from({ length: PLACES }, (_, place) => 1 + place * between) };
 }
 
-/** The painting of a reward for one car; laps are null from the one on in which it failed. `isWanted` is asked before every
+/** The painting of a reward for one car, among the objects of a race; laps are null from the one on in which it failed. `isWanted` is asked before every
  * lap, and where it is not any more, there is no painting. */
 export async function paint(
   open: () => Pay,
+  core: Core,
   track: TrackFile,
-  words: Words,
+  about: Among,
   isWanted: () => Promise<boolean>,
 ): Promise<RewardPainting | undefined> {
+  const words = { columns: core.names("row"), statuses: about.statuses };
   const { laps, rows } = lapsBeside(track, words);
+  const road = thingsOn(core, track, about);
+  const things = road?.placed(0) ?? [];
   const paid: (number | null)[][] = laps.map(() => rows.map(() => null));
   try {
     const pay = open();
     for (const [number, lap] of laps.entries()) {
       if (!(await isWanted())) return undefined;
-      const all = lap.map((row) => pay(row)[0]!);
+      const all = lap.map((row) => pay(road ? Float64Array.from(road.among(row, things)) : row)[0]!);
       paid[number] = rows.map((row) => all[row]!);
     }
   } catch (error) {
@@ -58,7 +64,7 @@ export async function paint(
     offsets: OFFSETS,
     points: rows.map((row) => laps.map((lap) => [rounded(lap[row]![x]!), rounded(lap[row]![y]!)])),
     rewards: rows.map((_, place) => paid.map((lap) => lap[place]!)),
-    objects: [],
+    objects: things.map((one) => [rounded(one["object_x"]!), rounded(one["object_y"]!)]),
   };
 }
 

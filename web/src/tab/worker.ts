@@ -63,7 +63,7 @@ export interface Paint {
   question: number;
   reward: string;
   track: TrackFile;
-  statuses: string[];
+  among: Among;
 }
 
 export interface Start {
@@ -227,14 +227,13 @@ async function check({ question, source, track, among }: Check, { core, python }
   const situations = momentsAmong(core.core, track, among);
   const verdict = python!.check(source, { waypoints: track.waypoints, situations });
   tell({ kind: "checked", question, verdict });
-  const open = () => python!.open(source, track, 1, core.core.names("row").length, 0).pay;
-  if (verdict.ok)
-    await painted({ question, track, statuses: among.statuses }, core, open, () => tell({ kind: "painting" }));
+  const open = () => python!.open(source, track, 1, situations[0]!.row.length, 0).pay;
+  if (verdict.ok) await painted({ question, track, among }, core, open, () => tell({ kind: "painting" }));
 }
 
 let newest = 0; // of the questions for paintings; a training is one, too
 async function painted(
-  { question, track, statuses }: Pick<Paint, "question" | "track" | "statuses">,
+  { question, track, among }: Pick<Paint, "question" | "track" | "among">,
   { core }: LoadedCore,
   open: () => Pay,
   sign: () => void, // of life, before every lap
@@ -247,7 +246,7 @@ async function painted(
     sign();
     return true;
   };
-  const painting = await paint(open, track, { columns: core.names("row"), statuses }, isWanted);
+  const painting = await paint(open, core, track, among, isWanted);
   if (painting) tell({ kind: "painted", question, painting });
 }
 
