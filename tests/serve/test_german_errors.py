@@ -20,7 +20,9 @@ PLACES = (
     *("importing", "sim/objects.py", "training/stop.py", "training/parent.py", "training/start.py"),
     *("training/settings.py", "learn/ppo.py", "learn/sac.py", "learn/distill.py", "learn/saliency.py"),
     *("run/checkpoint.py", "run/lock.py", "run/stretches.py", "race/entry.py", "race/entry_file.py", "race/policy.py"),
-    *("contest", "film/ghost_source.py", "judging/trained.py", "judging/evaluation.py"),
+    *("contest", "film", "judging/trained.py", "judging/evaluation.py", "judging/demonstration.py"),
+    *("replay", "json_file.py", "analysis/share.py", "run/simtrace.py", "run/metrics.py", "run/judged.py"),
+    *("run/training_params.py", "sim/randomization.py", "sim/vehicle.py", "sim/parameter_file.py"),
     *("reward/sandbox/confinement.py", "sweeping/plan.py", "tuning/space.py", "tuning/start.py"),
 )
 """Where errors come from that a page shows."""
@@ -36,14 +38,16 @@ OPERATORS = (
     ),
     "serve/server.py",
     *("importing/history.py", "importing/own.py", "serve/jobs/bench.py", "serve/jobs/line.py"),
+    *("film/limit_picture.py", "film/replay_film.py", "film/av1.py"),
 )
 """Where they come from that only terminals and logs show, or that quote others."""
 REPORTS = (
     *("importing/importer.py", "importing/job.py", "importing/drfc.py", "importing/env_file.py", "importing/own.py"),
     *("importing/report.py", "importing/weights.py", "importing/model_files.py"),
     *("agent/hyperparameters.py", "agent/model_metadata.py", "agent/aws_file.py", "car/metadata.py"),
+    *("training/plan.py", "training/parent.py"),
 )
-"""Where what a page tells of an import, or of a car, comes from."""
+"""Where what a page tells of an import, of a car, or of what a training begins with, comes from."""
 TOLD = {"used", "unused", "becomes", "without_effect", "NO_EFFECT", "ELSEWHERE", "RACES", "_WHY"}
 """What such a file calls its tables of these."""
 PLAIN = re.compile(

@@ -37,13 +37,13 @@ class Plan:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences for the user about the files and the parent."""
-        files, metadata = self.metadata.notes, self.metadata
+        metadata, notes = self.metadata, list(self.metadata.notes)
         if self.hyperparameters is not None:
-            files = (*files, *self.hyperparameters.notes_for(metadata.action_space.kind, metadata.training_algorithm))
-        if self.parent is None:
-            return files
-        anew = self.parent.check(self.settings.network_spec(self.metadata), self.metadata)
-        return (*files, f"Begins with the weights of {self.parent.name}.", *anew)
+            notes += self.hyperparameters.notes_for(metadata.action_space.kind, metadata.training_algorithm)
+        if self.parent is not None:
+            notes.append(f"Begins with the weights of {self.parent.name}.")
+            notes += self.parent.check(self.settings.network_spec(metadata), metadata)
+        return tuple(notes)
 
     def start(self, *, root: str | Path = "runs", name: str | None = None) -> RunFolder:
         """Make the run folder; see `racecraft.training.start.start_run`."""

@@ -12,6 +12,7 @@ interface Sentence {
 
 const GAP = "{}";
 const DECIMAL = /^-?\d+\.(\d+)$/;
+const MANY = /^\d{1,3}(,\d{3})+$/;
 const LONGEST = 600; // characters of a line that is looked for: names are short, and a stranger's text may not be
 
 /** Says a text in the other language, line by line; what it has no sentence for stays as it is. `number` writes a number with
@@ -31,6 +32,7 @@ export function translator(
   /** What fills a gap: words that have a sentence of their own, or a number. */
   function filled(text: string): string {
     const digits = DECIMAL.exec(text)?.[1];
+    if (MANY.test(text)) return number(Number(text.replaceAll(",", "")), 0);
     return digits ? number(Number(text), digits.length) : line(text);
   }
 
