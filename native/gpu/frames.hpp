@@ -103,7 +103,7 @@ RC_HD int32_t ground_pixel(const DrawnFrame& frame, const DrawnRow& row, const D
     const uint32_t v = static_cast<uint32_t>(sample.walk.v) + i * static_cast<uint32_t>(sample.walk.dv);
     const uint32_t texel = frame.ground.texels[texel_index(frame.ground.levels[sample.level], u, v)];
     return sample.level == 0
-               ? shade_edge(texel, edge_distance(texel, u, v), sample.sharpness, row.ground.blend)
+               ? shade_edge(texel, edge_distance(texel, u, v), sample.sharpness, row.ground.sides)
                : shade_coverage(texel, row.ground.weights);
 }
 
@@ -145,8 +145,8 @@ RC_HD void draw_quad(const DrawnFrame& frame, const DrawnRow& row, const DrawnSa
             const uint32_t texel = frame.ground.texels[texel_index(frame.ground.levels[0], u, v)];
             const int32_t distance = edge_distance(texel, u, v);
             const int32_t growth = edge_growth(texel, sample.walk.du >> 9, sample.walk.dv >> 9);
-            sums[i] += shade_edge(texel, distance - growth, sample.sharpness, row.ground.blend);
-            sums[i + 1] += shade_edge(texel, distance + growth, sample.sharpness, row.ground.blend);
+            sums[i] += shade_edge(texel, distance - growth, sample.sharpness, row.ground.sides);
+            sums[i + 1] += shade_edge(texel, distance + growth, sample.sharpness, row.ground.sides);
         }
     }
     for (int32_t i = 0; i < kQuad; ++i) out[i] = static_cast<uint8_t>(sums[i] >> shift);

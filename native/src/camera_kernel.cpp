@@ -53,6 +53,14 @@ struct SharedRow {
 // two neighbours share the texel under their common edge, which halves the fetches.
 #if defined(RC_HAS_LANES)
 
+// Calls work(i, lanes) for vectors that begin at pixel i and together cover [begin, end).
+template <typename Work>
+RC_HD void for_each_vector(int begin, int end, const Work& work) {
+    int i = begin;
+    for (; i + Lanes::kCount <= end; i += Lanes::kCount) work(i, AllLanes{});
+    if (i < end) work(i, first_lanes(end - i));
+}
+
 struct WalkLanes {
     Lanes u, v, du, dv;
 };
@@ -64,12 +72,20 @@ RC_HD WalkLanes start_walk(uint32_t u, uint32_t v, uint32_t du, uint32_t dv) {
             splat(static_cast<int32_t>(du * Lanes::kCount)), splat(static_cast<int32_t>(dv * Lanes::kCount))};
 }
 
-// texel_index() less the level's offset: tile row, tile column, then row and column in the tile.
-RC_HD Lanes index_lanes(Lanes u, Lanes v, Lanes tile_row) {
-    const Lanes in_tile_row = (shift_right(u, 14) & splat(~15)) | (shift_right(v, 14) & splat(12)) |
-                              (shift_right(u, 16) & splat(3));
+// Bytes from a level's first texel to that of texel_index(): of the row of tiles, of the tile, then of the
+// row and the column in the tile. tile_row is the bytes of a row of tiles.
+RC_HD Lanes offset_lanes(Lanes u, Lanes v, Lanes tile_row) {
+    const Lanes in_tile_row = (shift_right(u, 12) & splat(~63)) | (shift_right(v, 12) & splat(48)) |
+                              (shift_right(u, 14) & splat(12));
     return shift_right(v, 18) * tile_row + in_tile_row;
 }
+
+RC_HD Lanes tile_row_of(const GroundLevel& level) {
+    return splat(level.tiles_per_row * 64);
+}
+
+// edge_distance() and edge_growth() for steps that are the same in all lanes.
+#if defined(RC_HAS_BYTE_PRODUCTS)
 
 RC_HD Lanes distance_lanes(Lanes texel, Lanes u, Lanes v) {
     const Lanes position =
@@ -77,12 +93,45 @@ RC_HD Lanes distance_lanes(Lanes texel, Lanes u, Lanes v) {
     return dot_bytes(position, texel);
 }
 
-// The second factor of shade_edge()'s blend: coverage above the border and the unit.
+struct StepLanes {
+    Lanes both;  // shifted by 128, as bytes of dot_bytes() are unsigned on this side
+};
+
+RC_HD StepLanes step_lanes(int32_t x, int32_t y) {
+    return {splat(((y + 128) << 8) | (x + 128))};
+}
+
+RC_HD Lanes growth_lanes(Lanes texel, const StepLanes& step) {
+    return dot_bytes(step.both, texel) - dot_bytes(splat((128 << 8) | 128), texel);
+}
+
+#else
+
+RC_HD Lanes distance_lanes(Lanes texel, Lanes u, Lanes v) {
+    const Lanes low = (shift_right(u, 8) & splat(255)) | splat(kEdgeOffsetScale << 16);
+    return dot_halves(low, low_bytes(texel), shift_right(v, 8) & splat(255), high_bytes(texel));
+}
+
+struct StepLanes {
+    Lanes x, y;  // lower halves
+};
+
+RC_HD StepLanes step_lanes(int32_t x, int32_t y) {
+    return {splat(x & 0xffff), splat(y & 0xffff)};
+}
+
+RC_HD Lanes growth_lanes(Lanes texel, const StepLanes& step) {
+    return dot_halves(step.x, low_bytes(texel), step.y, high_bytes(texel));
+}
+
+#endif
+
+// What the two sides of the border have of shade_edge(): unit less coverage, and coverage.
 RC_HD Lanes coverage_lanes(Lanes distance, Lanes sharpness) {
-    const Lanes middle = splat(kCoverageUnit / 2);
+    constexpr int32_t half = kCoverageUnit / 2;
     const Lanes ramp = shift_right_signed(distance * sharpness, 16);
-    return shift_left(clamp_lanes(ramp, splat(-kCoverageUnit / 2), middle) + middle, 16) |
-           splat(kCoverageUnit);
+    const Lanes above = clamp_lanes(ramp, splat(-half), splat(half));
+    return shift_left(above, 16) - above + splat(half << 16 | half);
 }
 
 template <int kChannels, bool kIsEdge>
@@ -90,16 +139,14 @@ void add_ground(const GroundView& ground, const GroundLevel& level, const Ground
                 const ShadeTable* tables, PixelSpan span, int32_t* sums, int stride) {
     const uint32_t begin = static_cast<uint32_t>(span.begin);
     WalkLanes at = start_walk(walk.u + begin * walk.du, walk.v + begin * walk.dv, walk.du, walk.dv);
-    const Lanes tile_row = splat(level.tiles_per_row * 16);
+    const Lanes tile_row = tile_row_of(level);
     const Lanes sharp = splat(sharpness);
-    for (int i = span.begin; i < span.end; i += Lanes::kCount) {
-        const LaneMask mask = first_lanes(span.end - i);
-        const Lanes texel = gather(ground.texels + level.offset, index_lanes(at.u, at.v, tile_row), mask);
+    for_each_vector(span.begin, span.end, [&](int i, auto mask) __attribute__((always_inline)) {
+        const Lanes texel = gather(ground.texels + level.offset, offset_lanes(at.u, at.v, tile_row), mask);
         if constexpr (kIsEdge) {
             const Lanes mix = coverage_lanes(distance_lanes(texel, at.u, at.v), sharp);
-            const Lanes pair = shift_right(texel, 24);
             for (int c = 0; c < kChannels; ++c) {
-                add_to(sums + c * stride + i, dot_halves(look_up(tables[c].ground.blend, pair), mix), mask);
+                add_to(sums + c * stride + i, dot_halves(look_up(tables[c].ground.sides, texel), mix), mask);
             }
         } else {
             for (int c = 0; c < kChannels; ++c) {
@@ -109,36 +156,35 @@ void add_ground(const GroundView& ground, const GroundLevel& level, const Ground
         }
         at.u = at.u + at.du;
         at.v = at.v + at.dv;
-    }
+    });
 }
 
 void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTable& table, int width,
                   uint8_t* line) {
     const GroundLevel& level = ground.levels[0];
     const uint32_t* texels = ground.texels + level.offset;
-    const Lanes tile_row = splat(level.tiles_per_row * 16);
-    // Bytes of dot_bytes() are unsigned on this side: shift the step by 128 and take the same off again.
-    const Lanes origin = splat((128 << 8) | 128);
+    const Lanes tile_row = tile_row_of(level);
     const Lanes rounding = splat(kCoverageUnit / 2 * row.samples);
     const int shift = row_shift(row.samples);
     WalkLanes at[kMaxSamples];
+    StepLanes step[kMaxSamples];
     for (int k = 0; k < row.samples; ++k) {
         const GroundWalk& walk = row.walk[k];
         at[k] =
             start_walk(walk.u + half_step(walk.du), walk.v + half_step(walk.dv), 2 * walk.du, 2 * walk.dv);
+        step[k] = step_lanes(row.half_x[k], row.half_y[k]);
     }
     for (int i = 0; i < width; i += 2 * Lanes::kCount) {
         Lanes left = rounding;
         Lanes right = rounding;
         for (int k = 0; k < row.samples; ++k) {
-            const Lanes step = splat(((row.half_y[k] + 128) << 8) | (row.half_x[k] + 128));
             const Lanes sharp = splat(row.sharpness[k]);
-            const Lanes texel = gather_all(texels, index_lanes(at[k].u, at[k].v, tile_row));
+            const Lanes texel = gather(texels, offset_lanes(at[k].u, at[k].v, tile_row), AllLanes{});
             const Lanes distance = distance_lanes(texel, at[k].u, at[k].v);
-            const Lanes growth = dot_bytes(step, texel) - dot_bytes(origin, texel);
-            const Lanes blend = look_up(table.ground.blend, shift_right(texel, 24));
-            left = left + dot_halves(blend, coverage_lanes(distance - growth, sharp));
-            right = right + dot_halves(blend, coverage_lanes(distance + growth, sharp));
+            const Lanes growth = growth_lanes(texel, step[k]);
+            const Lanes sides = look_up(table.ground.sides, texel);
+            left = left + dot_halves(sides, coverage_lanes(distance - growth, sharp));
+            right = right + dot_halves(sides, coverage_lanes(distance + growth, sharp));
             at[k].u = at[k].u + at[k].du;
             at[k].v = at[k].v + at[k].dv;
         }
@@ -148,13 +194,15 @@ void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTab
 
 // Adds values[i] * factor to the sums of a span.
 void add_values(int32_t* sums, const int32_t* values, int32_t factor, int begin, int end) {
-    for (int i = begin; i < end; i += Lanes::kCount) {
-        add_to(sums + i, load(values + i) * splat(factor), first_lanes(end - i));
-    }
+    for_each_vector(begin, end, [&](int i, auto mask) __attribute__((always_inline)) {
+        add_to(sums + i, load(values + i) * splat(factor), mask);
+    });
 }
 
 void add_constant(int32_t* sums, int32_t value, int begin, int end) {
-    for (int i = begin; i < end; i += Lanes::kCount) add_to(sums + i, splat(value), first_lanes(end - i));
+    for_each_vector(begin, end, [&](int i, auto mask) __attribute__((always_inline)) {
+        add_to(sums + i, splat(value), mask);
+    });
 }
 
 #else
@@ -168,7 +216,7 @@ void add_ground(const GroundView& ground, const GroundLevel& level, const Ground
         const uint32_t texel = ground.texels[texel_index(level, u, v)];
         for (int c = 0; c < kChannels; ++c) {
             sums[c * stride + i] +=
-                kIsEdge ? shade_edge(texel, edge_distance(texel, u, v), sharpness, tables[c].ground.blend)
+                kIsEdge ? shade_edge(texel, edge_distance(texel, u, v), sharpness, tables[c].ground.sides)
                         : shade_coverage(texel, tables[c].ground.weights);
         }
         u += walk.du;
@@ -189,8 +237,8 @@ void store_ground(const GroundView& ground, const SharedRow& row, const ShadeTab
             const uint32_t texel = ground.texels[texel_index(ground.levels[0], u, v)];
             const int32_t distance = edge_distance(texel, u, v);
             const int32_t growth = edge_growth(texel, row.half_x[k], row.half_y[k]);
-            left += shade_edge(texel, distance - growth, row.sharpness[k], table.ground.blend);
-            right += shade_edge(texel, distance + growth, row.sharpness[k], table.ground.blend);
+            left += shade_edge(texel, distance - growth, row.sharpness[k], table.ground.sides);
+            right += shade_edge(texel, distance + growth, row.sharpness[k], table.ground.sides);
         }
         line[i] = static_cast<uint8_t>(left >> shift);
         line[i + 1] = static_cast<uint8_t>(right >> shift);

@@ -1,6 +1,7 @@
 // Vectors of 32-bit integers for kernels, one definition per instruction set: 16 lanes with AVX-512, 8 with
 // AVX2, 4 with SSE2, NEON and WebAssembly's SIMD. Include only from *_kernel.cpp. Without RC_HAS_LANES a
-// kernel runs its scalar code, which gives the same bits.
+// kernel runs its scalar code, which gives the same bits. With RC_HAS_BYTE_PRODUCTS bytes are multiplied by
+// bytes, without it low_bytes() and high_bytes() make halves of them.
 #pragma once
 
 #include "racecraft/platform.hpp"
@@ -9,6 +10,7 @@
 #elif defined(__AVX2__)
 #include <immintrin.h>
 #define RC_HAS_LANES 1
+#define RC_HAS_BYTE_PRODUCTS 1
 #elif defined(__SSE2__) && defined(__x86_64__)
 #include <emmintrin.h>
 #define RC_HAS_LANES 1
@@ -27,6 +29,9 @@
 
 namespace racecraft::RC_ISA {
 namespace {
+
+// In place of a mask: all lanes.
+struct AllLanes {};
 
 #if defined(RC_SCALAR)
 #elif defined(__AVX512VNNI__)
@@ -82,16 +87,20 @@ RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
 RC_HD Lanes dot_halves(Lanes a, Lanes b) {
     return {_mm512_madd_epi16(a.v, b.v)};
 }
-// Entry index[lane] of a table of eight.
-RC_HD Lanes look_up(const int32_t* table, Lanes index) {
+// The entry that the upper byte of each lane names, of a table of eight pairs of bytes, each as a half.
+RC_HD Lanes look_up(const int32_t* table, Lanes a) {
     const __m256i entries = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(table));
-    return {_mm512_permutexvar_epi32(index.v, _mm512_broadcast_i64x4(entries))};
+    return {_mm512_permutexvar_epi32(shift_right(a, 24).v, _mm512_broadcast_i64x4(entries))};
 }
-RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
-    return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), mask, index.v, base, 4)};
+// The words at base and so many bytes; what lanes outside the mask hold is nobody's business.
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, LaneMask mask) {
+    return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), mask, offset.v, base, 1)};
 }
-RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
-    return {_mm512_i32gather_epi32(index.v, base, 4)};
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, AllLanes) {
+    return {_mm512_i32gather_epi32(offset.v, base, 1)};
+}
+RC_HD void add_to(int32_t* sums, Lanes value, AllLanes) {
+    _mm512_storeu_si512(sums, _mm512_add_epi32(_mm512_loadu_si512(sums), value.v));
 }
 RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
     _mm512_mask_storeu_epi32(sums, mask, _mm512_add_epi32(_mm512_loadu_si512(sums), value.v));
@@ -154,21 +163,23 @@ RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
 RC_HD Lanes dot_halves(Lanes a, Lanes b) {
     return {_mm256_madd_epi16(a.v, b.v)};
 }
-RC_HD Lanes look_up(const int32_t* table, Lanes index) {
-    return {
-        _mm256_permutevar8x32_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(table)), index.v)};
+RC_HD Lanes look_up(const int32_t* table, Lanes a) {
+    const __m256i entries = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(table));
+    return {_mm256_permutevar8x32_epi32(entries, shift_right(a, 24).v)};
 }
-RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, LaneMask mask) {
     const int* words = reinterpret_cast<const int*>(base);
-    return {_mm256_mask_i32gather_epi32(_mm256_setzero_si256(), words, index.v, mask, 4)};
+    return {_mm256_mask_i32gather_epi32(_mm256_setzero_si256(), words, offset.v, mask, 1)};
 }
-RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
-    return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), index.v, 4)};
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, AllLanes) {
+    return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), offset.v, 1)};
+}
+RC_HD void add_to(int32_t* sums, Lanes value, AllLanes) {
+    __m256i* const to = reinterpret_cast<__m256i*>(sums);
+    _mm256_storeu_si256(to, _mm256_add_epi32(_mm256_loadu_si256(to), value.v));
 }
 RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
-    const __m256i old = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(sums));
-    const __m256i added = _mm256_add_epi32(old, _mm256_and_si256(value.v, mask));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums), added);
+    add_to(sums, {_mm256_and_si256(value.v, mask)}, AllLanes{});
 }
 RC_HD Lanes load(const int32_t* values) {
     return {_mm256_loadu_si256(reinterpret_cast<const __m256i*>(values))};
@@ -228,36 +239,47 @@ RC_HD Lanes shift_right_signed(Lanes a, int bits) {
 RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
     return {_mm_min_epi16(_mm_max_epi16(a.v, low.v), high.v)};
 }
-// Bytes 0 and 2 of each lane as halves, then bytes 1 and 3: there is no product of bytes.
-RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
-    const __m128i first =
-        _mm_madd_epi16(_mm_and_si128(a.v, _mm_set1_epi16(255)), _mm_srai_epi16(_mm_slli_epi16(b.v, 8), 8));
-    const __m128i second = _mm_madd_epi16(_mm_srli_epi16(a.v, 8), _mm_srai_epi16(b.v, 8));
-    return {_mm_add_epi32(first, second)};
+// Bytes 0 and 2 of each lane, and bytes 1 and 3, as signed halves.
+RC_HD Lanes low_bytes(Lanes a) {
+    return {_mm_srai_epi16(_mm_slli_epi16(a.v, 8), 8)};
+}
+RC_HD Lanes high_bytes(Lanes a) {
+    return {_mm_srai_epi16(a.v, 8)};
 }
 RC_HD Lanes dot_halves(Lanes a, Lanes b) {
     return {_mm_madd_epi16(a.v, b.v)};
 }
-RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
-    const auto lower = static_cast<uint64_t>(_mm_cvtsi128_si64(index.v));
-    const auto upper = static_cast<uint64_t>(_mm_cvtsi128_si64(_mm_unpackhi_epi64(index.v, index.v)));
-    const auto at = [base](uint64_t i) { return _mm_cvtsi32_si128(static_cast<int32_t>(base[i])); };
+// The sum of two dot products whose products fit 16 bits.
+RC_HD Lanes dot_halves(Lanes a, Lanes b, Lanes c, Lanes d) {
+    return dot_halves(a, b) + dot_halves(c, d);
+}
+RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
+    const Lanes first = {_mm_and_si128(a.v, _mm_set1_epi16(255))};
+    return dot_halves(first, low_bytes(b), {_mm_srli_epi16(a.v, 8)}, high_bytes(b));
+}
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, AllLanes) {
+    const auto lower = static_cast<uint64_t>(_mm_cvtsi128_si64(offset.v));
+    const auto upper = static_cast<uint64_t>(_mm_cvtsi128_si64(_mm_unpackhi_epi64(offset.v, offset.v)));
+    const char* bytes = reinterpret_cast<const char*>(base);
+    const auto at = [bytes](uint64_t i) { return _mm_loadu_si32(bytes + i); };
     return {_mm_unpacklo_epi64(_mm_unpacklo_epi32(at(lower & 0xffffffff), at(lower >> 32)),
                                _mm_unpacklo_epi32(at(upper & 0xffffffff), at(upper >> 32)))};
 }
-RC_HD Lanes look_up(const int32_t* table, Lanes index) {
-    return gather_all(reinterpret_cast<const uint32_t*>(table), index);
+RC_HD Lanes look_up(const int32_t* table, Lanes a) {
+    return gather(reinterpret_cast<const uint32_t*>(table), shift_left(shift_right(a, 24), 2), AllLanes{});
 }
-// Lanes outside the mask read the first entry.
-RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
-    return {_mm_and_si128(gather_all(base, {_mm_and_si128(index.v, mask)}).v, mask)};
+// Lanes outside the mask read the first word.
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, LaneMask mask) {
+    return gather(base, {_mm_and_si128(offset.v, mask)}, AllLanes{});
 }
 RC_HD Lanes load(const int32_t* values) {
     return {_mm_loadu_si128(reinterpret_cast<const __m128i*>(values))};
 }
+RC_HD void add_to(int32_t* sums, Lanes value, AllLanes) {
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(sums), (load(sums) + value).v);
+}
 RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
-    const __m128i added = _mm_add_epi32(load(sums).v, _mm_and_si128(value.v, mask));
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(sums), added);
+    add_to(sums, {_mm_and_si128(value.v, mask)}, AllLanes{});
 }
 RC_HD void store_halves(uint8_t* out, Lanes a) {
     const __m128i low = _mm_shufflelo_epi16(a.v, 0x08);
@@ -314,39 +336,53 @@ RC_HD Lanes shift_right_signed(Lanes a, int bits) {
 RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
     return {vminq_s32(vmaxq_s32(a.v, low.v), high.v)};
 }
-// Bytes 0 and 2 of each lane as halves, then bytes 1 and 3; each product fits one.
+// Bytes 0 and 2 of each lane, and bytes 1 and 3, as signed halves.
+RC_HD Lanes low_bytes(Lanes a) {
+    return {vreinterpretq_s32_s16(vshrq_n_s16(vshlq_n_s16(halves_of(a.v), 8), 8))};
+}
+RC_HD Lanes high_bytes(Lanes a) {
+    return {vreinterpretq_s32_s16(vshrq_n_s16(halves_of(a.v), 8))};
+}
+// The sum of two dot products whose products fit 16 bits.
+RC_HD Lanes dot_halves(Lanes a, Lanes b, Lanes c, Lanes d) {
+    const int16x8_t first = vmulq_s16(halves_of(a.v), halves_of(b.v));
+    return {vpadalq_s16(vpaddlq_s16(first), vmulq_s16(halves_of(c.v), halves_of(d.v)))};
+}
 RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
     const uint16x8_t bytes = vreinterpretq_u16_s32(a.v);
-    const int16x8_t first = vmulq_s16(vreinterpretq_s16_u16(vandq_u16(bytes, vdupq_n_u16(255))),
-                                      vshrq_n_s16(vshlq_n_s16(halves_of(b.v), 8), 8));
-    const int16x8_t second =
-        vmulq_s16(vreinterpretq_s16_u16(vshrq_n_u16(bytes, 8)), vshrq_n_s16(halves_of(b.v), 8));
-    return {vpadalq_s16(vpaddlq_s16(first), second)};
+    const Lanes first = {vreinterpretq_s32_u16(vandq_u16(bytes, vdupq_n_u16(255)))};
+    return dot_halves(first, low_bytes(b), {vreinterpretq_s32_u16(vshrq_n_u16(bytes, 8))}, high_bytes(b));
 }
 RC_HD Lanes dot_halves(Lanes a, Lanes b) {
     const int16x8_t x = halves_of(a.v), y = halves_of(b.v);
     return {vpaddq_s32(vmull_s16(vget_low_s16(x), vget_low_s16(y)), vmull_high_s16(x, y))};
 }
-// The table as two vectors of bytes.
-RC_HD Lanes look_up(const int32_t* table, Lanes index) {
-    const uint8_t* bytes = reinterpret_cast<const uint8_t*>(table);
-    const int32x4_t byte = vmlaq_s32(vdupq_n_s32(0x03020100), index.v, vdupq_n_s32(0x04040404));
-    const uint8x16x2_t entries = {{vld1q_u8(bytes), vld1q_u8(bytes + 16)}};
-    return {vreinterpretq_s32_u8(vqtbl2q_u8(entries, vreinterpretq_u8_s32(byte)))};
+// The table as one vector of bytes; where a byte's number is not one of the vector's, there is 0.
+RC_HD Lanes look_up(const int32_t* table, Lanes a) {
+    const uint8x16_t entries = vcombine_u8(vmovn_u16(vreinterpretq_u16_s32(vld1q_s32(table))),
+                                           vmovn_u16(vreinterpretq_u16_s32(vld1q_s32(table + 4))));
+    const uint32x4_t index = vshrq_n_u32(vreinterpretq_u32_s32(a.v), 24);
+    const uint32x4_t bytes = vmlaq_u32(vdupq_n_u32(0xff01ff00), index, vdupq_n_u32(0x00020002));
+    return {vreinterpretq_s32_u8(vqtbl1q_u8(entries, vreinterpretq_u8_u32(bytes)))};
 }
-RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
-    const uint32x4_t i = vreinterpretq_u32_s32(index.v);
-    uint32x4_t all = vdupq_n_u32(base[vgetq_lane_u32(i, 0)]);
-    all = vld1q_lane_u32(base + vgetq_lane_u32(i, 1), all, 1);
-    all = vld1q_lane_u32(base + vgetq_lane_u32(i, 2), all, 2);
-    return {vreinterpretq_s32_u32(vld1q_lane_u32(base + vgetq_lane_u32(i, 3), all, 3))};
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, AllLanes) {
+    const uint32x4_t i = vreinterpretq_u32_s32(offset.v);
+    const char* bytes = reinterpret_cast<const char*>(base);
+    const auto at = [bytes](uint32_t byte) { return reinterpret_cast<const uint32_t*>(bytes + byte); };
+    uint32x4_t all = vld1q_dup_u32(at(vgetq_lane_u32(i, 0)));
+    all = vld1q_lane_u32(at(vgetq_lane_u32(i, 1)), all, 1);
+    all = vld1q_lane_u32(at(vgetq_lane_u32(i, 2)), all, 2);
+    return {vreinterpretq_s32_u32(vld1q_lane_u32(at(vgetq_lane_u32(i, 3)), all, 3))};
 }
-// Lanes outside the mask read the first entry.
-RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
-    return {vandq_s32(gather_all(base, {vandq_s32(index.v, mask)}).v, mask)};
+// Lanes outside the mask read the first word.
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, LaneMask mask) {
+    return gather(base, {vandq_s32(offset.v, mask)}, AllLanes{});
+}
+RC_HD void add_to(int32_t* sums, Lanes value, AllLanes) {
+    vst1q_s32(sums, vaddq_s32(vld1q_s32(sums), value.v));
 }
 RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
-    vst1q_s32(sums, vaddq_s32(vld1q_s32(sums), vandq_s32(value.v, mask)));
+    add_to(sums, {vandq_s32(value.v, mask)}, AllLanes{});
 }
 RC_HD Lanes load(const int32_t* values) {
     return {vld1q_s32(values)};
@@ -399,37 +435,52 @@ RC_HD Lanes shift_right_signed(Lanes a, int bits) {
 RC_HD Lanes clamp_lanes(Lanes a, Lanes low, Lanes high) {
     return {wasm_i32x4_min(wasm_i32x4_max(a.v, low.v), high.v)};
 }
-// Bytes 0 and 2 of each lane as halves, then bytes 1 and 3: there is no product of bytes.
-RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
-    const v128_t first = wasm_i32x4_dot_i16x8(wasm_v128_and(a.v, wasm_i16x8_const_splat(255)),
-                                              wasm_i16x8_shr(wasm_i16x8_shl(b.v, 8), 8));
-    const v128_t second = wasm_i32x4_dot_i16x8(wasm_u16x8_shr(a.v, 8), wasm_i16x8_shr(b.v, 8));
-    return {wasm_i32x4_add(first, second)};
+// Bytes 0 and 2 of each lane, and bytes 1 and 3, as signed halves.
+RC_HD Lanes low_bytes(Lanes a) {
+    return {wasm_i16x8_shr(wasm_i16x8_shl(a.v, 8), 8)};
+}
+RC_HD Lanes high_bytes(Lanes a) {
+    return {wasm_i16x8_shr(a.v, 8)};
 }
 RC_HD Lanes dot_halves(Lanes a, Lanes b) {
     return {wasm_i32x4_dot_i16x8(a.v, b.v)};
 }
-// The table as two vectors of bytes; where a byte's number is not one of the vector's, a swizzle gives 0.
-RC_HD Lanes look_up(const int32_t* table, Lanes index) {
-    const v128_t first_byte = wasm_i32x4_mul(index.v, wasm_i32x4_const_splat(0x04040404));
-    const v128_t byte = wasm_v128_or(first_byte, wasm_i32x4_const_splat(0x03020100));
-    const v128_t low = wasm_i8x16_swizzle(wasm_v128_load(table), byte);
-    const v128_t high =
-        wasm_i8x16_swizzle(wasm_v128_load(table + 4), wasm_i8x16_sub(byte, wasm_i8x16_const_splat(16)));
-    return {wasm_v128_or(low, high)};
+// The sum of two dot products whose products fit 16 bits.
+RC_HD Lanes dot_halves(Lanes a, Lanes b, Lanes c, Lanes d) {
+    return dot_halves(a, b) + dot_halves(c, d);
 }
-RC_HD Lanes gather_all(const uint32_t* base, Lanes index) {
-    v128_t all = wasm_v128_load32_zero(base + wasm_u32x4_extract_lane(index.v, 0));
-    all = wasm_v128_load32_lane(base + wasm_u32x4_extract_lane(index.v, 1), all, 1);
-    all = wasm_v128_load32_lane(base + wasm_u32x4_extract_lane(index.v, 2), all, 2);
-    return {wasm_v128_load32_lane(base + wasm_u32x4_extract_lane(index.v, 3), all, 3)};
+RC_HD Lanes dot_bytes(Lanes a, Lanes b) {
+    const Lanes first = {wasm_v128_and(a.v, wasm_i16x8_const_splat(255))};
+    return dot_halves(first, low_bytes(b), {wasm_u16x8_shr(a.v, 8)}, high_bytes(b));
 }
-// Lanes outside the mask read the first entry.
-RC_HD Lanes gather(const uint32_t* base, Lanes index, LaneMask mask) {
-    return {wasm_v128_and(gather_all(base, {wasm_v128_and(index.v, mask)}).v, mask)};
+// The table as one vector of bytes; byte 255 of it is 0, with relaxed SIMD as well.
+RC_HD Lanes look_up(const int32_t* table, Lanes a) {
+    const v128_t entries = wasm_u8x16_narrow_i16x8(wasm_v128_load(table), wasm_v128_load(table + 4));
+    const v128_t index = wasm_i8x16_shuffle(a.v, a.v, 3, 3, 3, 3, 7, 7, 7, 7, 11, 11, 11, 11, 15, 15, 15, 15);
+    const v128_t bytes = wasm_v128_or(wasm_i16x8_shl(index, 1), wasm_u32x4_const_splat(0xff01ff00));
+#if defined(__wasm_relaxed_simd__)
+    return {wasm_i8x16_relaxed_swizzle(entries, bytes)};
+#else
+    return {wasm_i8x16_swizzle(entries, bytes)};
+#endif
+}
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, AllLanes) {
+    const v128_t address = wasm_i32x4_add(offset.v, wasm_u32x4_splat(reinterpret_cast<uint32_t>(base)));
+    const auto at = [](uint32_t byte) { return reinterpret_cast<const uint32_t*>(byte); };
+    v128_t all = wasm_v128_load32_zero(at(wasm_u32x4_extract_lane(address, 0)));
+    all = wasm_v128_load32_lane(at(wasm_u32x4_extract_lane(address, 1)), all, 1);
+    all = wasm_v128_load32_lane(at(wasm_u32x4_extract_lane(address, 2)), all, 2);
+    return {wasm_v128_load32_lane(at(wasm_u32x4_extract_lane(address, 3)), all, 3)};
+}
+// Lanes outside the mask read the first word.
+RC_HD Lanes gather(const uint32_t* base, Lanes offset, LaneMask mask) {
+    return gather(base, {wasm_v128_and(offset.v, mask)}, AllLanes{});
+}
+RC_HD void add_to(int32_t* sums, Lanes value, AllLanes) {
+    wasm_v128_store(sums, wasm_i32x4_add(wasm_v128_load(sums), value.v));
 }
 RC_HD void add_to(int32_t* sums, Lanes value, LaneMask mask) {
-    wasm_v128_store(sums, wasm_i32x4_add(wasm_v128_load(sums), wasm_v128_and(value.v, mask)));
+    add_to(sums, {wasm_v128_and(value.v, mask)}, AllLanes{});
 }
 RC_HD Lanes load(const int32_t* values) {
     return {wasm_v128_load(values)};

@@ -89,13 +89,13 @@ RC_HD int32_t edge_growth(uint32_t texel, int32_t x, int32_t y) {
     return x * static_cast<int8_t>(texel & 255) + y * static_cast<int8_t>((texel >> 8) & 255);
 }
 
-// Brightness times 64 of an edge texel. sharpness is 256 over the filter width in texels; blend holds, per
-// pair, the brightness below in the low half and the difference to the brightness above in the high half.
-RC_HD int32_t shade_edge(uint32_t texel, int32_t distance, int32_t sharpness, const int32_t* blend) {
+// Brightness times 64 of an edge texel. sharpness is 256 over the filter width in texels; sides holds, per
+// pair, the brightness below in the low half and that above in the high half.
+RC_HD int32_t shade_edge(uint32_t texel, int32_t distance, int32_t sharpness, const int32_t* sides) {
     const int32_t ramp = ((distance * sharpness) >> 16) + kCoverageUnit / 2;
     const int32_t coverage = clamp(ramp, 0, kCoverageUnit);
-    const int32_t entry = blend[texel >> 24];
-    return kCoverageUnit * static_cast<int16_t>(entry & 0xffff) + coverage * (entry >> 16);
+    const int32_t pair = sides[texel >> 24];
+    return (kCoverageUnit - coverage) * (pair & 0xffff) + coverage * (pair >> 16);
 }
 
 // Brightness times 64 of a coverage texel; weights are the four brightnesses, one byte each.

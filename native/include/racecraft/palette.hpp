@@ -95,7 +95,7 @@ RC_HD void mix_colours(const uint8_t* from, const uint8_t* to, float share, uint
 
 // A palette in the form the inner loop wants; see shade_edge() and shade_coverage().
 struct GroundShades {
-    int32_t blend[kNumMaterialPairs];
+    int32_t sides[kNumMaterialPairs];
     uint32_t weights;
 };
 
@@ -118,7 +118,7 @@ RC_HD GroundShades ground_shades(const uint8_t* ground, const uint8_t* grain) {
             below -= contrast;
             above += contrast;
         }
-        shades.blend[i] = static_cast<int32_t>(static_cast<uint32_t>(above - below) << 16) | below;
+        shades.sides[i] = above << 16 | below;
     }
     for (int32_t i = 0; i < kNumMaterials; ++i) {
         shades.weights |= static_cast<uint32_t>(ground[i]) << (8 * i);
