@@ -14,6 +14,7 @@ from leagues import running_league
 from postgres_servers import PostgresServer, binaries, postgres_server
 from running_consoles import RunningConsole, running_console
 from running_workers import processes_on
+from s3_servers import S3Server, s3_server
 from schools import School
 
 if TYPE_CHECKING:
@@ -32,6 +33,14 @@ def postgres() -> Iterator[PostgresServer]:
     if binaries() is None:
         pytest.skip("PostgreSQL is not installed: apt-get install postgresql")
     with postgres_server() as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def s3() -> Iterator[S3Server]:
+    """An S3 server; skips where moto is not installed."""
+    pytest.importorskip("moto.server")
+    with s3_server() as server:
         yield server
 
 

@@ -6,19 +6,15 @@ import hashlib
 import json
 import shutil
 import socket
-import subprocess
-import sys
 import threading
 import time
-import urllib.error
-import urllib.request
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from running_consoles import running_console
+from s3_servers import S3Server
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.run import RunFolder
@@ -35,48 +31,14 @@ from racecraft.serve.store.database import Database
 REWARD = "def reward_function(params):\n    return 1.0\n"
 
 
-@pytest.fixture(scope="session")
-def s3() -> Iterator[str]:
-    """The address of an S3 server on this machine, with the bucket "racing"."""
-    pytest.importorskip("moto.server")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    address = f"http://127.0.0.1:{port}"
-    try:
-        deadline = time.monotonic() + 60
-        while True:
-            try:
-                urllib.request.urlopen(urllib.request.Request(f"{address}/racing", method="PUT")).close()
-                break
-            except urllib.error.HTTPError as error:
-                error.close()
-                raise
-            except urllib.error.URLError:
-                assert process.poll() is None
-                assert time.monotonic() < deadline
-                time.sleep(0.1)
-        yield address
-    finally:
-        process.terminate()
-        process.wait(30)
-
-
 @pytest.fixture(params=["s3", "file"])
 def url(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     if request.param == "file":
         return f"file://{tmp_path}/store"
-    address = request.getfixturevalue("s3")
-    for name, value in (
-        ("AWS_ENDPOINT_URL", address),
-        ("AWS_ACCESS_KEY_ID", "test"),
-        ("AWS_SECRET_ACCESS_KEY", "test"),
-        ("AWS_REGION", "us-east-1"),
-    ):
+    server: S3Server = request.getfixturevalue("s3")
+    for name, value in server.environment.items():
         monkeypatch.setenv(name, value)
-    return f"s3://racing/{tmp_path.name}"
+    return server.url(tmp_path.name)
 
 
 def make_run(runs: Path, name: str = "a") -> RunFolder:

@@ -19,8 +19,10 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 from leagues import RunningLeague, ok, refused, running_league
+from postgres_servers import PostgresServer
 from running_consoles import PATIENCE, running_console
 from running_workers import RunningWorker, running_worker
+from s3_servers import S3Server
 from sqlalchemy.orm import Session
 
 pytest.importorskip("obstore")
@@ -45,10 +47,10 @@ UNTIL = "16000 steps"
 class Place:
     """A league that leaves its trainings to workers who come with tokens."""
 
-    def __init__(self, league: RunningLeague, folder: Path) -> None:
+    def __init__(self, league: RunningLeague, folder: Path, store: str) -> None:
         self.league, self.console, self.folder = league, league.console, folder
         self.url = str(league.owner.base_url).rstrip("/")
-        self.artifacts = Artifacts(f"file://{folder}/store")
+        self.artifacts = Artifacts(store)
 
     def token(self) -> tuple[int, str]:
         asked = {"title": "lab", "scopes": ["worker"]}
@@ -120,9 +122,10 @@ class Hand:
 
 @contextmanager
 def place_at(folder: Path, port: int = 0) -> Iterator[Place]:
-    options = ["--artifacts", f"file://{folder}/store", "--trainings", "0", "--port", str(port)]
+    store = f"file://{folder}/store"
+    options = ["--artifacts", store, "--trainings", "0", "--port", str(port)]
     with running_league(folder / "console", *options) as league:
-        yield Place(league, folder)
+        yield Place(league, folder, store)
 
 
 @pytest.fixture(scope="module")
@@ -201,6 +204,36 @@ def test_what_a_revoked_token_had_ends_elsewhere_in_the_same_bits(place: Place) 
     assert ended["machine"].startswith("lab-2#")
     assert ended["attempts"] == held + 1
     same_bits(calm, RunFolder(place.console.runs / "passed-on"))
+
+
+@pytest.mark.slow
+def test_a_league_on_postgresql_and_s3_has_workers_that_know_of_neither(
+    tmp_path: Path, postgres: PostgresServer, s3: S3Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    database, store = postgres.new_database(), s3.url(tmp_path.name)
+    options = ["--database", database, "--artifacts", store, "--trainings", "0"]
+    with ExitStack() as stack:
+        with monkeypatch.context() as environment:
+            for name, value in s3.environment.items():
+                environment.setenv(name, value)
+            league = stack.enter_context(running_league(tmp_path / "console", *options))
+            place = Place(league, tmp_path, store)
+        job, calm = place.training("away", seed=7, until="60000 steps")
+        number, secret = place.token()
+        worker = stack.enter_context(place.worker("killed", secret))
+        for process in (worker.process.pid, *worker.children()):
+            environ = Path(f"/proc/{process}/environ").read_bytes()
+            assert not [told for told in (database, store, s3.address) if told.encode() in environ]
+        place.console.wait_for(lambda: place.saved("away"))
+        worker.kill()
+        stack.enter_context(place.worker("next", secret))
+        assert place.done(job)["machine"].startswith("next#")
+        same_bits(calm, RunFolder(place.console.runs / "away"))
+        kept = place.artifacts.copy("away")
+        assert kept is not None
+        assert "checkpoints/manifest.json" in kept.files
+        ok(league.owner.delete(f"/api/account/tokens/{number}"), 204)
+        assert "token" in refused(place.hand(secret).take(), 401)
 
 
 @pytest.mark.slow
