@@ -255,7 +255,7 @@ def test_somebody_elses_reward_stays_somebody_elses(console: RunningConsole) -> 
     """In a clone, and in a model that is made with the very same text; edited, it is the owner's."""
     name = upload(console, "theirs.tar.gz", tar_of(AWS_MODEL)).json()["model"]["name"]
     clone = console.client.post(f"/api/models/{name}/clone", json={}).json()["name"]
-    same, edited = console.create(reward=REWARD), console.create(reward=REWARD + "# seen\n")
+    same, edited = (console.create(reward=reward, train=False) for reward in (REWARD, REWARD + "# seen\n"))
     marks = [RunFolder.open(console.runs / run).read_info().foreign for run in (name, clone, same, edited)]
     assert marks == [True, True, True, False]
     verdict = console.client.post("/api/rewards/check", json={"source": REWARD, "track": "oval"}).json()
