@@ -402,7 +402,7 @@ def test_every_page_has_a_title_and_wrong_addresses_lead_on(visit: Visit) -> Non
         "/create": "New model",
         "/models/ada/race": "ada: Evaluation",
         "/tracks": "Tracks",
-        "/drive/oval": "Drive: oval",
+        "/drive/oval": "Drive: Paperclip",
         "/races/new": "New race",
         "/contests/new": "New heat or ladder",
         "/settings": "Settings",

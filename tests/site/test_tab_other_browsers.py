@@ -168,7 +168,7 @@ def test_a_car_learns_and_is_downloaded(visitor: Visitor, tmp_path: Path) -> Non
     if visitor.tab.run(says, SLOW):
         visitor.press("Stop")  # five laps take minutes
         return
-    visitor.read("oval, 5 of 5 laps, best")  # among the models, too
+    visitor.read("Paperclip, 5 of 5 laps, best")  # among the models, too
     visitor.press("Download: oval-racing-1")
     archive = tmp_path / "model.tar.gz"
     archive.write_bytes(base64.b64decode(visitor.tab.wait(DOWNLOADED)))

@@ -141,7 +141,7 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
     page.get_by_role("button", name="Race it: oval-racing-1").click()
     expect(page.get_by_label("Ghost")).to_have_value("model:oval-racing-1", timeout=PATIENCE)
     page.get_by_role("button", name="Back").click()
-    shown = page.get_by_text(re.compile(r"oval, 5 of 5 laps, best \d+\.\d\d\ss")).inner_text()
+    shown = page.get_by_text(re.compile(r"Paperclip, 5 of 5 laps, best \d+\.\d\d\ss")).inner_text()
     with page.expect_download() as download:
         page.get_by_role("button", name="Download: oval-racing-1").click()
     archive = tmp_path / download.value.suggested_filename
@@ -369,7 +369,7 @@ def test_a_replay_is_driven_again_in_the_tab_and_a_changed_number_is_named(page:
     path = write_replay(Replay.of(evaluation), tmp_path / "club.replay")
     chooser = page.get_by_label("Choose a replay", exact=True).and_(page.locator("input"))
     chooser.set_input_files(path)
-    page.get_by_text("Driven: by drfc rules, with the car v5, on oval.").wait_for(timeout=PATIENCE)
+    page.get_by_text("Driven: by drfc rules, with the car v5, on Paperclip.").wait_for(timeout=PATIENCE)
     page.get_by_text(re.compile(r"All \d+ steps of 2 cars come out the same, bit for bit")).wait_for()
     page.get_by_role("button", name="Watch its laps", exact=True).click()
     shown, best = page.get_by_role("dialog"), min(trial.laps[0].time for trial in evaluation.trials)

@@ -17,6 +17,7 @@ from racecraft.site.lessons import write_lessons
 from racecraft.site.plan import plan, told_medals, track_file
 from racecraft.site.starter import told_starter
 from racecraft.track import track_names
+from racecraft.track.library import course
 
 GENERATED: Final = tuple(f"generated:{seed}" for seed in range(1, 13))
 """Tracks of the generator that the page has beside the library's: it cannot draw others itself."""
@@ -62,7 +63,8 @@ def write_data(folder: Path) -> None:
     (folder / "starter.bin").write_bytes(weights.astype("<f2").tobytes())
     tracks = [*track_names(), *GENERATED]
     medals = {name: told_medals(name) for name in track_names()}
-    told = {"starter": starter, "tracks": tracks, "medals": medals, "rewards": rewards}
+    titles = {name: course(name).display_name for name in track_names()}
+    told = {"starter": starter, "tracks": tracks, "titles": titles, "medals": medals, "rewards": rewards}
     write(folder / "plan.json", {**plan(), **told})
     for name in tracks:
         write(folder / "tracks" / f"{name.replace(':', '-')}.json", track_file(name))

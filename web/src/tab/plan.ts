@@ -55,6 +55,7 @@ export interface Plan {
   starter: { table: number[] }; // lowest and highest command of the car that drives at first (2, 2)
   known: Known; // rules, cars and randomisations of the library
   tracks: string[];
+  titles: Record<string, string>; // of those of the library
   medals: Record<string, MedalTimes | null>; // by track of the library; none where no limit is known
   rewards: RewardPreset[];
 }
@@ -101,8 +102,9 @@ export const indicesOf = ({ told }: TrackFile, isReversed = false): Int32Array =
 export const readTrack = async (site: string, name: string): Promise<TrackFile> =>
   (await (await read(site, `data/tracks/${name.replace(":", "-")}.json`)).json()) as TrackFile;
 
-/** As people read a track's name. */
-export const spaced = (name: string): string => name.replaceAll(/[_:]/g, " ");
+/** What a track is called, as in the console; one that was drawn has its name alone. */
+export const titleOf = ({ titles }: Pick<Plan, "titles">, name: string): string =>
+  Object.hasOwn(titles, name) ? titles[name]! : name.replaceAll(/[_:]/g, " ");
 
 /** A file of the site, wherever the site lies. */
 export async function read(site: string, file: string): Promise<Response> {
