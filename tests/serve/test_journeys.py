@@ -83,7 +83,7 @@ def test_a_veteran_brings_files_of_aws_and_takes_an_archive_home(visit: Visit) -
     )
     page.get_by_text("reward_function.py wurde übernommen").wait_for()
     page.get_by_role("button", name="In Worten").click()
-    page.locator("section", has_text="Bis wann").get_by_role("textbox").fill("1500 steps")
+    page.locator("section", has_text="Bis wann").get_by_role("textbox").fill("500 steps")
     page.get_by_role("button", name="Jetzt trainieren").first.click()
     page.wait_for_url("**/models/**")
     assert visit.overflow() <= 0
