@@ -5,7 +5,9 @@
     .venv/bin/python benchmarks/perception.py --routes ../shared/tracks
 
 Errors are those of the lens, median and 90th percentile, over cars that drive badly near the road's middle: over all of
-them, and over those who have the road's middle in their picture. The last line on stdout is JSON.
+them, and over those who have the road's middle in their picture; of each picture by itself, and with those before it
+remembered; over all pictures of drives of 30, and from the eighth of a drive on. Drivers by perception remember, and
+those "alone" do not. The last line on stdout is JSON.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.perception import Perceiver, PerceptionDriver
+from racecraft.perception import Belief, Perceiver, PerceptionDriver, Watcher
 from racecraft.perception.answers import HALF, NUM_CONTINUOUS, NUMBERS, ROWS
 from racecraft.perception.network import WEIGHTS
 from racecraft.perception.training import World
@@ -35,6 +37,8 @@ UNSEEN = ("kidney", "bowtie", "lakeside", "trefoil", "serpent", "boomerang", "de
 CONDITIONS = ("none", "strong", "real")
 STARTERS = ("steady", "quick")
 """Policies end to end that come along."""
+EARLY = 8
+"""Pictures of a drive until memory has something to go by."""
 SPEEDS = (1.0, 1.5, 2.0, 2.5)
 """m/s on straights of the driver by perception."""
 
@@ -60,35 +64,54 @@ def main() -> None:
 
 
 def sight(perceiver: Perceiver, routes: list[str], randomize: str, *, looks: int) -> dict[str, Any]:
-    """Errors over some 3,000 pictures, of 24 looks."""
+    """Errors over some 3,000 pictures, of 24 looks, every third of which counts."""
     world = World(routes, num_envs=128, seed=11, randomize=randomize, lateral=0.1, turned=0.15, sway=0.08)
-    errors: dict[str, list[NDArray[np.float32]]] = {}
-    middle_seen: list[NDArray[np.bool_]] = []
-    for _ in range(looks):
-        frames, truth = [world.look() for _ in range(3)][-1]
-        belief = perceiver(frames)
-        for name, unit, told in (
-            ("offset_cm", 100.0, belief.offset),
-            ("heading_deg", np.degrees(1.0), belief.heading),
-            ("heading_ahead_deg", np.degrees(1.0), belief.heading_ahead),
-        ):
-            wanted = name.rpartition("_")[0]
-            column = truth[:, list(NUMBERS).index(wanted)] * NUMBERS[wanted]
-            errors.setdefault(name, []).append(unit * np.abs(told - column))
-        is_there = truth[:, NUM_CONTINUOUS : NUM_CONTINUOUS + len(ROWS)] > 0.5
-        middle_seen.append(is_there.any(axis=1))
-        columns = truth[:, len(NUMBERS) : NUM_CONTINUOUS] * HALF + HALF - 0.5
-        errors.setdefault("middle_px", []).append(np.abs(belief.middle - columns)[is_there])
-    in_sight = np.concatenate(middle_seen)
+    watcher, ages = Watcher(perceiver), np.zeros(128, int)
+    parts: list[dict[str, Any]] = []
+    for look in range(1, 3 * looks + 1):
+        frames, truth = world.look()
+        watcher.forget(world.begins)
+        ages = np.where(world.begins, 1, ages + 1)
+        remembering = watcher(frames)
+        if look % 3 == 0:
+            there: dict[str, Any] = {"is_in_sight": _is_there(truth).any(axis=1), "is_late": ages >= EARLY}
+            after = {f"remembering {name}": errors for name, errors in _where(remembering, truth).items()}
+            parts.append(there | _where(perceiver(frames), truth) | _columns(remembering, truth) | after)
+    errors = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    in_sight, late = errors.pop("is_in_sight"), errors.pop("is_late")
     row: dict[str, Any] = {"randomize": randomize, "middle_in_sight": round(float(in_sight.mean()), 3)}
-    for name, parts in errors.items():
-        values = np.concatenate(parts)
+    for name, values in errors.items():
         row[name] = _spread(values)
         if len(values) == len(in_sight):
             row[name]["in sight"] = _spread(values[in_sight])
+            if late.any():
+                row[name][f"from the {EARLY}th on"] = _spread(values[late])
     told = (f"{name} {row[name]['median']:.2f} / {row[name]['90 %']:.2f}" for name in errors)
     print(f"{randomize:8}", *told)
     return row
+
+
+def _where(belief: Belief, truth: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+    """How far off it is where each of N lenses is and looks  (N,)."""
+    found = {}
+    for name, unit, told in (
+        ("offset_cm", 100.0, belief.offset),
+        ("heading_deg", np.degrees(1.0), belief.heading),
+        ("heading_ahead_deg", np.degrees(1.0), belief.heading_ahead),
+    ):
+        wanted = name.rpartition("_")[0]
+        column = truth[:, list(NUMBERS).index(wanted)] * NUMBERS[wanted]
+        found[name] = unit * np.abs(told - column)
+    return found
+
+
+def _columns(belief: Belief, truth: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+    columns = truth[:, len(NUMBERS) : NUM_CONTINUOUS] * HALF + HALF - 0.5
+    return {"middle_px": np.abs(belief.middle - columns)[_is_there(truth)]}
+
+
+def _is_there(truth: NDArray[np.float32]) -> NDArray[np.bool_]:
+    return np.asarray(truth[:, NUM_CONTINUOUS : NUM_CONTINUOUS + len(ROWS)] > 0.5)
 
 
 def _spread(values: NDArray[np.float32]) -> dict[str, Any]:
@@ -99,8 +122,11 @@ def driving(perceiver: Perceiver, options: argparse.Namespace) -> list[dict[str,
     """Laps tried once on each track, each way, by perception at several speeds and by the starters."""
     threads: int = options.num_threads
     drivers: dict[str, Callable[..., Any]] = {
-        f"perception, {speed:g} m/s": PerceptionDriver(perceiver, autopilot=Autopilot(speed=speed))
+        f"perception{name}, {speed:g} m/s": PerceptionDriver(
+            perceiver, autopilot=Autopilot(speed=speed), remembers=remembers
+        )
         for speed in options.speeds
+        for name, remembers in (("", True), (" alone", False))
     }
     for name in options.starters:
         drivers[f"starter:{name}"] = load_policy(RunFolder.open(FOLDER / name), num_threads=threads)[1]
@@ -113,7 +139,7 @@ def driving(perceiver: Perceiver, options: argparse.Namespace) -> list[dict[str,
             rows.append(
                 {"driver": name, "randomize": randomize, "laps": found.laps, "trials": found.trials, "m/s": pace}
             )
-            print(f"{name:20} {randomize:8} {found.laps:4} of {found.trials} laps, {pace} m/s")
+            print(f"{name:26} {randomize:8} {found.laps:4} of {found.trials} laps, {pace} m/s")
     return rows
 
 

@@ -174,14 +174,17 @@ def judge(name: str, routes: list[str], options: argparse.Namespace) -> list[Lap
         left_degrees=LOCK, right_degrees=LOCK, speeds=((100.0, FULL_THROTTLE),), slider_percent=options.slider
     )
     drives_blind = name == "geometry"
-    driver = None if drives_blind else perception(options.speed) if name == "perception" else exported(Path(name), car)
+    looks = name == "perception"
+    driver = None if drives_blind or looks else exported(Path(name), car)
     for route in routes:
         for start in options.starts:
             track = load_track(route)
             track = track.reversed() if start == 1 else track
             world = World(track, seed=start, latency=options.latency, size=None if drives_blind else (640, 480))
             keep = bool(options.film or options.sheet)
-            lap = drive_lap(world, track, driver or geometry(track), start=start, sees=not drives_blind, keep=keep)
+            # perception remembers: a driver of its own for each lap
+            drives = driver or (perception(options.speed) if looks else geometry(track))
+            lap = drive_lap(world, track, drives, start=start, sees=not drives_blind, keep=keep)
             world.close()
             laps.append(lap)
             if not options.json:

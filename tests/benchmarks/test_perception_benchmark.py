@@ -20,16 +20,21 @@ def run(script: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.costly
 def test_it_tells_how_well_roads_are_seen_and_driven() -> None:
-    small = ["--looks", "2", "--routes", "oval", "--randomize", "none", "--speeds", "1.5", "--starters"]
+    small = ["--looks", "4", "--routes", "oval", "--randomize", "none", "--speeds", "1.5", "--starters"]
     done = run(SCRIPT, *small)
     assert done.returncode == 0, done.stderr
     last = json.loads(done.stdout.splitlines()[-1])
-    (seen,), (driven,) = last["sight"], last["driving"]
+    (seen,), (driven, alone) = last["sight"], last["driving"]
     assert 0.7 < seen["middle_in_sight"] <= 1.0
     for name, most in {"offset_cm": 2.0, "heading_deg": 4.0, "heading_ahead_deg": 4.0, "middle_px": 3.0}.items():
         assert 0.0 < seen[name]["median"] < min(most, seen[name]["90 %"]), name
     assert seen["offset_cm"]["in sight"]["90 %"] <= seen["offset_cm"]["90 %"]
-    assert (driven["driver"], driven["laps"], driven["trials"]) == ("perception, 1.5 m/s", 2, 2)
+    for name in ("offset_cm", "heading_deg", "heading_ahead_deg"):
+        after = seen[f"remembering {name}"]
+        assert 0.0 < after["from the 8th on"]["median"] < after["from the 8th on"]["90 %"], name
+    assert seen["remembering heading_deg"]["from the 8th on"]["90 %"] < 0.8 * seen["heading_deg"]["90 %"]
+    for row, name in ((driven, "perception, 1.5 m/s"), (alone, "perception alone, 1.5 m/s")):
+        assert (row["driver"], row["laps"], row["trials"]) == (name, 2, 2)
 
 
 @pytest.mark.costly

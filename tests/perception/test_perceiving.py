@@ -80,7 +80,9 @@ def unseen(perceiver: Perceiver) -> tuple[Belief, NDArray[np.float32]]:
     frames, targets = [], []
     for step in range(80):
         simulation.step(driver(simulation.frames))
-        simulation.reset(simulation.terminated | simulation.truncated)
+        begins = simulation.terminated | simulation.truncated
+        simulation.reset(begins)
+        driver.forget(begins)
         if step % 5 == 0:
             frames.append(simulation.frames.copy())
             targets.append(truth.targets())

@@ -34,7 +34,8 @@ class Seen:
 
 
 def commands_of(belief: Belief) -> tuple[float, float]:
-    steering, speed = PerceptionDriver(Seen(belief))(np.zeros((1, 120, 160), np.uint8))[0]  # type: ignore[arg-type]
+    driver = PerceptionDriver(Seen(belief), remembers=False)  # type: ignore[arg-type]
+    steering, speed = driver(np.zeros((1, 120, 160), np.uint8))[0]
     return float(steering), float(speed)
 
 

@@ -116,6 +116,7 @@ def test_a_video_is_painted_as_one(tmp_path: Path, perceiver: Perceiver) -> None
     frames = [np.asarray(road(640, 480).rotate(turn)) for turn in range(5)]
     write_video(frames, tmp_path / "in.mp4")
     told = perceive([tmp_path / "in.mp4"], output=tmp_path / "out.mp4", perceiver=perceiver)
+    assert {picture.is_of_film for picture in read_pictures([tmp_path / "in.mp4"])} == {True}
     assert [one["file"].rpartition("#")[2] for one in told] == ["0", "1", "2", "3", "4"]
     painted = [picture.shown.astype(int) for picture in read_pictures([tmp_path / "out.mp4"])]
     assert len(painted) == 5
@@ -158,6 +159,23 @@ def test_a_replay_shows_what_the_driver_saw(tmp_path: Path, sensor: str, camera:
     assert len(pictures) == len(seen) + 1  # the first is of the step that prepares the start
     for picture, frame in zip(pictures[1:], seen, strict=True):
         assert np.abs(picture.seen.astype(int) - frame).mean() < 2.0
+
+
+def test_a_car_that_is_put_back_is_in_another_place(tmp_path: Path) -> None:
+    evaluation = evaluate(
+        lambda frames: np.tile(np.array([0.3, 1.5], np.float32), (len(frames), 1)),
+        load_track("oval"),
+        rules=replace(RULE_SETS["drfc"], time_limit=8.0),
+        num_trials=1,
+        num_threads=1,
+    )
+    pictures = list(read_pictures([write_replay(Replay.of(evaluation), tmp_path / "a.replay")]))
+    firsts = [step for step, picture in enumerate(pictures) if picture.is_first]
+    poses = evaluation.best_trial.recording.poses
+    jumps = [step for step in range(1, len(poses)) if np.hypot(*(poses[step] - poses[step - 1])[:2]) > 0.2]
+    assert len(jumps) > 0
+    assert firsts == [0, *jumps]
+    assert all(picture.is_of_film for picture in pictures)
 
 
 @pytest.mark.filterwarnings("default")  # no errors, which they are in tests alone

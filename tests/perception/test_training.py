@@ -10,8 +10,8 @@ import pytest
 from racecraft.errors import CheckpointError, ConfigError
 from racecraft.perception import Lessons, Perceiver, train
 from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, NUMBERS
+from racecraft.perception.losses import slopes_of
 from racecraft.perception.network import MAX_WEIGHTS, STEP, WEIGHTS
-from racecraft.perception.training import slopes_of
 
 pytestmark = pytest.mark.costly
 
@@ -20,10 +20,16 @@ FEW = Lessons(updates=60, minibatch_size=32, store=1024, roads=2, learning_rate=
 
 @pytest.fixture(scope="module")
 def learned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[float]]:
-    """Weights after a few lessons, and the losses on the way."""
+    """Weights after a few lessons, and the network's losses on the way."""
     losses: list[float] = []
+
+    def tell(update: int, loss: float) -> None:
+        assert update <= FEW.all_updates
+        if update <= FEW.updates:
+            losses.append(loss)
+
     path = tmp_path_factory.mktemp("lessons") / "a.safetensors"
-    train(FEW, tell=lambda _, loss: losses.append(loss)).save(path)
+    train(FEW, tell=tell).save(path)
     return path, losses
 
 

@@ -31,6 +31,24 @@ class LineFollower:
         return np.stack([-0.06 * offset, np.full(len(frames), 0.8)], axis=1).astype(np.float32)
 
 
+class Remembering(LineFollower):
+    """Drives slower with every picture that it has seen of a car."""
+
+    def __init__(self) -> None:
+        self.seen = np.zeros(99, int)
+
+    def __call__(self, frames: np.ndarray, cars: np.ndarray | None = None) -> np.ndarray:
+        assert cars is not None
+        assert len(cars) == len(frames)
+        commands = super().__call__(frames)
+        commands[:, 1] -= 0.0005 * self.seen[cars]
+        self.seen[cars] += 1
+        return commands
+
+    def forget(self) -> None:
+        self.seen[:] = 0
+
+
 @pytest.fixture(scope="module")
 def table() -> Generalization:
     return generalize(LineFollower(), TRACKS, camera=SMALL, num_trials=2, num_threads=1)
@@ -55,6 +73,14 @@ def test_a_trial_does_not_depend_on_its_company(table, monkeypatch):
     by_name = {row.track: row for row in table.results if row.direction == "reverse"}
     for row in alone.results:
         assert row.completions[0] == by_name[row.track].completions[0]
+
+
+def test_who_remembers_is_told_the_cars_apart_and_when_they_begin(table):
+    together = generalize(Remembering(), TRACKS[:3], camera=SMALL, num_trials=2, num_threads=1)
+    for index, track in enumerate(TRACKS[:3]):
+        alone = generalize(Remembering(), [track], camera=SMALL, num_trials=2, num_threads=1)
+        assert alone.results == together.results[2 * index : 2 * index + 2]
+    assert min(together.results[0].lap_times) > 1.02 * min(table.results[0].lap_times)
 
 
 def test_no_longer_road_beside_it_gives_a_slow_car_more_time():

@@ -53,7 +53,7 @@ def perceive(
         lessons = Lessons(seed=seed, **{name: value for name, value in given.items() if value is not None})
 
         def tell(update: int, loss: float) -> None:
-            text().say_progress(f"{update:,} of {lessons.updates:,} updates, loss {loss:.3f}")
+            text().say_progress(f"{update:,} of {lessons.all_updates:,} updates, loss {loss:.3f}")
 
         learn(lessons, tell=tell).save(train)
         if as_json:

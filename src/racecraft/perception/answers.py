@@ -46,3 +46,5 @@ NUM_CONTINUOUS: Final = len(NUMBERS) + len(ROWS)
 """Those that are told with how far off they may be; the other targets are yes or no."""
 NUM_OUTPUTS: Final = NUM_TARGETS + NUM_CONTINUOUS
 """Of the network: an answer to each target, then the logarithm of the mean error of each continuous one."""
+LOG_LIMITS: Final = (-6.0, 2.0)
+"""Of those logarithms, in units of the network."""

@@ -1,6 +1,6 @@
 """A driver that has learned nothing but to see: pure pursuit of the road that perception believes in.
 
-frames ──perceiver──▶ Belief ──as the simulator's state──▶ autopilot ──caution──▶ commands
+frames ──watcher──▶ Belief ──as the simulator's state──▶ autopilot ──caution──▶ commands
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from racecraft.perception.answers import CURVATURE_AT
 from racecraft.perception.network import Belief, Perceiver
+from racecraft.perception.watching import Watcher
 from racecraft.race.autopilot import Autopilot
 from racecraft.sim.columns import CURVATURE_AHEAD, STATE_COLUMNS
 
@@ -24,20 +25,32 @@ TOP_SPEED: Final = 4.0
 class PerceptionDriver:
     """Steers along the middle of the road that it sees, slows for bends, and more where it is not sure.
 
-    It remembers nothing: a picture always gives the same commands.
-
     Args:
         perceiver: Who looks; by default with the weights that the package brings along.
         autopilot: Who steers by what is seen.
+        remembers: Whether a car's pictures before are remembered; otherwise a picture always gives the same commands.
     """
 
-    def __init__(self, perceiver: Perceiver | None = None, *, autopilot: Autopilot | None = None) -> None:
+    def __init__(
+        self, perceiver: Perceiver | None = None, *, autopilot: Autopilot | None = None, remembers: bool = True
+    ) -> None:
         self.perceiver = perceiver or Perceiver()
         self.autopilot = autopilot or Autopilot(speed=1.5)
+        self._watcher = Watcher(self.perceiver) if remembers else None
 
-    def __call__(self, frames: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Commands (N, 2), steering angle in rad and speed in m/s, for pictures uint8 (N, 120, 160)."""
-        belief = self.perceiver(frames)
+    def forget(self, cars: NDArray[np.intp] | NDArray[np.bool_] | None = None) -> None:
+        """Begin anew with some cars, which were put somewhere else; by default with all."""
+        if self._watcher is not None:
+            self._watcher.forget(cars)
+
+    def __call__(self, frames: NDArray[np.uint8], cars: NDArray[np.intp] | None = None) -> NDArray[np.float32]:
+        """Commands (N, 2), steering angle in rad and speed in m/s, for pictures uint8 (N, 120, 160).
+
+        Args:
+            frames: Of cars under way, the next picture of each.
+            cars: Which they are; by default the first N  (N,).
+        """
+        belief = self.perceiver(frames) if self._watcher is None else self._watcher(frames, cars)
         state = state_of(belief)
         # no picture tells the speed: it is taken to be the one that the bends ahead allow
         pace = self.autopilot(state)[:, 1]

@@ -12,7 +12,7 @@ class Lessons:
     """How much is learned, and how."""
 
     updates: int = 20_000
-    """Gradient steps."""
+    """Gradient steps of the network."""
     minibatch_size: int = 128
     """Pictures to each of them."""
     learning_rate: float = 6e-3
@@ -25,6 +25,21 @@ class Lessons:
     """Generated roads to learn on, beside three of the library; a quarter of them with tight bends."""
     seed: int = 1
     """Decides everything."""
+
+    @property
+    def memory_updates(self) -> int:
+        """Gradient steps of the memory, which learns once the network has."""
+        return max(1, self.updates // 8)
+
+    @property
+    def all_updates(self) -> int:
+        """Of the network and of its memory."""
+        return self.updates + self.memory_updates
+
+    @property
+    def remembered(self) -> int:
+        """Pictures of drives that memory learns from, at least."""
+        return 8 * self.store
 
     def __post_init__(self) -> None:
         check_whole("updates", self.updates, 1, 10_000_000)

@@ -16,6 +16,7 @@ from racecraft.perception.network import Perceiver
 from racecraft.perception.painting import paint
 from racecraft.perception.reading import is_sequence, read_pictures
 from racecraft.perception.telling import tell
+from racecraft.perception.watching import Watcher
 
 TOGETHER: Final = 64
 """Pictures that are looked at, and kept in memory, together."""
@@ -28,7 +29,7 @@ def perceive(
     perceiver: Perceiver | None = None,
     num_threads: int = 0,
 ) -> list[dict[str, Any]]:
-    """Look at pictures.
+    """Look at pictures. Those of a video, replay or run are in order, and looked at with those before in mind.
 
     Args:
         sources: Files, folders, a video, a replay or a run.
@@ -57,12 +58,14 @@ def perceive(
 
 
 def _looked_at(
-    looker: Perceiver, sources: Sequence[str | Path], told: list[dict[str, Any]], *, paints: bool = True
+    perceiver: Perceiver, sources: Sequence[str | Path], told: list[dict[str, Any]], *, paints: bool = True
 ) -> Iterator[tuple[str, NDArray[np.uint8]]]:
     """Name of the file and painted picture, one after the other; `told` grows with them."""
-    pictures = read_pictures(sources)
+    pictures, watcher = read_pictures(sources), Watcher(perceiver)
     while some := list(islice(pictures, TOGETHER)):
-        belief = looker(np.stack([picture.seen for picture in some]))
+        seen = np.stack([picture.seen for picture in some])
+        is_first = np.array([picture.is_first for picture in some])
+        belief = watcher.film(seen, is_first, np.array([picture.is_of_film for picture in some]))
         for index, picture in enumerate(some):
             told.append(tell(picture.file, belief, index))
             yield picture.stem, paint(picture.shown, belief, index) if paints else picture.shown

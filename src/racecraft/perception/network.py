@@ -20,6 +20,7 @@ from racecraft.learn.native_regressor import NativeRegressor
 from racecraft.learn.networks import PERCEIVER
 from racecraft.perception.answers import (
     HALF,
+    LOG_LIMITS,
     NUM_CONTINUOUS,
     NUM_OUTPUTS,
     NUM_REGIONS,
@@ -29,12 +30,15 @@ from racecraft.perception.answers import (
     REGION_ROWS,
     ROWS,
 )
+from racecraft.perception.memory import Memory
 from racecraft.perception.mirror import mirrored_answers, mirrored_observations
 
 WEIGHTS: Final = Path(__file__).with_name("weights.safetensors")
 """What `racecraft perceive --train` made and the package brings along: float16, and steps of the largest matrix."""
 STEP: Final = ".step"
 """Behind the name of a large matrix: what one of its whole numbers is worth, in each row."""
+MEMORY: Final = "memory."
+"""Before the names of the memory's weights."""
 LARGE: Final = 100_000
 """Weights in a matrix that is kept so; coarser outputs would put the road one or two millimetres aside."""
 MEAN, SPREAD = 112.0, 48.0
@@ -43,8 +47,6 @@ LEAST_SPREAD: Final = 4.0
 """Standard deviation, in levels, that the picture of a wall has: less is noise, and is not made more of."""
 MAX_WEIGHTS: Final = 16_000_000
 """Bytes of a file of weights; ours has 0.8 million."""
-LOG_LIMITS: Final = (-6.0, 2.0)
-"""Of the logarithm of an error, in units of the network."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ class Belief:
 
 
 class Perceiver:
-    """Looks at pictures.
+    """Looks at pictures, each by itself; who has them in order asks a `Watcher`, which remembers those before.
 
     Args:
         weights: A file of weights; None begins untrained, from `seed`.
@@ -104,6 +106,8 @@ class Perceiver:
         self.network = NativeRegressor(
             PERCEIVER, NUM_OUTPUTS, seed=seed if weights is None else None, num_threads=num_threads
         )
+        self.memory: Memory | None = None
+        """For pictures in order; None where the weights are without."""
         if weights is not None:
             self._load(weights)
 
@@ -113,10 +117,18 @@ class Perceiver:
         Raises:
             ShapeError: They are not of this type and shape.
         """
+        return believe(self.outputs(frames))
+
+    def outputs(self, frames: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """The same as the network tells it  (N, NUM_OUTPUTS).
+
+        Raises:
+            ShapeError: The pictures are not of this type and shape.
+        """
         observations = self.observe(frames)
         straight = self.network.policy(observations)
         turned = self.network.policy(mirrored_observations(observations))
-        return believe(np.float32(0.5) * (straight + mirrored_answers(turned)))
+        return np.asarray(np.float32(0.5) * (straight + mirrored_answers(turned)))
 
     def observe(self, frames: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """What the network sees of pictures: without their sky, pooled, and of one brightness and contrast.
@@ -128,8 +140,16 @@ class Perceiver:
 
     def save(self, path: Path) -> None:
         """Write the weights: the large matrix, nine tenths of all, in 255 steps a row, and the rest in float16."""
+        path.write_bytes(save_tensors(self._kept()))
+
+    def settle(self) -> None:
+        """Round the weights to what `save` keeps of them."""
+        self._take(self._kept())
+
+    def _kept(self) -> dict[str, NDArray[np.generic]]:
         weights = {name: array for name, array in self.network.weights().items() if name.startswith("policy.")}
-        path.write_bytes(save_tensors(_packed(weights)))
+        remembers = {} if self.memory is None else self.memory.weights
+        return _packed(weights) | {MEMORY + name: array.astype(np.float16) for name, array in remembers.items()}
 
     def _load(self, path: Path) -> None:
         try:
@@ -144,15 +164,25 @@ class Perceiver:
             stored: Mapping[str, NDArray[np.generic]] = load_tensors(data)
         except Exception as error:  # whatever the reader makes of what is no such file
             raise CheckpointError(f"The weights of perception in {path} cannot be read: {error}.") from error
+        if not all(np.isfinite(array).all() for array in stored.values()):
+            raise CheckpointError(f"The weights of perception in {path} are not all finite.")
         try:
-            weights = _unpacked(stored)
+            self._take(stored)
         except ValueError as error:
             raise CheckpointError(f"The weights of perception in {path} cannot be read: {error}.") from error
-        if not all(np.isfinite(array).all() for array in weights.values()):
-            raise CheckpointError(f"The weights of perception in {path} are not all finite.")
-        needed = self.network.weights()
-        critic = {name: array for name, array in needed.items() if name.startswith("critic.")}
+
+    def _take(self, stored: Mapping[str, NDArray[np.generic]]) -> None:
+        """Have the weights of a file.
+
+        Raises:
+            ValueError: They do not go together.
+            CheckpointError: They are of another network.
+        """
+        weights = _unpacked(stored)
+        remembers = {name: weights.pop(name).astype(np.float64) for name in list(weights) if name.startswith(MEMORY)}
+        critic = {name: array for name, array in self.network.weights().items() if name.startswith("critic.")}
         self.network.load_weights(weights | critic)
+        self.memory = Memory.of({name.removeprefix(MEMORY): array for name, array in remembers.items()})
 
 
 def _packed(weights: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.generic]]:

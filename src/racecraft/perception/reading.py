@@ -56,6 +56,10 @@ class Picture:
     """RGB (480, 640, 3)."""
     seen: NDArray[np.uint8]
     """What the network gets, grey (120, 160)."""
+    is_of_film: bool = False
+    """Whether it is one of a video, replay or run, of which its neighbours tell more."""
+    is_first: bool = True
+    """Whether it has nothing to do with the picture before: the first of all, or the car was put somewhere else."""
 
 
 def read_pictures(sources: Sequence[str | Path]) -> Iterator[Picture]:
@@ -145,7 +149,8 @@ def _from_video(path: Path) -> Iterator[Picture]:
             _check_size(path, stream.codec_context.width, stream.codec_context.height)
             for number, frame in enumerate(container.decode(stream)):
                 _check_size(path, frame.width, frame.height)
-                yield _picture(path, np.asarray(frame.to_ndarray(format="rgb24"), np.uint8), frame=number)
+                pixels = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
+                yield _picture(path, pixels, frame=number, is_first=number == 0)
     except (av.error.FFmpegError, OSError) as error:
         raise ConfigError(f"{_named(path)} is no video that can be read.") from error
 
@@ -157,8 +162,11 @@ def _from_replay(path: Path) -> Iterator[Picture]:
     lens = (replay.conditions.camera or CameraSpec()).left_lens
     camera = replace(lens, width=SHOWN[0], height=SHOWN[1])
     view = Scene(recording.track, palette=camera.palette).driver_view(camera, lit_walls=False)
+    is_placed = recording.is_placed
+    is_first = is_placed & ~np.append(False, is_placed[:-1])
     for step, (x, y, heading) in enumerate(recording.seen_from(camera.age).tolist()):
-        yield _picture(path, view.draw(x, y, heading, cars=recording.objects(step)), frame=step)
+        pixels = view.draw(x, y, heading, cars=recording.objects(step))
+        yield _picture(path, pixels, frame=step, is_first=step == 0 or bool(is_first[step]))
 
 
 def _upright(image: Image) -> NDArray[np.uint8]:
@@ -183,7 +191,7 @@ def _turns_of(image: Image) -> tuple[bool, int]:
         return False, 0
 
 
-def _picture(path: Path, pixels: NDArray[np.uint8], *, frame: int | None = None) -> Picture:
+def _picture(path: Path, pixels: NDArray[np.uint8], *, frame: int | None = None, is_first: bool = True) -> Picture:
     """Resized as the original does it: bilinear, then grey."""
     from PIL import Image
 
@@ -195,6 +203,8 @@ def _picture(path: Path, pixels: NDArray[np.uint8], *, frame: int | None = None)
         stem=path.stem,
         shown=np.asarray(image.resize(SHOWN, Image.Resampling.BILINEAR)),
         seen=grey,
+        is_of_film=frame is not None,
+        is_first=is_first,
     )
 
 

@@ -1,35 +1,29 @@
 """How perception learns: cars drive badly through randomised worlds, and the network is told what was there.
 
-worlds ──frames, truth──▶ a shuffled store ──minibatches──▶ loss's slopes ──▶ network
+worlds ──frames, truth──▶ a shuffled store ──minibatches──▶ loss's slopes ──▶ network ──answers──▶ `recalling`
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.perception.answers import NUM_CONTINUOUS, NUM_TARGETS, NUMBERS, ROWS
+from racecraft.perception.answers import NUM_TARGETS
 from racecraft.perception.lessons import Lessons
+from racecraft.perception.losses import slopes_of
 from racecraft.perception.mirror import mirrored_answers, mirrored_observations
-from racecraft.perception.network import LOG_LIMITS, Perceiver
+from racecraft.perception.network import Perceiver
+from racecraft.perception.recalling import STRETCH, Drives, taught
 from racecraft.perception.truth import Truth
 from racecraft.sim import STATE_COLUMNS, Objects, Obstacles, Simulation, Start
 from racecraft.track import load_tracks
 
 Floats = NDArray[np.float32]
 
-ROUND_OFF: Final = 0.02
-"""In units of the network: errors below it count by their square, those above it as they are."""
-ERROR_RATE: Final = 0.1
-"""Weight of learning how far off answers are, beside the answers themselves."""
-YES_OR_NO: Final = 0.15
-"""Weight of each answer that is yes or no."""
-WEIGHTS: Final = np.array([3.0, 3.0, 1.0, 1.0, 1.0, 1.0, 2.0, 3.0, *[1.0] * len(ROWS)], np.float32)
-"""Of the continuous answers: offset and headings matter most."""
 USUAL: Final = Lessons()
 
 
@@ -46,7 +40,11 @@ class World:
         turned: rad to either side of the road's direction in which they start.
         sway: Of the driver: m, standard deviation of where it aims.
         steps: Of an episode.
+        fastest: m/s that it drives at most.
     """
+
+    begins: NDArray[np.bool_]
+    """Cars that were put somewhere else by the last look  (N,)."""
 
     def __init__(
         self,
@@ -60,6 +58,7 @@ class World:
         turned: float = 0.4,
         sway: float = 0.15,
         steps: int = 30,
+        fastest: float = 3.0,
     ) -> None:
         self.simulation = Simulation(
             load_tracks(tracks),
@@ -75,7 +74,8 @@ class World:
         )
         self._truth = Truth(self.simulation)
         self._rng = np.random.default_rng([seed, 0x70657263])
-        self._sway = sway
+        self._sway, self._fastest = sway, fastest
+        self.begins = np.ones(num_envs, bool)
         self._aim = self._rng.normal(0.0, sway, num_envs)
         self._pace = self._rng.uniform(0.6, 2.5, num_envs)
 
@@ -84,23 +84,29 @@ class World:
         simulation, rng = self.simulation, self._rng
         count = simulation.num_envs
         self._aim += rng.normal(0.0, 0.45 * self._sway, count) - 0.1 * self._aim
-        self._pace = np.where(rng.random(count) < 0.05, rng.uniform(0.5, 3.0, count), self._pace)
+        self._pace = np.where(rng.random(count) < 0.05, rng.uniform(0.5, self._fastest, count), self._pace)
         state = dict(zip(STATE_COLUMNS, simulation.state.T.astype(np.float64), strict=False))
         aside = state["offset"] * state["half_width"] - self._aim
         steering = np.arctan(0.165 * state["curvature_1"]) - 1.2 * aside - 0.6 * state["sin_heading_error"]
         steering += rng.normal(0.0, 0.1, count)
         simulation.step(np.stack([steering.clip(-0.5, 0.5), self._pace], axis=1))
-        simulation.reset(simulation.terminated | simulation.truncated)
+        self.begins = simulation.terminated | simulation.truncated
+        simulation.reset(self.begins)
         return simulation.frames, self._truth.targets()
 
 
-def worlds(seed: int, *, num_roads: int) -> list[World]:
-    """Those that perception learns in; a seed's tracks are no other's."""
+def roads_of(seed: int, num_roads: int) -> list[str]:
+    """Those that perception learns on; a seed's are no other's."""
     known = ["reinvent_2018", "oval", "hairpin"]
     num_tight = num_roads // 4
     wide = [f"generated:{1000 * seed + i}" for i in range(num_roads - num_tight)]
     tight = [f"generated:{1000 * seed + 100 + i},radius=0.45,difficulty=0.9" for i in range(num_tight)]
-    roads = [*known, *wide, *tight]
+    return [*known, *wide, *tight]
+
+
+def worlds(seed: int, *, num_roads: int) -> list[World]:
+    """Those that the network learns in."""
+    roads = roads_of(seed, num_roads)
     return [
         World(roads, num_envs=72, seed=seed, randomize="real"),
         World(roads, num_envs=96, seed=seed + 1, randomize="strong"),
@@ -109,35 +115,28 @@ def worlds(seed: int, *, num_roads: int) -> list[World]:
     ]
 
 
-def slopes_of(outputs: Floats, targets: Floats) -> tuple[Floats, float]:
-    """The loss's derivative at each output (B, NUM_OUTPUTS), and its mean.
-
-    Continuous answers have a rounded absolute error; what is expected of it has the likelihood of Laplace's
-    distribution around the answer, which does not move the answer itself. Columns out of the picture do not count.
-    """
-    rows = len(ROWS)
-    slopes = np.zeros_like(outputs)
-    told, wanted = outputs[:, :NUM_CONTINUOUS], targets[:, :NUM_CONTINUOUS]
-    weights = np.broadcast_to(WEIGHTS, told.shape).copy()
-    weights[:, len(NUMBERS) :] *= targets[:, NUM_CONTINUOUS : NUM_CONTINUOUS + rows]
-    error = told - wanted
-    rounded = np.sqrt(error * error + np.float32(ROUND_OFF**2))
-    slopes[:, :NUM_CONTINUOUS] = weights * error / rounded
-    loss = float((weights * (rounded - np.float32(ROUND_OFF))).sum(axis=1).mean())
-
-    logs = outputs[:, NUM_TARGETS:]
-    sizes = np.abs(error) * np.exp(-logs.clip(*LOG_LIMITS))
-    counts = np.float32(ERROR_RATE) * (weights > 0.0)
-    # beyond the limits only the way back
-    slope = counts * (1.0 - sizes)
-    slope[(logs < LOG_LIMITS[0]) & (slope > 0.0) | (logs > LOG_LIMITS[1]) & (slope < 0.0)] = 0.0
-    slopes[:, NUM_TARGETS:] = slope.clip(-1.0, 1.0)
-
-    logits, is_so = outputs[:, NUM_CONTINUOUS:NUM_TARGETS], targets[:, NUM_CONTINUOUS:]
-    yes = 1.0 / (1.0 + np.exp(-logits.clip(-30.0, 30.0)))
-    slopes[:, NUM_CONTINUOUS:NUM_TARGETS] = YES_OR_NO * (yes - is_so)
-    loss += YES_OR_NO * float(np.logaddexp(0.0, np.where(is_so > 0.5, -logits, logits)).sum(axis=1).mean())
-    return slopes, loss
+def drives_of(perceiver: Perceiver, lessons: Lessons) -> list[Drives]:
+    """Those that memory learns from, over the network's roads: bad and good ones, fast and slow ones."""
+    roads, seed = roads_of(lessons.seed, lessons.roads), lessons.seed + 500
+    far: dict[str, Any] = {"lateral": 0.2, "turned": 0.3, "sway": 0.12, "steps": 45, "fastest": 4.0}
+    near: dict[str, Any] = far | {"lateral": 0.05, "turned": 0.1, "sway": 0.04}
+    places = [
+        World(roads, num_envs=96, seed=seed, randomize="strong", **far),
+        World(roads, num_envs=48, seed=seed + 1, randomize="strong", **near),
+        World(roads, num_envs=64, seed=seed + 2, randomize="real", **far),
+        World(roads[::2], num_envs=32, seed=seed + 3, randomize="real", objects=10, **far),
+    ]
+    length = max(STRETCH, lessons.remembered // sum(place.simulation.num_envs for place in places))
+    drives = []
+    for place in places:
+        outputs, targets, begins = [], [], []
+        for _ in range(length):
+            frames, truth = place.look()
+            outputs.append(perceiver.outputs(frames))
+            targets.append(truth)
+            begins.append(place.begins)
+        drives.append(Drives(np.stack(outputs), np.stack(targets), np.stack(begins)))
+    return drives
 
 
 def train(lessons: Lessons = USUAL, *, tell: Callable[[int, float], None] = lambda *_: None) -> Perceiver:
@@ -145,9 +144,17 @@ def train(lessons: Lessons = USUAL, *, tell: Callable[[int, float], None] = lamb
 
     Args:
         lessons: How much, and how.
-        tell: Called with the number of updates and the loss, every few seconds.
+        tell: Called with the number of updates, of the network and then of its memory, and the loss, now and then.
     """
     perceiver = Perceiver(None, seed=lessons.seed, num_threads=1)
+    _teach_network(perceiver, lessons, tell)
+    perceiver.settle()  # memory learns of the answers that it will be told
+    drives = drives_of(perceiver, lessons)
+    perceiver.memory = taught(drives, lessons, tell=lambda update, loss: tell(lessons.updates + update, loss))
+    return perceiver
+
+
+def _teach_network(perceiver: Perceiver, lessons: Lessons, tell: Callable[[int, float], None]) -> None:
     network = perceiver.network
     observations = np.zeros((lessons.store, *network.observation_shape), np.uint8)
     targets = np.zeros((lessons.store, NUM_TARGETS), np.float32)
@@ -180,4 +187,3 @@ def train(lessons: Lessons = USUAL, *, tell: Callable[[int, float], None] = lamb
             tell(update + 1, float(np.mean(losses)))
             losses.clear()
             said = time.monotonic()
-    return perceiver

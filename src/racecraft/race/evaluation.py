@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,17 @@ _LAP_COMPLETE = STATUS_NAMES.index("lap_complete")
 
 Driver = Callable[[NDArray[Any]], NDArray[np.float32]]
 """From what N cars see to commands (N, 2), without chance: a `racecraft.race.policy.Policy`, or a state's."""
+
+
+@runtime_checkable
+class RememberingDriver(Protocol):
+    """A `Driver` that remembers what each car saw, and so is told which cars it is asked for."""
+
+    def __call__(self, sight: NDArray[Any], cars: NDArray[np.intp] | None = None, /) -> NDArray[np.float32]:
+        """Commands (N, 2) for what N cars see; by default the first N."""
+
+    def forget(self) -> None:
+        """Begin anew with every car."""
 
 
 def evaluate(

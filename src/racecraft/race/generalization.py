@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.checks import check_choice, check_whole
 from racecraft.errors import ConfigError
-from racecraft.race.evaluation import MAX_STEPS, Driver, drive_lap
+from racecraft.race.evaluation import MAX_STEPS, Driver, RememberingDriver, drive_lap
 from racecraft.race.placement import start_pose
 from racecraft.race.rules import RULE_SETS
 from racecraft.race.statistics import Interval, wilson_interval
@@ -212,12 +212,20 @@ def _line_up(simulation: Simulation, direction: str, *, seed: int) -> None:
 
 
 def _awake(policy: Driver, simulation: Simulation) -> Driver:
-    """A policy that is asked for the cars under way only: most of a group's time a few slow ones are."""
+    """A policy that is asked for the cars under way only: most of a group's time a few slow ones are.
+
+    Who remembers begins anew here, and is told which cars they are.
+    """
     commands = np.zeros((simulation.num_envs, 2), dtype=np.float32)
 
+    remembering = policy if isinstance(policy, RememberingDriver) else None
+    if remembering is not None:
+        remembering.forget()
+
     def drive(sight: NDArray[Any]) -> NDArray[np.float32]:
-        awake = ~(simulation.terminated | simulation.truncated)
-        commands[awake] = policy(sight[awake])
+        awake = np.flatnonzero(~(simulation.terminated | simulation.truncated))
+        seen = sight[awake]
+        commands[awake] = policy(seen) if remembering is None else remembering(seen, awake)
         return commands
 
     return drive

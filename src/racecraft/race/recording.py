@@ -80,8 +80,12 @@ class Recording:
 
     def seen_from(self, age: float) -> NDArray[np.float64]:
         """Poses, as `poses`, in which pictures of a camera of this age (s) were taken, between two steps  (T, 3)."""
-        placed = [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")]  # who did not drive there
-        return poses_seen(self.poses, age, is_put=np.isin(self.column("status"), placed))
+        return poses_seen(self.poses, age, is_put=self.is_placed)
+
+    @cached_property
+    def is_placed(self) -> NDArray[np.bool_]:
+        """Whether the car did not drive to where it is in a step: it was put there, or stands  (T,)."""
+        return np.isin(self.column("status"), [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")])
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""What perception believes of one moment of a lap, beside the camera's picture of it."""
+"""What perception believes of one moment of a lap and those before it, beside the camera's picture of it."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ from racecraft.sim.views import BoxView, CarView, ObjectView, Scene
 if TYPE_CHECKING:
     from racecraft.perception import Perceiver
 
+REMEMBERED: Final = 12
+"""Pictures of a lap that are looked at for one, 0.8 s of driving: of more before it memory holds little."""
 router = APIRouter(prefix="/api/models/{name}", tags=["analysis"])
 
 _LOOKING: Final = threading.Lock()
@@ -39,6 +41,7 @@ def get_belief(
     """The camera's picture of one step of a lap, with what stood on the road, and what perception believes of it."""
     from racecraft.perception.answers import REGION_COLUMNS, REGION_ROWS, ROWS
     from racecraft.perception.telling import sees_middle, tell
+    from racecraft.perception.watching import Watcher
 
     folder = context.garage.folder(name)
     track = evaluation_track(context, folder, stamp)
@@ -47,22 +50,27 @@ def get_belief(
     if found is None or row >= len(found.time):
         raise NotFound(f"Evaluation {stamp} of {name!r} has no step {row} in lap {lap}.")
     camera = lens_of(folder)
-    x, y, heading = found.seen_from(camera.age)[row].tolist()
+    poses = found.seen_from(camera.age)
     view = Scene(driven_direction(track, [found.points]), palette=camera.palette).driver_view(camera, lit_walls=False)
-    there = [_view(one, row) for one in objects_of(folder, stamp, laps).get(lap, [])]
-    picture = view.draw(x, y, heading, cars=there)
-    frame = (picture @ np.array(LUMA) + 0.5).astype(np.uint8)
+    objects = objects_of(folder, stamp, laps).get(lap, [])
+    first = max(0, row - REMEMBERED + 1, *(put for put in found.puts if put <= row))
+    pictures = [
+        view.draw(*poses[step].tolist(), cars=[_view(one, step) for one in objects]) @ np.array(LUMA)
+        for step in range(first, row + 1)
+    ]
+    frames = (np.stack(pictures) + 0.5).astype(np.uint8)
+    frame, last = frames[-1], row - first
     with _LOOKING:
-        belief = _perceiver()(frame[None])
-    told = tell("", belief, 0)
+        belief = Watcher(_perceiver()).film(frames, np.arange(first, row + 1) == first)
+    told = tell("", belief, last)
     del told["file"]
-    seen = [place for place in range(len(ROWS)) if sees_middle(belief, 0, place)]
+    seen = [place for place in range(len(ROWS)) if sees_middle(belief, last, place)]
     return RoadBelief(
         **told,
         line_rows=[ROWS[place] for place in seen],
-        line_columns=belief.middle[0, seen].astype(float).round(2).tolist(),
-        line_error=belief.middle_error[0, seen].astype(float).round(2).tolist(),
-        regions=belief.regions[0].astype(float).round(3).tolist(),
+        line_columns=belief.middle[last, seen].astype(float).round(2).tolist(),
+        line_error=belief.middle_error[last, seen].astype(float).round(2).tolist(),
+        regions=belief.regions[last].astype(float).round(3).tolist(),
         region_rows=list(REGION_ROWS),
         region_columns=list(REGION_COLUMNS),
         height=frame.shape[0],

@@ -1,0 +1,137 @@
+"""How memory learns: cars drive, well and badly, and memory is told what was there in each picture of a drive.
+
+worlds ──the network's answers, truth──▶ drives ──stretches of them──▶ loss's slopes, back through time ──▶ weights
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.perception.lessons import Lessons
+from racecraft.perception.losses import slopes_of
+from racecraft.perception.memory import ANSWERS, REACH, SHAPES, UNITS, Array, Memory, seen_of
+from racecraft.perception.mirror import mirrored_answers
+
+STRETCH: Final = 32
+"""Pictures of a drive that are learned from together: two seconds."""
+TOGETHER: Final = 64
+"""Stretches to a step of learning; half of them are looked at in a mirror."""
+LEARNING_RATE: Final = 4e-3
+"""Adam's step size after its first steps; it falls to nothing along a line."""
+SLOPE: Final = 2.0**20
+"""Slopes are multiples of one over this, so that their sums are exact as those of `memory` are."""
+
+
+@dataclass(frozen=True)
+class Drives:
+    """T pictures of each of N cars, in order."""
+
+    outputs: NDArray[np.float32]
+    """Of the network that looks  (T, N, NUM_OUTPUTS)."""
+    targets: NDArray[np.float32]
+    """(T, N, NUM_TARGETS)."""
+    begins: NDArray[np.bool_]
+    """Whether a car was put somewhere else before the picture  (T, N)."""
+
+
+def taught(drives: list[Drives], lessons: Lessons, *, tell: Callable[[int, float], None] = lambda *_: None) -> Memory:
+    """A memory that has learned from drives; the same bits for the same ones.
+
+    Args:
+        drives: Each of at least `STRETCH` pictures a car.
+        lessons: How much, and its seed.
+        tell: Called with the number of updates and the loss, now and then.
+    """
+    rng = np.random.default_rng([lessons.seed, 0x6D656D6F])
+    sizes = {"seen": 0.5 / 95**0.5, "state": 1.0 / UNITS**0.5, "answer": 0.0, "bias": 0.0, "answer_bias": 0.0}
+    weights = {name: sizes[name] * rng.standard_normal(shape) for name, shape in SHAPES.items()}
+    weights["bias"][:, UNITS:] = 1.0  # at first most of the old stays
+    means = {name: np.zeros(shape) for name, shape in SHAPES.items()}
+    squares = {name: np.zeros(shape) for name, shape in SHAPES.items()}
+    shares = np.array([each.begins.size for each in drives], float)
+    for update in range(1, lessons.memory_updates + 1):
+        counts = rng.multinomial(TOGETHER, shares / shares.sum())
+        parts = [_stretches(each, int(count), rng) for each, count in zip(drives, counts, strict=True)]
+        outputs, targets, begins = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
+        for array in (outputs, targets):
+            turned = array[:, ::2]
+            turned[:] = mirrored_answers(turned.reshape(-1, turned.shape[2])).reshape(turned.shape)
+        slopes, loss = gradient(Memory(weights), outputs, targets, begins)
+        rate = LEARNING_RATE * min(1.0, update / 100) * (1.0 - (update - 1) / lessons.memory_updates)
+        for name, slope in slopes.items():
+            mean = slope / outputs[..., 0].size
+            means[name] += 0.1 * (mean - means[name])
+            squares[name] += 0.001 * (mean * mean - squares[name])
+            unbiased = means[name] / (1.0 - 0.9**update)
+            weights[name] -= rate * unbiased / (np.sqrt(squares[name] / (1.0 - 0.999**update)) + 1e-8)
+        if update % 50 == 0 or update == lessons.memory_updates:
+            tell(update, loss)
+    return Memory({name: array.astype(np.float16) for name, array in weights.items()})
+
+
+def gradient(
+    memory: Memory, outputs: NDArray[np.float32], targets: NDArray[np.float32], begins: NDArray[np.bool_]
+) -> tuple[dict[str, Array], float]:
+    """Slopes of the loss, summed over pictures, at each weight, and the loss's mean.
+
+    Args:
+        memory: Which.
+        outputs: Of stretches  (T, B, NUM_OUTPUTS).
+        targets: (T, B, NUM_TARGETS).
+        begins: Where memory begins anew  (T, B).
+    """
+    length, count = begins.shape
+    seen = seen_of(outputs.reshape(length * count, -1)).reshape(length, count, -1)
+    befores, steps, states = [], [], []
+    state = np.zeros((count, UNITS))
+    for here, is_new in zip(seen, begins, strict=True):
+        befores.append(np.where(is_new[:, None], 0.0, state))
+        state, step = memory.step(here, befores[-1])
+        steps.append(step)
+        states.append(state)
+    flat = np.concatenate(states)
+    better = outputs.reshape(length * count, -1).copy()
+    better[:, ANSWERS] += memory.answer(flat)
+    all_slopes, loss = slopes_of(better, targets.reshape(length * count, -1))
+    told = _even(REACH * all_slopes[:, ANSWERS].astype(np.float64))
+    at_states = (told @ memory.weights["answer"].T).reshape(length, count, UNITS)
+    sums = np.zeros((length, count, 2 * UNITS))
+    later = np.zeros((count, UNITS))  # slopes at a state, of all that comes after it
+    for place in reversed(range(length)):
+        slope = later + at_states[place]
+        before, (new, stays) = befores[place], steps[place]
+        # what bends from -1 to 1 has the slope (1 - its square) to the power of 3/2
+        gate = 2.0 * stays - 1.0
+        falls = np.concatenate([1.0 - new * new, 1.0 - gate * gate], axis=1)
+        at_bent = np.concatenate([slope * (1.0 - stays), 0.5 * slope * (before - new)], axis=1)
+        sums[place] = _even(at_bent * falls * np.sqrt(falls))
+        back = slope * stays + sums[place] @ memory.weights["state"].T
+        later = np.where(begins[place][:, None], 0.0, back)
+    flat_sums = sums.reshape(length * count, -1)
+    ones = np.ones((1, length * count))
+    return {
+        "seen": seen.reshape(length * count, -1).T @ flat_sums,
+        "state": np.concatenate(befores).T @ flat_sums,
+        "bias": ones @ flat_sums,
+        "answer": flat.T @ told,
+        "answer_bias": ones @ told,
+    }, loss
+
+
+def _even(slopes: Array) -> Array:
+    return np.asarray(np.rint(slopes * SLOPE) / SLOPE)
+
+
+def _stretches(
+    drives: Drives, count: int, rng: np.random.Generator
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    """Some stretches of them, as `gradient` takes them."""
+    length, cars = drives.begins.shape
+    first, which = rng.integers(0, length - STRETCH + 1, count), rng.integers(0, cars, count)
+    rows = first + np.arange(STRETCH)[:, None]
+    return drives.outputs[rows, which], drives.targets[rows, which], drives.begins[rows, which]
