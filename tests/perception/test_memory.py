@@ -231,6 +231,8 @@ def test_lenses_are_told_apart_and_forgotten_one_by_one(perceiver: Perceiver) ->
     third = watcher(frames)
     assert third.heading[0] == first.heading[0]
     assert third.heading[1] != first.heading[1]
+    watcher.forget(np.array([9]))
+    watcher.forget(np.array([False, False, False, True, True]))
     watcher.forget()
     assert (watcher(frames).heading == first.heading).all()
 

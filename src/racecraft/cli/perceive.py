@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 def perceive(
     context: typer.Context,
     sources: Annotated[
-        list[Path] | None, typer.Argument(help="Pictures, folders of them, a video, a replay or a run folder.")
+        list[Path] | None,
+        typer.Argument(
+            help="Pictures, folders of them, or a video, replay or run, seen with the pictures before in mind."
+        ),
     ] = None,
     output: Annotated[
         Path | None,

@@ -50,8 +50,9 @@ class Watcher:
         """Begin anew with some lenses, whose next picture is of another place; by default with all."""
         if lenses is None:
             self._states = self._states[:0]
-        elif len(self._states):
-            self._states[lenses] = 0.0
+        else:
+            which = np.flatnonzero(lenses) if lenses.dtype == np.bool_ else lenses
+            self._states[which[which < len(self._states)]] = 0.0  # of the others nothing was seen
 
     def film(
         self, frames: NDArray[np.uint8], is_first: NDArray[np.bool_], is_of_film: NDArray[np.bool_] | None = None
