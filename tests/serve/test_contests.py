@@ -14,10 +14,12 @@ from running_consoles import RunningConsole
 
 from racecraft.race.rules import RaceRules
 from racecraft.replay import read_replay, verify
+from racecraft.serve.contests import ghosts
 from racecraft.serve.contests.terms import terms_of
 from racecraft.sim.objects import Bots, Objects, Obstacles
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.vehicle import PRESETS as VEHICLES
+from racecraft.track import load_track
 
 pytestmark = pytest.mark.costly
 
@@ -409,3 +411,19 @@ def test_a_model_learns_against_itself_or_against_others(console: RunningConsole
     assert "head-to-head" in alone.json()["error"]["message"]
     nobody = console.client.post("/api/models", json={**wanted, "opponents": ["nobody"]})
     assert nobody.status_code == 404
+
+
+def test_a_full_garage_lists_the_newest_evaluations(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two hundred models of two hundred evaluations each took three seconds."""
+    monkeypatch.setattr(ghosts, "MAX_READ", 5)
+    for name, hours in (("ada", (1, 4, 7)), ("bob", (2, 5, 8)), ("cid", (3, 6))):
+        for hour in hours:
+            folder = tmp_path / name / f"evaluation-202601010{hour}0000"
+            folder.mkdir(parents=True)
+            (folder / "evaluation.json").write_text(json.dumps({"track": "oval", "best_lap_seconds": hour}))
+            (folder / "evaluation.replay").write_bytes(b"")
+        (tmp_path / name / "run.json").write_text("{}")
+    (tmp_path / "ada" / "evaluation-notes").mkdir()
+    listed = [(card.model, card.best_lap) for card in ghosts.evaluated(tmp_path, load_track("oval"))]
+    assert sorted(listed) == [("ada", 4), ("ada", 7), ("bob", 5), ("bob", 8), ("cid", 6)]
+    assert listed.index(("ada", 7)) < listed.index(("ada", 4))

@@ -9,9 +9,13 @@ may be removed meanwhile.
 
 from __future__ import annotations
 
+import heapq
 import json
+import os
 import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -33,30 +37,39 @@ if TYPE_CHECKING:
 NEWEST: Final = 20
 """Evaluations of a model that are listed."""
 MAX_LISTED: Final = 500
+MAX_READ: Final = 2000
+"""Evaluations whose summaries are read for a list; it is to be there within a second."""
 MAX_BESIDE: Final = 64 << 20
 """Bytes of the file that says where a heat's ghosts were."""
 
 
 def evaluated(runs: Path, track: Track) -> list[EvaluatedCard]:
-    """Evaluations on a track that have a replay, model by model, the newest first.
+    """Evaluations on a track that have a replay, model by model, the newest first; of the newest `MAX_READ` of all.
 
     Of those whose files do not tell their road only its name is known here; a replay itself is looked at by who starts
     a heat with it.
     """
-    found = []
-    for folder in list_runs(runs):
-        paths = sorted(folder.path.glob("evaluation-*/evaluation.json"), reverse=True)
-        own = (card for path in paths if (card := _card(folder, path, track)) is not None)
-        found += [card for card, _ in zip(own, range(NEWEST), strict=False)]
-    return found[:MAX_LISTED]
+    folders = list_runs(runs)
+    stamps = [(stamp, number) for number, folder in enumerate(folders) for stamp in _stamps(folder)]
+    found: list[list[EvaluatedCard]] = [[] for _ in folders]
+    for stamp, number in heapq.nlargest(MAX_READ, stamps):
+        if len(found[number]) < NEWEST and (card := _card(folders[number], stamp, track)) is not None:
+            found[number].append(card)
+    return list(chain.from_iterable(found))[:MAX_LISTED]
 
 
-def _card(folder: RunFolder, path: Path, track: Track) -> EvaluatedCard | None:
-    stamp = path.parent.name.removeprefix("evaluation-")
-    if not (stamp.isascii() and stamp.isdigit()) or not folder.evaluation_replay(stamp).is_file():
+def _stamps(folder: RunFolder) -> list[str]:
+    with suppress(OSError):
+        names = [name.removeprefix("evaluation-") for name in os.listdir(folder.path) if name.startswith("evaluation-")]
+        return [stamp for stamp in names if stamp.isascii() and stamp.isdigit()]
+    return []
+
+
+def _card(folder: RunFolder, stamp: str, track: Track) -> EvaluatedCard | None:
+    if not folder.evaluation_replay(stamp).is_file():
         return None
     try:
-        summary = read_json_object(path)
+        summary = read_json_object(folder.evaluation(stamp) / "evaluation.json")
     except RacecraftError:
         return None
     if summary.get("track") != track.name or summary.get("track_digest", track.digest) != track.digest:
