@@ -5,16 +5,34 @@ Never accepted is a file that says two things at once (duplicate keys), or has n
 
 from __future__ import annotations
 
+import errno
 import json
 import math
+import os
+import stat
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, BinaryIO, Final, NoReturn
 
 from racecraft.errors import ConfigError
 
 MAX_BYTES = 1 << 20  # bytes; the largest file AWS's console wrote is under 10 kB
+
+
+def open_regular(path: str | Path) -> BinaryIO:
+    """A regular file, to be read. Whoever reads a pipe waits for somebody to write, maybe for ever.
+
+    Raises:
+        OSError: Not readable, or a folder, a pipe, a socket or a device.
+    """
+    mode = os.stat(path).st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "it is no regular file")
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    return open(handle, "rb")
 
 
 def read_bytes(path: str | Path, *, max_bytes: int, name: str = "") -> bytes:
@@ -26,10 +44,10 @@ def read_bytes(path: str | Path, *, max_bytes: int, name: str = "") -> bytes:
         name: What messages call it; its path where none is given.
 
     Raises:
-        ConfigError: Not readable, or too large.
+        ConfigError: Not readable, no regular file, or too large.
     """
     try:
-        with Path(path).open("rb") as file:
+        with open_regular(path) as file:
             data = file.read(max_bytes + 1)
     except OSError as error:
         raise ConfigError(f"{name or path} cannot be read: {error.strerror or error}.") from error

@@ -146,3 +146,27 @@ def test_odd_surroundings_are_no_bug(
     assert done.stderr.startswith(says)
     assert "Traceback" not in done.stderr
     assert "bug" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "train --reward {}",
+        "train --reward centerline --model-metadata {}",
+        "train --reward centerline --hyperparameters {}",
+        "train --reward centerline --track {}.npy",
+        "reward check {}",
+        "verify {}",
+        "film {}",
+        "replay {} --track oval",
+        "sweep {}",
+        "import {}",
+    ],
+)
+def test_a_pipe_is_not_waited_for(racecraft: Run, tmp_path: Path, command: str) -> None:
+    for name in ("pipe", "pipe.npy"):
+        os.mkfifo(tmp_path / name)
+    outcome = racecraft(*command.format(tmp_path / "pipe").split(), "--json")
+    assert outcome.status == 1
+    message = outcome.document["error"]["message"]
+    assert message.endswith(("it is no regular file.", "to import.")), message

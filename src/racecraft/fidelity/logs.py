@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.errors import RunError
+from racecraft.json_file import open_regular
 from racecraft.run.simtrace import COLUMNS, READABLE
 from racecraft.sim.simulation import CONTROL_DT
 
@@ -115,7 +116,7 @@ def _read_file(path: Path, faults: Faults) -> Iterator[Log]:
     rows: list[tuple[int, Sequence[str]]] = []
     good, broken_before = 0, faults.count
     try:
-        with path.open("rb") as raw, _decoded(raw) as file:
+        with open_regular(path) as raw, _decoded(raw) as file:
             for log in _batches(path.name, file, rows, faults):
                 good += len(log)
                 yield log

@@ -11,7 +11,6 @@ times. Whatever a member's reader leaves is read past and checked, so an archive
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -20,6 +19,7 @@ from racecraft.errors import ArchiveError
 from racecraft.importing.archive_guard import Guard, Limits, Member
 from racecraft.importing.tar_reader import read_tar
 from racecraft.importing.zip_reader import read_zip
+from racecraft.json_file import open_regular
 
 DEFAULT_LIMITS: Final = Limits()
 _OTHERS: Final = {
@@ -60,13 +60,10 @@ def is_archive_name(name: str) -> bool:
 def _opened(path: Path, limits: Limits) -> BinaryIO:
     """The archive, when it is a regular file of an allowed size; never waits on a pipe."""
     try:
-        if not stat.S_ISREG(os.stat(path).st_mode):
-            raise ArchiveError(f"{path} is not a regular file.")
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        file = open_regular(path)
     except (OSError, ValueError) as error:
         raise ArchiveError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
-    file = open(handle, "rb")  # noqa: SIM115  (the caller's with statement closes it)
-    size = os.fstat(handle).st_size
+    size = os.fstat(file.fileno()).st_size  # the caller's with statement closes it
     if size > limits.file_bytes:
         file.close()
         raise ArchiveError(f"{path.name} has {size:,} bytes; archives of at most {limits.file_bytes:,} are read.")

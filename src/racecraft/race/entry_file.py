@@ -21,6 +21,7 @@ from racecraft.agent.metadata_words import CONFIGURED
 from racecraft.agent.model_metadata import ModelMetadata
 from racecraft.agent.sensors import LidarConfig
 from racecraft.errors import CheckpointError, ConfigError
+from racecraft.json_file import open_regular
 from racecraft.learn import NetworkSpec
 from racecraft.race.entry import Entry
 from racecraft.race.policy import WEIGHTS, driving_weights, network_of, policy_of
@@ -86,7 +87,7 @@ def read_entry_file(path: Path) -> EntryFile:
 def _read(path: Path) -> EntryFile:
     try:
         size = path.stat().st_size
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             length = int.from_bytes(file.read(8), "little")
     except OSError as error:
         raise CheckpointError(f"{path} cannot be read: {error.strerror or error}.") from error

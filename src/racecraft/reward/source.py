@@ -43,13 +43,15 @@ def load_reward(name_or_path: str | Path) -> str:
         return load_preset(str(name_or_path))
     path = Path(name_or_path).expanduser()
     try:
-        is_file, is_folder = path.is_file(), path.is_dir()
+        is_file, is_folder, is_there = path.is_file(), path.is_dir(), path.exists()
     except (OSError, ValueError):  # a name too long, or with a NUL in it
-        is_file = is_folder = False
+        is_file = is_folder = is_there = False
     if is_folder:
         inside = path / "reward_function.py"
         hint = f"Did you mean '{inside}'?" if inside.is_file() else "Name the file inside it."
         raise RewardError(f"'{path}' is a folder, expected a reward function's file.", hint=hint)
+    if is_there and not is_file:  # a pipe that nobody writes to would be waited for
+        raise RewardError(f"Reward function '{path}' cannot be read: it is no regular file.")
     if not is_file:
         suggestion = did_you_mean(str(name_or_path), [*preset_names(), *_python_files_beside(path)])
         raise RewardError(

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import io
 import os
-import stat
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from racecraft.errors import TrackError, TrackNotFound
+from racecraft.json_file import open_regular
 from racecraft.scoped_warnings import scoped_warnings
 from racecraft.track.polyline import Floats, signed_area
 from racecraft.track.track import CLOSED_GAP, Track
@@ -125,21 +125,18 @@ def _checked(name: str, lines: dict[str, Floats]) -> Track:
 def _read_bytes(path: Path) -> bytes:
     """The content of a regular file of a sane size. Never waits on a pipe, never reads a large file."""
     try:
-        if not stat.S_ISREG(os.stat(path).st_mode):
-            raise TrackError(f"{str(path)!r} is not a regular file.")
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        with open_regular(path) as file:
+            size = os.fstat(file.fileno()).st_size
+            content = file.read(MAX_FILE_BYTES + 1) if size <= MAX_FILE_BYTES else b""
     except (FileNotFoundError, NotADirectoryError):
         raise TrackNotFound(f"There is no track file {str(path)!r}.") from None
     except (OSError, ValueError) as error:
         raise TrackError(
             f"Cannot read track file {str(path)!r}: {getattr(error, 'strerror', None) or error}."
         ) from None
-    with open(handle, "rb") as file:
-        status = os.fstat(handle)
-        content = file.read(MAX_FILE_BYTES + 1) if status.st_size <= MAX_FILE_BYTES else b""
-    if status.st_size > MAX_FILE_BYTES or len(content) > MAX_FILE_BYTES:
+    if size > MAX_FILE_BYTES or len(content) > MAX_FILE_BYTES:
         raise TrackError(
-            f"{path.name} has {status.st_size:,} bytes; track files of at most {MAX_FILE_BYTES:,} are read.",
+            f"{path.name} has {size:,} bytes; track files of at most {MAX_FILE_BYTES:,} are read.",
             hint=f"A track has at most {MAX_WAYPOINTS:,} waypoints.",
         )
     return content
