@@ -14,6 +14,8 @@ from racecraft.learn import NetworkSpec, PPOConfig, networks
 from racecraft.limits import known_limit
 from racecraft.race.conditions import STANDARD_CAR
 from racecraft.race.rules import RULE_SETS
+from racecraft.replay.codec import DENSE_BYTES, MAX_BODY_BYTES, MAX_DENSITY, MAX_FILE_BYTES, MAX_HEADER_BYTES
+from racecraft.replay.replay import MAX_CELLS, MAX_NUMBER
 from racecraft.reward import situations
 from racecraft.run.folder import RunInfo
 from racecraft.run.simtrace import STEP_WIDTH
@@ -177,6 +179,10 @@ def plan() -> dict[str, Any]:
         "spaces": [preset.model_dump() for preset in list_actions()],
         "races": {race: told_race(race) for race in RACE_TYPES},
         "known": known(),
+        "replays": {
+            **{"file": MAX_FILE_BYTES, "body": MAX_BODY_BYTES, "header": MAX_HEADER_BYTES},
+            **{"dense": DENSE_BYTES, "density": MAX_DENSITY, "cells": MAX_CELLS, "number": MAX_NUMBER},
+        },
     }
 
 

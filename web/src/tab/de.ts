@@ -144,7 +144,7 @@ export const de: Record<TabKey, string> = {
   replay_not: "Das ist kein Replay von Racecraft: Es beginnt nicht wie eines.",
   replay_version: "Das ist ein Replay der Version {version}, die diese Seite nicht kennt.",
   replay_large:
-    "Dieses Replay ist zu groß für eine Seite, die bis zu {size} MB und 16 Millionen Zahlen nimmt: racecraft verify liest größere.",
+    "Dieses Replay ist zu groß: Es darf bis zu {size} MB haben und {cells} Millionen Zahlen enthalten, und nicht mehr als ein Rennen seiner Größe.",
   replay_damaged: "Dieses Replay ist beschädigt: Es enthält nicht, was es sagt.",
   replay_header: "Der Kopf dieses Replays ist falsch bei {at}.",
   replay_track:

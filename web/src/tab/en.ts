@@ -137,7 +137,7 @@ export const en = {
   replay_not: "This is no replay of Racecraft: it does not begin like one.",
   replay_version: "This is a replay of version {version}, which this page does not know.",
   replay_large:
-    "This replay is too large for a page, which takes up to {size} MB and 16 million numbers: racecraft verify reads larger ones.",
+    "This replay is too large: it may have up to {size} MB and hold {cells} million numbers, and no more than a race of its size does.",
   replay_damaged: "This replay is damaged: it does not hold what it says.",
   replay_header: "This replay's header is wrong at {at}.",
   replay_track: "This replay's track, {name}, is not in this page's library: racecraft verify drives it.",

@@ -54,11 +54,16 @@ export interface Plan {
   races: Record<RaceType, RacePlan>;
   starter: { table: number[] }; // lowest and highest command of the car that drives at first (2, 2)
   known: Known; // rules, cars and randomisations of the library
+  replays: ReplayLimits;
   tracks: string[];
   titles: Record<string, string>; // of those of the library
   medals: Record<string, MedalTimes | null>; // by track of the library; none where no limit is known
   rewards: RewardPreset[];
 }
+
+/** How large a replay may be, as for racecraft.replay: bytes of the file, of what is packed in it and of its header; bytes
+ * that a body may have in any file and for each byte of it; numbers in all rows, and the largest of them. */
+export type ReplayLimits = Record<"file" | "body" | "header" | "dense" | "density" | "cells" | "number", number>;
 
 interface Packed {
   dtype: "float64" | "float32" | "int32";

@@ -8,7 +8,7 @@
 import type { Core } from "../core";
 import { doublesOf, type Plan, type TrackFile } from "../plan";
 import { driveAgain } from "./again";
-import { MOST_FILE, readReplay, type ReplayFile, type StoredCar } from "./file";
+import { readReplay, tooLarge, type ReplayFile, type StoredCar } from "./file";
 import type { Driven } from "./marshal";
 import { ReplayProblem } from "./problem";
 import { provenanceOf, type Provenance } from "./provenance";
@@ -45,7 +45,7 @@ export async function verifyFile(
   track: (name: string) => Promise<TrackFile>,
   keep?: (replay: ReplayFile, road: TrackFile) => void,
 ): Promise<Verdict> {
-  if (file.size > MOST_FILE) throw new ReplayProblem("replay_large", { size: MOST_FILE >> 20 });
+  if (file.size > plan.replays.file) throw tooLarge(plan.replays);
   return verify(core, plan, new Uint8Array(await file.arrayBuffer()), track, keep);
 }
 
@@ -58,7 +58,7 @@ export async function verify(
   keep: (replay: ReplayFile, road: TrackFile) => void = () => undefined,
 ): Promise<Verdict> {
   const columns = core.names("row");
-  const replay = await readReplay(bytes, columns);
+  const replay = await readReplay(bytes, columns, plan.replays);
   const road = await roadOf(replay, plan, track);
   const about = {
     title: printable(replay.title),
