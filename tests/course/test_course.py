@@ -217,8 +217,12 @@ def test_pictures_are_saved_where_the_script_runs(tmp_path: Path, monkeypatch: p
         with pytest.raises(ConfigError, match="picture's name"):
             show(Picture(frames), name)
     (tmp_path / "runs/09_some_lesson/taken.webp").mkdir()
-    with pytest.raises(ConfigError, match=r"taken\.webp cannot be written: Is a directory"):
-        show(Picture(frames), "taken")
+    monkeypatch.setenv("RACECRAFT_LANGUAGE", "de")
+    with pytest.warns(UserWarning, match=r"^Das Bild runs/.*/taken\.webp lässt sich nicht aufheben: Is a directory\.$"):
+        assert show(Picture(frames), "taken") is None
+    (tmp_path / "runs/09_some_lesson/full.webp").symlink_to("/dev/full")
+    with pytest.warns(UserWarning, match="No space left on device"):
+        show(Picture(frames), "full")
 
 
 def colored(picture: Picture, color: tuple[int, int, int]) -> int:

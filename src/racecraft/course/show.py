@@ -6,16 +6,21 @@ import base64
 import io
 import re
 import sys
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from racecraft.course.phrases import learner_language, said_in
 from racecraft.errors import ConfigError
 
 if TYPE_CHECKING:
     from PIL import Image
+
+NOT_KEPT: Final = "The picture {} cannot be kept: {}."
+"""Of a script: the file, and why."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +68,11 @@ def show(picture: Picture, name: str) -> Path | None:
         name: Of the file, without its ending.
 
     Returns:
-        The file; None in a notebook.
+        The file; None in a notebook, and where it cannot be written.
 
     Raises:
-        ConfigError: The name is not one of a file, or the file cannot be written.
+        ConfigError: The name is not one of a file, or there can be no folder for it. A full disk only costs the
+            picture: the lesson goes on, with a warning.
     """
     if not re.fullmatch(r"[\w-]+", name):
         raise ConfigError(f"A picture's name is {name!r}; allowed are letters, digits, - and _.")
@@ -78,7 +84,9 @@ def show(picture: Picture, name: str) -> Path | None:
     try:
         path.write_bytes(picture.encoded())
     except OSError as error:
-        raise ConfigError(f"The picture {path} cannot be written: {error.strerror or error}.") from error
+        told = NOT_KEPT.format(path, error.strerror or error)
+        warnings.warn(said_in(learner_language(), told), stacklevel=2)
+        return None
     sys.stdout.write(f"[picture: {path}]\n")
     return path
 
