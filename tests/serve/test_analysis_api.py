@@ -18,8 +18,10 @@ from running_consoles import RunningConsole
 from racecraft import load_track
 from racecraft.analysis import read_laps
 from racecraft.car.export import read_exported
+from racecraft.perception import Perceiver, Watcher
 from racecraft.race.policy import load_policy
 from racecraft.run import RunFolder
+from racecraft.serve.evaluations.beliefs import REMEMBERED
 from racecraft.serve.models.schemas import NewModel
 from racecraft.sim.camera import CAMERAS
 from racecraft.sim.views import driver_frames
@@ -143,6 +145,15 @@ def test_what_perception_believes_of_one_moment(raced: tuple[RunningConsole, str
         assert len(seen["line_rows"]) == len(seen["line_columns"]) == len(seen["line_error"]) > 3
         assert np.shape(seen["regions"]) == (len(seen["region_rows"]), len(seen["region_columns"]))
         assert seen["distance_m"] is None
+    last = len(lap["x"]) - 1
+    assert last > REMEMBERED
+    told = [console.client.get(path, params={"lap": 1, "row": row}).json() for row in range(last + 1)]
+    looks = [np.frombuffer(base64.b64decode(one["frame"]), np.uint8).reshape(120, 160) for one in told]
+    for row in (3, last):  # with the pictures before in mind, as far as there are any
+        frames = np.stack(looks[max(0, row - REMEMBERED + 1) : row + 1])
+        belief = Watcher(Perceiver(num_threads=1)).film(frames, np.arange(len(frames)) == 0)
+        assert told[row]["heading_rad"] == pytest.approx(float(belief.heading[-1]), abs=6e-5)
+        assert told[row]["half_width_m"] == pytest.approx(float(belief.half_width[-1]), abs=6e-5)
     sensors = console.runs / name / "model_metadata.json"
     document = sensors.read_text()
     sensors.write_text(json.dumps({**json.loads(document), "sensor": ["LEFT_CAMERA"]}))
