@@ -1,6 +1,7 @@
 // The driver's camera against its reference, across instruction sets, and at poses that no car should reach.
 #include <algorithm>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 
 #include "../src/camera_model.hpp"
@@ -189,7 +190,7 @@ TEST(the_lens_is_where_the_car_carries_it) {
     spec.left = 0.03f;
     spec.yaw = 0.2f;
     const CameraModel camera(spec);
-    const double headings[] = {0.0, 0.5 * M_PI, M_PI, -0.5 * M_PI, 0.7};
+    const double headings[] = {0.0, 0.5 * std::numbers::pi, std::numbers::pi, -0.5 * std::numbers::pi, 0.7};
     for (const double heading : headings) {
         const LensPose lens =
             place_lens(camera.view(), ground.view(), 0.4f, -0.3f, static_cast<float>(heading));

@@ -1,6 +1,7 @@
 // The loss of one sample, term by term, where its formula can be followed by hand.
 #include "../src/learner_loss.hpp"
 
+#include <numbers>
 #include <vector>
 
 #include "check.hpp"
@@ -80,7 +81,7 @@ TEST(entropy_is_that_of_the_distribution) {
     const float mean[2] = {0.0f, 0.0f}, log_std[2] = {0.5f, -0.25f}, action[2] = {0.1f, 0.2f};
     float at_mean[2], at_std[2] = {};
     gaussian_loss(mean, log_std, 2, action, {0.0f, 0.0f, 1.0}, kObjective, loss.terms, at_mean, at_std);
-    CHECK_NEAR(loss.terms.entropy, 0.25 + std::log(2.0 * M_PI * std::exp(1.0)), 1e-6);
+    CHECK_NEAR(loss.terms.entropy, 0.25 + std::log(2.0 * std::numbers::pi * std::exp(1.0)), 1e-6);
 }
 
 TEST(a_deviation_at_its_bounds_is_pulled_no_further) {

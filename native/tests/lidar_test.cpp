@@ -1,5 +1,6 @@
 // A scan: the vector code against one ray after the other, and its noise.
 #include <algorithm>
+#include <numbers>
 #include <vector>
 
 #include "check.hpp"
@@ -28,7 +29,8 @@ LidarPose pose_in(uint32_t step, float heading = 0.0f) {
 std::vector<double> distances(const LidarPose& pose, const Room& room) {
     std::vector<double> found;
     for (int32_t ray = 0; ray < kLidarRays; ++ray) {
-        const double angle = M_PI - 2.61799 + ray * 2.0 * 2.61799 / 63.0;  // 300 degrees about straight back
+        const double angle =
+            std::numbers::pi - 2.61799 + ray * 2.0 * 2.61799 / 63.0;  // 300 degrees about straight back
         const double dx = pose.cosine * std::cos(angle) - pose.sine * std::sin(angle);
         const double dy = pose.sine * std::cos(angle) + pose.cosine * std::sin(angle);
         const double x = pose.x + 0.02913 * pose.cosine, y = pose.y + 0.02913 * pose.sine;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include "check.hpp"
@@ -99,8 +100,8 @@ TEST(atan2_on_the_axes_and_at_the_origin) {
     CHECK_EQUAL(atan2_of(0.0f, -2.0f), kPi);
     CHECK_EQUAL(atan2_of(3.0f, 0.0f), 0.5f * kPi);
     CHECK_EQUAL(atan2_of(-3.0f, 0.0f), -0.5f * kPi);
-    CHECK_NEAR(atan2_of(1e-30f, 1e-30f), 0.25 * M_PI, 3e-7);
-    CHECK_NEAR(atan2_of(1e30f, -1e30f), 0.75 * M_PI, 3e-7);
+    CHECK_NEAR(atan2_of(1e-30f, 1e-30f), 0.25 * std::numbers::pi, 3e-7);
+    CHECK_NEAR(atan2_of(1e30f, -1e30f), 0.75 * std::numbers::pi, 3e-7);
 }
 
 TEST(wrap_angle_keeps_the_direction_and_the_range) {
@@ -108,8 +109,9 @@ TEST(wrap_angle_keeps_the_direction_and_the_range) {
     float highest = 0.0f;
     for_floats(-20000.0f, 20000.0f, [&](float angle) {
         const float wrapped = wrap_angle(angle);
-        worst = std::max(worst, std::abs(std::remainder(
-                                    static_cast<double>(angle) - static_cast<double>(wrapped), 2.0 * M_PI)));
+        worst =
+            std::max(worst, std::abs(std::remainder(static_cast<double>(angle) - static_cast<double>(wrapped),
+                                                    2.0 * std::numbers::pi)));
         if (abs_of(angle) < 100.0f) highest = std::max(highest, abs_of(wrapped));
     });
     std::printf("       wrap_angle: worst error %.3g, largest %.9g\n", worst, static_cast<double>(highest));

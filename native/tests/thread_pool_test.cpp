@@ -2,8 +2,10 @@
 // well.
 #include "thread_pool.hpp"
 
+#if !defined(_WIN32)
 #include <sys/wait.h>
 #include <unistd.h>
+#endif
 
 #include <atomic>
 #include <memory>
@@ -108,6 +110,8 @@ TEST(pools_may_run_side_by_side) {
     CHECK_EQUAL(calls.load(), 3 * 100 * 10);
 }
 
+#if !defined(_WIN32)  // which forks nothing
+
 TEST(a_forked_child_runs_loops_alone_and_ends) {
     auto pool = std::make_unique<ThreadPool>(3);
     int sum = 0;
@@ -127,5 +131,7 @@ TEST(a_forked_child_runs_loops_alone_and_ends) {
     pool->for_each(100, [&](size_t) { ++calls; });
     CHECK_EQUAL(calls.load(), 100);
 }
+
+#endif
 
 }  // namespace racecraft

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <vector>
 
 #include "track_store.hpp"
@@ -47,7 +48,7 @@ inline Outline road_along(const std::function<Point(double)>& curve, size_t piec
 inline Outline circuit(size_t pieces = 120) {
     return road_along(
         [](double t) {
-            const double angle = 2.0 * M_PI * t;
+            const double angle = 2.0 * std::numbers::pi * t;
             const double radius = 3.0 + 0.6 * std::sin(3.0 * angle) + 0.3 * std::cos(2.0 * angle);
             return Point{1.0 + radius * std::cos(angle), -2.0 + radius * std::sin(angle)};
         },
@@ -57,7 +58,7 @@ inline Outline circuit(size_t pieces = 120) {
 inline Outline figure_of_eight(size_t pieces = 150) {
     return road_along(
         [](double t) {
-            const double angle = 2.0 * M_PI * t;
+            const double angle = 2.0 * std::numbers::pi * t;
             return Point{4.0 * std::sin(angle), 2.5 * std::sin(2.0 * angle)};
         },
         pieces, 0.35, true);

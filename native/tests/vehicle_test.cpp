@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -177,10 +178,11 @@ TEST(a_heading_is_told_within_a_turn) {
             const float before = state.heading;
             state = drive(true_car(), state, steering, 1.5f, 1);
             CHECK(std::abs(state.heading) <= kPi + 1e-6f);
-            turned += std::remainder(static_cast<double>(state.heading) - before, 2.0 * M_PI);
+            turned += std::remainder(static_cast<double>(state.heading) - before, 2.0 * std::numbers::pi);
         }
         CHECK(std::abs(turned) > 50.0);
-        CHECK_NEAR(std::remainder(turned - static_cast<double>(state.heading), 2.0 * M_PI), 0.0, 1e-2);
+        CHECK_NEAR(std::remainder(turned - static_cast<double>(state.heading), 2.0 * std::numbers::pi), 0.0,
+                   1e-2);
     }
 }
 

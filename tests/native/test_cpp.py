@@ -1,6 +1,7 @@
 """Builds the C++ tests with CMake and runs them: as users get the core, and with assertions under sanitizers.
 
-The golden hashes are also compared without any optimisation nor vectors, and on an ARM processor, which is emulated.
+The golden hashes are also compared without any optimisation nor vectors, on an ARM processor, which is emulated, and as
+Windows programs under Wine, where it is installed.
 
     pytest tests/native -m "not slow"     only the release build, of which make test-fast runs the short programs
 
@@ -34,6 +35,15 @@ EMULATED = {  # and the word that chooses the tests: all but those that take an 
 }
 EMULATOR = ("qemu-aarch64", "-L", "/usr/aarch64-linux-gnu")
 CROSS_COMPILER = "aarch64-linux-gnu-g++"
+ZIG = ROOT / "build/zig/ziglang/zig"
+ELSEWHERE = {
+    "aarch64": {
+        "CMAKE_SYSTEM_NAME": "Linux",
+        "CMAKE_SYSTEM_PROCESSOR": "aarch64",
+        "CMAKE_CXX_COMPILER": CROSS_COMPILER,
+    },
+    "windows": {"CMAKE_TOOLCHAIN_FILE": str(ROOT / "native/windows.cmake"), "ZIG": str(ZIG)},
+}
 LONG = ("camera_test", "engine_test", "network_test", "vehicle_test")
 """Programs that take half a second and more as users get the core."""
 SHORT = tuple(name for name in PROGRAMS if name not in LONG)
@@ -59,7 +69,8 @@ def build(
     programs: tuple[str, ...] = PROGRAMS,
     *,
     portable: bool = False,
-    cross: bool = False,
+    elsewhere: str = "",
+    **environment: str,
 ) -> Path:
     """Configure and compile, and give the folder of the programs."""
     folder = ROOT / "build" / f"cpp-{name}"
@@ -68,18 +79,14 @@ def build(
         "RACECRAFT_PORTABLE": "ON" if portable else "OFF",
         "CMAKE_BUILD_TYPE": build_type,
     }
-    if cross:
-        settings |= {
-            "CMAKE_SYSTEM_NAME": "Linux",
-            "CMAKE_SYSTEM_PROCESSOR": "aarch64",
-            "CMAKE_CXX_COMPILER": CROSS_COMPILER,
-        }
-    run([cmake(), "-S", ROOT, "-B", folder, "-G", "Ninja", *(f"-D{key}={value}" for key, value in settings.items())])
-    return compiled(folder, programs)
+    settings |= ELSEWHERE.get(elsewhere, {})
+    options = (f"-D{key}={value}" for key, value in settings.items())
+    run([cmake(), "-S", ROOT, "-B", folder, "-G", "Ninja", *options], **environment)
+    return compiled(folder, programs, **environment)
 
 
-def compiled(folder: Path, programs: tuple[str, ...] = PROGRAMS) -> Path:
-    run([cmake(), "--build", folder, "--parallel", str(JOBS), "--target", *programs])
+def compiled(folder: Path, programs: tuple[str, ...] = PROGRAMS, **environment: str) -> Path:
+    run([cmake(), "--build", folder, "--parallel", str(JOBS), "--target", *programs], **environment)
     return folder
 
 
@@ -136,8 +143,22 @@ def test_an_arm_processor_computes_the_same_bits(program):
     for tool in (CROSS_COMPILER, EMULATOR[0]):
         if shutil.which(tool) is None:
             pytest.skip(f"{tool} is not installed")
-    folder = build("aarch64", "Release", programs=tuple(EMULATED), cross=True)
+    folder = build("aarch64", "Release", programs=tuple(EMULATED), elsewhere="aarch64")
     told = run([*EMULATOR, folder / program, EMULATED[program]])
+    assert re.search(r"^ok ", told, flags=re.MULTILINE), told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_windows_programs_compute_the_same_bits(program):
+    if shutil.which("wine") is None:
+        pytest.skip("Wine is not installed")
+    if not ZIG.exists():
+        pytest.skip("Zig is not here: make site")
+    folder = ROOT / "build/cpp-windows"
+    cache = str(folder / "zig")
+    build("windows", "Release", elsewhere="windows", ZIG_GLOBAL_CACHE_DIR=cache, ZIG_LOCAL_CACHE_DIR=cache)
+    told = run(["wine", folder / f"{program}.exe"], WINEPREFIX=str(folder / "wine"), WINEDEBUG="-all")
     assert re.search(r"^ok ", told, flags=re.MULTILINE), told
 
 

@@ -33,6 +33,7 @@ USES = {
     "map": r"std::map<",
     "memory": r"std::(?:unique_ptr|shared_ptr|make_unique|make_shared)\b",
     "mutex": r"std::(?:mutex|lock_guard|unique_lock|scoped_lock|once_flag|call_once)\b",
+    "numbers": r"std::numbers::",
     "new": r"std::align_val_t",
     "numeric": r"std::(?:iota|accumulate|inner_product)\(",
     "optional": r"std::optional\b",
