@@ -62,5 +62,7 @@ def test_a_record_is_further_or_faster_than_all_before() -> None:
         drive(7, 1.0, 11.0),
     ]
     assert [one.step for one in records(drives)] == [1, 3, 4, 7]
+    assert [one.step for one in records(drives[:-1], drive(7, 1.0, 11.0))] == [1, 3, 4]
+    assert [one.step for one in records(drives, drive(8, 0.3))] == [1]  # by luck others came as far or further
     assert [one.step for one in evenly(drives, 3)] == [1, 4, 7]
     assert evenly(drives, 7) is drives

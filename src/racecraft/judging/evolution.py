@@ -52,7 +52,7 @@ def drive_checkpoint(folder: RunFolder, step: int, *, num_trials: int = 5) -> Ev
 
 
 def evolution_of(folder: RunFolder, *, most: int = SHOWN) -> list[Drive]:
-    """Laps of a training that beat all before them, in their order, and the best checkpoint's at the end.
+    """Laps of a training that beat all before them, in their order; at the end the best checkpoint's, which beats all.
 
     A run from before laps were kept, or from elsewhere, has those of the checkpoints that it still has.
 
@@ -66,7 +66,8 @@ def evolution_of(folder: RunFolder, *, most: int = SHOWN) -> list[Drive]:
     if not kept:
         steps = sorted(entry.step for entry in folder.checkpoints.entries() if entry.step < best.step)
         kept = [_drive(folder, step) for step in steps]
-    return [*evenly(records(kept), most - 1), _drive(folder, best.step)]
+    last = _drive(folder, best.step)
+    return [*evenly(records(kept, last), most - 1), last]
 
 
 def film_evolution(run: str | Path, path: str | Path | None = None) -> Path:

@@ -60,8 +60,13 @@ def read_drives(folder: RunFolder) -> list[Drive]:
     return [drive for drive in map(_drive, points) if drive is not None]
 
 
-def records(drives: list[Drive]) -> list[Drive]:
-    """Those that came further, or round faster, than all before them."""
+def records(drives: list[Drive], best: Drive | None = None) -> list[Drive]:
+    """Those that came further, or round faster, than all before them, and less far than `best`.
+
+    The best is so by all trials of an evaluation; in a single lap an earlier one may have had more luck.
+    """
+    if best is not None:
+        drives = [drive for drive in drives if _rank(drive) < _rank(best)]
     found: list[Drive] = []
     for drive in drives:
         if not found or _rank(drive) > _rank(found[-1]):
