@@ -264,6 +264,8 @@ def test_every_cut_and_every_flipped_byte_is_noticed(clean: Path, tmp_path: Path
         if not is_same_stream(bytes(changed), data):
             refused(path, bytes(changed), "damaged|does not begin|version|says it holds")
     refused(path, data + b"more", "damaged")
+    broken = data[:-1] + bytes([data[-1] ^ 1])
+    refused(path, broken, r"^bad\.replay is damaged: its content cannot be unpacked\.$")  # in our words, not in zlib's
 
 
 def test_what_is_no_replay_is_refused(tmp_path: Path) -> None:

@@ -118,7 +118,7 @@ def unpack(data: bytes, *, name: str) -> tuple[dict[str, Any], memoryview]:
     try:
         body = inflater.decompress(memoryview(data)[_PREFIX.size :], size + 1)
     except zlib.error as error:
-        raise ReplayError(f"{name} is damaged: {error}.") from error
+        raise ReplayError(f"{name} is damaged: its content cannot be unpacked.") from error
     if len(body) != size or not inflater.eof or inflater.unused_data:
         raise ReplayError(f"{name} is damaged: it holds another number of bytes than the {size:,} it says.")
     if hashlib.sha256(body).digest() != digest:
