@@ -197,7 +197,7 @@ def test_a_map_that_was_asked_for_before_does_not_come_after(studio: tuple[Runni
 
 def test_models_are_compared(studio: tuple[RunningConsole, Any]) -> None:
     page = visit(studio, "/compare/left")
-    page.get_by_role("button", name="right oval").click()
+    page.get_by_role("button", name="right Paperclip").click()
     page.wait_for_url("**/compare/left/right")
     page.get_by_role("region", name="Reward code").wait_for()
     assert page.locator("tr.removed").count() > 3
@@ -227,9 +227,9 @@ def test_a_model_is_compared_with_another_that_is_still_chosen(studio: tuple[Run
     code = page.get_by_role("region", name="Reward code")
     code.wait_for()
     page.get_by_role("combobox", name="left →").select_option("right")
-    page.get_by_role("button", name="left oval").click()
+    page.get_by_role("button", name="left Paperclip").click()
     page.wait_for_url("**/compare/right")
-    page.get_by_role("button", name="left oval").click()
+    page.get_by_role("button", name="left Paperclip").click()
     page.wait_for_url("**/compare/right/left")
     assert page.get_by_role("combobox", name="right →").input_value() == "left"
     code.wait_for()
