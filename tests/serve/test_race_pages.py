@@ -398,6 +398,8 @@ def test_the_settings_say_where_things_are(visit: Visit) -> None:
 
 
 def test_every_page_has_a_title_and_wrong_addresses_lead_on(visit: Visit) -> None:
+    from playwright.sync_api import expect
+
     titles = {
         "/": "Garage",
         "/create": "New model",
@@ -409,7 +411,7 @@ def test_every_page_has_a_title_and_wrong_addresses_lead_on(visit: Visit) -> Non
         "/settings": "Settings",
     }
     for path, title in titles.items():
-        assert visit.open(path).title() == f"{title} · Racecraft"
+        expect(visit.open(path)).to_have_title(f"{title} · Racecraft")  # a track's is known once it has been asked
     for path in ("/nowhere", "/models/nobody", "/races/99", "/contests/0", "/races/nonsense", "/drive/nowhere"):
         page = visit.open(path)
         page.get_by_role("heading", name="There is nothing here").wait_for()
