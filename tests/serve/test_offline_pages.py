@@ -13,12 +13,14 @@ from running_consoles import running_console
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 AWAY = 8.0  # s; it was 60 when it was looked at
+LEISURELY = "import time\n\n\ndef reward_function(params):\n    time.sleep(0.001)\n    return 1.0\n"
+"""A reward under which a training goes on and leaves most of the processor to others."""
 USUAL = 5.0  # s between two points of the graph, at most; the machine may be busy
 
 
 def test_a_graph_has_no_gap_after_a_time_without_server(runs: Path) -> None:
     with running_console(runs) as first, visiting(first) as visit:
-        first.create(name="away", track="oval", until="20 minutes")
+        first.create(name="away", track="oval", until="20 minutes", reward=LEISURELY)
         page = visit.open("/models/away/watch")
         page.get_by_text("learning at once").wait_for()
 
