@@ -161,10 +161,12 @@ def test_odd_surroundings_are_no_bug(
         "replay {} --track oval",
         "sweep {}",
         "import {}",
+        "perceive {}",
+        "perceive {}.mp4",
     ],
 )
 def test_a_pipe_is_not_waited_for(racecraft: Run, tmp_path: Path, command: str) -> None:
-    for name in ("pipe", "pipe.npy"):
+    for name in ("pipe", "pipe.npy", "pipe.mp4"):
         os.mkfifo(tmp_path / name)
     outcome = racecraft(*command.format(tmp_path / "pipe").split(), "--json")
     assert outcome.status == 1

@@ -100,12 +100,14 @@ def _pictures_of(path: Path) -> Iterator[Picture]:
             raise ConfigError(f"Run {_named(path)} was never evaluated.", hint=f"First racecraft evaluate {path}")
         yield from _from_replay(replays[-1])
     elif path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURES)
+        files = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURES and file.is_file())
         if not files:
             hint = f"Pictures end in {', '.join(PICTURES)}; a run folder has a run.json."
             raise ConfigError(f"There is no picture in {_named(path)}.", hint=hint)
         for file in files:
             yield _from_file(file)
+    elif not path.is_file():  # whoever reads a pipe may wait for ever
+        raise ConfigError(f"{_named(path)} cannot be read: it is no regular file.")
     elif path.suffix.lower() in VIDEOS:
         yield from _from_video(path)
     elif path.suffix.lower() == ".replay":
