@@ -77,5 +77,5 @@ def test_names_that_are_no_file(name):
 
 def test_a_pipe_is_no_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(RewardError, match="neither a preset nor a file"):
+    with pytest.raises(RewardError, match="it is no regular file"):
         load_reward(tmp_path / "pipe")
