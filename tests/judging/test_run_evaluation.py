@@ -56,7 +56,7 @@ def test_a_run_learns_and_is_evaluated_and_filmed_with_its_camera(
     assert cameras == [CAMERAS["2026"]]
     palettes: list[str] = []
     for module in ("judging.evaluation", "film.replay_film"):
-        monkeypatch.setattr(f"racecraft.{module}.film", lambda *_, palette, **__: palettes.append(palette) or run)
+        monkeypatch.setattr(f"racecraft.{module}.film", lambda *_, camera, **__: palettes.append(camera.palette) or run)
     found = evaluate(run, **{**QUICK, "video": True})
     film_replay(found.files["replay"])
     assert (found.evaluation.conditions.camera, palettes) == (CAMERAS["2026"], ["2026", "2026"])
