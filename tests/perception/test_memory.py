@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 from safetensors.numpy import load_file, save_file
+from unseen_roads import unseen_roads
 
 from racecraft.errors import CheckpointError
 from racecraft.film.encoding import write_video
@@ -23,8 +24,6 @@ from racecraft.perception.reading import read_pictures
 from racecraft.perception.recalling import STRETCH, Drives, gradient, taught
 from racecraft.perception.truth import Truth
 from racecraft.race.autopilot import Autopilot
-from racecraft.sim import Simulation, Start
-from racecraft.track import load_tracks
 
 
 def some_memory(seed: int = 1) -> Memory:
@@ -146,17 +145,7 @@ def remembered(perceiver: Perceiver) -> tuple[Belief, Belief, NDArray[np.float32
 
     Of every fifth picture from the eighth of a drive on; drives are by what is seen.
     """
-    simulation = Simulation(
-        load_tracks(["kidney", "bowtie", "lakeside", "trefoil", "serpent", "boomerang"]),
-        num_envs=96,
-        seed=5,
-        start=Start(mode="random", lateral_jitter=0.1, heading_jitter=0.15),
-        direction="alternate",
-        track_order="random",
-        randomize="strong",
-        max_steps=60,
-        num_threads=2,
-    )
+    simulation = unseen_roads()
     truth, watcher = Truth(simulation), Watcher(perceiver)
     driver = PerceptionDriver(perceiver, autopilot=Autopilot(speed=1.5))
     frames, targets, ages = [], [], np.zeros(96, int)

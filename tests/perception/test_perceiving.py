@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+from unseen_roads import unseen_roads
 
 from racecraft.errors import ShapeError
 from racecraft.perception import Belief, Perceiver, PerceptionDriver, perceive
@@ -16,8 +17,6 @@ from racecraft.perception.network import of_one_brightness
 from racecraft.perception.training import World
 from racecraft.perception.truth import Truth
 from racecraft.race.autopilot import Autopilot
-from racecraft.sim import Simulation, Start
-from racecraft.track import load_tracks
 
 pytestmark = pytest.mark.costly
 
@@ -65,17 +64,7 @@ def test_the_middle_of_a_real_road(perceiver: Perceiver) -> None:
 @pytest.fixture(scope="module")
 def unseen(perceiver: Perceiver) -> tuple[Belief, NDArray[np.float32]]:
     """Roads that were never learned from, driven by what is seen under strong conditions; belief and truth."""
-    simulation = Simulation(
-        load_tracks(["kidney", "bowtie", "lakeside", "trefoil", "serpent", "boomerang"]),
-        num_envs=96,
-        seed=5,
-        start=Start(mode="random", lateral_jitter=0.1, heading_jitter=0.15),
-        direction="alternate",
-        track_order="random",
-        randomize="strong",
-        max_steps=60,
-        num_threads=2,
-    )
+    simulation = unseen_roads()
     truth, driver = Truth(simulation), PerceptionDriver(perceiver, autopilot=Autopilot(speed=1.5))
     frames, targets = [], []
     for step in range(80):
