@@ -100,7 +100,8 @@ def test_a_search_whose_best_trial_becomes_a_model(console: RunningConsole, mode
 def test_a_search_is_stopped_and_one_that_fails_says_why(console: RunningConsole, model: str) -> None:
     client, path = console.client, f"/api/models/{model}/tunings"
     job = client.post(path, json={"search": [GAMMA], "trial_steps": 10**8, "minutes": 60}).json()
-    console.wait_for(lambda: list((console.runs / ".racecraft" / "tunings").glob("*/trial-0000/run.json")))
+    (card,) = (card for card in client.get(path).json() if card["job"] == job["id"])
+    console.wait_for((console.runs / ".racecraft" / "tunings" / card["id"] / "trial-0000" / "run.json").exists)
     refused(client.delete(f"/api/models/{model}"), 409, "tune")
     client.post(f"/api/jobs/{job['id']}/cancel")
     assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
