@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.perception import Belief, Perceiver, PerceptionDriver, Watcher
-from racecraft.perception.answers import HALF, NUM_CONTINUOUS, NUMBERS, ROWS
+from racecraft.perception.answers import HALF, IN_SIGHT, MIDDLES, NUMBERS, PLACES
 from racecraft.perception.network import WEIGHTS
-from racecraft.perception.training import World
+from racecraft.perception.worlds import Episodes, World
 from racecraft.race.autopilot import Autopilot
 from racecraft.race.generalization import generalize
 from racecraft.race.policy import load_policy
@@ -65,7 +65,8 @@ def main() -> None:
 
 def sight(perceiver: Perceiver, routes: list[str], randomize: str, *, looks: int) -> dict[str, Any]:
     """Errors over some 3,000 pictures, of 24 looks, every third of which counts."""
-    world = World(routes, num_envs=128, seed=11, randomize=randomize, lateral=0.1, turned=0.15, sway=0.08)
+    episodes = Episodes(lateral=0.1, turned=0.15, sway=0.08)
+    world = World(routes, episodes, num_envs=128, seed=11, randomize=randomize)
     watcher, ages = Watcher(perceiver), np.zeros(128, int)
     parts: list[dict[str, Any]] = []
     for look in range(1, 3 * looks + 1):
@@ -100,18 +101,18 @@ def _where(belief: Belief, truth: NDArray[np.float32]) -> dict[str, NDArray[Any]
         ("heading_ahead_deg", np.degrees(1.0), belief.heading_ahead),
     ):
         wanted = name.rpartition("_")[0]
-        column = truth[:, list(NUMBERS).index(wanted)] * NUMBERS[wanted]
+        column = truth[:, PLACES[wanted]] * NUMBERS[wanted]
         found[name] = unit * np.abs(told - column)
     return found
 
 
 def _columns(belief: Belief, truth: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
-    columns = truth[:, len(NUMBERS) : NUM_CONTINUOUS] * HALF + HALF - 0.5
+    columns = truth[:, MIDDLES] * HALF + HALF - 0.5
     return {"middle_px": np.abs(belief.middle - columns)[_is_there(truth)]}
 
 
 def _is_there(truth: NDArray[np.float32]) -> NDArray[np.bool_]:
-    return np.asarray(truth[:, NUM_CONTINUOUS : NUM_CONTINUOUS + len(ROWS)] > 0.5)
+    return np.asarray(truth[:, IN_SIGHT] > 0.5)
 
 
 def _spread(values: NDArray[np.float32]) -> dict[str, Any]:

@@ -22,8 +22,8 @@ import torch
 from numpy.typing import NDArray
 
 from perception import UNSEEN
-from racecraft.perception.answers import HALF, NUMBERS
-from racecraft.perception.training import World
+from racecraft.perception.answers import HALF, NUMBERS, PLACES
+from racecraft.perception.worlds import Episodes, World
 from racecraft.sim import STATE_COLUMNS
 
 Floats = NDArray[np.float64]
@@ -86,10 +86,9 @@ def gather(
         apart: Steps between two of them.
         wider: Factor on how badly cars drive.
     """
-    world = World(
-        tracks, num_envs=512, seed=seed, randomize=randomize, lateral=0.1 * wider, turned=0.15 * wider, sway=0.08
-    )
-    columns = [list(NUMBERS).index(name) for name in WANTED]
+    episodes = Episodes(lateral=0.1 * wider, turned=0.15 * wider, sway=0.08)
+    world = World(tracks, episodes, num_envs=512, seed=seed, randomize=randomize)
+    columns = [PLACES[name] for name in WANTED]
     sights, truths, firsts = [], [], []
     for _ in range(looks):
         targets = [world.look() for _ in range(apart)][-1][1]

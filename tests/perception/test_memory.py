@@ -17,7 +17,7 @@ from racecraft.perception import Belief, Perceiver, PerceptionDriver, Watcher, p
 from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, NUMBERS
 from racecraft.perception.lessons import Lessons
 from racecraft.perception.losses import slopes_of
-from racecraft.perception.memory import ANSWERS, SHAPES, UNITS, Memory, seen_of
+from racecraft.perception.memory import ANSWERS, SHAPES, UNITS, Memory, seen_of, unseen
 from racecraft.perception.mirror import mirrored_answers
 from racecraft.perception.network import MEMORY, WEIGHTS
 from racecraft.perception.reading import read_pictures
@@ -43,7 +43,7 @@ def some_targets(*shape: int) -> NDArray[np.float32]:
 
 def test_it_corrects_where_the_lens_is_and_nothing_else() -> None:
     memory, outputs = some_memory(), some_outputs(5)
-    better, state = memory(outputs, memory.begin(5))
+    better, state = memory(outputs, unseen(5))
     others = np.setdiff1d(np.arange(NUM_OUTPUTS), ANSWERS)
     assert (better[:, others] == outputs[:, others]).all()
     assert (better[:, ANSWERS] != outputs[:, ANSWERS]).all()
@@ -53,12 +53,12 @@ def test_it_corrects_where_the_lens_is_and_nothing_else() -> None:
 
 def test_how_many_are_looked_at_together_changes_no_bit() -> None:
     memory, outputs = some_memory(), some_outputs(33, 4)
-    together, state = [], memory.begin(33)
+    together, state = [], unseen(33)
     for step in range(4):
         better, state = memory(outputs[:, step], state)
         together.append(better)
     for lens in (0, 7, 32):
-        alone = memory.begin(1)
+        alone = unseen(1)
         for step in range(4):
             better, alone = memory(outputs[lens : lens + 1, step], alone)
             assert (better[0] == together[step][lens]).all()
@@ -74,7 +74,7 @@ def test_sums_are_exact_in_any_order() -> None:
 
 def test_in_a_mirror_it_remembers_the_same() -> None:
     memory, outputs = some_memory(), some_outputs(6, 3)
-    state, turned = memory.begin(6), memory.begin(6)
+    state, turned = unseen(6), unseen(6)
     for step in range(3):
         better, state = memory(outputs[:, step], state)
         reflected, turned = memory(mirrored_answers(outputs[:, step]), turned)
@@ -235,6 +235,10 @@ def test_a_film_goes_on_where_it_ended_and_begins_anew_where_it_is_cut(perceiver
     apart = [parts.film(frames[part], cuts[part]).heading for part in (slice(0, 3), slice(3, 6))]
     assert (np.concatenate(apart) == whole).all()
     assert (Watcher(perceiver).film(frames[4:], cuts[4:]).heading == whole[4:]).all()
+    watcher = Watcher(perceiver)
+    watcher(frames[:3])
+    watcher.film(frames[3:], cuts[:3])
+    assert watcher(frames[:3]).heading[2] != perceiver(frames[:3]).heading[2]
     still = np.array([True, False, True, True, True, True])  # the second is a picture by itself
     assert Watcher(perceiver).film(frames, cuts, still).heading[1] == perceiver(frames).heading[1]
     assert whole[1] != perceiver(frames).heading[1]

@@ -7,8 +7,8 @@ import pytest
 
 from racecraft.perception import Perceiver
 from racecraft.perception.answers import NUM_OUTPUTS, NUM_TARGETS
+from racecraft.perception.belief import believe
 from racecraft.perception.mirror import mirrored_answers, mirrored_observations
-from racecraft.perception.network import believe
 
 
 def test_observations_are_those_of_the_turned_picture() -> None:

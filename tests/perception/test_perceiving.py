@@ -14,8 +14,8 @@ from racecraft.errors import ShapeError
 from racecraft.perception import Belief, Perceiver, PerceptionDriver, perceive
 from racecraft.perception.answers import NUM_CONTINUOUS, NUM_TARGETS, NUMBERS, ROWS
 from racecraft.perception.network import of_one_brightness
-from racecraft.perception.training import World
 from racecraft.perception.truth import Truth
+from racecraft.perception.worlds import Episodes, World
 from racecraft.race.autopilot import Autopilot
 
 pytestmark = pytest.mark.costly
@@ -117,7 +117,7 @@ def test_regions_and_rows_on_roads_never_seen(unseen: tuple[Belief, NDArray[np.f
 
 
 def test_what_stands_in_the_way(perceiver: Perceiver) -> None:
-    boxed = World(["lakeside"], num_envs=64, seed=4, randomize="real", objects=8, lateral=0.1, turned=0.1)
+    boxed = World(["lakeside"], Episodes(lateral=0.1, turned=0.1), num_envs=64, seed=4, randomize="real", objects=8)
     looks = []
     for _ in range(8):
         frames, targets = boxed.look()

@@ -8,8 +8,8 @@ import pytest
 from racecraft import load_track
 from racecraft.perception import PerceptionDriver
 from racecraft.perception.answers import NUM_OUTPUTS, NUM_TARGETS, NUMBERS
+from racecraft.perception.belief import Belief, believe
 from racecraft.perception.driving import state_of
-from racecraft.perception.network import Belief, believe
 from racecraft.race.generalization import generalize
 from racecraft.sim.columns import STATE_COLUMNS
 

@@ -17,7 +17,8 @@ from racecraft.learn.native_regressor import NativeRegressor
 from racecraft.learn.networks import PERCEIVER
 from racecraft.perception import Belief, Perceiver, perceive
 from racecraft.perception.answers import NUM_OUTPUTS, NUMBERS
-from racecraft.perception.network import believe, of_one_brightness
+from racecraft.perception.belief import believe
+from racecraft.perception.network import of_one_brightness
 from racecraft.perception.painting import paint
 from racecraft.perception.reading import read_pictures
 from racecraft.perception.telling import tell

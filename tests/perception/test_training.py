@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from racecraft.errors import CheckpointError, ConfigError
+from racecraft.errors import CheckpointError, ConfigError, RunError
 from racecraft.perception import Lessons, Perceiver, train
 from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, NUMBERS
 from racecraft.perception.losses import slopes_of
-from racecraft.perception.network import MAX_WEIGHTS, STEP, WEIGHTS
+from racecraft.perception.network import MAX_WEIGHTS, WEIGHTS
+from racecraft.perception.packing import STEP
 
 pytestmark = pytest.mark.costly
 
@@ -113,6 +115,10 @@ def test_weights_that_are_none_are_refused(learned: tuple[Path, list[float]], tm
     for name in ("cut", "text", "missing"):
         with pytest.raises(CheckpointError, match="cannot be read"):
             Perceiver(tmp_path / name, num_threads=1)
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe")
+        with pytest.raises(CheckpointError, match="no regular file"):
+            Perceiver(tmp_path / "pipe", num_threads=1)
     with (tmp_path / "large").open("wb") as file:
         file.truncate(MAX_WEIGHTS + 1)
     with pytest.raises(CheckpointError, match="larger than 16 MB"):
@@ -158,8 +164,28 @@ def test_weights_that_are_no_numbers_are_refused(learned: tuple[Path, list[float
         Perceiver(tmp_path / "w", num_threads=1)
 
 
+def test_steps_that_are_too_long_for_a_number_are_refused(learned: tuple[Path, list[float]], tmp_path: Path) -> None:
+    from safetensors.numpy import load_file, save_file
+
+    arrays = load_file(learned[0])
+    (step,) = [name for name in arrays if name.endswith(STEP)]
+    arrays[step][:] = np.finfo(np.float32).max
+    save_file(arrays, tmp_path / "w")
+    with pytest.raises(CheckpointError, match="not all finite"):
+        Perceiver(tmp_path / "w", num_threads=1)
+
+
+def test_weights_are_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match=r"nowhere/w cannot be written: No such file or directory\."):
+        Perceiver(None, num_threads=1).save(tmp_path / "nowhere" / "w")
+    (tmp_path / "w").write_bytes(b"older")
+    Perceiver(None, num_threads=1).save(tmp_path / "w")
+    assert [path.name for path in tmp_path.iterdir()] == ["w"]
+    Perceiver(tmp_path / "w", num_threads=1)
+
+
 def test_lessons_have_limits() -> None:
-    for wrong in ({"updates": 0}, {"roads": 0}, {"store": 8}, {"learning_rate": 2.0}):
+    for wrong in ({"updates": 0}, {"roads": 0}, {"store": 8}, {"learning_rate": 2.0}, {"seed": -1}):
         with pytest.raises(ConfigError):
             Lessons(**wrong)
 

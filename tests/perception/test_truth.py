@@ -6,26 +6,35 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from racecraft.perception.answers import HALF, NUM_CONTINUOUS, NUMBERS, REGION_COLUMNS, REGION_ROWS, ROWS
-from racecraft.perception.training import World
+from racecraft.perception.answers import (
+    HALF,
+    IN_SIGHT,
+    MIDDLES,
+    NUM_CONTINUOUS,
+    NUMBERS,
+    PLACES,
+    REGION_COLUMNS,
+    REGION_ROWS,
+    ROWS,
+)
 from racecraft.perception.truth import Truth
+from racecraft.perception.worlds import Episodes, World
 from racecraft.sim import STATE_COLUMNS, Simulation, Start
 from racecraft.track import load_track
 
-AHEAD = list(NUMBERS).index("heading_ahead")
+AHEAD = PLACES["heading_ahead"]
 
 
 def columns_of(targets: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Columns of the road's middle, and whether they are in the picture  (N, R)."""
-    first, rows = len(NUMBERS), len(ROWS)
-    is_there = targets[:, NUM_CONTINUOUS : NUM_CONTINUOUS + rows] > 0.5
-    return targets[:, first : first + rows] * np.float32(HALF) + np.float32(HALF - 0.5), is_there
+    return targets[:, MIDDLES] * np.float32(HALF) + np.float32(HALF - 0.5), targets[:, IN_SIGHT] > 0.5
 
 
 @pytest.fixture(scope="module")
 def strong() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Pictures under strong randomisation, and the truth of them."""
-    world = World(["reinvent_2018", "delta"], num_envs=64, seed=5, randomize="strong", lateral=0.1, turned=0.15)
+    episodes = Episodes(lateral=0.1, turned=0.15)
+    world = World(["reinvent_2018", "delta"], episodes, num_envs=64, seed=5, randomize="strong")
     looks = [(frames.copy(), targets) for frames, targets in (world.look() for _ in range(12))]
     return np.concatenate([frames for frames, _ in looks]), np.concatenate([targets for _, targets in looks])
 

@@ -6,10 +6,11 @@ pictures ──reading──▶ frames ──network──▶ Belief ──telli
 simulator's state ──truth──▶ targets ──training──▶ weights of the network ──recalling──▶ weights of the memory
 """
 
+from racecraft.perception.belief import Belief
 from racecraft.perception.driving import PerceptionDriver
 from racecraft.perception.lessons import Lessons
 from racecraft.perception.looking import perceive
-from racecraft.perception.network import Belief, Perceiver
+from racecraft.perception.network import Perceiver
 from racecraft.perception.training import train
 from racecraft.perception.watching import Watcher
 

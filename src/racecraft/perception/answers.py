@@ -40,11 +40,25 @@ REGION_COLUMNS: Final = tuple(range(10, 160, 20))
 """Columns of the middles of regions."""
 
 NUM_REGIONS: Final = len(REGION_ROWS) * len(REGION_COLUMNS)
-NUM_TARGETS: Final = len(NUMBERS) + 2 * len(ROWS) + NUM_REGIONS + 1
-"""Numbers, columns, whether each is there, regions, on_road."""
 NUM_CONTINUOUS: Final = len(NUMBERS) + len(ROWS)
-"""Those that are told with how far off they may be; the other targets are yes or no."""
+"""Numbers and columns, which are told with how far off they may be; the other targets are yes or no."""
+NUM_TARGETS: Final = NUM_CONTINUOUS + len(ROWS) + NUM_REGIONS + 1
 NUM_OUTPUTS: Final = NUM_TARGETS + NUM_CONTINUOUS
 """Of the network: an answer to each target, then the logarithm of the mean error of each continuous one."""
 LOG_LIMITS: Final = (-6.0, 2.0)
 """Of those logarithms, in units of the network."""
+
+PLACES: Final = {name: place for place, name in enumerate(NUMBERS)}
+"""Where each of the numbers is among the outputs."""
+POSE: Final = [PLACES[name] for name in ("offset", "heading", "heading_ahead")]
+"""Where those are that say how the lens stands on its road."""
+CURVATURES: Final = slice(PLACES["curvature_near"], PLACES["curvature_far"] + 1)
+"""Where the road's curvature is, at `CURVATURE_AT`."""
+MIDDLES: Final = slice(len(NUMBERS), NUM_CONTINUOUS)
+"""Where the columns of the road's middle are, counted from the picture's middle."""
+IN_SIGHT: Final = slice(MIDDLES.stop, MIDDLES.stop + len(ROWS))
+"""Where it is said whether each of them is in the picture."""
+REGIONS: Final = slice(IN_SIGHT.stop, IN_SIGHT.stop + NUM_REGIONS)
+ON_ROAD: Final = NUM_TARGETS - 1
+ERRORS: Final = slice(NUM_TARGETS, NUM_OUTPUTS)
+"""Where the logarithms are."""

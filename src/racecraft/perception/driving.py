@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.perception.answers import CURVATURE_AT
-from racecraft.perception.network import Belief, Perceiver
+from racecraft.perception.belief import Belief
+from racecraft.perception.network import Perceiver
 from racecraft.perception.watching import Watcher
 from racecraft.race.autopilot import Autopilot
 from racecraft.sim.columns import CURVATURE_AHEAD, STATE_COLUMNS

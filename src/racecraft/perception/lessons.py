@@ -48,3 +48,4 @@ class Lessons:
         check_whole("roads", self.roads, 1, 90)
         check_number("learning_rate", self.learning_rate, 0.0, 1.0)
         check_number("fresh", self.fresh, 0.01, 10.0)
+        check_whole("seed", self.seed, 0, 2**32 - 1)

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import RunError
+from racecraft.errors import ConfigError, RunError
 from racecraft.film.encoding import write_video
 from racecraft.perception.network import Perceiver
 from racecraft.perception.painting import paint
@@ -42,7 +42,7 @@ def perceive(
         What `tell` says of every picture, in order.
 
     Raises:
-        ConfigError: A source is not something to look at.
+        ConfigError: A source is not something to look at, or no film and to be painted as one.
         RunError: The painted pictures cannot be written.
     """
     looker = perceiver or Perceiver(num_threads=num_threads)
@@ -50,7 +50,12 @@ def perceive(
     if output is None:
         for _ in _looked_at(looker, sources, told, paints=False):
             pass
-    elif is_sequence(sources) and output.suffix.lower() == ".mp4":
+    elif output.suffix.lower() == ".mp4":
+        if not is_sequence(sources):
+            raise ConfigError(
+                f"{output} would be a film of what is none: that is for a single video, replay or run.",
+                hint="Name a folder for painted pictures.",
+            )
         write_video((pixels for _, pixels in _looked_at(looker, sources, told)), output)
     else:
         _write_pictures(_looked_at(looker, sources, told), output)

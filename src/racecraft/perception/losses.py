@@ -7,7 +7,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.perception.answers import LOG_LIMITS, NUM_CONTINUOUS, NUM_TARGETS, NUMBERS, ROWS
+from racecraft.perception.answers import (
+    ERRORS,
+    IN_SIGHT,
+    LOG_LIMITS,
+    MIDDLES,
+    NUM_CONTINUOUS,
+    NUM_TARGETS,
+    PLACES,
+    POSE,
+)
 
 Floats = NDArray[np.float32]
 
@@ -17,33 +26,34 @@ ERROR_RATE: Final = 0.1
 """Weight of learning how far off answers are, beside the answers themselves."""
 YES_OR_NO: Final = 0.15
 """Weight of each answer that is yes or no."""
-WEIGHTS: Final = np.array([3.0, 3.0, 1.0, 1.0, 1.0, 1.0, 2.0, 3.0, *[1.0] * len(ROWS)], np.float32)
-"""Of the continuous answers: offset and headings matter most."""
+WEIGHTS: Final = np.ones(NUM_CONTINUOUS, np.float32)
+"""Of the continuous answers: how the lens stands on the road matters most."""
+WEIGHTS[POSE] = 3.0
+WEIGHTS[PLACES["closeness"]] = 2.0
 
 
 def slopes_of(outputs: Floats, targets: Floats) -> tuple[Floats, float]:
-    """The loss's derivative at each output (B, NUM_OUTPUTS), and its mean.
+    """The loss's derivative at each output (B, NUM_OUTPUTS), and the mean of what wrong answers cost.
 
     Continuous answers have a rounded absolute error; what is expected of it has the likelihood of Laplace's
     distribution around the answer, which does not move the answer itself. Columns out of the picture do not count.
     """
-    rows = len(ROWS)
     slopes = np.zeros_like(outputs)
     told, wanted = outputs[:, :NUM_CONTINUOUS], targets[:, :NUM_CONTINUOUS]
     weights = np.broadcast_to(WEIGHTS, told.shape).copy()
-    weights[:, len(NUMBERS) :] *= targets[:, NUM_CONTINUOUS : NUM_CONTINUOUS + rows]
+    weights[:, MIDDLES] *= targets[:, IN_SIGHT]
     error = told - wanted
     rounded = np.sqrt(error * error + np.float32(ROUND_OFF**2))
     slopes[:, :NUM_CONTINUOUS] = weights * error / rounded
     loss = float((weights * (rounded - np.float32(ROUND_OFF))).sum(axis=1).mean())
 
-    logs = outputs[:, NUM_TARGETS:]
+    logs = outputs[:, ERRORS]
     sizes = np.abs(error) * np.exp(-logs.clip(*LOG_LIMITS))
     counts = np.float32(ERROR_RATE) * (weights > 0.0)
     # beyond the limits only the way back
     slope = counts * (1.0 - sizes)
     slope[(logs < LOG_LIMITS[0]) & (slope > 0.0) | (logs > LOG_LIMITS[1]) & (slope < 0.0)] = 0.0
-    slopes[:, NUM_TARGETS:] = slope.clip(-1.0, 1.0)
+    slopes[:, ERRORS] = slope.clip(-1.0, 1.0)
 
     logits, is_so = outputs[:, NUM_CONTINUOUS:NUM_TARGETS], targets[:, NUM_CONTINUOUS:]
     yes = 1.0 / (1.0 + np.exp(-logits.clip(-30.0, 30.0)))

@@ -2,7 +2,7 @@
 
 answers to a picture, state ──Memory──▶ better answers, state
 
-A lens sees the road from 18 cm ahead on. What lies beside it now lay ahead of it a moment ago.
+A lens sees the road from 16 cm ahead on. What lies beside it now lay ahead of it a moment ago.
 
 Every sum of products here is exact: its factors are multiples of powers of two, and a float64 holds all of their sums.
 So neither the order of summing, which is the BLAS library's own affair, nor how many lenses are looked at together
@@ -17,21 +17,29 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.perception.answers import LOG_LIMITS, NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, NUMBERS, ROWS
+from racecraft.perception.answers import (
+    ERRORS,
+    IN_SIGHT,
+    LOG_LIMITS,
+    MIDDLES,
+    NUM_CONTINUOUS,
+    NUM_OUTPUTS,
+    NUM_TARGETS,
+    POSE,
+)
 from racecraft.perception.mirror import mirrored_answers
 
 Array = NDArray[np.float64]
 
 UNITS: Final = 64
 """Numbers that are remembered of a lens's pictures, H; as many again of their mirror images."""
-_TOLD: Final = [list(NUMBERS).index(name) for name in ("offset", "heading", "heading_ahead")]
-ANSWERS: Final = [*_TOLD, *(NUM_TARGETS + place for place in _TOLD)]
+ANSWERS: Final = [*POSE, *(ERRORS.start + place for place in POSE)]
 """Outputs that memory corrects: where the lens is and looks, and how far off that may be."""
 REACH: Final = 0.25
 """What 1 of memory's own outputs adds to an answer, in units of the network."""
 MOST: Final = 4.0
 """In units of the network: numbers and logits beyond it are told as it."""
-FINE: Final = {"seen": 10, "state": 14, "weight": 14}
+SEEN_PLACES, STATE_PLACES, WEIGHT_PLACES = 10, 14, 14
 """Binary places that are kept of what goes into sums."""
 SHAPES: Final = {
     "seen": (NUM_OUTPUTS, 2 * UNITS),
@@ -51,7 +59,7 @@ class Memory:
     """
 
     def __init__(self, weights: Mapping[str, NDArray[np.floating]]) -> None:
-        self.weights = {name: exact(np.asarray(weights[name], np.float64).clip(-8, 8), "weight") for name in SHAPES}
+        self.weights = {name: exact(weights[name].astype(np.float64).clip(-8, 8), WEIGHT_PLACES) for name in SHAPES}
 
     @classmethod
     def of(cls, weights: Mapping[str, NDArray[np.floating]]) -> Memory | None:
@@ -65,10 +73,6 @@ class Memory:
         if {name: array.shape for name, array in weights.items()} != SHAPES:
             raise ValueError("the weights of its memory are others than a memory has")
         return cls(weights)
-
-    def begin(self, count: int) -> Array:
-        """The state of lenses that have seen nothing, of what they see and of that in a mirror  (N, 2, H)."""
-        return np.zeros((count, 2, UNITS))
 
     def __call__(self, outputs: NDArray[np.float32], state: Array) -> tuple[NDArray[np.float32], Array]:
         """Better outputs (N, NUM_OUTPUTS) of a picture of each lens, and the state (N, 2, H) that it leaves."""
@@ -87,22 +91,25 @@ class Memory:
         sums = seen @ weights["seen"] + state @ weights["state"] + weights["bias"]
         bent = bend(sums)
         new, stays = bent[:, :UNITS], 0.5 + 0.5 * bent[:, UNITS:]
-        return exact(new + stays * (state - new), "state"), (new, stays)
+        return exact(new + stays * (state - new), STATE_PLACES), (new, stays)
 
     def answer(self, state: Array) -> NDArray[np.float32]:
         """What to add to `ANSWERS`  (B, A)."""
         return (REACH * (state @ self.weights["answer"] + self.weights["answer_bias"])).astype(np.float32)
 
 
+def unseen(count: int) -> Array:
+    """The state of lenses that have seen nothing, of what they see and of that in a mirror  (N, 2, H)."""
+    return np.zeros((count, 2, UNITS))
+
+
 def seen_of(outputs: NDArray[np.float32]) -> Array:
     """Outputs as memory is told them: bounded, and no columns of rows in which the road's middle is not."""
-    first, rows = len(NUMBERS), len(ROWS)
     seen = outputs.astype(np.float64).clip(-MOST, MOST)
-    is_there = seen[:, NUM_CONTINUOUS : NUM_CONTINUOUS + rows] > 0.0
-    seen[:, first:NUM_CONTINUOUS] *= is_there
+    seen[:, MIDDLES] *= seen[:, IN_SIGHT] > 0.0
     seen[:, NUM_CONTINUOUS:NUM_TARGETS] /= MOST
-    seen[:, NUM_TARGETS:] = outputs[:, NUM_TARGETS:].clip(*LOG_LIMITS) / 3.0
-    return exact(seen, "seen")
+    seen[:, ERRORS] = outputs[:, ERRORS].clip(*LOG_LIMITS) / 3.0
+    return exact(seen, SEEN_PLACES)
 
 
 def bend(sums: Array) -> Array:
@@ -110,7 +117,7 @@ def bend(sums: Array) -> Array:
     return sums / np.sqrt(1.0 + sums * sums)
 
 
-def exact(numbers: Array, kind: str) -> Array:
-    """Rounded to the binary places of a kind of factor."""
-    scale = 2.0 ** FINE[kind]
+def exact(numbers: Array, places: int) -> Array:
+    """Rounded to so many binary places."""
+    scale = 2.0**places
     return np.asarray(np.rint(numbers * scale) / scale)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.perception.answers import NUM_CONTINUOUS, NUM_TARGETS, NUMBERS, REGION_COLUMNS, REGION_ROWS, ROWS
+from racecraft.perception.answers import MIDDLES, NUM_OUTPUTS, PLACES, REGION_COLUMNS, REGION_ROWS, REGIONS
 
 SIDED: Final = ("offset", "heading", "curvature_near", "curvature", "curvature_far", "heading_ahead")
 """Numbers that are of the other sign there, as all columns are."""
@@ -24,17 +24,15 @@ def mirrored_answers(answers: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _order() -> NDArray[np.intp]:
-    order = np.arange(NUM_TARGETS + NUM_CONTINUOUS)
-    first = NUM_CONTINUOUS + len(ROWS)
-    regions = order[first : NUM_TARGETS - 1].reshape(len(REGION_ROWS), len(REGION_COLUMNS))
-    order[first : NUM_TARGETS - 1] = regions[:, ::-1].ravel()
+    order = np.arange(NUM_OUTPUTS)
+    order[REGIONS] = order[REGIONS].reshape(len(REGION_ROWS), len(REGION_COLUMNS))[:, ::-1].ravel()
     return order
 
 
 def _signs() -> NDArray[np.float32]:
-    signs = np.ones(NUM_TARGETS + NUM_CONTINUOUS, np.float32)
-    signs[[place for place, name in enumerate(NUMBERS) if name in SIDED]] = -1.0
-    signs[len(NUMBERS) : NUM_CONTINUOUS] = -1.0
+    signs = np.ones(NUM_OUTPUTS, np.float32)
+    signs[[PLACES[name] for name in SIDED]] = -1.0
+    signs[MIDDLES] = -1.0
     return signs
 
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 PICTURES: Final = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
 VIDEOS: Final = (".mp4", ".mkv", ".mov", ".avi", ".webm")
+FORMATS: Final = "mov,matroska,avi"
+"""FFmpeg's names of what videos may be: what a file is goes by its content, and some formats are lists of others."""
 MAX_BYTES: Final = 20_000_000
 """Of a picture's file."""
 MAX_PIXELS: Final = 4096 * 4096
@@ -142,7 +144,7 @@ def _from_video(path: Path) -> Iterator[Picture]:
     # What labels it is nothing to us; newer ones of PyAV pass over what is not text by themselves.
     unlabelled: dict[str, Any] = {"metadata_errors": "ignore"} if int(av.__version__.split(".")[0]) < 19 else {}
     try:
-        with av.open(str(path), **unlabelled) as container:
+        with av.open(str(path), options={"format_whitelist": FORMATS}, **unlabelled) as container:
             if not container.streams.video:
                 raise ConfigError(f"There is no picture in the video {_named(path)}.")
             stream = container.streams.video[0]
@@ -152,7 +154,9 @@ def _from_video(path: Path) -> Iterator[Picture]:
             for number, frame in enumerate(container.decode(stream)):
                 _check_size(path, frame.width, frame.height)
                 pixels = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
-                yield _picture(path, pixels, frame=number, is_first=number == 0)
+                quarters = round(getattr(frame, "rotation", 0) / 90)  # to the left; the first of PyAV 14 did not tell
+                upright = np.ascontiguousarray(np.rot90(pixels, quarters))
+                yield _picture(path, upright, frame=number, is_first=number == 0)
     except (av.error.FFmpegError, OSError) as error:
         raise ConfigError(f"{_named(path)} is no video that can be read.") from error
 

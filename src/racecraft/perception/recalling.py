@@ -5,17 +5,20 @@ worlds ──the network's answers, truth──▶ drives ──stretches of the
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.perception.answers import NUM_OUTPUTS
 from racecraft.perception.lessons import Lessons
 from racecraft.perception.losses import slopes_of
-from racecraft.perception.memory import ANSWERS, REACH, SHAPES, UNITS, Array, Memory, seen_of
+from racecraft.perception.memory import ANSWERS, REACH, SHAPES, UNITS, Array, Memory, exact, seen_of
 from racecraft.perception.mirror import mirrored_answers
+from racecraft.perception.network import Perceiver
+from racecraft.perception.worlds import Episodes, World, roads_of
 
 STRETCH: Final = 32
 """Pictures of a drive that are learned from together: two seconds."""
@@ -23,8 +26,8 @@ TOGETHER: Final = 64
 """Stretches to a step of learning; half of them are looked at in a mirror."""
 LEARNING_RATE: Final = 4e-3
 """Adam's step size after its first steps; it falls to nothing along a line."""
-SLOPE: Final = 2.0**20
-"""Slopes are multiples of one over this, so that their sums are exact as those of `memory` are."""
+SLOPE_PLACES: Final = 20
+"""Binary places that are kept of slopes, so that their sums are exact as those of `memory` are."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,31 @@ class Drives:
     """Whether a car was put somewhere else before the picture  (T, N)."""
 
 
+def drives_of(perceiver: Perceiver, lessons: Lessons) -> list[Drives]:
+    """Those that memory learns from, over the network's roads: bad and good ones, fast and slow ones."""
+    roads, seed = roads_of(lessons.seed, lessons.roads), lessons.seed + 500
+    bad = Episodes(lateral=0.2, turned=0.3, sway=0.12, steps=45, fastest=4.0)
+    good = replace(bad, lateral=0.05, turned=0.1, sway=0.04)
+    places = [
+        World(roads, bad, num_envs=96, seed=seed, randomize="strong"),
+        World(roads, good, num_envs=48, seed=seed + 1, randomize="strong"),
+        World(roads, bad, num_envs=64, seed=seed + 2, randomize="real"),
+        World(roads[::2], bad, num_envs=32, seed=seed + 3, randomize="real", objects=10),
+    ]
+    length = max(STRETCH, lessons.remembered // sum(place.simulation.num_envs for place in places))
+    return [_driven(perceiver, place, length) for place in places]
+
+
+def _driven(perceiver: Perceiver, place: World, length: int) -> Drives:
+    outputs, targets, begins = [], [], []
+    for _ in range(length):
+        frames, truth = place.look()
+        outputs.append(perceiver.outputs(frames))
+        targets.append(truth)
+        begins.append(place.begins)
+    return Drives(np.stack(outputs), np.stack(targets), np.stack(begins))
+
+
 def taught(drives: list[Drives], lessons: Lessons, *, tell: Callable[[int, float], None] = lambda *_: None) -> Memory:
     """A memory that has learned from drives; the same bits for the same ones.
 
@@ -48,30 +76,42 @@ def taught(drives: list[Drives], lessons: Lessons, *, tell: Callable[[int, float
         tell: Called with the number of updates and the loss, now and then.
     """
     rng = np.random.default_rng([lessons.seed, 0x6D656D6F])
-    sizes = {"seen": 0.5 / 95**0.5, "state": 1.0 / UNITS**0.5, "answer": 0.0, "bias": 0.0, "answer_bias": 0.0}
-    weights = {name: sizes[name] * rng.standard_normal(shape) for name, shape in SHAPES.items()}
-    weights["bias"][:, UNITS:] = 1.0  # at first most of the old stays
-    means = {name: np.zeros(shape) for name, shape in SHAPES.items()}
-    squares = {name: np.zeros(shape) for name, shape in SHAPES.items()}
-    shares = np.array([each.begins.size for each in drives], float)
+    weights = _first_weights(rng)
+    adam = _Adam()
     for update in range(1, lessons.memory_updates + 1):
-        counts = rng.multinomial(TOGETHER, shares / shares.sum())
-        parts = [_stretches(each, int(count), rng) for each, count in zip(drives, counts, strict=True)]
-        outputs, targets, begins = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
-        for array in (outputs, targets):
-            turned = array[:, ::2]
-            turned[:] = mirrored_answers(turned.reshape(-1, turned.shape[2])).reshape(turned.shape)
+        outputs, targets, begins = _minibatch(drives, rng)
         slopes, loss = gradient(Memory(weights), outputs, targets, begins)
         rate = LEARNING_RATE * min(1.0, update / 100) * (1.0 - (update - 1) / lessons.memory_updates)
-        for name, slope in slopes.items():
-            mean = slope / outputs[..., 0].size
-            means[name] += 0.1 * (mean - means[name])
-            squares[name] += 0.001 * (mean * mean - squares[name])
-            unbiased = means[name] / (1.0 - 0.9**update)
-            weights[name] -= rate * unbiased / (np.sqrt(squares[name] / (1.0 - 0.999**update)) + 1e-8)
+        adam.descend(weights, {name: slope / begins.size for name, slope in slopes.items()}, rate)
         if update % 50 == 0 or update == lessons.memory_updates:
             tell(update, loss)
     return Memory({name: array.astype(np.float16) for name, array in weights.items()})
+
+
+def _first_weights(rng: np.random.Generator) -> dict[str, Array]:
+    sizes = {"seen": 0.5 / NUM_OUTPUTS**0.5, "state": 1.0 / UNITS**0.5, "answer": 0.0, "bias": 0.0, "answer_bias": 0.0}
+    weights = {name: sizes[name] * rng.standard_normal(shape) for name, shape in SHAPES.items()}
+    weights["bias"][:, UNITS:] = 1.0  # at first most of the old stays
+    return weights
+
+
+class _Adam:
+    """The optimiser of Kingma and Ba (2014), with their constants."""
+
+    def __init__(self) -> None:
+        self._means = {name: np.zeros(shape) for name, shape in SHAPES.items()}
+        self._squares = {name: np.zeros(shape) for name, shape in SHAPES.items()}
+        self._updates = 0
+
+    def descend(self, weights: dict[str, Array], slopes: Mapping[str, Array], rate: float) -> None:
+        """One step of a size, in place."""
+        self._updates += 1
+        for name, slope in slopes.items():
+            mean, square = self._means[name], self._squares[name]
+            mean += 0.1 * (slope - mean)
+            square += 0.001 * (slope * slope - square)
+            unbiased = mean / (1.0 - 0.9**self._updates)
+            weights[name] -= rate * unbiased / (np.sqrt(square / (1.0 - 0.999**self._updates)) + 1e-8)
 
 
 def gradient(
@@ -98,7 +138,7 @@ def gradient(
     better = outputs.reshape(length * count, -1).copy()
     better[:, ANSWERS] += memory.answer(flat)
     all_slopes, loss = slopes_of(better, targets.reshape(length * count, -1))
-    told = _even(REACH * all_slopes[:, ANSWERS].astype(np.float64))
+    told = exact(REACH * all_slopes[:, ANSWERS].astype(np.float64), SLOPE_PLACES)
     at_states = (told @ memory.weights["answer"].T).reshape(length, count, UNITS)
     sums = np.zeros((length, count, 2 * UNITS))
     later = np.zeros((count, UNITS))  # slopes at a state, of all that comes after it
@@ -109,7 +149,7 @@ def gradient(
         gate = 2.0 * stays - 1.0
         falls = np.concatenate([1.0 - new * new, 1.0 - gate * gate], axis=1)
         at_bent = np.concatenate([slope * (1.0 - stays), 0.5 * slope * (before - new)], axis=1)
-        sums[place] = _even(at_bent * falls * np.sqrt(falls))
+        sums[place] = exact(at_bent * falls * np.sqrt(falls), SLOPE_PLACES)
         back = slope * stays + sums[place] @ memory.weights["state"].T
         later = np.where(begins[place][:, None], 0.0, back)
     flat_sums = sums.reshape(length * count, -1)
@@ -123,8 +163,18 @@ def gradient(
     }, loss
 
 
-def _even(slopes: Array) -> Array:
-    return np.asarray(np.rint(slopes * SLOPE) / SLOPE)
+def _minibatch(
+    drives: list[Drives], rng: np.random.Generator
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+    """`TOGETHER` stretches of them, longer drives in proportion, as `gradient` takes them."""
+    shares = np.array([each.begins.size for each in drives], float)
+    counts = rng.multinomial(TOGETHER, shares / shares.sum())
+    parts = [_stretches(each, int(count), rng) for each, count in zip(drives, counts, strict=True)]
+    outputs, targets, begins = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
+    for array in (outputs, targets):
+        turned = array[:, ::2]
+        turned[:] = mirrored_answers(turned.reshape(-1, turned.shape[2])).reshape(turned.shape)
+    return outputs, targets, begins
 
 
 def _stretches(

@@ -6,7 +6,7 @@ import math
 from typing import Any, Final
 
 from racecraft.perception.answers import CURVATURE_AT, ROWS
-from racecraft.perception.network import Belief
+from racecraft.perception.belief import Belief
 
 TOLD_ROWS: Final = (60, 75, 90, 105)
 """Rows of a picture of 160 x 120 whose middle is told."""

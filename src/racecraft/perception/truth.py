@@ -13,12 +13,19 @@ from numpy.typing import NDArray
 
 from racecraft.perception.answers import (
     CURVATURE_AT,
+    CURVATURES,
     HALF,
     HEADING_OVER,
+    IN_SIGHT,
+    MIDDLES,
     NUM_TARGETS,
     NUMBERS,
+    ON_ROAD,
+    PLACES,
+    POSE,
     REGION_COLUMNS,
     REGION_ROWS,
+    REGIONS,
     ROWS,
 )
 from racecraft.sim import CONDITIONS, STATE_COLUMNS, Simulation
@@ -34,8 +41,7 @@ COARSE: Final = 8
 BEHIND, AHEAD = 8, 80
 """Points behind and ahead of the nearest one that are looked at: 2 m of road. Between as many to both sides, 0.4 m, the
 direction of the road is told."""
-HEADINGS: Final = [0, 1, list(NUMBERS).index("heading_ahead")]
-"""Targets that a centre line tells: offset, heading, and heading against where it leads."""
+_CURVATURE_COLUMNS: Final = [STATE_COLUMNS.index(f"curvature_{CURVATURE_AHEAD.index(ahead)}") for ahead in CURVATURE_AT]
 CELL: Final = 0.02
 """m, side of a cell of the map of a road."""
 MARGIN: Final = 0.5
@@ -65,7 +71,9 @@ class Truth:
         self._counts = np.array([len(road.line) for road in self._roads])
         most = -(-int(self._counts.max()) // COARSE) * COARSE
         # beyond its last point a line goes on with its first one where it is closed, else it stands still
-        self._lines = np.stack([road.line[road.index(np.arange(most))] for road in self._roads])
+        self._lines = np.stack(
+            [road.line[_within(np.arange(most), len(road.line), road.is_closed)] for road in self._roads]
+        )
         self._is_closed = np.array([road.is_closed for road in self._roads])
         self._map = np.concatenate([road.is_road.ravel() for road in roads])
         shapes = np.array([road.is_road.shape for road in roads])
@@ -78,20 +86,18 @@ class Truth:
         simulation = self._simulation
         found = np.zeros((simulation.num_envs, NUM_TARGETS))
         state = simulation.state.astype(np.float64)
-        found[:, 2] = state[:, STATE_COLUMNS.index("half_width")]
-        for place, ahead in enumerate(CURVATURE_AT, 3):
-            found[:, place] = state[:, STATE_COLUMNS.index(f"curvature_{CURVATURE_AHEAD.index(ahead)}")]
+        found[:, PLACES["half_width"]] = state[:, STATE_COLUMNS.index("half_width")]
+        found[:, CURVATURES] = state[:, _CURVATURE_COLUMNS]
         if simulation.objects.count:
-            found[:, 6] = state[:, len(STATE_COLUMNS)]
+            found[:, PLACES["closeness"]] = state[:, len(STATE_COLUMNS)]
         roads = simulation.column("track_index").astype(int)
         lenses = self._lenses()
-        found[:, HEADINGS], columns, is_there = self._along(roads, lenses)
+        found[:, POSE], columns, is_there = self._along(roads, lenses)
         found[:, : len(NUMBERS)] /= np.array(list(NUMBERS.values()))
-        begin, num_rows = len(NUMBERS), len(ROWS)
-        found[:, begin : begin + num_rows] = np.where(is_there, columns / HALF, 0.0)
-        found[:, begin + num_rows : begin + 2 * num_rows] = is_there
-        found[:, begin + 2 * num_rows : -1] = self._regions(roads, lenses)
-        found[:, -1] = self._is_road(roads, lenses[:, 0, None], lenses[:, 1, None])[:, 0]
+        found[:, MIDDLES] = np.where(is_there, columns / HALF, 0.0)
+        found[:, IN_SIGHT] = is_there
+        found[:, REGIONS] = self._regions(roads, lenses)
+        found[:, ON_ROAD] = self._is_road(roads, lenses[:, 0, None], lenses[:, 1, None])[:, 0]
         return (np.round(found.clip(-MOST, MOST) * GRID) / GRID).astype(np.float32)
 
     def _lenses(self) -> Floats:
@@ -119,11 +125,10 @@ class Truth:
         return np.asarray(near[np.arange(len(roads)), best])
 
     def _index(self, roads: NDArray[np.intp], index: NDArray[np.intp]) -> NDArray[np.intp]:
-        count = self._counts[roads][:, None]
-        return np.where(self._is_closed[roads][:, None], index % count, index.clip(0, count - 1))
+        return _within(index, self._counts[roads][:, None], self._is_closed[roads][:, None])
 
     def _along(self, roads: NDArray[np.intp], lenses: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """`HEADINGS` (N, 3); pixels from the picture's middle to the road's (N, R), and where it is in view."""
+        """`POSE` (N, 3); pixels from the picture's middle to the road's (N, R), and where it is in view."""
         x, y, cosine, sine, above, pitch, focal = lenses.T[:, :, None]
         nearest = self._nearest(roads, x[:, 0], y[:, 0])
         ahead_of = self._index(roads, nearest[:, None] + np.arange(-BEHIND, AHEAD))
@@ -207,16 +212,19 @@ class _Road:
             draw.polygon([*rings[0], *reversed(rings[1])], fill=1)
         self.is_road: NDArray[np.bool_] = np.asarray(picture, bool)
 
-    def index(self, index: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Within the line's points."""
-        return index % len(self.line) if self.is_closed else index.clip(0, len(self.line) - 1)
-
     def reversed(self) -> _Road:
         """Driven the other way."""
         other = object.__new__(_Road)
         other.line, other.is_closed = self.line[::-1], self.is_closed
         other.origin, other.is_road = self.origin, self.is_road
         return other
+
+
+def _within(
+    index: NDArray[np.intp], count: int | NDArray[np.intp], is_closed: bool | NDArray[np.bool_]
+) -> NDArray[np.intp]:
+    """Of a line's points: behind the last comes the first where it is closed, else the last itself."""
+    return np.where(is_closed, index % count, np.clip(index, 0, count - 1))
 
 
 def _area(ring: list[tuple[float, float]]) -> float:

@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.perception.network import Belief, Perceiver, believe
+from racecraft.perception.belief import Belief, believe
+from racecraft.perception.memory import unseen
+from racecraft.perception.network import Perceiver
 
 
 class Watcher:
@@ -23,7 +25,7 @@ class Watcher:
 
     def __init__(self, perceiver: Perceiver) -> None:
         self.perceiver = perceiver
-        self._states = np.zeros((0, 2, 0))
+        self._states = unseen(0)
 
     def __call__(self, frames: NDArray[np.uint8], lenses: NDArray[np.intp] | None = None) -> Belief:
         """What is believed of a picture of each of N lenses.
@@ -41,8 +43,7 @@ class Watcher:
         which = np.arange(len(frames)) if lenses is None else lenses
         missing = int(which.max()) + 1 - len(self._states)
         if missing > 0:
-            known = self._states if len(self._states) else memory.begin(0)
-            self._states = np.concatenate([known, memory.begin(missing)])
+            self._states = np.concatenate([self._states, unseen(missing)])
         outputs, self._states[which] = memory(outputs, self._states[which])
         return believe(outputs)
 
@@ -70,9 +71,11 @@ class Watcher:
         outputs, memory = self.perceiver.outputs(frames), self.perceiver.memory
         if memory is None:
             return believe(outputs)
-        state = self._states[:1] if len(self._states) else memory.begin(1)
+        if not len(self._states):
+            self._states = unseen(1)
+        state = self._states[:1]
         for place in range(len(frames)) if is_of_film is None else np.flatnonzero(is_of_film).tolist():
             here = slice(place, place + 1)
-            outputs[here], state = memory(outputs[here], memory.begin(1) if is_first[place] else state)
-        self._states = state
+            outputs[here], state = memory(outputs[here], unseen(1) if is_first[place] else state)
+        self._states[:1] = state
         return believe(outputs)
