@@ -69,6 +69,10 @@ def test_mistakes(racecraft: Run) -> None:
     assert "There is nothing at nowhere." in outcome.err
     assert racecraft("perceive").status == 1
     assert racecraft("perceive", "a.png", "--train", "w").status == 2
+    outcome = racecraft("perceive", "--train", "nowhere/w", "--updates", "1", "--roads", "1", "--store", "128")
+    assert (outcome.status, outcome.out) == (1, "")
+    assert "nowhere/w cannot be written: there is no folder nowhere." in outcome.err
+    assert "updates" not in outcome.err
     Path("w").write_text("no weights")
     Image.new("RGB", (160, 120)).save("a.png")
     outcome = racecraft("perceive", "a.png", "--weights", "w")

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from racecraft.cli.app import Json, app, print_json, text
+from racecraft.cli.app import Json, app, is_given, print_json, text
+from racecraft.errors import ConfigError
 
 if TYPE_CHECKING:
     from racecraft.perception import Perceiver
+
+
+OF_DRIVING: Final = ("speed", "vehicle", "randomize", "trials", "seed")
+OF_LEARNING: Final = ("updates", "roads", "store", "seed")
 
 
 @app.command()
@@ -49,9 +54,17 @@ def perceive(
     from racecraft.perception import perceive as look
     from racecraft.perception import train as learn
 
+    meant = OF_LEARNING if train is not None else OF_DRIVING if drive else ()
+    for option in context.command.params:
+        name = str(option.name)
+        if name in (*OF_DRIVING, *OF_LEARNING) and name not in meant and is_given(context, name):
+            verbs = [verb for verb, of in (("--drive", OF_DRIVING), ("--train", OF_LEARNING)) if name in of]
+            context.fail(f"{option.opts[0]} goes with {' or '.join(verbs)}.")
     if train is not None:
         if sources or output or weights or drive:
             context.fail("--train goes alone; call perceive again for pictures and for driving.")
+        if not train.parent.is_dir():  # told now, and not after hours of learning
+            raise ConfigError(f"{train} cannot be written: there is no folder {train.parent}.")
         given = {"updates": updates, "roads": roads, "store": store}
         lessons = Lessons(seed=seed, **{name: value for name, value in given.items() if value is not None})
 
