@@ -63,6 +63,23 @@ def test_driving(racecraft: Run) -> None:
     assert "nowhere" in racecraft("perceive", "--drive", "nowhere").err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["a.png", "--speed", "2"], "--speed goes with --drive."),
+        (["a.png", "--seed", "2"], "--seed goes with --drive or --train."),
+        (["a.png", "--updates", "2"], "--updates goes with --train."),
+        (["--drive", "oval", "--roads", "2"], "--roads goes with --train."),
+        (["--train", "w", "--vehicle", "v4"], "--vehicle goes with --drive."),
+    ],
+)
+def test_options_of_what_is_not_done_are_refused(racecraft: Run, arguments: list[str], says: str) -> None:
+    Image.new("RGB", (160, 120)).save("a.png")
+    outcome = racecraft("perceive", *arguments)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert says in outcome.err
+
+
 def test_mistakes(racecraft: Run) -> None:
     outcome = racecraft("perceive", "nowhere")
     assert (outcome.status, outcome.out) == (1, "")

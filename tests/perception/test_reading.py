@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +22,7 @@ from racecraft.perception.answers import NUM_OUTPUTS, NUMBERS
 from racecraft.perception.belief import believe
 from racecraft.perception.network import of_one_brightness
 from racecraft.perception.painting import paint
-from racecraft.perception.reading import read_pictures
+from racecraft.perception.reading import rate_of, read_pictures
 from racecraft.perception.telling import tell
 from racecraft.race import RULE_SETS, evaluate
 from racecraft.replay import Replay, write_replay
@@ -133,6 +135,67 @@ def test_a_video_may_be_badly_labelled(tmp_path: Path, perceiver: Perceiver) -> 
     (tmp_path / "in.mp4").write_bytes(film.replace(b"avc1", b"none"))
     with pytest.raises(ConfigError, match="no video"):
         perceive([tmp_path / "in.mp4"], perceiver=perceiver)
+
+
+def moved(film: Path, matrix: tuple[int, ...]) -> bytes:
+    """A video of MP4 that is to be shown by a matrix."""
+    content = bytearray(film.read_bytes())
+    place = content.index(b"tkhd") + 44
+    content[place : place + 36] = struct.pack(">9i", *(number << 16 for number in matrix[:6]), 0, 0, 1 << 30)
+    return bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("quarters", "matrix"), [(1, (0, 1, 0, -1, 0, 0)), (2, (-1, 0, 0, 0, -1, 0)), (3, (0, -1, 0, 1, 0, 0))]
+)
+def test_a_video_is_seen_the_way_up_that_its_camera_says(
+    tmp_path: Path, quarters: int, matrix: tuple[int, ...]
+) -> None:
+    upright = np.zeros((480, 640, 3), np.uint8)
+    upright[:160, :200], upright[:160, 200:] = 250, 120
+    write_video([np.ascontiguousarray(np.rot90(upright, quarters))], tmp_path / "a.mp4")
+    (lying,) = read_pictures([tmp_path / "a.mp4"])
+    (tmp_path / "a.mp4").write_bytes(moved(tmp_path / "a.mp4", matrix))
+    (turned,) = read_pictures([tmp_path / "a.mp4"])
+    assert np.abs(turned.shown.astype(int) - upright).mean() < 4.0
+    assert np.abs(lying.shown.astype(int) - upright).mean() > 40.0
+
+
+def test_a_painted_film_is_as_fast_as_the_film_and_never_replaces_it(tmp_path: Path, perceiver: Perceiver) -> None:
+    film = tmp_path / "in.mp4"
+    write_video([np.asarray(road(640, 480))] * 3, film, rate=30)
+    perceive([film], output=tmp_path / "out.mp4", perceiver=perceiver)
+    assert rate_of(film) == rate_of(tmp_path / "out.mp4") == 30
+    assert rate_of(tmp_path / "a.replay") == 15
+    (tmp_path / "link.mp4").symlink_to(film)
+    before = film.read_bytes()
+    for same in (film, tmp_path / "link.mp4"):
+        with pytest.raises(ConfigError, match="the film that is looked at"):
+            perceive([film], output=same, perceiver=perceiver)
+    assert film.read_bytes() == before
+
+
+def test_pictures_do_not_become_a_film(tmp_path: Path, perceiver: Perceiver) -> None:
+    road().save(tmp_path / "a.png")
+    with pytest.raises(ConfigError, match="a film of what is none"):
+        perceive([tmp_path / "a.png"], output=tmp_path / "out.mp4", perceiver=perceiver)
+    assert not (tmp_path / "out.mp4").exists()
+
+
+def test_pictures_of_a_folder_go_by_their_numbers(tmp_path: Path) -> None:
+    for name in ("frame_10.png", "frame_2.png", "1.png", "frame.png", "frame_2b10.png", "frame_2b9.png"):
+        road(160, 120).save(tmp_path / name)
+    names = [Path(picture.file).name for picture in read_pictures([tmp_path])]
+    assert names == ["1.png", "frame.png", "frame_2.png", "frame_2b9.png", "frame_2b10.png", "frame_10.png"]
+
+
+def test_a_video_that_is_a_list_of_other_files_is_refused(tmp_path: Path, perceiver: Perceiver) -> None:
+    write_video([np.asarray(road(640, 480))], tmp_path / "in.mp4")
+    os.mkfifo(tmp_path / "pipe")  # whoever reads it waits for ever
+    for other in ("in.mp4", "pipe"):
+        (tmp_path / "a.mp4").write_text(f"ffconcat version 1.0\nfile {other}\n")
+        with pytest.raises(ConfigError, match="no video that can be read"):
+            perceive([tmp_path / "a.mp4"], perceiver=perceiver)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from racecraft.errors import ConfigError, RunError
 from racecraft.film.encoding import write_video
 from racecraft.perception.network import Perceiver
 from racecraft.perception.painting import paint
-from racecraft.perception.reading import is_sequence, read_pictures
+from racecraft.perception.reading import is_sequence, rate_of, read_pictures
 from racecraft.perception.telling import tell
 from racecraft.perception.watching import Watcher
 
@@ -56,7 +56,10 @@ def perceive(
                 f"{output} would be a film of what is none: that is for a single video, replay or run.",
                 hint="Name a folder for painted pictures.",
             )
-        write_video((pixels for _, pixels in _looked_at(looker, sources, told)), output)
+        (film,) = map(Path, sources)
+        if output.exists() and output.samefile(film):
+            raise ConfigError(f"{output} is the film that is looked at.", hint="Paint it to another file.")
+        write_video((pixels for _, pixels in _looked_at(looker, sources, told)), output, rate=rate_of(film))
     else:
         _write_pictures(_looked_at(looker, sources, told), output)
     return told

@@ -5,8 +5,10 @@ Everybody's files: what is no picture, too large or too many is refused in a sen
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, printable
 from racecraft.extras import needed_for
+from racecraft.film.encoding import FRAME_RATE
 from racecraft.replay.replay import read_replay
 from racecraft.scoped_warnings import scoped_warnings
 from racecraft.sim.camera import LUMA, CameraSpec
@@ -102,11 +105,11 @@ def _pictures_of(path: Path) -> Iterator[Picture]:
             raise ConfigError(f"Run {_named(path)} was never evaluated.", hint=f"First racecraft evaluate {path}")
         yield from _from_replay(replays[-1])
     elif path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.suffix.lower() in PICTURES and file.is_file())
+        files = [file for file in path.iterdir() if file.suffix.lower() in PICTURES and file.is_file()]
         if not files:
             hint = f"Pictures end in {', '.join(PICTURES)}; a run folder has a run.json."
             raise ConfigError(f"There is no picture in {_named(path)}.", hint=hint)
-        for file in files:
+        for file in sorted(files, key=_by_number):
             yield _from_file(file)
     elif not path.is_file():  # whoever reads a pipe may wait for ever
         raise ConfigError(f"{_named(path)} cannot be read: it is no regular file.")
@@ -116,6 +119,12 @@ def _pictures_of(path: Path) -> Iterator[Picture]:
         yield from _from_replay(path)
     else:
         yield _from_file(path)
+
+
+def _by_number(path: Path) -> list[str | int]:
+    """Frame 2 comes before frame 10."""
+    parts = re.split(r"(\d+)", path.name)
+    return [int(part) if place % 2 else part for place, part in enumerate(parts)]
 
 
 def _from_file(path: Path) -> Picture:
@@ -137,7 +146,31 @@ def _from_file(path: Path) -> Picture:
         raise ConfigError(f"{_named(path)} is no picture that can be read.", hint=hint) from error
 
 
+def rate_of(path: Path) -> int:
+    """Pictures a second of a film, 1 to 120; a replay or run has the simulator's.
+
+    Raises:
+        ConfigError: It is no video that can be read.
+    """
+    if path.suffix.lower() not in VIDEOS:
+        return FRAME_RATE
+    with _video(path) as (_, stream):
+        return min(max(round(stream.average_rate or FRAME_RATE), 1), 120)
+
+
 def _from_video(path: Path) -> Iterator[Picture]:
+    with _video(path) as (container, stream):
+        for number, frame in enumerate(container.decode(stream)):
+            _check_size(path, frame.width, frame.height)
+            pixels = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
+            quarters = round(getattr(frame, "rotation", 0) / 90)  # to the left; the first of PyAV 14 did not tell
+            upright = np.ascontiguousarray(np.rot90(pixels, quarters))
+            yield _picture(path, upright, frame=number, is_first=number == 0)
+
+
+@contextmanager
+def _video(path: Path) -> Iterator[tuple[Any, Any]]:
+    """PyAV's container and its stream of pictures; what goes wrong inside the block is the file's fault."""
     with needed_for("Reading a video"):
         import av
 
@@ -151,12 +184,7 @@ def _from_video(path: Path) -> Iterator[Picture]:
             if stream.codec_context is None:  # of a codec that there is not
                 raise ConfigError(f"{_named(path)} is no video that can be read.")
             _check_size(path, stream.codec_context.width, stream.codec_context.height)
-            for number, frame in enumerate(container.decode(stream)):
-                _check_size(path, frame.width, frame.height)
-                pixels = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
-                quarters = round(getattr(frame, "rotation", 0) / 90)  # to the left; the first of PyAV 14 did not tell
-                upright = np.ascontiguousarray(np.rot90(pixels, quarters))
-                yield _picture(path, upright, frame=number, is_first=number == 0)
+            yield container, stream
     except (av.error.FFmpegError, OSError) as error:
         raise ConfigError(f"{_named(path)} is no video that can be read.") from error
 
