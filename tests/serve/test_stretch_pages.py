@@ -17,7 +17,7 @@ from PIL import Image
 from running_consoles import PATIENCE, RunningConsole, running_console
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page, Route
+    from playwright.sync_api import Locator, Page, Route
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
@@ -79,6 +79,15 @@ def test_the_curve_has_a_band_for_each_stretch(changed: Visit) -> None:
         "Stretch 1 · the beginning",
         "Stretch 2 · reward",
     ]
+
+
+def test_a_model_that_has_learned_is_said_to_have_driven_all_its_steps(changed: Visit) -> None:
+    """The last point of the curve is older than the last checkpoint."""
+    client = changed.console.client
+    model, points = client.get("/api/models/heron").json(), client.get("/api/models/heron/history").json()["points"]
+    assert max(point["step"] for point in points if point["kind"] == "iteration") < model["steps"]
+    page = changed.open("/models/heron/watch")
+    page.locator(".figures dd").get_by_text(f"{model['steps']:,}", exact=True).wait_for()
 
 
 def test_a_band_shows_its_change_and_a_model_branches_off_from_before_it(changed: Visit) -> None:
@@ -187,8 +196,7 @@ def test_when_nobody_trains_the_best_car_drives_its_lap(changed: Visit) -> None:
     canvas = page.locator(".scene canvas")
     canvas.wait_for()
     first = canvas.screenshot()
-    page.wait_for_timeout(700)
-    assert canvas.screenshot() != first, "it drives"
+    changed.console.wait_for(lambda: canvas.screenshot() != first)  # it drives
     page.reload()
     page.get_by_text("The best car on its lap").wait_for()
 
@@ -360,10 +368,10 @@ def _made(page: Page) -> str:
 def test_the_end_of_a_training_is_said_on_another_page(changed: Visit) -> None:
     console = changed.console
     page = changed.open("/models/other/watch")
-    steps = console.client.get("/api/models/other").json()["steps"]
-    console.client.post("/api/models/other/train", json={"until": f"{steps + 4000} steps"})
-    page.get_by_role("button", name="Stop").wait_for()
+    console.client.post("/api/models/other/train", json={"until": "10 minutes"})
+    page.get_by_text("cars learning at once").wait_for()  # one that had not begun would be cancelled
     page.get_by_role("link", name="Garage").first.click()
+    console.client.post("/api/models/other/stop")
     page.locator(".toast").get_by_text("other has finished its training.").wait_for()
     page.locator(".toast").get_by_role("button", name="Look").click()
     page.wait_for_url("**/models/other")
@@ -386,13 +394,12 @@ def test_the_title_and_the_browser_say_the_end_to_whoever_is_away(changed: Visit
     console = changed.console
     page = changed.open("/models/other/watch")
     page.evaluate(HIDDEN)
-    steps = console.client.get("/api/models/other").json()["steps"]
     for wanted in (True, False):
-        steps += 2000
-        console.client.post("/api/models/other/train", json={"until": f"{steps} steps"})
-        page.get_by_role("button", name="Stop").wait_for()
+        console.client.post("/api/models/other/train", json={"until": "10 minutes"})
+        page.get_by_text("cars learning at once").wait_for()
         page.get_by_role("checkbox", name="Let the browser tell me").set_checked(wanted)
         page.evaluate("window.isAway = true")
+        console.client.post("/api/models/other/stop")
         console.wait_for(lambda: page.title().startswith("✓ "))
         job = console.client.get("/api/jobs", params={"run": "other"}).json()[0]
         told = page.evaluate("window.told.splice(0)")
@@ -417,8 +424,16 @@ def test_a_picture_that_grows_has_the_whole_road_as_one_that_was_large_from_the_
         for width in widths:
             page.set_viewport_size({"width": width, "height": 900})
             page.wait_for_timeout(1500)
-        pictures.append(Image.open(io.BytesIO(canvas.screenshot())).convert("L"))
+        picture = changed.console.wait_for(lambda: _still(page, canvas))  # noqa: B023
+        pictures.append(Image.open(io.BytesIO(picture)).convert("L"))
     page.emulate_media(reduced_motion="no-preference")
     grown, large = (np.asarray(picture, float) for picture in pictures)
     assert grown.shape == large.shape
     assert np.abs(grown - large).mean() < 2.0  # of 255; as they were before, most of the road is elsewhere
+
+
+def _still(page: Page, canvas: Locator) -> bytes | None:
+    """Its picture, if it stays as it is for longer than the next one takes."""
+    before = canvas.screenshot()
+    page.wait_for_timeout(1000)
+    return before if canvas.screenshot() == before else None

@@ -135,6 +135,11 @@ def test_an_address_that_cannot_be_read_is_no_page(visit: Visit) -> None:
     page.get_by_text("The console has no page at").wait_for()
 
 
+def test_a_tab_that_a_model_has_not_is_no_page(visit: Visit) -> None:
+    page = visit.open("/models/heron/races")
+    page.get_by_text("The console has no page at /models/heron/races.").wait_for()
+
+
 def test_a_name_with_a_space_is_refused_in_a_sentence(visit: Visit) -> None:
     client = visit.console.client
     for reply in (
@@ -280,16 +285,15 @@ def test_nothing_is_drawn_while_nothing_moves(visit: Visit) -> None:
     )
     expect(canvas).not_to_have_attribute("width", "300")  # the scene is there
     asked = [1]
-    while asked[-1] and len(asked) < 8:  # the last frame, a sharp one, comes after a moment
+    while asked[-1] and len(asked) < 60:  # the last frame, a sharp one, comes after a moment
         page.evaluate("window.asked = 0")
         page.wait_for_timeout(1000)
         asked.append(page.evaluate("window.asked"))
     assert asked[-1] == 0, asked
     before = canvas.screenshot()
     page.get_by_role("button", name="From above").click()
-    page.wait_for_timeout(1000)
-    assert page.evaluate("window.asked") > 0
-    assert canvas.screenshot() != before
+    visit.console.wait_for(lambda: page.evaluate("window.asked") > 0)
+    visit.console.wait_for(lambda: canvas.screenshot() != before)
 
 
 def test_a_waiting_model_says_what_it_waits_for(visit: Visit) -> None:

@@ -1,4 +1,4 @@
-/** Pages by address: /, /create, /models/NAME, /models/NAME/races, /tracks, /settings. */
+/** Pages by address: /, /create, /models/NAME, /models/NAME/race, /tracks, /settings. */
 export const route = $state({ path: location.pathname });
 
 export function go(path: string): void {
