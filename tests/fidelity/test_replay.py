@@ -286,6 +286,11 @@ def test_logs_as_they_come_out_of_other_tools(lines, tmp_path):
     }
     for name, texts in tables.items():
         (tmp_path / name).write_text("\r\n".join(texts) + "\r\n")
+    events = [{"timestamp": 1, "message": f"SIM_TRACE_LOG:{row}\n"} for row in rows]
+    tables["line.json"] = [json.dumps({"nextToken": "9" * 12_345, "events": events})]
+    tables["glued.log"] = ["SIM_TRACE_LOG:" + "SIM_TRACE_LOG:".join(rows)]
+    for name in ("line.json", "glued.log"):
+        (tmp_path / name).write_text(tables[name][0])
     (tmp_path / "utf16.csv").write_text("\n".join([",".join(COLUMNS), *rows]), encoding="utf-16")
     for name in (*tables, "utf16.csv"):
         found = replay(tmp_path / name, track="oval").to_dict()

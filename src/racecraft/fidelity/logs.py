@@ -147,10 +147,9 @@ def _batches(source: str, file: TextIO, rows: list[tuple[int, Sequence[str]]], f
     names: Sequence[str] | None = None  # of a CSV file
     order = _ORDERS[READABLE[-1]]
     episode = ""
-    for number, line in enumerate(_lines(file), start=1):
-        marked = line.find(MARK)
-        if marked >= 0:
-            fields = _split(_AFTER_TRACE.sub("", line[marked + len(MARK) :].rstrip()))
+    for number, line in _lines(file):
+        if line.startswith(MARK):
+            fields = _split(_AFTER_TRACE.sub("", line[len(MARK) :].rstrip()))
             if len(fields) not in READABLE:
                 faults.add(source, number, f"{len(fields)} columns, a sim-trace has 15, 17, 18 or 19")
                 continue
@@ -186,12 +185,21 @@ def _batches(source: str, file: TextIO, rows: list[tuple[int, Sequence[str]]], f
     yield from _convert(source, rows, faults)
 
 
-def _lines(file: TextIO) -> Iterator[str]:
-    """Lines, of which a longer one than any row is only the beginning."""
-    while line := file.readline(MAX_LINE):
-        yield line
-        while len(line) == MAX_LINE and not line.endswith("\n"):
-            line = file.readline(MAX_LINE)
+def _lines(file: TextIO) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers: of one that holds marked rows each of these, of one too long for a row its start."""
+    number, rest, is_told = 1, "", False  # rest: what may go on in the next piece of the same line
+    while piece := file.readline(MAX_LINE):
+        is_whole = piece.endswith("\n")
+        before, *rows = (rest + piece).split(MARK)
+        if not rows and not is_told:
+            yield number, before
+        goes_on = bool(rows) and not is_whole and len(rows[-1]) < MAX_LINE
+        for row in rows[: len(rows) - goes_on]:
+            yield number, MARK + row
+        rest = "" if is_whole else MARK + rows[-1] if goes_on else piece[1 - len(MARK) :]
+        number, is_told = number + is_whole, not is_whole
+    if rest.startswith(MARK):
+        yield number, rest
 
 
 def _header(line: str) -> list[str]:
