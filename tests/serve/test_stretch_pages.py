@@ -82,12 +82,17 @@ def test_the_curve_has_a_band_for_each_stretch(changed: Visit) -> None:
 
 
 def test_a_model_that_has_learned_is_said_to_have_driven_all_its_steps(changed: Visit) -> None:
-    """The last point of the curve is older than the last checkpoint."""
-    client = changed.console.client
-    model, points = client.get("/api/models/heron").json(), client.get("/api/models/heron/history").json()["points"]
-    assert max(point["step"] for point in points if point["kind"] == "iteration") < model["steps"]
-    page = changed.open("/models/heron/watch")
-    page.locator(".figures dd").get_by_text(f"{model['steps']:,}", exact=True).wait_for()
+    """A curve may end before its model does: iterations that follow each other quickly are left out of it."""
+    history = changed.console.runs / "heron" / "metrics" / "history.jsonl"
+    whole = history.read_bytes()
+    steps = changed.console.client.get("/api/models/heron").json()["steps"]
+    lines = [line for line in whole.splitlines(keepends=True) if json.loads(line)["step"] < steps]
+    history.write_bytes(b"".join(lines))
+    try:
+        page = changed.open("/models/heron/watch")
+        page.locator(".figures dd").get_by_text(f"{steps:,}", exact=True).wait_for()
+    finally:
+        history.write_bytes(whole)
 
 
 def test_a_band_shows_its_change_and_a_model_branches_off_from_before_it(changed: Visit) -> None:
