@@ -38,6 +38,7 @@ OPERATORS = (
     ),
     "serve/server.py",
     *("importing/history.py", "importing/own.py", "serve/jobs/bench.py", "serve/jobs/line.py"),
+    "serve/jobs/parcel.py",
     *("film/limit_picture.py", "film/replay_film.py", "film/av1.py"),
 )
 """Where they come from that only terminals and logs show, or that quote others."""

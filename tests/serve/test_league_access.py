@@ -212,6 +212,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "POST /api/workers/{worker}/finish": ("worker", {"job": "x", "state": "done"}),
     "POST /api/workers/{worker}/release": ("worker", {"why": "asked"}),
     "GET /api/workers/{worker}/objects/{key}": ("worker", None),
+    "PUT /api/workers/{worker}/objects": ("worker", None),
     "PUT /api/workers/{worker}/objects/{key}": ("worker", None),
 }
 MAY = {  # who may do what is theirs by role; everybody else gets 404

@@ -27,8 +27,10 @@ from sqlalchemy.orm import Session
 
 pytest.importorskip("obstore")
 from racecraft.run import RunFolder
-from racecraft.serve.jobs.line import MAX_OBJECT
+from racecraft.serve.jobs.line import MAX_OBJECT, Line
+from racecraft.serve.jobs.parcel import MAX_PARCEL, pack
 from racecraft.serve.jobs.queue import LEASE
+from racecraft.serve.jobs.remote import RemoteObjects
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.artifacts import Artifacts
 from racecraft.serve.store.database import Database
@@ -116,8 +118,23 @@ class Hand:
     def put(self, key: str, data: bytes) -> httpx.Response:
         return self.client.put(f"/api/workers/{self.name}/objects/{key}", content=data)
 
+    def put_all(self, *pieces: tuple[str, bytes]) -> httpx.Response:
+        return self.client.put(f"/api/workers/{self.name}/objects", content=pack(pieces))
+
     def put_list(self, run: str, document: dict[str, Any]) -> httpx.Response:
         return self.put(f"runs/{run}.json", json.dumps(document).encode())
+
+
+class CountingLine(Line):
+    """Knows where files were sent."""
+
+    def __init__(self, url: str, token_file: Path) -> None:
+        super().__init__(url, token_file)
+        self.sent: list[str] = []
+
+    def send(self, path: str, data: bytes) -> None:
+        self.sent.append(path)
+        super().send(path, data)
 
 
 @contextmanager
@@ -328,6 +345,49 @@ def test_a_worker_reads_and_writes_what_its_job_names_and_nothing_else(place: Pl
     ok(hand.post("release", why="asked"), 204)
     assert place.artifacts.objects.below(f"runs/mine/{unnamed}") == []
     assert "does not have this job" in refused(hand.put_list("mine", missing), 409)
+    place.console.client.post(f"/api/jobs/{job}/cancel")
+
+
+def test_small_files_travel_together_and_nowhere_else_than_alone(place: Place) -> None:
+    for name in ("packed", "other"):
+        place.console.create(name=name, train=False, track="oval", seed=5, until="512 steps")
+    place.console.wait_for(lambda: {"packed", "other"} <= set(place.artifacts.names()))
+    job = ok(place.console.client.post("/api/models/packed/train", json={}), 202)["id"]
+    hand = place.hand(secret := place.token()[1])
+    assert "does not have this job" in refused(hand.put_all(("runs/packed.json", b"{}")), 409)
+    assert ok(hand.take())["id"] == job
+
+    for key in ("runs/other.json", "live/other", "tracks/" + "0" * 64, "contests/packed.json", "../runs/packed.json"):
+        assert hand.put_all((key, b"{}")).status_code == 404, key
+    digest = hashlib.sha256(b"good").hexdigest()
+    wrong = refused(hand.put_all((f"runs/packed/{digest}", b"good"), (f"runs/packed/{'0' * 64}", b"bad")), 422)
+    assert wrong == "What came has another digest than it was sent under."
+    assert hand.get(f"runs/packed/{digest}").content == b"good"
+    document = json.loads(hand.get("runs/packed.json").content)
+    missing = {"size": 3, "time": 1, "sha256": "0" * 64}
+    lies = {**document, "number": document["number"] + 1, "files": {**document["files"], "new.txt": missing}}
+    assert "is not there" in refused(hand.put_all(("runs/packed.json", json.dumps(lies).encode())), 422)
+    assert json.loads(hand.get("runs/packed.json").content) == document
+    assert "at most 1 MB" in refused(hand.put_all((f"runs/packed/{digest}", b"x" * MAX_PARCEL)), 413)
+
+    (file := place.folder / "hand.token").write_text(secret)
+    line = CountingLine(place.url, file)
+    there = Artifacts(RemoteObjects(line, hand.name))
+    there.bring("packed", runs := place.folder / "hand", incoming=runs / "incoming")
+    here = RunFolder(runs / "packed")
+    (here.path / "checkpoints").mkdir(exist_ok=True)
+    for number in range(40):
+        (here.path / f"{number}.txt").write_text(str(number))
+    (here.path / "large.bin").write_bytes(large := bytes(2 * MAX_PARCEL))
+    assert there.keep(here) == 42 - 1
+    room = f"/api/workers/{hand.name}/objects"
+    alone = f"{room}/runs/packed/{hashlib.sha256(large).hexdigest()}"
+    assert line.sent == [room, alone, room], "forty files and a list go beside a large one"
+    assert place.artifacts.is_current(here)
+    assert there.keep(here) == 0
+    assert len(line.sent) == 3
+    line._hang_up()  # else the process's end does
+    ok(hand.post("release", why="asked"), 204)
     place.console.client.post(f"/api/jobs/{job}/cancel")
 
 

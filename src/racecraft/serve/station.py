@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.serve.jobs.access import Access
-from racecraft.serve.jobs.office import Office
+from racecraft.serve.jobs.office import AWAY, Office
 from racecraft.serve.jobs.remote import ROOM, RemoteOffice
 from racecraft.serve.jobs.supervisor import Supervisor
 from racecraft.serve.settings import LOOPBACK, ServeSettings
@@ -21,7 +21,7 @@ from racecraft.serve.store.artifacts import Artifacts
 from racecraft.system import STOPS
 from racecraft.version import VERSION
 
-DEAF: Final = 2.0  # s before a server that tells no news is asked again
+DEAF: Final = 2.0  # s before a server or a database that tells no news is asked again
 
 
 def work_for(settings: ServeSettings, *, on_ready: Callable[[], None]) -> None:
@@ -82,34 +82,25 @@ def work_through(
             hint="Install the same version of Racecraft on both machines.",
         )
     office = RemoteOffice(line)
-    _work(settings, office, access, on_ready, listen=office.later_than)
+    _work(settings, office, access, on_ready)
 
 
-def _work(
-    settings: ServeSettings,
-    office: Office,
-    access: Access,
-    on_ready: Callable[[], None],
-    *,
-    listen: Callable[[int], int] | None = None,
-) -> None:
+def _work(settings: ServeSettings, office: Office, access: Access, on_ready: Callable[[], None]) -> None:
     if settings.training_slots == settings.other_slots == 0:
         raise ConfigError("A worker without a place does nothing.", hint="Give --trainings or --others at least 1.")
     settings.state.mkdir(parents=True, exist_ok=True)
     supervisor = Supervisor(settings, office, access, is_home=False)
-    if listen is not None:
-        # a daemon, as it may wait for an answer when everything else has ended
-        threading.Thread(target=_hear, args=(listen, supervisor.wake), name="news", daemon=True).start()
+    # a daemon, as it may wait for an answer when everything else has ended
+    threading.Thread(target=_hear, args=(office.listen, supervisor.wake), name="news", daemon=True).start()
     asyncio.run(_until_signalled(supervisor, on_ready))
 
 
-def _hear(listen: Callable[[int], int], wake: Callable[[], None]) -> None:
+def _hear(listen: Callable[[], None], wake: Callable[[], None]) -> None:
     """Look at the queue as soon as there is something new; in between it is looked at now and then as well."""
-    number = -1
     while True:
         try:
-            number = listen(number)
-        except RunError:  # nobody answers, or says no: whoever looks at the queue hears that, too
+            listen()
+        except (*AWAY, RunError):  # nobody answers, or says no: whoever looks at the queue hears that, too
             time.sleep(DEAF)
         else:
             wake()

@@ -52,6 +52,9 @@ class Office(Protocol):
             is_home: Whether it is the console's own machine, which can do what does not travel.
         """
 
+    def listen(self) -> None:
+        """Return as soon as there may be something new for workers, or after some seconds; for one thread."""
+
     def held(self, owner: str) -> Job | None:
         """The job that a worker has."""
 

@@ -10,10 +10,12 @@ Every step is one UPDATE whose WHERE says what it relies on, so two servers or w
 from __future__ import annotations
 
 import secrets
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import cache
 from importlib import import_module
 from typing import Any, Final, Literal
 
@@ -110,6 +112,8 @@ ENDED: Final = ("done", "failed", "cancelled")
 RESTING: Final = tuple(name for name, kind in KINDS.items() if kind.rests)
 WATCHED: Final = timedelta(seconds=5)
 """How long a look at a training on another machine makes that show its cars."""
+GLANCE: Final = 0.1  # s between two looks of who listens: a small question, a fifth of a millisecond each
+PATIENCE: Final = 5.0  # s that it listens
 
 
 def function_named(name: str) -> Callable[..., Any]:
@@ -161,6 +165,7 @@ class JobQueue:
 
     def __init__(self, database: Database, *, user_id: int = OWNER) -> None:
         self._database, self._user_id = database, user_id
+        self._heard: str | None = None  # of `listen`
 
     def of(self, user_id: int) -> JobQueue:
         """The same for another person."""
@@ -313,10 +318,19 @@ class JobQueue:
             self.make_room(kinds, machine=machine, places=places, is_home=is_home)
         return job
 
+    def listen(self) -> None:
+        """Return when there is a newer job for other machines than before, or after some seconds."""
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            with self._database.asking() as connection:
+                before, self._heard = self._heard, connection.scalar(_NEWEST)
+            if self._heard not in (None, before):
+                return
+            time.sleep(GLANCE)
+
     def _has_waiting(self, kinds: tuple[str, ...], *, is_home: bool) -> bool:
-        query = sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds)).limit(1)
-        with self._database.transaction() as session:
-            return session.scalar(query if is_home else query.where(Job.travels)) is not None
+        with self._database.asking() as connection:
+            return connection.scalar(_waiting(kinds, is_home=is_home)) is not None
 
     def claim(self, kinds: tuple[str, ...], *, owner: str, machine: str = "", is_home: bool = True) -> Job | None:
         """Take the next queued job of these kinds, or None; away from home one that travels.
@@ -439,6 +453,15 @@ class JobQueue:
                         values["rested"] = moment
                 is_it = sa.and_(Job.id == job.id, Job.owner == job.owner, Job.state == "running", condition)
                 session.execute(sa.update(Job).where(is_it).values(values))
+
+
+_NEWEST: Final = sa.select(Job.id).where(Job.state == "queued", Job.travels).order_by(Job.created.desc()).limit(1)
+
+
+@cache  # as it is asked all the time
+def _waiting(kinds: tuple[str, ...], *, is_home: bool) -> sa.Select[str]:
+    query = sa.select(Job.id).where(Job.state == "queued", Job.kind.in_(kinds)).limit(1)
+    return query if is_home else query.where(Job.travels)
 
 
 def _let_go(job: Job, moment: datetime) -> dict[str, Any]:

@@ -5,7 +5,8 @@ Every address names the worker that asks, and the server answers about the one j
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
@@ -13,6 +14,7 @@ from urllib.parse import quote
 from racecraft.errors import RunError
 from racecraft.serve.jobs.line import MAX_OBJECT, Line, Refused
 from racecraft.serve.jobs.office import Answer, OfficeAway, Slot
+from racecraft.serve.jobs.parcel import HEAD, MAX_PARCEL, pack
 from racecraft.serve.store.objects import Content, NoObject
 from racecraft.serve.store.tables import Job
 from racecraft.version import VERSION
@@ -31,6 +33,7 @@ class RemoteOffice:
 
     def __init__(self, line: Line) -> None:
         self._line = line
+        self._heard = -1
 
     def take(
         self, slot: Slot, kinds: tuple[str, ...], *, owner: str, machine: str, places: int, is_home: bool
@@ -41,13 +44,13 @@ class RemoteOffice:
         asked = {"slot": slot, "kinds": list(kinds), "machine": machine, "places": places, "version": VERSION}
         return _job(self._line.ask("POST", f"{ROOM}/{owner}/take", asked))
 
-    def later_than(self, number: int) -> int:
-        """The number of the newest news of the queue, once it is another one, or after some seconds."""
-        told = self._line.ask("GET", f"{ROOM}/news?after={number}")
+    def listen(self) -> None:
+        """Return as soon as there may be something new, which the server answers with, or after some seconds."""
+        told = self._line.ask("GET", f"{ROOM}/news?after={self._heard}")
         found = told.get("number") if isinstance(told, dict) else None
         if type(found) is not int:
             raise OfficeAway("The console's answer is no news.")
-        return found
+        self._heard = found
 
     def held(self, owner: str) -> Job | None:
         """The job that a worker has."""
@@ -125,6 +128,33 @@ class RemoteObjects:
         if len(content) > MAX_OBJECT:
             raise Refused(f"A file is larger than {MAX_OBJECT >> 20} MB, more than a worker may send.")
         self._line.send(f"{self._room}/{quote(key)}", content)
+
+    @contextmanager
+    def together(self) -> Iterator[Callable[[str, bytes], None]]:
+        """A block that puts much, in as few requests as it takes."""
+        pieces: list[tuple[str, bytes]] = []
+        room = MAX_PARCEL
+
+        def send() -> None:
+            nonlocal room
+            if pieces:
+                self._line.send(self._room, pack(pieces))
+            pieces.clear()
+            room = MAX_PARCEL
+
+        def put(key: str, data: bytes) -> None:
+            nonlocal room
+            size = HEAD + len(data)
+            if size > room:
+                send()
+            if size > room:
+                self.put(key, data)
+            else:
+                pieces.append((key, data))
+                room -= size
+
+        yield put
+        send()
 
     def delete(self, keys: Iterable[str]) -> None:
         """The server does that itself, when a list of files no longer names them."""

@@ -36,6 +36,17 @@ OPENERS: Final = (Card, Reset, Session, Token)
 """Tables of what opens the door by itself."""
 TOKEN_MARK: Final = "rc_"
 """What tokens begin with, so that whoever finds one knows what it is."""
+# what every request asks is put together once, as that takes longer than the answer
+_SESSION: Final = sa.select(Session.user_id).where(
+    Session.digest == sa.bindparam("digest"),
+    sa.or_(Session.expires.is_(None), Session.expires > sa.bindparam("moment", type_=Session.expires.type)),
+)
+_BEARER: Final = (
+    sa.select(Token.user_id, Token.scopes, Token.id, User.role)
+    .join(User, User.id == Token.user_id)
+    .where(Token.digest == sa.bindparam("digest"), Token.expires > sa.bindparam("moment", type_=Token.expires.type))
+    .where(User.deleted.is_(None))
+)
 
 
 @dataclass(frozen=True)
@@ -97,8 +108,9 @@ class Keys:
 
     def session_user(self, secret: str) -> int | None:
         """Whose cookie it is."""
-        is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
-        return self._user(sa.select(Session.user_id).where(Session.digest == digest_of(secret), is_valid))
+        with self._database.asking() as connection:
+            found: int | None = connection.scalar(_SESSION, {"digest": digest_of(secret), "moment": now()})
+        return found
 
     def is_open(self, digest: str) -> bool:
         """Whether a session is good of which only the digest is known."""
@@ -268,10 +280,8 @@ class Keys:
 
     def bearer(self, secret: str) -> Bearer | None:
         """Whose token it is, and what it may be used for now: workers are those of an admin."""
-        query = sa.select(Token.user_id, Token.scopes, Token.id, User.role).join(User, User.id == Token.user_id)
-        query = query.where(Token.digest == digest_of(secret), Token.expires > now(), User.deleted.is_(None))
-        with self._database.transaction() as session:
-            found = session.execute(query).first()
+        with self._database.asking() as connection:
+            found = connection.execute(_BEARER, {"digest": digest_of(secret), "moment": now()}).first()
         if found is None:
             return None
         user_id, scopes, number, role = found

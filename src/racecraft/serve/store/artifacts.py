@@ -136,7 +136,7 @@ class Artifacts:
             there = {line["sha256"] for line in before.files.values()}
             count = 0
 
-            def put(path: str, file: Path) -> dict[str, Any]:
+            def taken(path: str, file: Path) -> dict[str, Any]:
                 nonlocal count
                 status = file.stat()
                 digest = known.get((status.st_size, status.st_mtime_ns, path))
@@ -145,17 +145,17 @@ class Artifacts:
                     data = _content(file)
                     digest, size = hashlib.sha256(data).hexdigest(), len(data)
                     if digest not in there:
-                        self.objects.put(self.key(folder.name, digest), data)
+                        put(self.key(folder.name, digest), data)
                         there.add(digest)
                         count += 1
                 return {"size": size, "time": status.st_mtime_ns, "sha256": digest}
 
-            files = _snapshot(folder.path, put)
-            number = before.number
-            if files != before.files:
-                number += 1
-                document = {"format": FORMAT, "number": number, "life": before.life, "files": files}
-                self.objects.put(self.key(f"{folder.name}.json"), json.dumps(document).encode())
+            with self.objects.together() as put:
+                files, number = _snapshot(folder.path, taken), before.number
+                if files != before.files:
+                    number += 1
+                    document = {"format": FORMAT, "number": number, "life": before.life, "files": files}
+                    put(self.key(f"{folder.name}.json"), json.dumps(document).encode())
             _remember(folder.path, number, before.life)
             gone = {line["sha256"] for line in before.files.values()} - {line["sha256"] for line in files.values()}
             self.objects.delete(self.key(folder.name, digest) for digest in gone)

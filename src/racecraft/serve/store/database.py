@@ -138,6 +138,12 @@ class Database:
         with self._sessions.begin() as session:
             yield session
 
+    @contextmanager
+    def asking(self) -> Iterator[sa.Connection]:
+        """A connection for a question of columns that is asked all the time: a quarter of what a session costs."""
+        with self.engine.connect() as connection:
+            yield connection
+
     def moment(self, session: Session) -> datetime:
         """Now by the database's clock, which all machines share; SQLite's is this machine's."""
         if self.url.startswith("sqlite"):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -46,6 +46,9 @@ class Objects(Protocol):
 
     def put(self, key: str, data: bytes | Path) -> None:
         """Have this under a key, or a file's content, from now on."""
+
+    def together(self) -> AbstractContextManager[Callable[[str, bytes], None]]:
+        """A block that puts much: in the order in which it does, and all when it has ended well."""
 
     def delete(self, keys: Iterable[str]) -> None:
         """Have nothing under these keys."""
@@ -106,6 +109,11 @@ class ObjectStore:
         """Have this under a key."""
         with self._translated():
             self._api.put(self._store, key, data)
+
+    @contextmanager
+    def together(self) -> Iterator[Callable[[str, bytes], None]]:
+        """A block that puts much."""
+        yield self.put
 
     def delete(self, keys: Iterable[str]) -> None:
         """Have nothing under these keys."""

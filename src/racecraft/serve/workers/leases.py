@@ -77,7 +77,7 @@ class Lease:
             )
         if (job := self._queue.held(self._owner)) is not None:
             return job
-        doable = tuple(kind for kind in kinds if kind in KINDS and KINDS[kind].travels and KINDS[kind].slot == slot)
+        doable = tuple(name for name, kind in KINDS.items() if name in kinds and kind.travels and kind.slot == slot)
         # machines of one token are told apart by their names, those of two tokens in any case
         mark = f"#{self._token}"
         name = machine[-(MAX_MACHINE - len(mark)) :] + mark

@@ -12,7 +12,8 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from racecraft.errors import RunError
-from racecraft.serve.context import InConsoles, InLeague
+from racecraft.serve.context import Consoles, InConsoles, InLeague
+from racecraft.serve.jobs.parcel import unpack
 from racecraft.serve.models.archives import UPLOADS, require_disk
 from racecraft.serve.people.keys import WORKER
 from racecraft.serve.problems import NotFound
@@ -105,6 +106,23 @@ def fetch_object(key: str, lease: InLease, consoles: InConsoles) -> StreamingRes
     content = consoles.owner.parcels.fetch(lease.required(), Key.parse(key))
     headers = {"Content-Length": str(content.size)}
     return StreamingResponse(content.chunks, media_type="application/octet-stream", headers=headers)
+
+
+@router.put("/{worker}/objects", status_code=204, openapi_extra={"requestBody": {"required": True, "content": BINARY}})
+async def keep_objects(request: Request, lease: InLease, consoles: InConsoles) -> Response:
+    """What the worker's job made, several small files in one request, kept in their order."""
+    await run_in_threadpool(_keep_all, await request.body(), lease, consoles)
+    return Response(status_code=204)
+
+
+def _keep_all(data: bytes, lease: Lease, consoles: Consoles) -> None:
+    pieces, parcels, job = unpack(data), consoles.owner.parcels, lease.required()
+    require_disk(consoles.owner.settings.state)
+    for text, content in pieces:
+        key = Key.parse(text)
+        parcels.require_writable(job, key, len(content))
+        found = hashlib.sha256(content).hexdigest()
+        parcels.keep(job, key, content, size=len(content), digest=found, lease=lease)
 
 
 @router.put(
