@@ -21,6 +21,7 @@ from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Member, Race, Submission, User
 from racecraft.serve.submissions import judge, tasks
 from racecraft.serve.submissions.bench import Bench
+from racecraft.serve.submissions.entries import Entries
 from racecraft.serve.submissions.league import League
 from racecraft.serve.tracks.courses import Courses
 from racecraft.track import load_track
@@ -70,10 +71,15 @@ class Court:
             race.document, race.commitment, race.secret = dict(terms.document), terms.commitment, terms.secret
             race.rules, race.attempts_per_day = RULES.to_dict(), 1
             session.add(race)
-        self.league = League(self.database, root / STATE_FOLDER, lambda _: Courses(root / "tracks"))
+
+        def courses(_: int) -> Courses:
+            return Courses(root / "tracks")
+
+        self.league = League(self.database, courses)
+        self.entries = Entries(self.database, root / STATE_FOLDER, courses, self.league)
 
     def enter(self, data: bytes) -> Task:
-        self.league.submit(RACE, data, model="novice", user_id=ADA)
+        self.entries.submit(RACE, data, model="novice", user_id=ADA)
         return self.claim()
 
     def claim(self) -> Task:

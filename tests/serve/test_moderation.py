@@ -51,28 +51,28 @@ def test_an_entry_that_was_given_a_name_keeps_it_on_the_board_and_in_its_replay(
 
     entry = pack_entry(untrained_run(tmp_path / "runs", "novice"))
     task = court.enter(entry)
-    number = court.league.submit(RACE, entry, model="novice", user_id=ADA)
+    number = court.entries.submit(RACE, entry, model="novice", user_id=ADA)
     rename: dict[str, Any] = {"race_id": RACE, "submission_id": number, "model": "polite"}
     with pytest.raises(Conflict, match="not judged yet"):
-        court.league.rename_model(**rename, user_id=TEACHER)
+        court.entries.rename_model(**rename, user_id=TEACHER)
     court.end(task, "done", result=tasks.judge(task))
     assert names() == ("novice", ["novice, trial 1", "novice, trial 2"])
     with pytest.raises(NotFound):
-        court.league.rename_model(**rename, user_id=ADA)
+        court.entries.rename_model(**rename, user_id=ADA)
     with pytest.raises(NotFound):
-        court.league.rename_model(**{**rename, "submission_id": number + 1}, user_id=TEACHER)
-    court.league.rename_model(**rename, user_id=TEACHER)
+        court.entries.rename_model(**{**rename, "submission_id": number + 1}, user_id=TEACHER)
+    court.entries.rename_model(**rename, user_id=TEACHER)
     assert names() == ("polite", ["polite, trial 1", "polite, trial 2"])
 
-    assert court.league.submit(RACE, entry, model="rude", user_id=ADA) == number
-    court.league.judge_again(RACE, number, user_id=TEACHER)
+    assert court.entries.submit(RACE, entry, model="rude", user_id=ADA) == number
+    court.entries.judge_again(RACE, number, user_id=TEACHER)
     task = court.claim()
     court.end(task, "done", result=tasks.judge(task))
     assert names() == ("polite", ["polite, trial 1", "polite, trial 2"])
 
-    court.league.judge_again(RACE, number, user_id=TEACHER)
+    court.entries.judge_again(RACE, number, user_id=TEACHER)
     court.end(court.claim(), "cancelled")
-    court.league.submit(RACE, entry, model="rude", user_id=ADA)  # whose job has ended, so it is a new one
+    court.entries.submit(RACE, entry, model="rude", user_id=ADA)  # whose job has ended, so it is a new one
     task = court.claim()
     court.end(task, "done", result=tasks.judge(task))
     assert names() == ("polite", ["polite, trial 1", "polite, trial 2"])

@@ -21,8 +21,9 @@ from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions import admission
-from racecraft.serve.submissions import league as league_module
+from racecraft.serve.submissions import entries as entries_module
 from racecraft.serve.submissions.admission import MAX_FREE
+from racecraft.serve.submissions.entries import Entries
 from racecraft.serve.submissions.league import League
 from racecraft.serve.submissions.schemas import LeagueRaceChange
 from racecraft.serve.tracks.courses import Courses
@@ -55,7 +56,12 @@ def league(database: Database, tmp_path: Path) -> League:
         session.add(Member(group_id=1, user_id=ADA, role="racer"))
         terms = {"track": "oval", "ranking": "total", "commitment": "0" * 64, "attempts_per_day": 1}
         session.add(Race(owner_id=1, group_id=1, title="Cup", **terms))
-    return League(database, tmp_path / "state", lambda _: Courses(tmp_path / "tracks"))
+    return League(database, lambda _: Courses(tmp_path / "tracks"))
+
+
+@pytest.fixture
+def entries(database: Database, league: League, tmp_path: Path) -> Entries:
+    return Entries(database, tmp_path / "state", lambda _: Courses(tmp_path / "tracks"), league)
 
 
 def race_of(database: Database) -> int:
@@ -63,9 +69,9 @@ def race_of(database: Database) -> int:
         return int(session.scalars(sa.select(Race.id)).one())
 
 
-def enter(league: League, database: Database) -> Callable[[bytes], int]:
+def enter(entries: Entries, database: Database) -> Callable[[bytes], int]:
     number = race_of(database)
-    return lambda data: league.submit(number, data, model="novice", user_id=ADA)
+    return lambda data: entries.submit(number, data, model="novice", user_id=ADA)
 
 
 def end(database: Database, submission: int, state: str, *, days_ago: int = 0) -> None:
@@ -82,9 +88,9 @@ def folders(tmp_path: Path) -> list[str]:
 
 
 def test_what_was_cancelled_yesterday_and_is_sent_again_is_todays_attempt(
-    league: League, database: Database, files: list[bytes], tmp_path: Path
+    entries: Entries, database: Database, files: list[bytes], tmp_path: Path
 ) -> None:
-    submit = enter(league, database)
+    submit = enter(entries, database)
     first = submit(files[0])
     (before,) = folders(tmp_path)
     end(database, first, "cancelled", days_ago=2)
@@ -97,9 +103,9 @@ def test_what_was_cancelled_yesterday_and_is_sent_again_is_todays_attempt(
 
 
 def test_of_many_at_the_same_moment_only_the_days_attempts_come_in(
-    league: League, database: Database, files: list[bytes], tmp_path: Path
+    entries: Entries, database: Database, files: list[bytes], tmp_path: Path
 ) -> None:
-    submit = enter(league, database)
+    submit = enter(entries, database)
 
     def attempt(data: bytes) -> int | None:
         try:
@@ -113,8 +119,8 @@ def test_of_many_at_the_same_moment_only_the_days_attempts_come_in(
     assert len(folders(tmp_path)) == 1
 
 
-def test_only_some_that_fail_are_free(league: League, database: Database, files: list[bytes]) -> None:
-    submit = enter(league, database)
+def test_only_some_that_fail_are_free(entries: Entries, database: Database, files: list[bytes]) -> None:
+    submit = enter(entries, database)
     for _ in range(MAX_FREE):
         end(database, submit(files[0]), "failed")
     with pytest.raises(Conflict, match="failed or were cancelled") as refused:
@@ -127,13 +133,13 @@ def test_only_some_that_fail_are_free(league: League, database: Database, files:
 
 
 def test_so_many_wait_and_so_many_are_kept(
-    league: League, database: Database, files: list[bytes], monkeypatch: pytest.MonkeyPatch
+    entries: Entries, database: Database, files: list[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(admission, "MAX_WAITING", 2)
     monkeypatch.setattr(admission, "MAX_SUBMISSIONS", 3)
     with database.transaction() as session:
         session.get_one(Race, race_of(database)).attempts_per_day = 0
-    submit = enter(league, database)
+    submit = enter(entries, database)
     first, second = submit(files[0]), submit(files[1])
     with pytest.raises(Conflict, match="2 of your submissions are not judged yet"):
         submit(files[2])
@@ -169,38 +175,38 @@ def test_a_change_of_a_race_changes_what_it_names_and_nothing_else(league: Leagu
 
 
 def test_who_is_in_no_group_of_a_race_sees_no_entries_and_the_board_says_how_many_wait(
-    league: League, database: Database, files: list[bytes]
+    league: League, entries: Entries, database: Database, files: list[bytes]
 ) -> None:
-    first, number = race_of(database), enter(league, database)(files[0])
+    first, number = race_of(database), enter(entries, database)(files[0])
     with database.transaction() as session:
         session.add(User(id=ADA + 1, name="Bob", handle="bob"))
         terms = {"track": "oval", "ranking": "total", "commitment": "0" * 64, "attempts_per_day": 0}
         session.add(Race(owner_id=1, group_id=1, title="Second", visibility="public", **terms))
     second = first + 1
-    assert [entry.id for entry in league.submissions(first, user_id=ADA)] == [number]
+    assert [entry.id for entry in entries.submissions(first, user_id=ADA)] == [number]
     for race in (first, second):  # that it is public is for its board alone
         with pytest.raises(NotFound):
-            league.submissions(race, user_id=ADA + 1)
+            entries.submissions(race, user_id=ADA + 1)
     waiting = {race: league.board(race, user_id=ADA, top=10)[2] for race in (first, second)}
     assert waiting == {first: 1, second: 0}
 
 
 def test_the_trial_that_counts_is_that_with_the_score(
-    league: League, database: Database, files: list[bytes], monkeypatch: pytest.MonkeyPatch
+    entries: Entries, database: Database, files: list[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(league_module, "trial_scores", lambda race, job: [19.985, 20.0, 30.0])
-    number = enter(league, database)(files[0])
-    assert league.counted_trial(number) == 0, "it has no score"
+    monkeypatch.setattr(entries_module, "trial_scores", lambda race, job: [19.985, 20.0, 30.0])
+    number = enter(entries, database)(files[0])
+    assert entries.counted_trial(number) == 0, "it has no score"
     with database.transaction() as session:
         session.get_one(Submission, number).score_ms = 20_000
-    assert league.counted_trial(number) == 1
+    assert entries.counted_trial(number) == 1
 
 
 def test_nobody_enters_a_final_before_all_of_its_qualifying_is_judged(
-    league: League, database: Database, files: list[bytes]
+    entries: Entries, database: Database, files: list[bytes]
 ) -> None:
     qualifying = race_of(database)
-    number = enter(league, database)(files[0])
+    number = enter(entries, database)(files[0])
     with database.transaction() as session:
         session.get_one(Submission, number).judged = now()
         terms = {"track": "oval", "ranking": "total", "commitment": "0" * 64, "attempts_per_day": 0}
@@ -211,7 +217,7 @@ def test_nobody_enters_a_final_before_all_of_its_qualifying_is_judged(
 
     def refusal() -> str:
         with pytest.raises(Conflict) as refused:
-            league.submit(after, files[1], model="novice", user_id=ADA)
+            entries.submit(after, files[1], model="novice", user_id=ADA)
         return str(refused.value)
 
     assert refusal() == "Who drives here is decided by 'Cup', which is not over yet."
@@ -224,26 +230,50 @@ def test_nobody_enters_a_final_before_all_of_its_qualifying_is_judged(
     assert refusal() == "The first 1 of 'Cup' drive here.", "without a score she has no place"
     with database.transaction() as session:
         session.get_one(Submission, number).score_ms = 20_000
-    league.submit(after, files[1], model="novice", user_id=ADA)
+    entries.submit(after, files[1], model="novice", user_id=ADA)
 
 
 def test_judging_again_leaves_one_copy_of_the_file(
-    league: League, database: Database, files: list[bytes], tmp_path: Path
+    entries: Entries, database: Database, files: list[bytes], tmp_path: Path
 ) -> None:
-    submission = enter(league, database)(files[0])
+    submission = enter(entries, database)(files[0])
     (before,) = folders(tmp_path)
     end(database, submission, "done")
     with database.transaction() as session:
         session.get_one(Member, (1, ADA)).role = "organiser"
-    league.judge_again(race_of(database), submission, user_id=ADA)
+    entries.judge_again(race_of(database), submission, user_id=ADA)
     (after,) = folders(tmp_path)
     assert after != before
 
 
-def test_what_an_organiser_has_judged_again_its_racer_does_not_cancel(
-    league: League, database: Database, files: list[bytes]
+def test_two_organisers_at_the_same_moment_have_it_judged_again_once(
+    entries: Entries, database: Database, files: list[bytes], tmp_path: Path
 ) -> None:
-    teacher, race, submit = 1, race_of(database), enter(league, database)
+    submission, race = enter(entries, database)(files[0]), race_of(database)
+    end(database, submission, "done")
+    with database.transaction() as session:
+        session.get_one(Member, (1, ADA)).role = "organiser"
+
+    def again(_: int) -> str:
+        try:
+            entries.judge_again(race, submission, user_id=ADA)
+        except Conflict as error:
+            return str(error)
+        return "judged again"
+
+    with ThreadPoolExecutor(4) as pool:
+        said = sorted(pool.map(again, range(4)))
+    assert said == [*["It is not judged yet."] * 3, "judged again"]
+    with database.transaction() as session:
+        states = session.scalars(sa.select(Job.state).order_by(Job.state)).all()
+        assert folders(tmp_path) == [session.get_one(Submission, submission).job_id]
+    assert states == ["done", "queued"]
+
+
+def test_what_an_organiser_has_judged_again_its_racer_does_not_cancel(
+    entries: Entries, database: Database, files: list[bytes]
+) -> None:
+    teacher, race, submit = 1, race_of(database), enter(entries, database)
     with database.transaction() as session:
         session.add(Member(group_id=1, user_id=teacher, role="organiser"))
     seen = SimpleNamespace(see=lambda job: job)
@@ -260,7 +290,7 @@ def test_what_an_organiser_has_judged_again_its_racer_does_not_cancel(
     assert cancel(first) == "cancelled", "what she has sent in herself"
     first = submit(files[0])
     end(database, first, "done")
-    league.judge_again(race, first, user_id=teacher)
+    entries.judge_again(race, first, user_id=teacher)
     with pytest.raises(Conflict, match="An organiser has this judged again"):
         cancel(first)
     assert job_of(first).state == "queued"
@@ -269,16 +299,16 @@ def test_what_an_organiser_has_judged_again_its_racer_does_not_cancel(
     with database.transaction() as session:
         session.get_one(Member, (1, ADA)).role = "organiser"
     end(database, first, "done")
-    league.judge_again(race, first, user_id=ADA)
+    entries.judge_again(race, first, user_id=ADA)
     assert cancel(first) == "cancelled", "what she has judged again herself"
 
 
 def test_who_leaves_takes_the_files_along(
-    league: League, database: Database, files: list[bytes], tmp_path: Path
+    entries: Entries, database: Database, files: list[bytes], tmp_path: Path
 ) -> None:
-    enter(league, database)(files[0])
+    enter(entries, database)(files[0])
     assert len(folders(tmp_path)) == 1
-    league.forget(ADA + 1)
+    entries.forget(ADA + 1)
     assert len(folders(tmp_path)) == 1
-    league.forget(ADA)
+    entries.forget(ADA)
     assert folders(tmp_path) == []

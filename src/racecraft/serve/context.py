@@ -35,6 +35,7 @@ from racecraft.serve.races.races import Races
 from racecraft.serve.settings import OWNER, ServeSettings
 from racecraft.serve.store.database import Database
 from racecraft.serve.streams.hub import Hub
+from racecraft.serve.submissions.entries import Entries
 from racecraft.serve.submissions.league import League
 from racecraft.serve.sweeps.sweeps import Sweeps
 from racecraft.serve.tracks.courses import Courses
@@ -87,7 +88,8 @@ class Consoles:
         self._provider = _provider(told) if told is not None else None
         self.quotas = Quotas(owner.database, owner.settings.runs)
         self.audit, self.devices = Audit(owner.database), Devices()
-        self.league = League(owner.database, owner.settings.state, self._courses)
+        self.league = League(owner.database, self._courses)
+        self.entries = Entries(owner.database, owner.settings.state, self._courses, self.league)
         self.comments = Comments(owner.database)
         self.finals = Finals(owner.database, owner.settings.state, self._courses, self.league)
         self._others: dict[int, Context] = {}

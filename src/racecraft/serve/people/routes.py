@@ -154,7 +154,7 @@ def remove_account(consoles: InConsoles, person: InPerson, body: Farewell | None
             raise ConfigError("That is not your password.")
     console = consoles.of(person.id)
     consoles.people.remove(person.id)
-    consoles.league.forget(person.id)
+    consoles.entries.forget(person.id)
     consoles.forget(person.id)
     shutil.rmtree(console.settings.runs, ignore_errors=True)
     console.mirror.forget_all()

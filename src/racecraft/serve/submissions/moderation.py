@@ -8,21 +8,17 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from racecraft.replay.replay import read_replay, write_replay
-from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.problems import Conflict
 from racecraft.serve.store.tables import Job, Submission
 from racecraft.serve.submissions.tasks import REPLAY, submission_folder
 
 
-def rename_model(session: Session, state: Path, race_id: int, submission_id: int, model: str) -> None:
+def rename_model(session: Session, state: Path, submission: Submission, model: str) -> None:
     """Call an entry otherwise: on the board, in its replay, and when it is judged again.
 
     Raises:
-        NotFound: The race has no such submission.
         Conflict: It waits or is driven, and nobody else sees it yet.
     """
-    submission = session.get(Submission, submission_id)
-    if submission is None or submission.race_id != race_id:
-        raise NotFound(f"There is no submission {submission_id} in this race.")
     job = session.get_one(Job, submission.job_id)
     if job.state in ("queued", "running"):
         raise Conflict("It is not judged yet.")

@@ -149,7 +149,7 @@ def get_league_announcement(race_id: Id, request: Request, consoles: InLeague) -
 @router.get("/boards/{race_id}/replays/{submission_id}")
 def get_submission_replay(race_id: Id, submission_id: Id, request: Request, consoles: InLeague) -> FileResponse:
     """The replay file of a submission, for `racecraft verify`, once the race is over."""
-    path = consoles.league.replay(race_id, submission_id, user_id=request.state.user_id)
+    path = consoles.entries.replay(race_id, submission_id, user_id=request.state.user_id)
     return FileResponse(path, media_type="application/octet-stream", filename=f"{race_id}-{submission_id}.replay")
 
 
@@ -161,18 +161,18 @@ def get_film(
     submissions: Annotated[str, Query(max_length=200, pattern=r"^\d{1,9}(,\d{1,9})*$")],
 ) -> RaceReplay:
     """The trial that the first of some submissions is ranked by, of all of them side by side, once starts are known."""
-    league, user = consoles.league, request.state.user_id
+    entries, user = consoles.entries, request.state.user_id
     wanted = list(dict.fromkeys(int(part) for part in submissions.split(",")))
     if len(wanted) > MAX_CARS:
         raise ConfigError(f"A film shows at most {MAX_CARS} cars, {len(wanted)} were asked for.")
-    driven = [league.driven(race_id, number, user_id=user) for number in wanted]
-    names, trial = league.names(wanted), league.counted_trial(wanted[0])
+    driven = [entries.driven(race_id, number, user_id=user) for number in wanted]
+    names, trial = entries.names(wanted), entries.counted_trial(wanted[0])
     cars = [
         trial_of(path, trial, entry=number, model=names[number], grain=1 if is_over else OPEN_GRAIN)
         for number, (path, is_over) in zip(wanted, driven, strict=True)
     ]
     is_coarse = not all(is_over for _, is_over in driven)
-    return replay_of(*league.track(race_id), cars, trial=trial, is_coarse=is_coarse)
+    return replay_of(*consoles.league.track(race_id), cars, trial=trial, is_coarse=is_coarse)
 
 
 @router.post(
@@ -210,13 +210,13 @@ def list_submissions(
     race_id: Id, consoles: InConsoles, person: InPerson, everybody: bool = False
 ) -> list[SubmissionInfo]:
     """One's own submissions, newest first; for an organiser everybody's."""
-    return consoles.league.submissions(race_id, user_id=person.id, everybody=everybody)
+    return consoles.entries.submissions(race_id, user_id=person.id, everybody=everybody)
 
 
 @router.get("/league/races/{race_id}/submissions/{submission_id}")
 def get_submission(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> SubmissionInfo:
     """One of one's own."""
-    return consoles.league.submission(race_id, submission_id, user_id=person.id)
+    return consoles.entries.submission(race_id, submission_id, user_id=person.id)
 
 
 @router.patch("/league/races/{race_id}/submissions/{submission_id}", status_code=204)
@@ -224,43 +224,43 @@ def rename_model(
     race_id: Id, submission_id: Id, body: SubmissionChange, consoles: InConsoles, person: InPerson
 ) -> Response:
     """Another name for somebody's entry, if the one it has will not do; it stays."""
-    consoles.league.rename_model(race_id, submission_id, body.model, user_id=person.id)
+    consoles.entries.rename_model(race_id, submission_id, body.model, user_id=person.id)
     return Response(status_code=204)
 
 
 @router.post("/league/races/{race_id}/submissions/{submission_id}/disqualify", status_code=204)
 def disqualify(race_id: Id, submission_id: Id, body: Disqualify, consoles: InConsoles, person: InPerson) -> Response:
     """A submission does not count, for a reason that its owner reads."""
-    consoles.league.disqualify(race_id, submission_id, body.reason, user_id=person.id)
+    consoles.entries.disqualify(race_id, submission_id, body.reason, user_id=person.id)
     return Response(status_code=204)
 
 
 @router.post("/league/races/{race_id}/submissions/{submission_id}/restore", status_code=204)
 def restore_submission(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> Response:
     """It counts again."""
-    consoles.league.disqualify(race_id, submission_id, "", user_id=person.id)
+    consoles.entries.disqualify(race_id, submission_id, "", user_id=person.id)
     return Response(status_code=204)
 
 
 @router.post("/league/races/{race_id}/submissions/{submission_id}/accept", status_code=204)
 def accept_submission(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> Response:
     """Let stand what drives like somebody else's entry."""
-    consoles.league.accept(race_id, submission_id, user_id=person.id)
+    consoles.entries.accept(race_id, submission_id, user_id=person.id)
     return Response(status_code=204)
 
 
 @router.post("/league/races/{race_id}/submissions/{submission_id}/judge", status_code=202)
 def judge_again(race_id: Id, submission_id: Id, consoles: InConsoles, person: InPerson) -> Response:
     """Have it driven once more."""
-    consoles.league.judge_again(race_id, submission_id, user_id=person.id)
+    consoles.entries.judge_again(race_id, submission_id, user_id=person.id)
     consoles.owner.supervisor.wake()
     return Response(status_code=202)
 
 
 def _submit(consoles: Consoles, race_id: int, data: bytes, model: str, user_id: int) -> SubmissionInfo:
-    number = consoles.league.submit(race_id, data, model=model, user_id=user_id)
+    number = consoles.entries.submit(race_id, data, model=model, user_id=user_id)
     consoles.owner.supervisor.wake()
-    return consoles.league.submission(race_id, number, user_id=user_id)
+    return consoles.entries.submission(race_id, number, user_id=user_id)
 
 
 def _season(found: list[SeasonStanding], *, me: int | None) -> list[SeasonRow]:
