@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-PATIENCE = 60  # s
+PATIENCE = 120  # s; the machine may be busy
 OFTEN = 100  # ms
 
 

@@ -107,14 +107,15 @@ def complaints_of(message: Any) -> list[str]:
 
 @contextmanager
 def visiting(console: RunningConsole) -> Iterator[Visit]:
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import expect, sync_playwright
 
+    expect.set_options(timeout=1000 * PATIENCE)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
         context = browser.new_context()
         context.add_init_script(FEW_FRAMES)  # of every tab
+        context.set_default_timeout(1000 * PATIENCE)
         page = context.new_page()
-        page.set_default_timeout(1000 * PATIENCE)
         cookie = console.client.cookies["racecraft_session"]
         page.context.add_cookies([{"name": "racecraft_session", "value": cookie, "url": str(console.client.base_url)}])
         visit = Visit(console, page)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 USER = "racecraft"
-PATIENCE = 60.0  # s
+PATIENCE = 300.0  # s
 
 
 def binaries() -> Path | None:

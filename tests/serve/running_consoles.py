@@ -16,7 +16,10 @@ from typing import Any
 
 import httpx
 
-PATIENCE = 120.0  # s; the machine may be busy
+PATIENCE = 300.0  # s; the machine may be busy, and a film takes twenty of a core of its own
+
+LEISURELY = "import time\n\n\ndef reward_function(params):\n    time.sleep(0.001)\n    return 1.0\n"
+"""A reward under which a training goes on and leaves most of the processor to others."""
 
 
 @dataclass

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 BUCKET = "racing"
+PATIENCE = 300.0  # s
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ def s3_server() -> Iterator[S3Server]:
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     address = f"http://127.0.0.1:{port}"
     try:
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + PATIENCE
         while True:
             try:
                 urllib.request.urlopen(urllib.request.Request(f"{address}/{BUCKET}", method="PUT")).close()
@@ -59,4 +60,4 @@ def s3_server() -> Iterator[S3Server]:
         yield S3Server(address)
     finally:
         process.terminate()
-        process.wait(30)
+        process.wait(PATIENCE)

@@ -14,7 +14,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from running_consoles import RunningConsole
+from running_consoles import PATIENCE, RunningConsole
 
 from racecraft.importing import import_run
 from racecraft.run import RunFolder, archive_chunks
@@ -229,7 +229,7 @@ def test_a_huge_upload_is_refused_before_it_comes(console: RunningConsole) -> No
 
     cookie = f"racecraft_session={console.client.cookies['racecraft_session']}"
     for length in (str(2 << 30), "9" * 30, "-1"):
-        with socket.create_connection(host.split(":"), timeout=30) as connection:  # type: ignore[arg-type]
+        with socket.create_connection(host.split(":"), timeout=PATIENCE) as connection:  # type: ignore[arg-type]
             lines = [
                 "POST /api/models/import?filename=x.py HTTP/1.1",
                 f"Host: {host}",

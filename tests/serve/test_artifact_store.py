@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from running_consoles import running_console
+from running_consoles import PATIENCE, running_console
 from s3_servers import S3Server
 
 from racecraft.errors import ConfigError, RunError
@@ -269,20 +269,20 @@ def test_a_store_that_did_not_answer_at_first_is_asked_again(
     keeper = mirror.Mirror(store, settings=settings, queue=queue, supervisor=supervisor)
     thread = threading.Thread(target=keeper.start)
     thread.start()
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + PATIENCE
     while "cannot be fetched" not in caplog.text:
         assert time.monotonic() < deadline
         time.sleep(0.01)
     assert not (there / "a").exists()
     (tmp_path / "hidden").rename(stored)
-    thread.join(60)
+    thread.join(PATIENCE)
     assert contents(there / "a") == contents(folder.path)
     stored.unlink()  # and for ever, until the server ends
     shutil.rmtree(there / "a")
     thread = threading.Thread(target=keeper.start)
     thread.start()
     keeper.end()
-    thread.join(60)
+    thread.join(PATIENCE)
     assert not thread.is_alive()
     database.close()
 

@@ -85,7 +85,7 @@ def test_who_gives_up_waiting_takes_no_place() -> None:
         await settle()
         leave.set()
         await asyncio.gather(*tasks)
-        await asyncio.wait_for(hold(desks, 1, seated, leave), 1.0)
+        await asyncio.wait_for(hold(desks, 1, seated, leave), 60.0)
 
     asyncio.run(scene())
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import httpx
 import pytest
-from running_consoles import RunningConsole
+from running_consoles import PATIENCE, RunningConsole
 
 
 @pytest.mark.costly
 def test_the_link_works_once(console: RunningConsole) -> None:
-    with httpx.Client(base_url=console.client.base_url) as stranger:
+    with httpx.Client(base_url=console.client.base_url, timeout=PATIENCE) as stranger:
         assert stranger.get(console.link).status_code == 303
         reply = stranger.get("/api/models")
         assert reply.status_code == 401
@@ -19,7 +19,7 @@ def test_the_link_works_once(console: RunningConsole) -> None:
 @pytest.mark.parametrize("cookie", ["", "x", "ü".encode("latin-1").decode("latin-1"), "a" * 4000])
 def test_a_made_up_cookie_is_refused(console: RunningConsole, cookie: str) -> None:
     headers = {"cookie": f"racecraft_session={cookie}".encode("latin-1")}
-    assert httpx.get(f"{console.client.base_url}/api/models", headers=headers).status_code == 401
+    assert httpx.get(f"{console.client.base_url}/api/models", headers=headers, timeout=PATIENCE).status_code == 401
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1", "localhost:1", ""])

@@ -37,7 +37,8 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
 
 
 def press(page: Any, name: str) -> None:
-    """Go to what is called so by the Tab key, and press it."""
+    """Go to what is called so by the Tab key, and press it, once it is there."""
+    page.get_by_role("button", name=name).or_(page.get_by_role("link", name=name)).first.wait_for()
     for _ in range(120):
         page.keyboard.press("Tab")
         called = "document.activeElement.getAttribute('aria-label') || document.activeElement.textContent.trim()"

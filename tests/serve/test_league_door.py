@@ -11,6 +11,7 @@ from pathlib import Path
 import httpx
 import pytest
 from leagues import RunningLeague, ok, refused, running_league
+from running_consoles import PATIENCE
 
 from racecraft.serve.door import known_browsers
 from racecraft.serve.door.known_browsers import make_mark
@@ -92,7 +93,7 @@ def test_who_may_not_enter_is_told_before_a_file_is_read(league: RunningLeague) 
     theirs = ok(league.owner.post(f"/api/groups/{league.group('Theirs')}/races", json=race), 201)["id"]
     own = ok(teacher.post(f"/api/groups/{league.group('Own', teacher)}/races", json=race), 201)["id"]
     for number in (theirs, 99999):
-        with socket.create_connection((url.host, url.port), timeout=20) as line:
+        with socket.create_connection((url.host, url.port), timeout=PATIENCE) as line:
             head = f"POST /api/league/races/{number}/submissions?model=x HTTP/1.1\r\nHost: {url.host}:{url.port}\r\n"
             head += f"Cookie: {COOKIE}={teacher.cookies[COOKIE]}\r\nContent-Length: {32 << 20}\r\n\r\n"
             line.sendall(head.encode())
@@ -125,7 +126,7 @@ def test_forty_tries_at_once_are_not_more_than_ten() -> None:
         together.wait()
         try:
             with tries.attempt(account="ada", address="192.0.2.1") as attempt:
-                under_way.wait(5)
+                under_way.wait(PATIENCE)
                 attempt.fail()
             found.append("tried")
         except TooMany:

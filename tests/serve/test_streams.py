@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from running_consoles import RunningConsole
+from running_consoles import LEISURELY, RunningConsole
 
 pytestmark = pytest.mark.costly
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.costly
 @pytest.fixture(scope="module")
 def training(console: RunningConsole) -> Iterator[str]:
     """A model that is being trained."""
-    name = console.create(name="streamed", until="20 minutes")
+    name = console.create(name="streamed", until="20 minutes", reward=LEISURELY)
     console.wait_for(lambda: len(console.client.get(f"/api/models/{name}/history").json()["points"]) > 3)
     yield name
     console.client.post(f"/api/models/{name}/stop")

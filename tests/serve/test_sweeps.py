@@ -44,9 +44,10 @@ def test_a_sweep_is_trained_by_the_queue_and_ranked(console: RunningConsole) -> 
     client = console.client
     made = client.post("/api/sweeps", json={"name": "s", "text": TEXT})
     assert made.status_code == 202, made.text
-    assert [(run["model"], run["state"]) for run in made.json()["runs"]] == [
-        (f"s-{setting}-{seed}", "queued") for setting in ("plain", "bold") for seed in (1, 2)
+    assert [run["model"] for run in made.json()["runs"]] == [
+        f"s-{setting}-{seed}" for setting in ("plain", "bold") for seed in (1, 2)
     ]
+    assert {run["state"] for run in made.json()["runs"]} <= {"queued", "running"}  # the first may have begun
     refused(client.post("/api/sweeps", json={"name": "s", "text": TEXT}), 409, "already")
     found = ended(console, "s")
     assert (found["done"], {run["state"] for run in found["runs"]}) == (4, {"done"})
@@ -107,7 +108,7 @@ def test_the_page_starts_a_sweep_and_shows_its_board(console: RunningConsole) ->
         page.get_by_label("What is to be trained").fill(TEXT)
         page.get_by_role("button", name="Start the sweep").click()
         page.get_by_role("heading", name="paged").wait_for()
-        page.get_by_text("4 of 4 trained").wait_for(timeout=120_000)
+        page.get_by_text("4 of 4 trained").wait_for()
         assert page.get_by_role("link", name="Seed 2 · trained").count() == 2
         assert page.locator("tr.begun").count() == 2
         file = Sweep(console.runs, "paged").file  # as one that was made of files, by the command line
