@@ -40,7 +40,6 @@ def answer(page: Any, number: int, wrongly: int = 0) -> None:
 def test_a_learner_goes_through_three_lessons(visit: Visit) -> None:
     from playwright.sync_api import expect
 
-    expect.set_options(timeout=30_000)
     page = visit.open("/lessons")
     expect(page.get_by_text("0 of 12 read")).to_be_visible()
     page.get_by_role("link", name="Explore or exploit?").click()

@@ -213,7 +213,7 @@ def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> 
     page.get_by_role("checkbox", name="From a secret").check()
     assert page.get_by_label("Seed").count() == 0
     ghost = page.get_by_role("combobox", name="Add a ghost")
-    assert ghost.locator("option", has_text="Before").count() == 1
+    ghost.locator("option", has_text="Before").wait_for(state="attached")
     assert ghost.locator("option", has_text="Away").count() == 0  # on another road
     for choice in ("model bob", "lap", f"heat {before}", "model ada"):
         ghost.select_option(choice)
@@ -283,6 +283,7 @@ def test_an_evaluation_drives_along_as_a_ghost(visit: Visit) -> None:
     page.get_by_role("button", name="Start the heat with 2").click()
     page.get_by_role("heading", name="The heat in 3D").wait_for()
     assert page.locator("dd", has_text="bob · ").count() == 1
+    page.locator(".stage li").nth(2).wait_for()
     assert page.locator(".stage li").all_inner_texts()[2:] == ["bob\nghost"]
     film = str(page.get_by_role("link", name="Video").get_attribute("href"))
     assert console.wait_for(console.job_ended(alone))["state"] == "done"
@@ -343,6 +344,8 @@ def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
 
 
 def test_tables_of_heats_and_ladders_lead_to_why_the_first_is_faster(visit: Visit) -> None:
+    from playwright.sync_api import expect
+
     client = visit.console.client
     models = [{"model": client.post(f"/api/models/starters/{name}").json()["name"]} for name in ("quick", "steady")]
     heat = client.post("/api/contests/heats", json={"models": models, "title": "Starters", "seed": 1}).json()["id"]
@@ -356,8 +359,8 @@ def test_tables_of_heats_and_ladders_lead_to_why_the_first_is_faster(visit: Visi
         page.get_by_role("button", name=why).click()
         page.locator("#film").get_by_role("heading", name=why).wait_for()
         page.get_by_label("Moment of the race").press("End")
-        states = [label.inner_text() for label in page.locator("#film .stage li .number").all()]
-        assert states == ["arrived", "arrived"]
+        states = page.locator("#film .stage li .number")
+        expect(states).to_have_text(["arrived", "arrived"])
 
 
 def test_a_model_is_made_to_learn_against_others(visit: Visit) -> None:

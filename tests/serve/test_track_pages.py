@@ -155,10 +155,14 @@ def test_somebody_drives(visit: Visit) -> None:
     page.keyboard.up("ArrowUp")
     page.keyboard.press("p")
     page.get_by_text("Paused").wait_for()
-    page.wait_for_timeout(200)  # the step that was on its way
-    stopped = clock.inner_text()
-    page.wait_for_timeout(400)
-    assert clock.inner_text() == stopped
+
+    def stands() -> bool:
+        """Once the step that was on its way has come."""
+        before = clock.inner_text()
+        page.wait_for_timeout(400)
+        return clock.inner_text() == before
+
+    visit.console.wait_for(stands)
     page.keyboard.press("r")
     page.get_by_text("Press ↑ to drive off").wait_for()
     pedal = page.get_by_role("button", name="Faster")
