@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from racecraft import resume, train
-from racecraft.errors import RewardError, RunError, TrackNotFound
+from racecraft.errors import RewardError, RunError, SourceError, TrackNotFound
 from racecraft.importing import import_run
 from racecraft.importing.own import read_own
 from racecraft.importing.source import open_source
@@ -90,6 +90,13 @@ def test_a_run_on_a_drawn_road_goes_on_where_that_road_comes_with_it(tmp_path: P
     assert (began.read_info().track, began.checkpoints.last) == ("oval", None)
     assert began.read_hyperparameters() is None  # what was left for AWS's tools is not what it learned with
     assert any("Racecraft's own settings" in note for note in anew.notes)
+    assert any("What the run has learned was left out" in note for note in anew.notes)
+    for checkpoint, step in (("last", 64), ("none", None)):
+        chosen = import_run(archive, root=tmp_path / "theirs", name=checkpoint, track=str(road), checkpoint=checkpoint)
+        last = RunFolder.open(chosen.run).checkpoints.last
+        assert (last and last.step) == step
+    with pytest.raises(SourceError, match=r"--checkpoint is '64', and allowed are best, last and none"):
+        import_run(archive, root=tmp_path / "theirs", name="one", track=str(road), checkpoint="64")
 
 
 @pytest.mark.costly

@@ -21,7 +21,13 @@ SHARED = Path(__file__).parents[3] / "shared"
 
 @pytest.mark.costly
 def test_a_virtual_model_gives_the_same_run_from_a_folder_and_from_archives(tmp_path: Path) -> None:
-    files = {**models.MODEL, **models.HISTORY, **models.WEIGHTS, "mp4/camera-pip/0-video.mp4": "film"}
+    files = {
+        **models.MODEL,
+        **models.HISTORY,
+        **models.WEIGHTS,
+        "mp4/camera-pip/0-video.mp4": "film",
+        "notes.txt": "mine",
+    }
     sources = [
         models.as_folder(files, tmp_path / "model"),
         models.as_tar(files, tmp_path / "model.tar.gz"),
@@ -39,7 +45,11 @@ def test_a_virtual_model_gives_the_same_run_from_a_folder_and_from_archives(tmp_
     assert not any(name.endswith((".pb", ".mp4")) or "ckpt" in name for name in first)
     assert found[0].used["model/model_8.pb"] == "weights of the policy"
     assert any("TensorFlow" in why for why in found[0].unused.values())
+    assert found[0].unused["notes.txt (4 bytes)"] == "nothing that is read"
     assert "JOB_TYPE" in found[0].unused
+    job = [label for label in found[0].used if ": " in label and not label.startswith("WORLD_NAME")]
+    assert job == sorted(job)  # not as chance has it
+    assert len(job) == 4
 
     folder = RunFolder.open(found[0].run)
     settings = read_settings(folder)

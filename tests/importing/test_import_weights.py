@@ -98,8 +98,39 @@ def test_best_last_a_named_one_or_none(tmp_path: Path) -> None:
     (folder / "model/.coach_checkpoint").write_text("8_Step-80.ckpt\n")
     assert imported(folder, checkpoint="last")[0] == "model_8.pb"
     name, notes = imported(folder)
-    assert name == "model_9.pb"
-    assert any("model_9.pb was taken of 3 states" in note for note in notes)
+    assert name == "model_8.pb"  # the last, where nothing says which is best
+    assert any("model_8.pb was taken of 3 states" in note for note in notes)
+    with pytest.raises(SourceError, match="--checkpoint 8 asks for weights, and --network begins with fresh ones"):
+        imported(folder, checkpoint="8", network="RACECRAFT_SMALL")
+
+
+def test_weights_of_which_nobody_knows_what_they_answer(tmp_path: Path) -> None:
+    folder = models.as_folder({"reward_function.py": models.REWARD, "model_7.pb": models.GRAPH}, tmp_path / "m")
+    name, notes = imported(folder)
+    assert name == ""
+    assert "model_7.pb was left out: without a model_metadata.json nobody knows what it answers." in notes
+    assert not any("model_7" in note for note in imported(folder, checkpoint="none")[1])
+    with pytest.raises(SourceError, match=r"has no model_metadata\.json"):
+        imported(folder, checkpoint="7")
+
+
+def test_a_model_drives_with_the_actions_that_it_learned_with(tmp_path: Path) -> None:
+    bucket = "data/minio/bucket/my-model/model"
+    faster = AwsModel(num_actions=3).metadata()
+    for action in faster["action_space"]:
+        action["speed"] = 2.0
+    files = {
+        **models.DRFC,
+        "custom_files/model_metadata.json": json.dumps(faster),  # of the next model
+        f"{bucket}/model_metadata.json": json.dumps(AwsModel(num_actions=3).metadata()),
+    }
+    folder = models.as_folder(files, tmp_path / "m")
+    for options, speed in (({}, 1.0), ({"checkpoint": "none"}, 2.0)):
+        found = import_run(folder, name=f"at-{speed:g}", **options)
+        space = RunFolder.open(found.run).read_model_metadata().action_space
+        assert {action["speed"] for action in space.to_aws()} == {speed}
+        told = [note for note in found.notes if "custom_files/model_metadata.json has changed since" in note]
+        assert len(told) == (speed == 1.0)
 
 
 @pytest.mark.parametrize("damage", ["{", "[]", '{"best_checkpoint": 7}', '{"best_checkpoint": {"name": "../../etc"}}'])

@@ -50,7 +50,7 @@ def keep_history(files: Iterable[SourceFile], root: str, folder: Path) -> Histor
         try:
             _keep(file, kind, name, folder, history)
         except (RacecraftError, OSError) as error:
-            history.refused[name] = str(error).removesuffix(".")
+            history.refused[name] = str(error).replace(str(folder / name), name).removesuffix(".")
     return history
 
 

@@ -34,8 +34,8 @@ from racecraft.importing.layout import (
     find_root,
     role,
 )
-from racecraft.importing.model_files import BEST, ModelFiles, choose_model, find_models
-from racecraft.importing.own import read_own
+from racecraft.importing.model_files import BEST, LAST, NONE, ModelFiles, choose_model, find_models
+from racecraft.importing.own import OwnRun, read_own
 from racecraft.importing.policy_weights import has_critic
 from racecraft.importing.report import ImportedRun, unused_files
 from racecraft.importing.source import Source, SourceFile, open_source
@@ -75,6 +75,8 @@ class _Model:
     notes: list[str] = field(default_factory=list)
     weights: ModelFiles | None = None
     """Whose weights the run begins with."""
+    is_pretrained: bool = False
+    """They are those of another model, which this one was to go on from."""
 
     def find(self, name: str) -> str:
         """Path of a settings file, or an empty string."""
@@ -123,7 +125,7 @@ def import_run(
         model.weights = _find_weights(model, checkpoint, network)
         text = _read_reward(model, reward)
         metadata = _read_metadata(model)
-        own = None if reward or network else read_own(source, model.root, track=track)
+        own = _read_own(model, checkpoint, track, is_other=bool(reward or network))
         hyperparameters = (
             None if own is not None and not own.has_hyperparameters else _read_hyperparameters(model, metadata)
         )
@@ -211,7 +213,7 @@ def _read_params(model: _Model) -> tuple[TrainingParams, dict[str, str]]:
     if not place:
         return TrainingParams(), {}
     params = TrainingParams.from_yaml(source.text(place), name=model.shown(place))
-    given = {key: f"{key.upper()}: {getattr(params, key)}" for key in params.given}
+    given = {key: f"{key.upper()}: {getattr(params, key)}" for key in sorted(params.given)}
     given |= {str(key): str(key) for key in params.extra}
     model.used[model.shown(place)] = "settings of the training"
     return params, given
@@ -219,17 +221,48 @@ def _read_params(model: _Model) -> tuple[TrainingParams, dict[str, str]]:
 
 def _find_weights(model: _Model, checkpoint: str, network: str) -> ModelFiles | None:
     """The trained weights among the files, if they are wanted and can be understood."""
-    if network or not model.find(METADATA) or model.root + RUN in model.source.files:
+    if checkpoint not in (BEST, NONE) and network:
+        raise SourceError(
+            f"--checkpoint {checkpoint[:80]} asks for weights, and --network begins with fresh ones; give one of them."
+        )
+    if network or model.root + RUN in model.source.files:
         return None
     names = [file.name for file in _history_files(model) if role(file.name) == "weights"]
+    if not model.find(METADATA):
+        if checkpoint not in (BEST, NONE):
+            raise SourceError(
+                f"{model.source.title} has no {METADATA}, without which nobody knows what weights answer."
+            )
+        if checkpoint == BEST and (found := find_models(names)):
+            model.notes.append(f"{found[-1].name} was left out: without a {METADATA} nobody knows what it answers.")
+        return None
     drfc = model.drfc
     if drfc is not None and drfc.pretrained and not find_models(names):
         other = f"{model.root}{BUCKET}/{drfc.pretrained}/"
         names = [name for name in model.source.files if name.startswith(other) and role(name) == "weights"]
+        model.is_pretrained = True
         checkpoint = drfc.pretrained_checkpoint if checkpoint == BEST else checkpoint
         begins = f"the {checkpoint} ones" if find_models(names) else "fresh ones, since they are not among the files"
         model.notes.append(f"The model was to go on from the weights of {drfc.pretrained!a}; it begins with {begins}.")
     return choose_model(model.source, names, checkpoint, model.notes)
+
+
+def _read_own(model: _Model, checkpoint: str, track: str, *, is_other: bool) -> OwnRun | None:
+    """The run of an archive of ours, without its weights where fresh ones are wanted; None where it begins anew."""
+    if model.root + RUN not in model.source.files:
+        return None
+    if checkpoint not in (BEST, LAST, NONE):
+        raise SourceError(
+            f"{model.source.title} is a run of Racecraft, which comes with all checkpoints and goes on from the last; "
+            f"--checkpoint is {checkpoint[:80]!r}, and allowed are best, last and none."
+        )
+    own = None if is_other else read_own(model.source, model.root, track=track)
+    if own is None:
+        model.notes.append(
+            "What the run has learned was left out, as its reward, network or road is another now: import it as it is, "
+            "and racecraft train --from takes its weights along."
+        )
+    return own if own is None or checkpoint != NONE else replace(own, files={})
 
 
 @contextmanager
@@ -286,11 +319,22 @@ def _read_metadata(model: _Model) -> ModelMetadata:
     if not name:
         model.notes.append(f"There is no {METADATA}: Racecraft's own actions and network were chosen.")
         return ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
-    shown = model.shown(name)
-    metadata = ModelMetadata.from_dict(parse_json_object(model.source.text(name), name=shown), name=shown)
+    metadata, shown = _metadata_in(model, name), model.shown(name)
+    if model.weights is not None and not model.is_pretrained:
+        beside = f"{model.weights.paths[0].rpartition('/')[0]}/{METADATA}"
+        if beside in model.source.files and _metadata_in(model, beside) != metadata:
+            model.notes.append(
+                f"{shown} has changed since: what the model learned with counts; --checkpoint none begins anew."
+            )
+            metadata, shown = _metadata_in(model, beside), model.shown(beside)
     model.used[shown] = f"{_actions(metadata)}, {metadata.neural_network}, version {metadata.version}"
     model.notes += metadata.notes
     return metadata
+
+
+def _metadata_in(model: _Model, name: str) -> ModelMetadata:
+    shown = model.shown(name)
+    return ModelMetadata.from_dict(parse_json_object(model.source.text(name), name=shown), name=shown)
 
 
 def _actions(metadata: ModelMetadata) -> str:

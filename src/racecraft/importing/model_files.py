@@ -113,9 +113,10 @@ def choose_model(source: Source, names: Iterable[str], wanted: str, notes: list[
                 f"{source.title} holds {len(plain)} graphs: {listed}.", hint="Name one with --checkpoint FILE."
             )
         return plain[0]
+    chosen = next((model for model in models if model.iteration == said.get(LAST, -1) >= 0), models[-1])
     if len(models) > 1:
-        notes.append(f"{models[-1].name} was taken of {len(models)} states of the model; --checkpoint chooses another.")
-    return models[-1]
+        notes.append(f"{chosen.name} was taken of {len(models)} states of the model; --checkpoint chooses another.")
+    return chosen
 
 
 def _named(models: list[ModelFiles], wanted: str, source: Source) -> ModelFiles:

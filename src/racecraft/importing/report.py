@@ -15,6 +15,7 @@ _WHY: dict[Role, str] = {
     "video": "videos and pictures are not needed",
     "code": "code besides the reward function is neither run nor kept",
     "archive": "archives inside are not opened; import one by itself",
+    "other": "nothing that is read",
 }
 
 
