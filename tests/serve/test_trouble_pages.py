@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsers import Visit, needs_browser, needs_pages, visiting
-from running_consoles import PATIENCE, running_console
+from browsers import Visit, make_untrained, needs_browser, needs_pages, visiting
+from running_consoles import LEISURELY, PATIENCE, running_console
 
+from free_ports import free_port
 from racecraft.reward import preset_names
 from until_true import until_true
 
@@ -233,7 +234,7 @@ def test_files_of_the_original_are_taken_over_on_a_new_model(visit: Visit) -> No
     assert page.locator("#hp-lr").input_value() == "0.0007"
     page.locator("summary", has_text="More settings").click()
     page.get_by_role("textbox", name="Name").fill("veteran")
-    page.route("**/api/models", _make_untrained)
+    page.route("**/api/models", make_untrained)
     page.get_by_role("button", name="Train now").first.click()
     page.wait_for_url("**/models/veteran*")
     page.unroute("**/api/models")
@@ -265,14 +266,6 @@ def test_a_reward_is_chosen_by_its_picture_and_brings_what_it_needs(visit: Visit
     assert page.get_by_text("This reward looks out for boxes").count() == 0
 
 
-def _make_untrained(route: Any) -> None:
-    """The same request, for a model that is made and not trained."""
-    asked = route.request
-    route.continue_(
-        **({"post_data": json.dumps(asked.post_data_json | {"train": False})} if asked.method == "POST" else {})
-    )
-
-
 def test_nothing_is_drawn_while_nothing_moves(visit: Visit) -> None:
     from playwright.sync_api import expect
 
@@ -298,7 +291,7 @@ def test_nothing_is_drawn_while_nothing_moves(visit: Visit) -> None:
 
 def test_a_waiting_model_says_what_it_waits_for(visit: Visit) -> None:
     console = visit.console
-    console.create(name="first", track="oval", until="10 minutes")
+    console.create(name="first", track="oval", until="10 minutes", reward=LEISURELY)
     console.create(name="second", track="oval", until="1000 steps")
     page = visit.open("/models/second/watch")
     page.get_by_text("Waiting until there is room: first first").wait_for()
@@ -339,8 +332,9 @@ def test_a_lost_network_is_one_banner_and_everything_comes_back(visit: Visit) ->
 def test_a_server_that_is_gone_is_said_over_cars_that_look_frozen(visit: Visit, runs: Path) -> None:
     browser = visit.page.context.browser
     assert browser is not None
-    with running_console(runs) as console:
-        console.create(name="stork", track="oval", until="10 minutes", seed=1)
+    port = str(free_port())
+    with running_console(runs, "--port", port) as console:
+        console.create(name="stork", track="oval", until="10 minutes", reward=LEISURELY)
         address = str(console.client.base_url).rstrip("/")
         context = browser.new_context()
         cookie = console.client.cookies["racecraft_session"]
@@ -354,7 +348,7 @@ def test_a_server_that_is_gone_is_said_over_cars_that_look_frozen(visit: Visit, 
         page.get_by_role("alert").get_by_text("The console does not answer.").wait_for()
         assert page.get_by_text("cars learning at once").count() == 0
         assert "grayscale" in page.locator(".scene canvas").first.evaluate("canvas => getComputedStyle(canvas).filter")
-        with running_console(runs, "--port", address.rsplit(":", 1)[1]) as again:
+        with running_console(runs, "--port", port) as again:
             page.get_by_role("alert").wait_for(state="detached")
             page.get_by_text(re.compile(r"\d+ cars learning at once")).wait_for()
             job = again.client.get("/api/jobs", params={"run": "stork"}).json()[0]
@@ -376,7 +370,7 @@ def test_of_a_model_that_is_not_there_nothing_but_the_model_is_asked(visit: Visi
 
 def test_what_one_tab_does_the_other_sees(visit: Visit) -> None:
     console, first = visit.console, visit.page
-    console.create(name="two", track="oval", until="10 minutes", train=False)
+    console.create(name="two", track="oval", until="10 minutes", reward=LEISURELY, train=False)
     visit.open("/models/two/watch")
     second = first.context.new_page()
     second.set_default_timeout(1000 * PATIENCE)
@@ -392,6 +386,20 @@ def test_what_one_tab_does_the_other_sees(visit: Visit) -> None:
     second.get_by_role("button", name="Go on training").or_(gone).first.click()  # it may have been told by then
     gone.wait_for()
     second.close()
+
+
+def test_when_a_training_ends_is_said_and_understood_in_german(visit: Visit) -> None:
+    console = visit.console
+    console.create(name="swift", track="oval", until="20000 steps or 30 minutes", train=False)
+    visit.look("light", "de")
+    page = visit.open("/models/swift/watch")
+    goal = page.get_by_label("Weiter bis")
+    assert goal.get_attribute("placeholder") == "30 Minuten oder 20000 Schritte"
+    goal.fill("64 Schritte oder 1,5 Minuten")
+    page.get_by_role("button", name="Jetzt trainieren").click()
+    page.get_by_role("button", name="Weiter trainieren").wait_for()
+    assert 64 <= console.client.get("/api/models/swift").json()["steps"] < 20_000
+    visit.look("light")
 
 
 def test_what_is_wrong_is_said_in_the_language_of_the_page(visit: Visit) -> None:

@@ -1,5 +1,6 @@
 /** Texts in the chosen language. */
 import { de } from "./de";
+import { untilInEnglish, untilInGerman } from "./de/until";
 import { en, type Key } from "./en";
 import { fill, type Values } from "./fill";
 import { choose, language, type Language } from "./language.svelte";
@@ -22,6 +23,12 @@ void learnErrors();
 
 /** What the server said, in the page's language where it is known there. */
 export const said = (text: string): string => bound(language.choice !== "en" && translated ? translated(text) : text);
+
+/** When a training ends, as the server says it, in the page's language. */
+export const untilShown = (text: string): string => (language.choice === "de" ? untilInGerman(text) : text);
+
+/** When a training is to end, as somebody wrote it, for the server, which says what is wrong with it. */
+export const untilMeant = (words: string): string => (language.choice === "de" ? untilInEnglish(words) : words);
 
 export function speak(choice: Language): void {
   choose(choice);

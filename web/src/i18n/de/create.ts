@@ -167,7 +167,7 @@ export const create: Record<keyof typeof english, string> = {
   pays: "Zahlt",
   more: "Weitere Einstellungen",
   until: "Trainieren bis",
-  until_hint: "'5 laps', 'no better lap', '10 minutes', '200000 steps', oder mehrere mit 'or' verbunden.",
+  until_hint: "'5 Runden', 'keine bessere Runde', '10 Minuten', '200000 Schritte', oder mehrere mit 'oder' verbunden.",
   seed: "Startzahl",
   seed_hint: "Dieselbe Zahl wiederholt ein Training.",
   car: "Auto",
