@@ -10,7 +10,7 @@ import pytest
 from tiny_runs import Recorder, Train
 
 from racecraft.analysis import write_report
-from racecraft.errors import RewardError, RunError
+from racecraft.errors import ConfigError, RewardError, RunError
 from racecraft.importing import import_run
 from racecraft.reward import load_preset
 from racecraft.run import RunFolder, archive_chunks, change_reward, read_stretches, stretch_at
@@ -53,6 +53,23 @@ def test_actions_hyperparameters_and_vehicle_belong_to_a_stretch(tiny: Train) ->
     first, second = read_stretches(folder)
     assert second.changes(first) == ["actions", "hyperparameters", "vehicle"]
     assert first.model_metadata != second.model_metadata == metadata
+
+
+def test_another_network_is_refused_before_a_stretch_begins(tiny: Train) -> None:
+    folder = RunFolder.open(tiny().run)
+    before = folder.model_metadata.read_text()
+    fewer, stereo = json.loads(before), {**json.loads(before), "sensor": ["STEREO_CAMERAS"]}
+    fewer["action_space"] = fewer["action_space"][:6]
+    for document, says in ((fewer, "num_actions 10, and its files now ask for 6"), (stereo, "lenses 1, and")):
+        folder.model_metadata.write_text(json.dumps(document))
+        recorder = Recorder()
+        with pytest.raises(ConfigError, match=says) as caught:
+            resume(folder.path, until="576 steps", reporter=recorder)
+        assert "racecraft train --from" in caught.value.hint
+        assert recorder.notes == []
+        assert len(read_stretches(folder)) == 1
+    folder.model_metadata.write_text(before)
+    assert resume(folder.path, until="576 steps").steps == 576
 
 
 def test_a_stretch_that_trained_nothing_is_forgotten(tiny: Train) -> None:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
-from racecraft.learn import Algorithm, Learner, make_learner
+from racecraft.learn import Algorithm, Learner, NetworkSpec, make_learner
 from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import (
     AwsLog,
@@ -175,6 +175,8 @@ def open_session(
     metadata = metadata or folder.read_model_metadata()
     require_trainable(settings, metadata)
     saved, begun = _beginning(folder, note)
+    if saved is not None:
+        _require_its_network(saved, settings.network_spec(metadata), folder)
 
     with ExitStack() as stack:
         run = _Run(
@@ -263,6 +265,21 @@ def _beginning(folder: RunFolder, note: Note) -> tuple[Checkpoint | None, Checkp
     if saved is None and folder.read_info().parent is not None:
         return None, folder.parent_checkpoint.load()
     return (None, saved) if saved is not None and is_weights_only(saved) else (saved, None)
+
+
+def _require_its_network(saved: Checkpoint, asked: NetworkSpec, folder: RunFolder) -> None:
+    """Refuse files of a run that ask for another network than it has been training."""
+    described = saved.metadata.get("network")
+    if not isinstance(described, dict):
+        return
+    for name, value in asdict(asked).items():
+        had = described.get(name, value)
+        if had != (list(value) if isinstance(value, tuple) else value):
+            raise ConfigError(
+                f"The run's network has {name} {str(had)[:60]}, and its files now ask for {str(value)[:60]}.",
+                hint=f"Undo the change. With other actions racecraft train --from {folder.path} --model-metadata FILE "
+                "begins a new run with these weights.",
+            )
 
 
 def _load_tracks(folder: RunFolder, settings: TrainSettings) -> tuple[Track, ...]:
