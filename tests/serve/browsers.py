@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -52,7 +53,8 @@ class Visit:
 
     def look(self, theme: str, language: str = "en") -> None:
         """From the next page on."""
-        self.page.goto(f"{self.console.client.base_url}/settings")
+        if not self.page.url.startswith(str(self.console.client.base_url)):
+            self.page.goto(f"{self.console.client.base_url}/settings")
         self.page.evaluate(
             "([theme, language]) => { localStorage.setItem('racecraft-theme', theme);"
             " localStorage.setItem('racecraft-language', language); }",
@@ -98,6 +100,14 @@ def violations_by_theme(page: Page) -> dict[str, list[Any]]:
         page.evaluate("Promise.all(document.getAnimations().map(one => one.finished.catch(() => {})))")
         found[theme] = violations(page)
     return found
+
+
+def make_untrained(route: Any) -> None:
+    """The same request, for a model that is made and not trained."""
+    asked = route.request
+    route.continue_(
+        **({"post_data": json.dumps(asked.post_data_json | {"train": False})} if asked.method == "POST" else {})
+    )
 
 
 def complaints_of(message: Any) -> list[str]:

@@ -20,8 +20,8 @@ import yaml
 from leagues import ok
 from postgres_servers import PostgresServer
 from running_consoles import PATIENCE, RunningConsole, running_console
-from test_encryption import free_port
 
+from free_ports import free_port
 from racecraft.serve.settings import ServeSettings
 
 pytestmark = pytest.mark.costly
@@ -75,7 +75,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[RunningC
 
 
 def test_the_units_command_serves(service: tuple[RunningConsole, str]) -> None:
-    ok(httpx.get(f"{service[0].client.base_url}/api/health"), 204)
+    ok(httpx.get(f"{service[0].client.base_url}/api/health", timeout=PATIENCE), 204)
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import ssl
 import subprocess
 import sys
@@ -17,6 +16,7 @@ from leagues import ok, refused
 from running_consoles import PATIENCE, RunningConsole, end, running_console
 from running_workers import running_worker
 
+from free_ports import free_port
 from racecraft.errors import ConfigError
 from racecraft.serve.server import serve
 from racecraft.serve.settings import ServeSettings
@@ -33,12 +33,6 @@ def behind(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningConsole]
     options = ("--league", "--address", ADDRESS, "--trusted-proxy", "127.0.0.1")
     with running_console(tmp_path_factory.mktemp("behind") / "runs", *options) as console:
         yield console
-
-
-def free_port() -> int:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        return int(taken.getsockname()[1])
 
 
 def make_certificate(folder: Path, name: str = "localhost") -> tuple[Path, Path]:
@@ -75,7 +69,9 @@ def test_who_comes_unencrypted_through_the_proxy_is_refused(behind: RunningConso
 def test_a_proxy_that_is_not_trusted_is_not_believed(tmp_path: Path) -> None:
     with running_console(tmp_path / "runs", "--league", "--address", ADDRESS) as console:
         plain = {**PROXY, "x-forwarded-proto": "http"}
-        ok(httpx.get(f"{console.client.base_url}/api/door", headers=plain))  # of this machine, whatever it says
+        ok(
+            httpx.get(f"{console.client.base_url}/api/door", headers=plain, timeout=PATIENCE)
+        )  # of this machine, whatever it says
 
 
 @pytest.mark.costly

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
+from browsers import Visit, make_untrained, needs_axe, needs_browser, needs_pages, visiting
 from running_consoles import running_console
 
 from racecraft.judging.evaluation import evaluate_run
@@ -371,6 +371,7 @@ def test_a_model_is_made_to_learn_against_others(visit: Visit) -> None:
     page.get_by_label("Cars on the road").fill("3")
     page.get_by_role("button", name="In words").click()
     page.locator("section", has_text="Until when").get_by_role("textbox").fill("1000 steps")
+    page.route("**/api/models", make_untrained)
     with page.expect_request("**/api/models") as sent:
         page.get_by_role("button", name="Train now").first.click()
     wanted = sent.value.post_data_json
@@ -385,6 +386,7 @@ def test_a_model_is_made_to_learn_against_others(visit: Visit) -> None:
         "sensors": ["FRONT_FACING_CAMERA", "LIDAR"],
     }
     page.wait_for_url("**/models/**")
+    page.unroute("**/api/models")
 
 
 def test_the_settings_say_where_things_are(visit: Visit) -> None:

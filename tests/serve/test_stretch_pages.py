@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from browsers import Visit, needs_browser, needs_pages, visiting
+from browsers import Visit, make_untrained, needs_browser, needs_pages, visiting
 from model_requests import REQUESTS
 from PIL import Image
 from running_consoles import PATIENCE, RunningConsole, running_console
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Locator, Page, Route
+    from playwright.sync_api import Locator, Page
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
@@ -358,11 +358,7 @@ def _copy_of(visit: Visit, name: str) -> Page:
 
 def _made(page: Page) -> str:
     """The name of the model that the page asks for, which does not train."""
-
-    def hold(route: Route) -> None:
-        route.continue_(post_data=json.dumps({**route.request.post_data_json, "train": False}))
-
-    page.route("**/api/models", hold)
+    page.route("**/api/models", make_untrained)
     with page.expect_response("**/api/models") as answer:
         page.get_by_role("button", name="Train now").first.click()
     page.unroute("**/api/models")
