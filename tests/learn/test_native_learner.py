@@ -479,4 +479,4 @@ config = PPOConfig(num_envs=8, num_steps=4, minibatch_size=16, update_epochs=1)
 PPO(config, make_learner(NetworkSpec(num_actions=3, state_size=2)), StripeWorld(8)).iterate()
 """
     path = ":".join([str(Path(__file__).parent), *sys.path])
-    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": path}, timeout=60)
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": path}, timeout=300)

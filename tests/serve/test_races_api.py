@@ -235,7 +235,7 @@ def test_a_kept_checkpoint_is_what_drives(console: RunningConsole) -> None:
     assert str(first["step"]) in refused(client.post(entries, json={"models": [name], "checkpoint": 1}), 409)["message"]
     reply = client.post(entries, json={"models": [name], "checkpoint": first["step"]})
     assert reply.status_code == 202, reply.text
-    (drive,) = [one for one in client.get("/api/jobs", params={"run": name}).json() if one["state"] != "done"]
+    (drive,) = [one for one in client.get("/api/jobs", params={"run": name}).json() if one["kind"] == "race"]
     assert console.wait_for(console.job_ended(drive["id"]))["result"]["step"] == first["step"]
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 from leagues import ok, running_league
+from running_consoles import LEISURELY
 
 from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.jobs.turns import FIRST_TURN, PATIENCE, SLOW, SPARE, TURN, waiting_line
@@ -78,7 +79,7 @@ def machine(database_url: str) -> Iterator[Machine]:
 
 
 def test_a_training_gives_its_place_to_who_has_none_and_goes_on_after_them(machine: Machine) -> None:
-    hundred = [machine.add(ADA) for _ in range(100)]
+    hundred, began = [machine.add(ADA) for _ in range(100)], time.monotonic()
     assert machine.tend() == hundred[:1]
     bobs = machine.add(BOB)
     assert machine.tend() == []
@@ -98,7 +99,8 @@ def test_a_training_gives_its_place_to_who_has_none_and_goes_on_after_them(machi
     assert machine.told(bobs) == "rest"
     machine.rest(bobs)
     assert machine.tend() == [hundred[0]], "what had begun goes on before the next of the hundred"
-    assert machine.row(hundred[0]).used == pytest.approx(FIRST_TURN.total_seconds(), abs=2.0)
+    used, took = machine.row(hundred[0]).used, time.monotonic() - began
+    assert -0.01 < used - FIRST_TURN.total_seconds() < took
 
 
 def test_who_is_alone_is_never_asked(machine: Machine) -> None:
@@ -176,7 +178,10 @@ def test_a_first_training_starts_soon_beside_another_s_and_both_end(tmp_path: Pa
     with running_league(tmp_path / "runs") as league:
         ada, bob = (league.join(league.code(league.group("5b")), name) for name in ("Ada", "Bob"))
         for number in range(5):
-            ok(ada.post("/api/models", json={"name": f"long-{number}", "until": "30 minutes"}), 201)
+            ok(
+                ada.post("/api/models", json={"name": f"long-{number}", "until": "30 minutes", "reward": LEISURELY}),
+                201,
+            )
         league.console.wait_for(lambda: ok(ada.get("/api/models/long-0/history"))["points"])
         time.sleep(FIRST_TURN.total_seconds())
         ok(bob.post("/api/models", json={"name": "short", "until": "3000 steps"}), 201)
@@ -187,7 +192,7 @@ def test_a_first_training_starts_soon_beside_another_s_and_both_end(tmp_path: Pa
 
         job = league.console.wait_for(ended)
         waited = _moment(job["started"]) - _moment(job["created"])
-        assert waited < 10.0
+        assert waited < 20.0  # s, of a turn of thirty; the machine may be busy
 
         def goes_on() -> Any:
             first = ok(ada.get("/api/jobs"))[-1]
