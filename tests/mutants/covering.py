@@ -48,6 +48,9 @@ TOKENS: Final[Tests] = (
     "-k",
     "test_leases or reads_and_writes or too_large or opens_nothing",
 )
+MEMORY: Final = "tests/perception/test_memory.py"
+PERCEIVED: Final = "tests/perception/test_training.py"
+TRUTH: Final = "tests/perception/test_truth.py"
 WAYS: Final[Tests] = ("tests/training/test_algorithms.py", "tests/training/test_lap_place.py")
 
 COVERING: Final[dict[str, tuple[int, Tests]]] = {
@@ -166,14 +169,36 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "importing/history.py": (2, ("tests/importing/test_imported_history.py",)),
     "run/starters.py": (2, ("tests/run/test_starters.py", "-k", "unpacked or exist or folder or there")),
     # what is seen in a picture of the road
+    "perception/belief.py": (
+        3,
+        ("tests/perception/test_belief.py", "tests/perception/test_mirror.py"),
+    ),
     "perception/driving.py": (3, ("tests/perception/test_perception_driving.py", "-k", "not laps_roads")),
+    "perception/lessons.py": (2, (PERCEIVED, MEMORY, "-k", "limits or learns")),
     "perception/looking.py": (2, ("tests/perception/test_reading.py", "tests/cli/test_perceive_verb.py")),
+    "perception/losses.py": (5, (PERCEIVED, MEMORY, "-k", "slopes or expected_error or column_that")),
+    "perception/memory.py": (
+        8,
+        (
+            MEMORY,
+            "-k",
+            "corrects or told or together or exact or mirror or slopes or another_memory or lenses or knows",
+        ),
+    ),
     "perception/mirror.py": (2, ("tests/perception/test_mirror.py",)),
     "perception/network.py": (4, ("tests/perception/test_reading.py", "tests/perception/test_training.py")),
+    "perception/packing.py": (
+        3,
+        (PERCEIVED, "-k", "brought_along or half_a_step or whole_numbers or too_long or none_are"),
+    ),
     "perception/painting.py": (3, ("tests/perception/test_reading.py",)),
     "perception/reading.py": (3, ("tests/perception/test_reading.py",)),
+    "perception/recalling.py": (6, (MEMORY, "-k", "slopes or before_a_beginning or learns_what")),
+    "perception/store.py": (3, (PERCEIVED, "-k", "store")),
     "perception/training.py": (4, ("tests/perception/test_training.py",)),
-    "perception/truth.py": (4, ("tests/perception/test_truth.py",)),
+    "perception/truth.py": (4, (TRUTH,)),
+    "perception/watching.py": (4, (MEMORY, "-k", "lenses or goes_on or without_a_memory")),
+    "perception/worlds.py": (4, (TRUTH, "tests/perception/test_perceiving.py", "-k", "dashes or stands_in")),
     # the page that needs no installation
     "site/javascript.py": (5, ("tests/site/test_javascript.py",)),
     "analysis/laps.py": (4, ("tests/analysis/test_laps.py",)),
@@ -202,7 +227,8 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "serve/submissions/walls.py": (3, VERDICTS),
     "serve/submissions/board.py": (4, (BOARD,)),
     "serve/submissions/copies.py": (2, ("tests/serve/test_copies.py",)),
-    "serve/submissions/league.py": (6, (*ENTRIES, BOARD)),
+    "serve/submissions/entries.py": (4, ENTRIES),
+    "serve/submissions/league.py": (4, (*ENTRIES, BOARD)),
     "serve/submissions/season.py": (8, ("tests/serve/test_seasons.py",)),
     "serve/workers/leases.py": (4, ("tests/serve/test_leases.py", *TOKENS)),
     "serve/workers/parcels.py": (4, TOKENS),

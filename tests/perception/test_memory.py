@@ -14,7 +14,7 @@ from unseen_roads import unseen_roads
 from racecraft.errors import CheckpointError
 from racecraft.film.encoding import write_video
 from racecraft.perception import Belief, Perceiver, PerceptionDriver, Watcher, perceive
-from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, NUMBERS
+from racecraft.perception.answers import IN_SIGHT, MIDDLES, NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, NUMBERS
 from racecraft.perception.lessons import Lessons
 from racecraft.perception.losses import slopes_of
 from racecraft.perception.memory import ANSWERS, SHAPES, UNITS, Memory, seen_of, unseen
@@ -70,6 +70,17 @@ def test_sums_are_exact_in_any_order() -> None:
     seen = seen_of(outputs)
     turned = seen[:, order] @ memory.weights["seen"][order]
     assert (seen @ memory.weights["seen"] == turned).all()
+
+
+def test_it_is_told_no_columns_of_rows_without_a_middle_and_nothing_out_of_bounds() -> None:
+    outputs = some_outputs(50)
+    outputs[0] = 1e9
+    seen = seen_of(outputs)
+    is_there = outputs[:, IN_SIGHT] > 0.0
+    assert 0.3 < is_there.mean() < 0.7
+    assert (seen[:, MIDDLES][is_there] != 0.0).mean() > 0.99
+    assert not seen[:, MIDDLES][~is_there].any()
+    assert np.abs(seen).max() == 4.0
 
 
 def test_in_a_mirror_it_remembers_the_same() -> None:

@@ -14,6 +14,7 @@ from racecraft.perception.answers import NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGET
 from racecraft.perception.losses import slopes_of
 from racecraft.perception.network import MAX_WEIGHTS, WEIGHTS
 from racecraft.perception.packing import STEP
+from racecraft.perception.store import Store
 
 pytestmark = pytest.mark.costly
 
@@ -24,14 +25,17 @@ FEW = Lessons(updates=60, minibatch_size=32, store=1024, roads=2, learning_rate=
 def learned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[float]]:
     """Weights after a few lessons, and the network's losses on the way."""
     losses: list[float] = []
+    updates: list[int] = []
 
     def tell(update: int, loss: float) -> None:
-        assert update <= FEW.all_updates
+        updates.append(update)
         if update <= FEW.updates:
             losses.append(loss)
 
     path = tmp_path_factory.mktemp("lessons") / "a.safetensors"
     train(FEW, tell=tell).save(path)
+    assert updates == sorted(updates)
+    assert updates[-1] == FEW.all_updates  # those of the memory come last
     return path, losses
 
 
@@ -72,6 +76,36 @@ def test_expected_errors_settle_where_they_are_right() -> None:
         assert np.allclose(np.sign(np.where(np.abs(slopes) < 1e-6, 0.0, slopes)), sign)
 
 
+def test_beyond_what_is_told_an_expected_error_only_goes_back() -> None:
+    targets = np.zeros((1, NUM_TARGETS), np.float32)
+    for log, error, sign in ((-7.0, 1e-5, 0.0), (-7.0, 0.3, -1.0), (3.0, 0.3, 1.0), (3.0, 20.0, 0.0)):
+        outputs = np.zeros((1, NUM_OUTPUTS), np.float32)
+        outputs[:, : len(NUMBERS)] = error
+        outputs[:, NUM_TARGETS:] = log
+        slopes = slopes_of(outputs, targets)[0][0, NUM_TARGETS : NUM_TARGETS + len(NUMBERS)]
+        assert (np.sign(slopes) == sign).all(), (log, error)
+
+
+def test_a_full_store_forgets_pictures_at_random_and_no_other() -> None:
+    rng, store = np.random.default_rng(4), Store(64, (2,))
+    for number in range(0, 64 * 16, 48):
+        marks = np.arange(number, number + 48, dtype=np.float32)
+        store.put(
+            np.stack([marks % 256, marks // 256], axis=1).astype(np.uint8),
+            np.repeat(marks[:, None], NUM_TARGETS, 1),
+            rng=rng,
+        )
+    assert store.seen == 22 * 48
+    observations, targets = store.draw(4000, rng=rng)
+    assert (observations @ np.array([1.0, 256.0]) == targets[:, 0]).all()
+    known, often = np.unique(targets[:, 0], return_counts=True)
+    assert len(known) == 64  # each of its places has a picture of its own, as likely as another
+    assert often.max() < 3 * often.min()
+    assert 0.2 < np.mean(known < store.seen - 64) < 0.8  # not only the newest
+    observations[:] = 0
+    assert store.draw(50, rng=rng)[0].any()
+
+
 def test_a_column_that_is_not_there_teaches_nothing() -> None:
     targets = np.zeros((1, NUM_TARGETS), np.float32)
     outputs = np.full((1, NUM_OUTPUTS), 0.7, np.float32)
@@ -97,6 +131,7 @@ def test_what_is_written_is_read_to_half_a_step(learned: tuple[Path, list[float]
     from safetensors.numpy import load_file
 
     perceiver = Perceiver(learned[0], num_threads=1)
+    assert perceiver.memory is not None
     perceiver.save(tmp_path / "again")
     stored, weights = load_file(tmp_path / "again"), perceiver.network.weights()
     steps = [name for name in stored if name.endswith(STEP)]

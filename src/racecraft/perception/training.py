@@ -11,12 +11,12 @@ from typing import Final
 
 import numpy as np
 
-from racecraft.perception.answers import NUM_TARGETS
 from racecraft.perception.lessons import Lessons
 from racecraft.perception.losses import slopes_of
 from racecraft.perception.mirror import mirrored_answers, mirrored_observations
 from racecraft.perception.network import Perceiver
 from racecraft.perception.recalling import drives_of, taught
+from racecraft.perception.store import Store
 from racecraft.perception.worlds import worlds
 
 USUAL: Final = Lessons()
@@ -39,32 +39,25 @@ def train(lessons: Lessons = USUAL, *, tell: Callable[[int, float], None] = lamb
 
 def _teach_network(perceiver: Perceiver, lessons: Lessons, tell: Callable[[int, float], None]) -> None:
     network = perceiver.network
-    observations = np.zeros((lessons.store, *network.observation_shape), np.uint8)
-    targets = np.zeros((lessons.store, NUM_TARGETS), np.float32)
+    store = Store(lessons.store, network.observation_shape)
     rng = np.random.default_rng([lessons.seed, 0x6C657373])
-    places, known, seen = worlds(lessons.seed, num_roads=lessons.roads), 0, 0
+    places = worlds(lessons.seed, num_roads=lessons.roads)
     losses: list[float] = []
     said = time.monotonic()
     for update in range(lessons.updates):
-        wanted = lessons.store // 2 + round(update * lessons.fresh * lessons.minibatch_size)
-        while seen < wanted:
+        due = lessons.store // 2 + round(update * lessons.fresh * lessons.minibatch_size)
+        while store.seen < due:
             for place in places:
                 frames, truth = place.look()
-                # each new picture takes a random one's place, once there is no other
-                free = np.arange(known, min(known + len(frames), lessons.store))
-                rows = np.concatenate([free, rng.integers(0, max(known, 1), len(frames) - len(free))])
-                observations[rows], targets[rows] = perceiver.observe(frames), truth
-                known += len(free)
-                seen += len(frames)
-        rows = rng.integers(0, known, lessons.minibatch_size)
-        seen_now, wanted_now = observations[rows], targets[rows]
+                store.put(perceiver.observe(frames), truth, rng=rng)
+        seen, wanted = store.draw(lessons.minibatch_size, rng=rng)
         turned = lessons.minibatch_size // 2  # so many are looked at in a mirror
-        seen_now[:turned] = mirrored_observations(seen_now[:turned])
-        wanted_now[:turned] = mirrored_answers(wanted_now[:turned])
-        slopes, loss = slopes_of(network.policy(seen_now), wanted_now)
+        seen[:turned] = mirrored_observations(seen[:turned])
+        wanted[:turned] = mirrored_answers(wanted[:turned])
+        slopes, loss = slopes_of(network.policy(seen), wanted)
         share = update / lessons.updates
         rate = lessons.learning_rate * min(1.0, (update + 1) / 300) * (0.5 + 0.5 * np.cos(np.pi * share))
-        network.descend(seen_now, slopes, learning_rate=float(rate), max_grad_norm=5.0)
+        network.descend(seen, slopes, learning_rate=float(rate), max_grad_norm=5.0)
         losses.append(loss)
         if time.monotonic() - said > 5.0 or update == lessons.updates - 1:
             tell(update + 1, float(np.mean(losses)))
