@@ -58,6 +58,7 @@ def tabs() -> Iterator[list[Page]]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         context = browser.new_context()
+        context.set_default_timeout(PATIENCE)
         context.add_init_script(FEW_FRAMES)
         pages = [context.new_page(), context.new_page()]
         for page in pages:
@@ -84,11 +85,16 @@ def test_nothing_is_kept_for_later_before_the_first_car_has_what_it_needs(tabs: 
         held.append(route)
 
     context.route("**/core/*.wasm", hold)
+    context.set_default_timeout(PATIENCE)
     page = context.new_page()
     page.goto(tabs[0].url)
     page.get_by_role("button", name="Train", exact=True).wait_for()
-    page.wait_for_timeout(4500)  # longer than the page waits once all is there
+    for _ in range(PATIENCE // 100):
+        if held:
+            break
+        page.wait_for_timeout(100)
     assert held, "the core was not asked for"
+    page.wait_for_timeout(4500)  # longer than the page waits once all is there
     registered = "navigator.serviceWorker.getRegistration().then((one) => one !== undefined)"
     assert not page.evaluate(registered)
     for route in held:
@@ -101,11 +107,11 @@ def test_two_tabs_train_at_once_and_one_that_slept_goes_on(tabs: list[Page]) -> 
     for page in tabs:
         page.get_by_role("button", name="Train", exact=True).click()
     sleeper = tabs[1].context.new_cdp_session(tabs[1])
-    tabs[1].get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    tabs[1].get_by_text("64 cars learning at once").wait_for()
     sleeper.send("Page.setWebLifecycleState", {"state": "frozen"})
-    tabs[0].get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    tabs[0].get_by_text("It drives 5 of 5 laps").wait_for()
     sleeper.send("Page.setWebLifecycleState", {"state": "active"})
-    tabs[1].get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    tabs[1].get_by_text("It drives 5 of 5 laps").wait_for()
     for page in tabs:  # both see both
         page.get_by_text("oval-centerline-2", exact=True).wait_for()
         assert models(page) == ["oval-centerline-1", "oval-centerline-2"]
@@ -121,9 +127,7 @@ def test_what_a_full_browser_cannot_keep_is_told_and_stays_until_there_is_room(
     download.value.save_as(archive)
     page.evaluate(FULL)
     page.get_by_label("Bring a model", exact=True).and_(page.locator("input")).set_input_files(archive)
-    page.get_by_text("There is no room left in this browser's storage: download this model now").wait_for(
-        timeout=PATIENCE
-    )
+    page.get_by_text("There is no room left in this browser's storage: download this model now").wait_for()
     page.get_by_role("button", name="Download: oval-centerline-1-1").wait_for()
     page.get_by_label("Theme").select_option("dark")  # which is not remembered
     page.get_by_role("button", name="Draw a track").click()

@@ -41,7 +41,7 @@ SITE = ROOT / "build" / "site"
 AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"]
-PATIENCE = 60_000  # ms
+PATIENCE = 180_000  # ms; the machine may be busy
 THREADS = "crossOriginIsolated ? Math.min(navigator.hardwareConcurrency, 8) : 1"
 FADED = """new Promise(requestAnimationFrame)
   .then(() => document.getAnimations().filter((one) => one instanceof CSSTransition))
@@ -64,14 +64,16 @@ class Files(http.server.SimpleHTTPRequestHandler):
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Page]:
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import expect, sync_playwright
 
+    expect.set_options(timeout=PATIENCE)
     host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE.parent)))
     threading.Thread(target=host.serve_forever, daemon=True).start()
     complaints: list[str] = []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.set_default_timeout(PATIENCE)
         page.add_init_script(FEW_FRAMES)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
@@ -102,7 +104,7 @@ def test_what_a_preset_pays_is_painted_along_the_track(page: Page) -> None:
     from playwright.sync_api import expect
 
     painted = page.get_by_role("img", name=PAINTED)
-    painted.wait_for(timeout=PATIENCE)
+    painted.wait_for()
     before = painted.get_attribute("viewBox")
     train = page.get_by_role("button", name="Train", exact=True)
     page.evaluate(HOLD, "hairpin")
@@ -120,9 +122,10 @@ def test_what_a_preset_pays_is_painted_along_the_track(page: Page) -> None:
 def test_a_car_that_has_learned_drives_until_somebody_trains(page: Page) -> None:
     for track in ("reinvent_2018", "hairpin"):
         page.get_by_role("combobox", name="Track").select_option(track)
-        page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)
+        page.get_by_text("It has learned already").wait_for()
         until_true(page, f"before => {SEEN} !== before", page.evaluate(SEEN))
     still = page.context.browser.new_page(reduced_motion="reduce")
+    still.set_default_timeout(PATIENCE)
     still.goto(page.url)
     still.get_by_text("64 cars wait for you").wait_for()
     still.wait_for_timeout(500)
@@ -136,10 +139,10 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
     page.get_by_role("combobox", name="Track").select_option("oval")
     page.get_by_role("button", name="Delete: 9").click()  # nine actions are left
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text(re.compile("64 cars learning at once")).wait_for(timeout=PATIENCE)
-    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    page.get_by_text(re.compile("64 cars learning at once")).wait_for()
+    page.get_by_text("It drives 5 of 5 laps").wait_for()
     page.get_by_role("button", name="Race it: oval-racing-1").click()
-    expect(page.get_by_label("Ghost")).to_have_value("model:oval-racing-1", timeout=PATIENCE)
+    expect(page.get_by_label("Ghost")).to_have_value("model:oval-racing-1")
     page.get_by_role("button", name="Back").click()
     shown = page.get_by_text(re.compile(r"Paperclip, 5 of 5 laps, best \d+\.\d\d\ss")).inner_text()
     with page.expect_download() as download:
@@ -164,7 +167,7 @@ def test_a_car_learns_in_the_tab_and_drives_the_same_laps_in_the_installed_progr
     for file, name in ((archive, "oval-racing-1-1"), (as_console, RunFolder(imported.run).name)):
         chooser.set_input_files(file)
         brought = page.get_by_label("Your models").locator(".model", has=page.get_by_text(name, exact=True))
-        brought.get_by_text(shown.rsplit(",", 1)[0]).wait_for(timeout=PATIENCE)  # judged anew: the same laps
+        brought.get_by_text(shown.rsplit(",", 1)[0]).wait_for()  # judged anew: the same laps
         brought.get_by_role("button", name="Race it").wait_for()
         brought.get_by_role("button", name="Delete").click()
     chooser.set_input_files(AXE)
@@ -177,7 +180,7 @@ def test_a_models_laps_are_watched_again_corner_by_corner(page: Page) -> None:
     assert best is not None
     page.get_by_role("button", name="Watch its laps: oval-racing-1").click()
     shown = page.get_by_role("dialog")
-    shown.get_by_text(re.compile(rf"^oval-racing-1, Lap \d · {best[1]}$")).wait_for(timeout=PATIENCE)
+    shown.get_by_text(re.compile(rf"^oval-racing-1, Lap \d · {best[1]}$")).wait_for()
     assert shown.get_by_role("region", name="Corners").locator("tbody tr").count() == 2
     eye = shown.get_by_label("What the car sees")
     pixels = "eye => eye.getContext('2d').getImageData(0, 0, eye.width, eye.height).data.join()"
@@ -208,9 +211,9 @@ def test_a_drawn_track_is_trained_on_and_goes_with_its_model(page: Page, tmp_pat
     page.get_by_role("button", name="Change this track").wait_for()
     page.reload()
     page.get_by_role("combobox", name="Track").select_option("mine")
-    page.get_by_role("img", name=PAINTED).wait_for(timeout=PATIENCE)
+    page.get_by_role("img", name=PAINTED).wait_for()
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    page.get_by_text("It drives 5 of 5 laps").wait_for()
     shown = page.get_by_text(re.compile(r"mine, 5 of 5 laps, best \d+\.\d\d\ss")).inner_text()
     files = {}
     for button in ("Download this road", "Download: mine-racing-1"):
@@ -241,11 +244,11 @@ def test_a_training_is_stopped_at_once_and_another_begins(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("generated:4")
     page.get_by_label("What it is paid for").select_option("stay_inside")
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_text("64 cars learning at once").wait_for()
     page.get_by_role("button", name="Stop").click()
     page.get_by_text("Stopped after").wait_for()
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_text("64 cars learning at once").wait_for()
     page.get_by_role("button", name="Stop").click()
 
 
@@ -255,7 +258,7 @@ def test_cars_learn_among_bots_and_a_time_trial_follows(page: Page) -> None:
     page.get_by_label("Bot cars").fill("2")
     assert page.get_by_label("What it is paid for").input_value() == "dodge"
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("128 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_text("128 cars learning at once").wait_for()
     page.get_by_role("button", name="Stop").click()
     page.get_by_role("button", name="Time trial").click()
     assert page.get_by_label("What it is paid for").input_value() == "racing"
@@ -266,7 +269,7 @@ def test_a_model_is_trained_on_with_another_reward(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("oval")
     page.get_by_label("What it is paid for").select_option("centerline")
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    page.get_by_text("It drives 5 of 5 laps").wait_for()
     page.get_by_role("combobox", name="Track").select_option("kidney")
     page.get_by_role("button", name="Train on: oval-centerline-1").click()
     page.get_by_text("Begins with what oval-centerline-1 has learned.").wait_for()
@@ -276,8 +279,8 @@ def test_a_model_is_trained_on_with_another_reward(page: Page) -> None:
     assert page.get_by_role("button", name="Train", exact=True).is_disabled()
     page.get_by_role("button", name="Time trial").click()
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
-    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    page.get_by_text("64 cars learning at once").wait_for()
+    page.get_by_text("It drives 5 of 5 laps").wait_for()
     page.get_by_role("button", name="Train on: oval-racing-1").wait_for()
     page.get_by_role("button", name="Begin anew").click()
 
@@ -285,15 +288,13 @@ def test_a_model_is_trained_on_with_another_reward(page: Page) -> None:
 def test_somebody_drives_a_lap_and_then_against_it(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("straight")
     page.get_by_role("button", name="Drive yourself").click()
-    page.get_by_text("Press ↑ to drive off").wait_for(timeout=PATIENCE)
+    page.get_by_text("Press ↑ to drive off").wait_for()
     page.keyboard.down("ArrowUp")
-    page.get_by_text(re.compile("A new best: ")).first.wait_for(timeout=PATIENCE)
+    page.get_by_text(re.compile("A new best: ")).first.wait_for()
     page.keyboard.up("ArrowUp")
     page.get_by_role("button", name="Back").click()
     page.get_by_role("button", name="Drive yourself").click()
-    page.get_by_label("Ghost").get_by_text(re.compile(r"Your best lap · \d+\.\d\d\ss")).wait_for(
-        state="attached", timeout=PATIENCE
-    )
+    page.get_by_label("Ghost").get_by_text(re.compile(r"Your best lap · \d+\.\d\d\ss")).wait_for(state="attached")
     page.get_by_role("button", name="Back").click()
 
 
@@ -316,30 +317,30 @@ def write(page: Page, source: str) -> None:
 def test_a_reward_of_ones_own_is_checked_and_trains(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("oval")
     write(page, "import numpy\ndef reward_function(params):\n    return params['sped']\n")
-    page.get_by_text("1: 'import numpy' is allowed, but numpy is not installed here.").wait_for(timeout=PATIENCE)
+    page.get_by_text("1: 'import numpy' is allowed, but numpy is not installed here.").wait_for()
     page.get_by_text("the installed program, Racecraft, trains with numpy").wait_for()
     page.get_by_text("3: params has no key 'sped'. Did you mean 'speed'?").wait_for()
     assert page.get_by_role("button", name="Train", exact=True).is_disabled()
     assert page.get_by_role("img", name=PAINTED).count() == 0
     write(page, "#" * 2_000_000)
-    page.get_by_text("The source has 2,000,000 characters").wait_for(timeout=PATIENCE)
+    page.get_by_text("The source has 2,000,000 characters").wait_for()
     write(page, "def reward_function(params):\n    print('seen', params['steps'])\n    return params['speed']\n")
-    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("The function is fine.").wait_for()
     page.get_by_text("seen 95.0").wait_for()  # what it printed when it was tried
     page.get_by_text("least").get_by_text("1", exact=True).wait_for()  # around the 1.5 m/s at which it is painted
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+    page.get_by_text("It drives 5 of 5 laps").wait_for()
 
 
 def test_a_reward_of_ones_own_is_tried_among_the_objects_of_its_race(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("oval")
     write(page, "def reward_function(params):\n    return params['objects_distance'][params['closest_objects'][1]]\n")
-    page.get_by_text("IndexError").wait_for(timeout=PATIENCE)  # on an empty road
+    page.get_by_text("IndexError").wait_for()  # on an empty road
     page.get_by_role("button", name="Object avoidance").click()
-    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("The function is fine.").wait_for()
     page.get_by_text("near an object", exact=True).wait_for()
     page.get_by_text("crash", exact=True).wait_for()
-    page.get_by_text("Dark squares are the boxes and cars").wait_for(timeout=PATIENCE)  # and painted among them
+    page.get_by_text("Dark squares are the boxes and cars").wait_for()  # and painted among them
 
 
 def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Page) -> None:
@@ -354,11 +355,11 @@ def test_a_link_brings_a_reward_that_is_shown_and_runs_when_it_is_taken(page: Pa
     brought = page.get_by_label("This link brings a reward")
     brought.get_by_text("print('from afar')").wait_for()
     page.get_by_role("button", name="Train", exact=True).wait_for()
-    page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)
+    page.get_by_text("It has learned already").wait_for()
     assert len(page.workers) == page.evaluate(THREADS)  # those that have no Python
     assert page.get_by_label("What it is paid for").input_value() == "racing"
     brought.get_by_role("button", name="Take it").click()
-    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("The function is fine.").wait_for()
     page.get_by_text("from afar\n").first.wait_for()
     assert page.get_by_role("combobox", name="Track").input_value() == "hairpin"
     assert "#" not in page.url
@@ -369,20 +370,20 @@ def test_a_replay_is_driven_again_in_the_tab_and_a_changed_number_is_named(page:
     path = write_replay(Replay.of(evaluation), tmp_path / "club.replay")
     chooser = page.get_by_label("Choose a replay", exact=True).and_(page.locator("input"))
     chooser.set_input_files(path)
-    page.get_by_text("Driven: by drfc rules, with the car v5, on Paperclip.").wait_for(timeout=PATIENCE)
+    page.get_by_text("Driven: by drfc rules, with the car v5, on Paperclip.").wait_for()
     page.get_by_text(re.compile(r"All \d+ steps of 2 cars come out the same, bit for bit")).wait_for()
     page.get_by_role("button", name="Watch its laps", exact=True).click()
     shown, best = page.get_by_role("dialog"), min(trial.laps[0].time for trial in evaluation.trials)
-    shown.get_by_text("A replay does not say what its driver was paid for.").wait_for(timeout=PATIENCE)
+    shown.get_by_text("A replay does not say what its driver was paid for.").wait_for()
     shown.get_by_text(re.compile(rf"^club.replay, Lap \d · {best:.2f}\ss$")).wait_for()
     page.get_by_role("button", name="Back").click()
     replay = read_replay(path)
     replay.rewards[1][40] = 0.25
     chooser.set_input_files(write_replay(replay, path))
-    page.get_by_text("Car 2 differs first in step 40 (2.73 s): reward is 0.25 in the file").wait_for(timeout=PATIENCE)
+    page.get_by_text("Car 2 differs first in step 40 (2.73 s): reward is 0.25 in the file").wait_for()
     path.write_bytes(b"none")
     chooser.set_input_files(path)
-    page.get_by_text("This is no replay of Racecraft").wait_for(timeout=PATIENCE)
+    page.get_by_text("This is no replay of Racecraft").wait_for()
 
 
 FAILS_LATE = """calls = 0
@@ -398,45 +399,43 @@ def reward_function(params):
 def test_a_reward_that_raises_late_stops_with_its_line_and_leaves_what_was_judged(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("kidney")
     write(page, FAILS_LATE.format(ending="raise ValueError('enough')"))
-    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("The function is fine.").wait_for()
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("reward_function.py, line 6: the reward function raised ValueError: enough").wait_for(
-        timeout=PATIENCE
-    )
+    page.get_by_text("reward_function.py, line 6: the reward function raised ValueError: enough").wait_for()
     page.get_by_text("The reward function failed after").wait_for()
     page.get_by_role("button", name="Delete: kidney-own-1").wait_for()
 
 
 def test_a_reward_that_hangs_is_ended_and_the_page_goes_on(page: Page) -> None:
     page.reload()
-    page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)  # this car's life is no sign of another's
+    page.get_by_text("It has learned already").wait_for()  # this car's life is no sign of another's
     write(page, FAILS_LATE.format(ending="while True: print('again')"))
-    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("The function is fine.").wait_for()
     page.get_by_role("combobox", name="Track").select_option(
         "kidney"
     )  # so that the text is checked again, while it trains
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("the reward function did not return within 5 s").wait_for(timeout=PATIENCE)
+    page.get_by_text("the reward function did not return within 5 s").wait_for()
     assert page.get_by_role("button", name="Train", exact=True).is_enabled()  # and the check had its turn
     write(page, "def reward_function(params):\n    while True: pass\n")
-    page.get_by_text("1: The reward function did not return within 5 s.").wait_for(timeout=PATIENCE)
+    page.get_by_text("1: The reward function did not return within 5 s.").wait_for()
     write(page, "def reward_function(params):\n    return 1.0\n")
-    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)
+    page.get_by_text("The function is fine.").wait_for()
 
 
 def test_the_page_opens_and_trains_without_a_network_after_the_first_visit(page: Page) -> None:
-    late = "new Promise((_, failed) => setTimeout(() => failed(new Error('no service worker')), 30_000))"
+    late = f"new Promise((_, failed) => setTimeout(() => failed(new Error('no service worker')), {PATIENCE}))"
     page.evaluate(f"Promise.race([navigator.serviceWorker.ready, {late}]).then(() => 0)")
     page.reload()  # what the service worker has kept now comes from it, and has the page alone in its process
     assert page.evaluate("crossOriginIsolated")
     page.context.set_offline(True)
     page.reload()
     page.get_by_label("What it is paid for").select_option("own")
-    page.get_by_text("The function is fine.").wait_for(timeout=PATIENCE)  # Python is kept, too
+    page.get_by_text("The function is fine.").wait_for()  # Python is kept, too
     page.get_by_label("What it is paid for").select_option("racing")
     page.get_by_role("combobox", name="Track").select_option("needle")  # never opened before
     page.get_by_role("button", name="Train", exact=True).click()
-    page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+    page.get_by_text("64 cars learning at once").wait_for()
     if (threads := page.evaluate(THREADS)) > 1:
         page.locator("dl div", has=page.get_by_text("Threads", exact=True)).get_by_text(str(threads)).wait_for()
     page.get_by_role("button", name="Stop").click()
@@ -446,7 +445,7 @@ def test_the_page_opens_and_trains_without_a_network_after_the_first_visit(page:
     page.locator("#search-results").get_by_role("link", name="Evaluation", exact=True).click()
     page.get_by_role("heading", name="Evaluation", exact=True).wait_for()
     page.get_by_role("link", name="Train a car").click()
-    page.get_by_role("button", name="Train", exact=True).wait_for(timeout=PATIENCE)
+    page.get_by_role("button", name="Train", exact=True).wait_for()
     page.context.set_offline(False)
 
 
@@ -459,12 +458,11 @@ def test_the_page_is_accessible_in_both_themes_and_fits_a_phone(page: Page) -> N
         found = page.evaluate("axe.run().then((found) => found.violations.map((one) => [one.id, one.nodes[0].html]))")
         assert found == []
         page.get_by_role("button", name="Draw a track").click()
-        page.get_by_role("dialog").get_by_text("It can be driven.").wait_for(timeout=PATIENCE)
+        page.get_by_role("dialog").get_by_text("It can be driven.").wait_for()
         page.evaluate(FADED)
         inside = "axe.run('dialog').then((found) => found.violations.map((one) => [one.id, one.nodes[0].html]))"
         assert page.evaluate(inside) == []
         page.get_by_role("dialog").get_by_role("button", name="Back").click()
     for width in (390, 768):
         page.set_viewport_size({"width": width, "height": 800})
-        page.wait_for_timeout(300)  # until the chart has followed
-        assert page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") == 0
+        until_true(page, "document.documentElement.scrollWidth === document.documentElement.clientWidth")  # as charts
