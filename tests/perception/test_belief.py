@@ -34,7 +34,7 @@ def test_of_nothing_all_is_straight_and_as_likely_as_not() -> None:
 
 def test_every_number_is_told_in_its_unit_with_its_own_error() -> None:
     outputs = np.zeros((1, NUM_OUTPUTS), np.float32)
-    for name, place in PLACES.items():
+    for place in PLACES.values():
         outputs[0, place] = 0.1 * (place + 1)
         outputs[0, ERRORS.start + place] = np.log(0.01 * (place + 1))
     belief = believe(outputs)

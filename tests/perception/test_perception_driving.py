@@ -69,6 +69,8 @@ def test_it_slows_for_bends_and_where_it_is_not_sure() -> None:
 def test_a_belief_becomes_the_state_that_the_simulator_would_tell() -> None:
     state = dict(zip(STATE_COLUMNS, state_of(belief_of(offset=0.2, heading=0.3, curvature=0.5))[0], strict=True))
     assert state["offset"] == pytest.approx(0.5)
+    narrow = state_of(belief_of(offset=0.03, half_width=0.15))[0]
+    assert narrow[STATE_COLUMNS.index("offset")] == pytest.approx(0.2)
     assert state["sin_heading_error"] == pytest.approx(np.sin(0.3))
     assert state["cos_heading_error"] == pytest.approx(np.cos(0.3))
     assert [state[f"curvature_{i}"] for i in range(8)] == pytest.approx([0, 0, 0, 0.25, 0.5, 0.25, 0, 0])
