@@ -73,6 +73,13 @@ def test_a_quiz_is_told_where_its_score_cannot_be_kept(
     assert outcome.status == 0
     assert "right." in outcome.out
     assert outcome.err == "warning: The score cannot be kept: Not a directory.\n"
+    (tmp_path / "racecraft").mkdir()
+    (tmp_path / "racecraft" / "lessons.json").write_text("{")
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    outcome = racecraft("lessons", "quiz", "1", "-a", letters(1), "--json")
+    assert outcome.document["right"] == outcome.document["of"]
+    assert "The score cannot be kept: " in outcome.err
+    assert "holds no progress that can be read." in outcome.err
 
 
 def test_notebooks_are_made_once(racecraft: Run, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from dataclasses import replace
@@ -184,6 +185,18 @@ def test_damaged_progress_is_told(text: str) -> None:
     path.write_bytes(text.encode("latin-1"))
     with pytest.raises(ConfigError, match="no progress that can be read"):
         read_progress()
+
+
+def test_progress_that_cannot_be_read_is_told() -> None:
+    path = progress_file.progress_path()
+    path.mkdir(parents=True)
+    with pytest.raises(ConfigError, match=r"lessons\.json cannot be read: Is a directory\."):
+        read_progress()
+    path.rmdir()
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(path)
+        with pytest.raises(ConfigError, match="no regular file"):
+            read_progress()
 
 
 def test_an_answer_is_right_even_where_that_cannot_be_kept() -> None:

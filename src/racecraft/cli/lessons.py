@@ -144,8 +144,9 @@ def take_quiz(
     right = sum(question.answer == index for question, index in zip(questions, chosen, strict=True))
     try:
         record_quiz(number, right / len(questions))
-    except OSError as error:  # the answers are told all the same
-        warnings.warn(f"The score cannot be kept: {error.strerror or error}.", stacklevel=2)
+    except (OSError, ConfigError) as error:  # the answers are told all the same
+        why = f"{error.strerror or error}." if isinstance(error, OSError) else str(error)
+        warnings.warn(f"The score cannot be kept: {why}", stacklevel=2)
     if as_json:
         print_json({"lesson": number, "right": right, "of": len(questions)})
     else:

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from racecraft.errors import ConfigError
+from racecraft.json_file import MAX_BYTES, read_bytes
 from racecraft.run.atomic import write_file
 
 
@@ -39,19 +40,24 @@ def read_progress() -> Progress:
     """What was solved so far.
 
     Raises:
-        ConfigError: The file is damaged.
+        ConfigError: The file is damaged, or cannot be read.
     """
     path = progress_path()
-    try:
-        return Progress.model_validate_json(path.read_bytes())
-    except FileNotFoundError:
+    if not os.path.exists(path):  # nor where nobody may look
         return Progress()
-    except (ValidationError, ValueError) as error:
+    try:
+        return Progress.model_validate_json(read_bytes(path, max_bytes=MAX_BYTES))
+    except ValidationError as error:
         raise ConfigError(f"{path} holds no progress that can be read.", hint="Delete it to begin anew.") from error
 
 
 def record_exercise(name: str) -> None:
-    """An exercise is solved."""
+    """An exercise is solved.
+
+    Raises:
+        ConfigError: The file is damaged, or cannot be read.
+        OSError: It cannot be written.
+    """
     progress = read_progress()
     if name not in progress.exercises:
         progress.exercises.add(name)
@@ -59,7 +65,12 @@ def record_exercise(name: str) -> None:
 
 
 def record_quiz(number: int, share: float) -> None:
-    """A lesson's quiz was answered; the best share is kept."""
+    """A lesson's quiz was answered; the best share is kept.
+
+    Raises:
+        ConfigError: The file is damaged, or cannot be read.
+        OSError: It cannot be written.
+    """
     progress = read_progress()
     progress.quizzes[number] = max(share, progress.quizzes.get(number, 0.0))
     _write(progress)
