@@ -79,6 +79,22 @@ def test_a_drfc_folder(tmp_path: Path) -> None:
     assert report["used"] == found.used
 
 
+def test_an_experiment_has_its_model_where_all_others_have_theirs(tmp_path: Path) -> None:
+    of_all = ("data/", "system.env")
+    files = {name if name.startswith(of_all) else f"experiments/e-1/{name}": text for name, text in models.DRFC.items()}
+    folder = models.as_folder(files, tmp_path / "drfc")
+    plain = import_run(models.as_folder(models.DRFC, tmp_path / "plain"), name="plain")
+    found = import_run(folder / "experiments" / "e-1", name="e-1")
+    assert found.used["model/model_1.pb"] == "weights of the policy"
+    assert found.kept == plain.kept
+    with pytest.raises(SourceError, match=r"has no reward_function\.py of its own, but experiments") as caught:
+        import_run(folder)
+    assert "experiments/" in caught.value.hint
+    (folder / "system.env").unlink()
+    alone = import_run(folder, name="alone")
+    assert (alone.used["model/model_1.pb"], alone.kept) == ("weights of the policy", plain.kept)
+
+
 def test_what_only_awss_console_refused_comes_along_with_a_note(tmp_path: Path) -> None:
     limits = {"steering_angle": {"low": -20, "high": 20}, "speed": {"low": 1, "high": 2}}
     wide = {"num_epochs": 2, "batch_size": 1024, "lr": 0.01, "loss_type": "Huber", "exploration_type": "e-greedy"}

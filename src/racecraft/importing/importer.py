@@ -22,7 +22,9 @@ from racecraft.importing.env_file import EnvFile, parse_env
 from racecraft.importing.history import History, keep_history
 from racecraft.importing.job import job_settings
 from racecraft.importing.layout import (
+    BUCKET,
     CUSTOM_FILES,
+    EXPERIMENTS,
     HYPERPARAMETERS,
     METADATA,
     PLACES,
@@ -55,8 +57,6 @@ from racecraft.training.start import require_trainable, write_run
 
 ORIGINAL: Final = "original"
 """Folder of a run for what came with it."""
-BUCKET: Final = "data/minio/bucket"
-"""Where deepracer-for-cloud's own storage keeps models."""
 _WORLD: Final = re.compile(r"[A-Za-z0-9_-]{1,100}")
 _ALIKE: Final = ("reinvent_base", "reinvent_carpet", "reinvent_concrete", "reinvent_wood")  # the route of 2018
 
@@ -238,7 +238,7 @@ def _find_weights(model: _Model, checkpoint: str, network: str) -> ModelFiles | 
         return None
     drfc = model.drfc
     if drfc is not None and drfc.pretrained and not find_models(names):
-        other = f"{model.root}{BUCKET}/{drfc.pretrained}/"
+        other = f"{_bucket(model)}{drfc.pretrained}/"
         names = [name for name in model.source.files if name.startswith(other) and role(name) == "weights"]
         model.is_pretrained = True
         checkpoint = drfc.pretrained_checkpoint if checkpoint == BEST else checkpoint
@@ -296,6 +296,11 @@ def _read_reward(model: _Model, reward: str | Path) -> str:
         text = load_reward(TIME_TRIAL.reward)
         model.notes.append(f"There is no {REWARD}: should it be trained, then with the preset {TIME_TRIAL.reward!r}.")
     elif not name:
+        if any(file.startswith(f"{model.root}{EXPERIMENTS}/") for file in model.source.files):
+            raise SourceError(
+                f"{model.source.title} has no {REWARD} of its own, but experiments.",
+                hint=f"Import the folder of one of them, which is in {EXPERIMENTS}/.",
+            )
         raise SourceError(
             f"{model.source.title} has no {REWARD}, without which nothing can be trained.",
             hint="Give one with --reward: a file, or a preset such as centerline; 'racecraft reward list' lists them.",
@@ -413,7 +418,12 @@ def _history_root(model: _Model) -> str:
     """The folder that the history's paths are kept below."""
     if model.drfc is None:
         return model.root
-    return f"{model.root}{BUCKET}/{model.drfc.prefix or 'rl-deepracer-sagemaker'}/"
+    return f"{_bucket(model)}{model.drfc.prefix or 'rl-deepracer-sagemaker'}/"
+
+
+def _bucket(model: _Model) -> str:
+    """Where models are; an experiment has none of its own."""
+    return re.sub(rf"(^|/){EXPERIMENTS}/[^/]+/$", r"\1", model.root) + f"{BUCKET}/"
 
 
 def _history_files(model: _Model) -> list[SourceFile]:

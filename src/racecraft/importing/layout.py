@@ -22,6 +22,10 @@ TRAINING_PARAMS: Final = "training_params.yaml"
 RUN_ENV: Final = "run.env"
 SYSTEM_ENV: Final = "system.env"
 CUSTOM_FILES: Final = "custom_files"
+EXPERIMENTS: Final = "experiments"
+"""Folder of deepracer-for-cloud for run.env and the custom files of one experiment each."""
+BUCKET: Final = "data/minio/bucket"
+"""Where deepracer-for-cloud's own storage keeps models, those of experiments as well."""
 RUN: Final = "run.json"
 """In an archive of Racecraft's own."""
 
@@ -39,7 +43,7 @@ _MARKS: Final = sorted({place for places in PLACES.values() for place in places}
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}")
 _BOOKKEEPING: Final = (".coach_checkpoint", "checkpoint", "deepracer_checkpoints.json", ".ready", ".lock", ".finished")
 _WEIGHTS: Final = re.compile(r".*\.(ckpt\..*|ckpt|index|meta|data-\d+-of-\d+|pb|pbtxt|h5|tflite|onnx|pt|pth)")
-_FOLDERS_OF_OTHERS: Final = ("defaults", "data", "experiments")  # of deepracer-for-cloud, beside the model's own files
+_FOLDERS_OF_OTHERS: Final = ("defaults", "data", EXPERIMENTS)  # of deepracer-for-cloud, beside the model's own files
 
 
 def role(name: str) -> Role:

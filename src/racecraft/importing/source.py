@@ -17,7 +17,18 @@ from typing import Final
 from racecraft.errors import ConfigError, SourceError
 from racecraft.importing.archive import DEFAULT_LIMITS, read_archive
 from racecraft.importing.archive_guard import CHUNK, Limits
-from racecraft.importing.layout import HYPERPARAMETERS, METADATA, PLACES, REWARD, TRAINING_PARAMS, Role, is_plain, role
+from racecraft.importing.layout import (
+    BUCKET,
+    EXPERIMENTS,
+    HYPERPARAMETERS,
+    METADATA,
+    PLACES,
+    REWARD,
+    TRAINING_PARAMS,
+    Role,
+    is_plain,
+    role,
+)
 from racecraft.json_file import read_text
 
 MAX_FILES: Final = 100_000
@@ -107,6 +118,9 @@ def _folder(root: Path) -> Source:
     files: dict[str, SourceFile] = {}
     num_links = 0
     waiting = [(root, "", 0)]
+    place = root.resolve()
+    if place.parent.name == EXPERIMENTS and (bucket := place.parent.parent / BUCKET).is_dir():
+        waiting.append((bucket, f"{BUCKET}/", 0))  # an experiment's models lie where all others do
     while waiting:
         folder, prefix, depth = waiting.pop()
         try:
@@ -127,7 +141,7 @@ def _folder(root: Path) -> Source:
             raise SourceError(
                 f"{root} holds more than {MAX_FILES:,} files.", hint="Import the folder of one model, not of many."
             )
-    return Source(f"folder {root.name or root}", root.resolve().name, files, num_links)
+    return Source(f"folder {root.name or root}", place.name, files, num_links)
 
 
 def _single(path: Path) -> Source:
