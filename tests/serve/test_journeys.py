@@ -36,16 +36,34 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
         assert visit.complaints == []
 
 
-def press(page: Any, name: str) -> None:
-    """Go to what is called so by the Tab key, and press it, once it is there."""
-    page.get_by_role("button", name=name).or_(page.get_by_role("link", name=name)).first.wait_for()
+NAME_OF_WHERE_ONE_IS = """(() => {
+  const here = document.activeElement;
+  return here.getAttribute("aria-label") || here.labels?.[0]?.innerText.trim() || here.textContent.trim();
+})()"""
+
+
+def reach(page: Any, name: str) -> None:
+    """Go to what is called so by the Tab key, once it is there."""
+    there = page.get_by_role("button", name=name).or_(page.get_by_role("link", name=name))
+    there.or_(page.get_by_role("spinbutton", name=name)).first.wait_for()
     for _ in range(120):
         page.keyboard.press("Tab")
-        called = "document.activeElement.getAttribute('aria-label') || document.activeElement.textContent.trim()"
-        if page.evaluate(called) == name:
-            page.keyboard.press("Enter")
+        if page.evaluate(NAME_OF_WHERE_ONE_IS) == name:
             return
     raise AssertionError(f"The Tab key does not come by {name!r}.")
+
+
+def press(page: Any, name: str) -> None:
+    """A button or a link."""
+    reach(page, name)
+    page.keyboard.press("Enter")
+
+
+def write(page: Any, name: str, text: str) -> None:
+    """Into a field, instead of what is there."""
+    reach(page, name)
+    page.keyboard.press("ControlOrMeta+a")
+    page.keyboard.type(text)
 
 
 def trained(visit: Visit) -> dict[str, Any]:
@@ -66,7 +84,8 @@ def test_a_pupil_trains_a_car_by_keyboard_alone(visit: Visit) -> None:
     assert card["best_lap"] is not None
     press(page, "Evaluate it against the clock")
     page.wait_for_url("**/race")
-    page.get_by_label("Trials").wait_for()
+    write(page, "Laps", "1")
+    write(page, "Trials", "1")
     press(page, "Start an evaluation")
     page.get_by_role("link", name="As a picture").wait_for()
     with page.expect_download() as sent:
