@@ -25,6 +25,16 @@ describe("curves", () => {
     expect(curves.last!.step).toBeGreaterThan(19990);
   });
 
+  it("keep both ends however many come at once", () => {
+    for (const many of [4000, 4001, 4002, 9001, 20000]) {
+      const curves = new Curves();
+      curves.add(Array.from({ length: many }, (_, step) => iteration(step)));
+      expect(curves.iterations.length).toBeLessThanOrEqual(4000);
+      expect(curves.iterations.length).toBeGreaterThan(1999);
+      expect([curves.iterations[0]!.step, curves.last!.step]).toEqual([0, many - 1]);
+    }
+  });
+
   it("keep few evaluations and notes, the best among them", () => {
     const curves = new Curves();
     for (let step = 1; step <= 9000; step++) {

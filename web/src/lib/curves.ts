@@ -24,11 +24,8 @@ export class Curves {
       while (list.length && list[list.length - 1]!.step >= point.step && point.kind !== "note") list.pop();
       list.push(point);
     }
-    if (this.iterations.length > MAX_POINTS) this.iterations = this.iterations.filter((_, index) => index % 2 === 0);
-    if (this.evaluations.length > MAX_POINTS) {
-      const best = this.best;
-      this.evaluations = this.evaluations.filter((point, index) => index % 2 === 0 || point === best);
-    }
+    if (this.iterations.length > MAX_POINTS) this.iterations = thinned(this.iterations);
+    if (this.evaluations.length > MAX_POINTS) this.evaluations = thinned(this.evaluations, this.best);
     if (this.notes.length > MAX_NOTES) this.notes.splice(0, this.notes.length - MAX_NOTES);
   }
 
@@ -40,6 +37,16 @@ export class Curves {
   get best(): Point | undefined {
     return this.evaluations.findLast((point) => point["is_best"] === true);
   }
+}
+
+/** No more than are drawn; both ends stay, and one that is not to be missed. */
+function thinned(points: Point[], best?: Point): Point[] {
+  let found = points;
+  while (found.length > MAX_POINTS) {
+    const last = found.length - 1;
+    found = found.filter((point, index) => index === 0 || (last - index) % 2 === 0 || point === best);
+  }
+  return found;
 }
 
 export const completionOf = (evaluation: Point): number => {

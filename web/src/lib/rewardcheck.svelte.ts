@@ -9,6 +9,7 @@ export class RewardCheck {
   #of = $state<string | undefined>();
   #found = $state.raw<RewardVerdict | undefined>();
   #timer: ReturnType<typeof setTimeout> | undefined;
+  #asked = 0; // questions so far: of the same text about two tracks, the later one counts, whichever is answered first
   readonly #answer: typeof api.checkReward;
 
   /** `answer`: who is asked, the server or whoever knows as much. */
@@ -39,8 +40,9 @@ export class RewardCheck {
   ask(text: string, track: string, tried: Tried = {}): void {
     this.#text = text;
     clearTimeout(this.#timer);
+    const number = ++this.#asked;
     if (!text) return;
-    this.#timer = setTimeout(() => void this.#check(text, track, tried), PAUSE);
+    this.#timer = setTimeout(() => void this.#check(number, text, track, tried), PAUSE);
   }
 
   /** What the server said when the text was to be trained with. */
@@ -50,14 +52,14 @@ export class RewardCheck {
     [this.#of, this.#found] = [text, { ok: false, problems: [mistake], situations: [], painting: null, laps: [] }];
   }
 
-  async #check(text: string, track: string, tried: Tried) {
+  async #check(number: number, text: string, track: string, tried: Tried) {
     let answer: RewardVerdict | undefined;
     try {
       answer = await this.#answer(text, track, tried);
     } catch (error) {
-      if (error instanceof Problem && text === this.#text) this.refuse(text, error);
+      if (error instanceof Problem && number === this.#asked) this.refuse(text, error);
       return;
     }
-    if (text === this.#text) [this.#of, this.#found] = [text, answer];
+    if (number === this.#asked) [this.#of, this.#found] = [text, answer];
   }
 }

@@ -1,0 +1,37 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { RewardCheck } from "../src/lib/rewardcheck.svelte";
+import type { RewardVerdict } from "../src/api/client";
+
+const verdict = (track: string): RewardVerdict =>
+  ({ ok: true, problems: [], situations: [{ name: track }], painting: null, laps: [] }) as unknown as RewardVerdict;
+
+beforeEach(() => void vi.useFakeTimers());
+afterEach(() => void vi.useRealTimers());
+
+test("of one text about two tracks the later question counts, whichever is answered first", async () => {
+  const answers = new Map<string, () => void>();
+  const check = new RewardCheck(
+    (_, track) => new Promise((resolve) => answers.set(track, () => resolve(verdict(track)))),
+  );
+  check.ask("return 1.0", "oval");
+  await vi.advanceTimersByTimeAsync(500);
+  check.ask("return 1.0", "kidney");
+  await vi.advanceTimersByTimeAsync(500);
+  answers.get("kidney")!();
+  await vi.advanceTimersByTimeAsync(0);
+  expect(check.verdict).toEqual(verdict("kidney"));
+  answers.get("oval")!();
+  await vi.advanceTimersByTimeAsync(0);
+  expect(check.verdict).toEqual(verdict("kidney"));
+});
+
+test("an answer about an earlier text does not count", async () => {
+  let answer = () => {};
+  const check = new RewardCheck((_, track) => new Promise((resolve) => (answer = () => resolve(verdict(track)))));
+  check.ask("return 1.0", "oval");
+  await vi.advanceTimersByTimeAsync(500);
+  check.ask("return 2.0", "oval");
+  answer();
+  await vi.advanceTimersByTimeAsync(0);
+  expect([check.verdict, check.isChecking]).toEqual([undefined, true]);
+});
