@@ -88,8 +88,11 @@ def test_beyond_what_is_told_an_expected_error_only_goes_back() -> None:
 
 def test_a_full_store_forgets_pictures_at_random_and_no_other() -> None:
     rng, store = np.random.default_rng(4), Store(64, (2,))
+    store.put(np.full((3, 2), 7, np.uint8), np.ones((3, NUM_TARGETS), np.float32), rng=rng)
+    assert (store.draw(100, rng=rng)[0] == 7).all()  # of one that is not full only what it has
+    store = Store(64, (2,))
     for number in range(0, 64 * 16, 48):
-        marks = np.arange(number, number + 48, dtype=np.float32)
+        marks = np.arange(number, number + 48, dtype=np.float32) + 1.0
         store.put(
             np.stack([marks % 256, marks // 256], axis=1).astype(np.uint8),
             np.repeat(marks[:, None], NUM_TARGETS, 1),
