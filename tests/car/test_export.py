@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import io
 import json
+import shutil
 import sys
 import tarfile
 from dataclasses import replace
@@ -128,6 +129,24 @@ def test_the_file_alone_drives_the_laps_of_its_run_to_the_bit(seed: int, tmp_pat
     assert same(driven(GraphDriver(archive), seed=seed), own)
     assert same(driven(read_exported(archive), seed=seed), own)
     assert own.best_lap == driven(GraphDriver(archive), seed=seed).best_lap
+
+
+@pytest.mark.parametrize(
+    ("name", "archive"),
+    [("v1.2", "v1-2.tar.gz"), ("alt und größer", "alt-und-gr--er.tar.gz"), ("x" * 70, "x" * 64 + ".tar.gz")],
+)
+def test_a_run_of_any_name_has_an_archive_that_a_car_takes(run: Path, tmp_path: Path, name: str, archive: str) -> None:
+    named = tmp_path / name
+    shutil.copytree(run, named)
+    assert export_run(named).file == named / archive
+
+
+def test_the_run_that_somebody_works_in_has_its_folder_s_name(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(run, tmp_path / "mine")
+    monkeypatch.chdir(tmp_path / "mine")
+    assert export_run(".").file == Path("mine.tar.gz")
 
 
 WRONG = {

@@ -25,7 +25,7 @@ _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 def archive_name(run: str) -> str:
     """A file name for a run's archive that a car takes as it is."""
-    return run.replace(".", "-") + ENDING
+    return (re.sub(r"[^A-Za-z0-9_-]", "-", run)[:64] or "model") + ENDING
 
 
 def check_archive_name(path: Path) -> None:

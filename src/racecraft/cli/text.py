@@ -111,7 +111,7 @@ def say_imported(result: ImportedRun) -> None:
 def say_evaluated(outcome: RunEvaluation) -> None:
     """Every trial, the summary, and what was written."""
     console, evaluation = Console(), outcome.evaluation
-    table = _table(title=f"{outcome.run.name} on {evaluation.track.name}")
+    table = _table(title=f"{outcome.run.absolute().name} on {evaluation.track.name}")
     has_objects = evaluation.conditions.objects.count > 0
     crashes = ("crashes",) if has_objects else ()
     table.collapse_padding = has_objects  # or a terminal of 80 characters has no room for its figures
@@ -224,7 +224,7 @@ def say_limit(name: str, limit: TrackLimit) -> None:
 
 def say_generalized(outcome: RunGeneralization) -> None:
     """A line for each track, the sum, and where the table is."""
-    say_laps(outcome.generalization, title=f"{outcome.run.name} after {outcome.step:,} camera steps")
+    say_laps(outcome.generalization, title=f"{outcome.run.absolute().name} after {outcome.step:,} camera steps")
     _say(Console(), "  table        ", (str(outcome.path), "bold"))
 
 

@@ -131,8 +131,8 @@ class RunFolder:
 
     @property
     def name(self) -> str:
-        """The folder's name."""
-        return self.path.name
+        """The folder's name, also of the one that somebody works in."""
+        return self.path.absolute().name
 
     @property
     def reward_function(self) -> Path:
