@@ -17,10 +17,10 @@ from racecraft.serve.jobs.queue import JobQueue
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.people.people import add_person
 from racecraft.serve.problems import Conflict
-from racecraft.serve.settings import OWNER, STATE_FOLDER
+from racecraft.serve.settings import OWNER, STATE_FOLDER, TUNINGS
 from racecraft.serve.store.database import Database
 from racecraft.serve.tuning.schemas import KeepTrial
-from racecraft.serve.tuning.tunings import FOLDER, Tunings
+from racecraft.serve.tuning.tunings import Tunings
 from racecraft.tuning import Tuning, start_tuning
 
 TUNING = "0123456789abcdef"
@@ -37,7 +37,7 @@ class Bench:
         queue, mirror = JobQueue(database, user_id=user), None
         search = ["BORDER_LOSS", "learning_rate", "update_epochs"]
         self.folder = start_tuning(
-            "oval", reward="racing", search=search, root=state / FOLDER, name=TUNING, ppo=PPOConfig(num_envs=8)
+            "oval", reward="racing", search=search, root=state / TUNINGS, name=TUNING, ppo=PPOConfig(num_envs=8)
         )
         tuning = Tuning(self.folder)
         shutil.copytree(tuning.plan.start(root=root / "spare", name=f"of-{user}").path, runs / "model")

@@ -20,12 +20,11 @@ from racecraft.serve.jobs.queue import KINDS, JobQueue
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.people.people import add_person
 from racecraft.serve.problems import Conflict
-from racecraft.serve.settings import STATE_FOLDER
+from racecraft.serve.settings import STATE_FOLDER, TUNINGS
 from racecraft.serve.store.artifacts import RUNS, Artifacts, Copy
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
 from racecraft.serve.tuning.tasks import tune
-from racecraft.serve.tuning.tunings import FOLDER
 from racecraft.serve.workers.leases import Lease
 from racecraft.serve.workers.parcels import Key, Parcels
 from racecraft.training import Until
@@ -151,15 +150,15 @@ def test_what_a_search_is_about_is_not_changed_by_who_makes_it(desk: Desk) -> No
     settled = ("tuning.json", "reward_function.py", "model_metadata.json")
     for name in settled:
         (folder / name).write_text('{"foreign": true}')
-    desk.store.shelf(FOLDER).keep(RunFolder(folder))
+    desk.store.shelf(TUNINGS).keep(RunFolder(folder))
     job = desk.take("tune", tuning=TUNING)
     for name in settled:
         for change in (b'{"foreign": false}', None):
-            assert desk.refuses(job, FOLDER, TUNING, {name: change}) == f"A job does not change {name}."
+            assert desk.refuses(job, TUNINGS, TUNING, {name: change}) == f"A job does not change {name}."
     trial = "trial-0000"
     made: dict[str, bytes | None] = {"result.json": b"{}", f"{trial}/run.json": b"{}", "study.sqlite": b"SQLite"}
-    desk.send(job, FOLDER, TUNING, {**made, f"{trial}/reward_function.py": OTHER.encode()})
-    desk.send(job, FOLDER, TUNING, {"result.json": b'{"trials": []}', "study.sqlite": b"SQLite 2"})
+    desk.send(job, TUNINGS, TUNING, {**made, f"{trial}/reward_function.py": OTHER.encode()})
+    desk.send(job, TUNINGS, TUNING, {"result.json": b'{"trials": []}', "study.sqlite": b"SQLite 2"})
 
 
 def test_ghosts_of_a_heat_are_those_that_were_asked_for(desk: Desk) -> None:
@@ -183,7 +182,7 @@ def test_a_guests_search_is_made_as_a_guests_whatever_its_folder_says(
     pytest.importorskip("optuna")
     from racecraft.tuning import Tuning, start_tuning
 
-    root = desk.runs / STATE_FOLDER / FOLDER
+    root = desk.runs / STATE_FOLDER / TUNINGS
     folder = start_tuning("oval", reward="racing", search=["BORDER_LOSS"], root=root, name=TUNING)
     assert json.loads((folder / "tuning.json").read_text())["foreign"] is False
     found: list[bool] = []

@@ -119,8 +119,14 @@ def test_without_a_server_nobody_waits(standby: Standby) -> None:
 
 @pytest.mark.costly
 def test_a_worker_does_not_load_the_server() -> None:
-    said = "import sys; from racecraft.serve.jobs.worker import load; load(); sys.exit('fastapi' in sys.modules)"
-    subprocess.run([sys.executable, "-c", said], check=True)
+    said = """
+import sys
+from racecraft.serve.jobs.worker import load
+load()
+print(sorted(name for name in sys.modules if name == "fastapi" or name.endswith(".schemas")))
+"""
+    done = subprocess.run([sys.executable, "-c", said], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"
 
 
 @pytest.mark.costly

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Final
 
 from fastapi import Depends, Request
+from fastapi.concurrency import run_in_threadpool
 
 from racecraft.serve.audit.audit import Audit
 from racecraft.serve.comments.comments import Comments
@@ -166,14 +167,20 @@ def _console(owner: Context, user_id: int) -> Context:
     )
 
 
-def _consoles(request: Request) -> Consoles:
+# What nearly every route is given takes the request alone, as each step on the way to it is built for each route when
+# the server starts, and does not wait: what may wait runs in a thread, which costs more than it does.
+async def _consoles(request: Request) -> Consoles:
     consoles: Consoles = request.app.state.consoles
     return consoles
 
 
-def _user(request: Request) -> int:
+async def _user(request: Request) -> int:
     user: int = request.state.user_id
     return user
+
+
+def _asked(request: Request) -> tuple[Consoles, int]:
+    return request.app.state.consoles, request.state.user_id
 
 
 InConsoles = Annotated[Consoles, Depends(_consoles)]
@@ -183,18 +190,21 @@ InUser = Annotated[int, Depends(_user)]
 """A route's parameter of this type is given the id of who asks."""
 
 
-def _context(request: Request, consoles: InConsoles, user: InUser) -> Context:
+async def _context(request: Request) -> Context:
     """The console of who asks; with ``?of=NUMBER`` an organiser looks, and only looks, at that of a group's member."""
-    of = request.query_params.get("of")
+    (consoles, user), of = _asked(request), request.query_params.get("of")
     if of is None or not consoles.owner.settings.league:
         return consoles.of(user)
     member = int(of) if of.isascii() and of.isdigit() and len(of) < 10 else 0
-    if request.method not in SAFE or not (member == user or consoles.groups.may_look(user, member)):
+    if request.method not in SAFE or not (
+        member == user or await run_in_threadpool(consoles.groups.may_look, user, member)
+    ):
         raise NotFound(f"There is nobody with the number {of[:10]} whom you may look at.")
     return consoles.of(member)
 
 
-def _league(consoles: InConsoles) -> Consoles:
+async def _league(request: Request) -> Consoles:
+    consoles: Consoles = request.app.state.consoles
     if not consoles.owner.settings.league:
         raise NotFound("This console is one person's; accounts begin with racecraft serve --league.")
     return consoles
@@ -204,11 +214,12 @@ InLeague = Annotated[Consoles, Depends(_league)]
 """The same, only in a league."""
 
 
-def _person(consoles: InLeague, user: InUser) -> Person:
-    return consoles.people.get(user)
+def _person(request: Request, consoles: InLeague) -> Person:
+    return consoles.people.get(request.state.user_id)
 
 
-def _admin(consoles: InConsoles, user: InUser) -> None:
+def _admin(request: Request) -> None:
+    consoles, user = _asked(request)
     if consoles.people.get(user).role != "admin":
         raise NotFound("Only whoever holds the league sees this.")
 
@@ -217,7 +228,8 @@ OnlyAdmin = Depends(_admin)
 """A route with this dependency exists for admins only; alone at the console everybody is one."""
 
 
-async def _takes_turn(consoles: InConsoles, user: InUser) -> AsyncIterator[None]:
+async def _takes_turn(request: Request) -> AsyncIterator[None]:
+    consoles, user = _asked(request)
     async with consoles.quotas.turn(user):
         yield
 
@@ -226,19 +238,23 @@ TakesTurn = Depends(_takes_turn)
 """A route with this dependency waits until earlier ones of those who share a quota are done, so that it holds."""
 
 
-def _makes_model(consoles: InConsoles, user: InUser, turn: Annotated[None, TakesTurn]) -> None:
+def _makes_model(request: Request, turn: Annotated[None, TakesTurn]) -> None:
+    consoles, user = _asked(request)
     consoles.quotas.require(user, "models")
 
 
-def _takes_place(consoles: InConsoles, user: InUser, turn: Annotated[None, TakesTurn]) -> None:
+def _takes_place(request: Request, turn: Annotated[None, TakesTurn]) -> None:
+    consoles, user = _asked(request)
     consoles.quotas.require(user, "places")
 
 
-def _trains(consoles: InConsoles, user: InUser, turn: Annotated[None, TakesTurn]) -> None:
+def _trains(request: Request, turn: Annotated[None, TakesTurn]) -> None:
+    consoles, user = _asked(request)
     consoles.quotas.require(user, "places", "minutes")
 
 
-async def _computes(consoles: InConsoles, user: InUser) -> AsyncIterator[None]:
+async def _computes(request: Request) -> AsyncIterator[None]:
+    consoles, user = _asked(request)
     async with consoles.desks.place(user):
         yield
 

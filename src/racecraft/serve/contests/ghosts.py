@@ -24,14 +24,14 @@ from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder, list_runs
 from racecraft.run.atomic import write_file
 from racecraft.serve.contests.files import BESIDE, entry_name, ghost_file
-from racecraft.serve.contests.schemas import EvaluatedCard
 from racecraft.serve.problems import Conflict, NotFound
-from racecraft.serve.races.schemas import ReplayGhost
 from racecraft.track import Track
 
 if TYPE_CHECKING:
     from racecraft.film.ghost import Ghost
     from racecraft.race.recording import Recording
+    from racecraft.serve.contests.schemas import EvaluatedCard
+    from racecraft.serve.races.schemas import ReplayGhost
     from racecraft.sim.views import CarView
 
 NEWEST: Final = 20
@@ -74,6 +74,8 @@ def _card(folder: RunFolder, stamp: str, track: Track) -> EvaluatedCard | None:
         return None
     if summary.get("track") != track.name or summary.get("track_digest", track.digest) != track.digest:
         return None
+    from racecraft.serve.contests.schemas import EvaluatedCard  # jobs do without messages
+
     best = summary.get("best_lap_seconds")
     return EvaluatedCard(
         model=folder.name, evaluation=stamp, best_lap=float(best) if isinstance(best, int | float) else None
@@ -167,6 +169,8 @@ def read_beside(folder: Path) -> list[ReplayGhost]:
     path = folder / BESIDE
     if not path.is_file():
         return []
+    from racecraft.serve.races.schemas import ReplayGhost  # as above
+
     return [ReplayGhost(**ghost) for ghost in read_json_object(path, max_bytes=MAX_BESIDE)["ghosts"]]
 
 

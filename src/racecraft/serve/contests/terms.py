@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from racecraft.contest.terms import TOGETHER
 from racecraft.race.rules import RaceRules
-from racecraft.serve.contests.schemas import NewHeat, NewLadder
 from racecraft.serve.races.rules import rules_of
-from racecraft.serve.road import road_objects
 from racecraft.sim.objects import Objects
+
+if TYPE_CHECKING:  # jobs do without messages
+    from racecraft.serve.contests.schemas import NewHeat, NewLadder
 
 RACES: Final = {"none": "time-trial", "boxes": "object-avoidance", "bots": "head-to-bot"}
 """Kind of race by what is on the road."""
@@ -38,6 +39,9 @@ def settle(request: NewHeat | NewLadder) -> Terms:
     Raises:
         ConfigError: A setting does not go with the others.
     """
+    from racecraft.serve.contests.schemas import NewHeat
+    from racecraft.serve.road import road_objects
+
     rules, race = rules_of(request, laps=request.laps), RACES[request.objects or "none"]
     if isinstance(request, NewHeat) or request.kind in TOGETHER:
         rules = replace(rules, is_continuous=True)  # as `shared_road` holds it
@@ -50,6 +54,8 @@ def terms_of(payload: Mapping[str, Any]) -> Terms:
     """What the job of a heat or a ladder is held by; of one from before that was kept, what its request says."""
     if kept := payload.get("terms"):
         return Terms(rules=RaceRules.from_dict(kept["rules"]), objects=Objects.from_dict(kept["objects"]))
+    from racecraft.serve.contests.schemas import NewHeat, NewLadder
+
     kind: type[NewHeat] | type[NewLadder] = NewLadder if "schedule" in payload else NewHeat
     said = {name: value for name, value in payload.items() if name in kind.model_fields}
     return settle(kind.model_validate({"time_limit": 0.0, **said}))

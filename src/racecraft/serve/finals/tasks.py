@@ -22,7 +22,7 @@ from racecraft.contest.finals import FinalTerms, duel_result, final_places, plan
 from racecraft.errors import RunError
 from racecraft.race.announcement import Announcement
 from racecraft.serve.jobs.task import Task
-from racecraft.serve.races.races import announcement_of
+from racecraft.serve.races.state import announcement_of
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.tables import Duel, Finalist, Race, now
 from racecraft.serve.submissions.finalists import duels_of, finalists_of

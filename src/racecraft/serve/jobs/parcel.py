@@ -1,7 +1,7 @@
 """Several small files in one request, as a question to a server costs more than they do.
 
-A line of JSON holds the key and the bytes of each, ``[["runs/NAME/SHA256", 549], ["runs/NAME.json", 3120]]``; then comes
-their content, one after the other.
+A line of JSON holds the key and the bytes of each, ``[["runs/NAME/SHA256", 549], ["runs/NAME.json", 3120]]``; then
+comes their content, one after the other.
 """
 
 from __future__ import annotations

@@ -34,10 +34,12 @@ from racecraft.serve.races.schemas import (
     RaceCard,
     RaceChange,
     RaceDetail,
-    RaceState,
     Undecided,
 )
 from racecraft.serve.races.standings import Entered, key_of, score_of, standings_of
+from racecraft.serve.races.state import announcement_of as announcement_of
+from racecraft.serve.races.state import is_withheld as is_withheld
+from racecraft.serve.races.state import state_of as state_of
 from racecraft.serve.road import road_objects
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
@@ -340,29 +342,9 @@ def _terms(request: NewRace, track: Track, final: FinalTerms | None, rules: Race
     )
 
 
-def announcement_of(race: Race) -> Announcement:
-    """A race as it was made, with its secret."""
-    return Announcement(document=race.document, commitment=race.commitment, secret=race.secret)
-
-
 def _is_told(race: Race) -> bool:
     """Whether it is over for good: driven under the old rules, or everybody may know its secret."""
     return not race.commitment or (bool(race.secret) and state_of(race) == "closed")
-
-
-def is_withheld(race: Race) -> bool:
-    """Whether nobody may see yet where it starts."""
-    return bool(race.secret) and state_of(race) != "closed"
-
-
-def state_of(race: Race) -> RaceState:
-    """Whether a race can be entered now."""
-    moment = now()
-    if not race.commitment:
-        return "closed"  # nobody can enter what was driven under the old rules
-    if moment < race.opens:
-        return "upcoming"
-    return "closed" if race.closes is not None and moment >= race.closes else "open"
 
 
 def _card(race: Race, entries: list[Entered]) -> dict[str, Any]:

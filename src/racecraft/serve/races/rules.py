@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any, Final, get_args
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 from racecraft.race.rules import RaceRules, race_rules
-from racecraft.serve.races.schemas import RaceSettings, RuleSet
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
+
+if TYPE_CHECKING:  # jobs do without messages
+    from racecraft.serve.races.schemas import RaceSettings, RuleSet
 
 CHOSEN: Final = ("max_resets", "offtrack_penalty", "collision_penalty", "time_limit", "direction")
 """Rules that whoever holds a race may choose one by one, besides the laps; the others are the set's."""
@@ -27,8 +29,11 @@ def rules_of(asked: RaceSettings, *, laps: int | None) -> RaceRules:
 
 def rule_sets() -> list[RuleSet]:
     """All that a race can be held by, the usual one first."""
-    names = get_args(RaceSettings.model_fields["rules"].annotation)
-    return [RuleSet(name=name, **_shown(race_rules(name, {}))) for name in names]
+    from racecraft.serve.races.schemas import RaceSettings, RuleSet
+
+    names, told = get_args(RaceSettings.model_fields["rules"].annotation), RuleSet.model_fields
+    rules = {name: race_rules(name, {}).to_dict() for name in names}
+    return [RuleSet(name=name, **{key: rules[name][key] for key in rules[name] if key in told}) for name in names]
 
 
 def randomization_name(ranges: Mapping[str, Any]) -> str:
@@ -37,7 +42,3 @@ def randomization_name(ranges: Mapping[str, Any]) -> str:
         if {field: list(ends) for field, ends in asdict(preset).items()} == {key: list(v) for key, v in ranges.items()}:
             return name
     return ""
-
-
-def _shown(rules: RaceRules) -> dict[str, Any]:
-    return {name: value for name, value in rules.to_dict().items() if name in RuleSet.model_fields}

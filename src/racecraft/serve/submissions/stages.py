@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from racecraft.contest.finals import FinalTerms
 from racecraft.errors import ConfigError
 from racecraft.serve.problems import Conflict, NotFound
-from racecraft.serve.races.races import state_of
+from racecraft.serve.races.state import state_of
 from racecraft.serve.store.tables import Job, Race, Submission
-from racecraft.serve.submissions.schemas import NewLeagueRace
+
+if TYPE_CHECKING:  # jobs do without messages
+    from racecraft.serve.submissions.schemas import NewLeagueRace
 
 
 def final_of(race: Race) -> FinalTerms | None:

@@ -21,7 +21,7 @@ from sqlalchemy.orm import Session
 from racecraft.errors import RunError
 from racecraft.race.announcement import Announcement
 from racecraft.serve.jobs.task import Task
-from racecraft.serve.races.races import announcement_of
+from racecraft.serve.races.state import announcement_of
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.tables import Race, Submission, now
 from racecraft.serve.submissions.bench import Bench, clear

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from racecraft.serve.jobs.task import Task
-from racecraft.serve.settings import OWNER, STATE_FOLDER
-from racecraft.serve.tuning.tunings import FOLDER
+from racecraft.serve.settings import OWNER, STATE_FOLDER, TUNINGS
 
 
 def tune(task: Task) -> dict[str, Any]:
@@ -18,7 +17,7 @@ def tune(task: Task) -> dict[str, Any]:
     from racecraft.tuning import Tuning
 
     payload = task.job.payload
-    folder = task.runs / STATE_FOLDER / FOLDER / payload["tuning"]
+    folder = task.runs / STATE_FOLDER / TUNINGS / payload["tuning"]
     # the folder may come from another machine, which is not believed whose reward function it is
     tuning = Tuning(folder, foreign=task.job.user_id != OWNER, parents=task.runs)
     task.on_stop(tuning.stop)

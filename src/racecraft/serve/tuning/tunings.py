@@ -24,6 +24,7 @@ from racecraft.serve.live.cars import NAME as LIVE
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.settings import TUNINGS
 from racecraft.serve.store.tables import Job
 from racecraft.serve.tuning.schemas import KeepTrial, NewTuning, TunableNumber, TuningCard, TuningTrial
 from racecraft.training.start import read_settings
@@ -31,7 +32,6 @@ from racecraft.training.start import read_settings
 if TYPE_CHECKING:
     from racecraft.tuning import Parameter
 
-FOLDER: Final = "tunings"  # inside the state folder
 _ID: Final = re.compile(r"[0-9a-f]{16}")
 _WHERE: Final = re.compile(r"^.*/(?=model_metadata\.json: )")
 """Where a file of the model lies, which is nobody's business."""
@@ -52,7 +52,7 @@ class Tunings:
         self, state: Path, queue: JobQueue, garage: Garage, *, mirror: Mirror, see: Callable[[Job], Job]
     ) -> None:
         self._see = see
-        self._folder, self._queue, self._garage, self._mirror = state / FOLDER, queue, garage, mirror
+        self._folder, self._queue, self._garage, self._mirror = state / TUNINGS, queue, garage, mirror
 
     def space(self, name: str) -> list[TunableNumber]:
         """Everything that may be searched of a model.
