@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
-from running_consoles import running_console
+from running_consoles import LEISURELY, running_console
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, MAX_LOSSES, JobQueue, kinds_of
@@ -249,13 +249,13 @@ def test_a_killed_server_and_a_killed_worker_lose_nothing(runs: Path) -> None:
 @pytest.mark.slow
 def test_a_stopped_server_hands_its_training_to_the_next(runs: Path) -> None:
     with running_console(runs) as console:
-        name = console.create(name="patient", until="20000 steps")
+        name = console.create(name="patient", until="4000 steps", reward=LEISURELY)  # 8 s
         console.wait_for(lambda: console.client.get(f"/api/models/{name}/history").json()["points"])
     with running_console(runs) as console:
         job = console.client.get("/api/jobs").json()[0]
         ended = console.wait_for(console.job_ended(job["id"]))
         assert ended["state"] == "done"
-        assert ended["result"]["steps"] >= 20_000
+        assert ended["result"]["steps"] >= 4000
         assert ended["attempts"] == 2
 
 
