@@ -109,6 +109,21 @@ def test_what_kills_its_process_again_and_again_is_given_up(tmp_path: Path, monk
     assert set(map(str, told.values())) == {"It ended."}
 
 
+def test_what_nobody_expects_ends_the_sweep_and_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[str] = []
+
+    class Unlucky(seats.HereSeat):
+        def run(self, order: Order) -> Report:
+            tried.append(Path(order.run).name)
+            raise BlockingIOError(11, "Resource temporarily unavailable")  # of a system that begins no more processes
+
+    monkeypatch.setattr(sweep_module, "HereSeat", Unlucky)
+    sweep = make_sweep(read_sweep(FILE), runs=tmp_path, name="s")
+    with pytest.raises(BlockingIOError, match="temporarily unavailable"):
+        sweep.train(processes=1)
+    assert tried == ["s-plain-1"]
+
+
 def test_a_sweep_that_cannot_be_made_leaves_no_run(tmp_path: Path) -> None:
     reward = tmp_path / "mine.py"
     reward.write_text("def reward_function(params):\n    return params['sped']\n")

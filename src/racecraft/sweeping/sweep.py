@@ -16,7 +16,8 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -43,8 +44,11 @@ MAX_BYTES: Final = 1 << 22
 
 def sweep_names(runs: Path) -> list[str]:
     """The sweeps of a folder of runs, newest first."""
-    files = sorted((runs / FOLDER).glob("*.json"), key=lambda path: path.stat().st_mtime_ns, reverse=True)
-    return [path.stem for path in files]
+    ages: dict[str, int] = {}
+    for path in sorted((runs / FOLDER).glob("*.json")):
+        with suppress(FileNotFoundError):  # removed meanwhile
+            ages[path.stem] = path.stat().st_mtime_ns
+    return sorted(ages, key=ages.__getitem__, reverse=True)
 
 
 def make_sweep(plan: SweepPlan, *, runs: str | Path = "runs", name: str | None = None) -> Sweep:
@@ -169,10 +173,7 @@ class Sweep:
             RunError: It is being trained already.
         """
         check_whole("processes", processes, 0, 256)
-        waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
         names = [name for name in self.names() if (self.runs / name / "run.json").is_file()]
-        for name in names:
-            waiting.put(name)
         count = max(1, min(processes or num_cores(), len(names)))
         if cluster:
             from racecraft.tuning.cluster import cluster_seats
@@ -180,14 +181,12 @@ class Sweep:
             self._seats = cluster_seats(cluster, min(processes or len(names), len(names)))
         else:
             self._seats = [HereSeat()] if count == 1 else [ProcessSeat() for _ in range(count)]
-        threads = max(1, num_cores() // count)
+        call = _Call(num_threads=max(1, num_cores() // count), on_end=on_end)
+        for name in names:
+            call.waiting.put(name)
         lock = exclusive_lock(self.file.with_suffix(".lock"), of=f"Sweep {self.name!r}")
-        losses: Counter[str] = Counter()
         with lock, interruptible(self._stop, self.stop):
-            workers = [
-                threading.Thread(target=self._work, args=(seat, waiting, threads, losses, on_end), daemon=True)
-                for seat in self._seats
-            ]
+            workers = [threading.Thread(target=self._work, args=(seat, call), daemon=True) for seat in self._seats]
             for worker in workers:
                 worker.start()
             try:
@@ -197,6 +196,8 @@ class Sweep:
             finally:
                 for seat in self._seats:
                     seat.close()
+        if call.failures:
+            raise call.failures[0]
         return self._stop.is_set()
 
     def stop(self) -> None:
@@ -205,36 +206,51 @@ class Sweep:
         for seat in self._seats:
             seat.stop()
 
-    def _work(
-        self,
-        seat: Seat,
-        waiting: queue.SimpleQueue[str],
-        num_threads: int,
-        losses: Counter[str],
-        on_end: Callable[[str, Report | Exception], None],
-    ) -> None:
-        while not self._stop.is_set():
-            try:
-                name = waiting.get_nowait()
-            except queue.Empty:
-                return
-            order = Order(
-                run=str((self.runs / name).resolve()),
-                goal="laps",
-                trial_steps=1,
-                is_checked=False,  # it may have been edited
-                num_threads=num_threads,
-            )
-            try:
-                on_end(name, seat.run(order))
-            except SeatLost as error:
-                losses[name] += 1
-                if not self._stop.is_set() and losses[name] < MAX_LOSSES:
-                    waiting.put(name)
-                elif not self._stop.is_set():
-                    on_end(name, error)
-            except RacecraftError as error:
-                on_end(name, error)
+    def _work(self, seat: Seat, call: _Call) -> None:
+        """Train one waiting run after the other at a seat."""
+        try:
+            while not self._stop.is_set():
+                self._train_next(seat, call)
+        except queue.Empty:
+            return
+        except BaseException as error:  # told to who waits for it
+            call.failures.append(error)
+            self.stop()
+
+    def _train_next(self, seat: Seat, call: _Call) -> None:
+        name = call.waiting.get_nowait()
+        order = Order(
+            run=str((self.runs / name).resolve()),
+            goal="laps",
+            trial_steps=1,
+            is_checked=False,  # it may have been edited
+            num_threads=call.num_threads,
+        )
+        try:
+            call.on_end(name, seat.run(order))
+        except SeatLost as error:
+            call.losses[name] += 1
+            if not self._stop.is_set() and call.losses[name] < MAX_LOSSES:
+                call.waiting.put(name)
+            elif not self._stop.is_set():
+                call.on_end(name, error)
+        except RacecraftError as error:
+            call.on_end(name, error)
+
+
+@dataclass
+class _Call:
+    """What one call of `Sweep.train` has under way."""
+
+    num_threads: int
+    """Of each training."""
+    on_end: Callable[[str, Report | Exception], None]
+    waiting: queue.SimpleQueue[str] = field(default_factory=queue.SimpleQueue)
+    """Names of the runs that are not given to a seat."""
+    losses: Counter[str] = field(default_factory=Counter)
+    """How often what made a run died."""
+    failures: list[BaseException] = field(default_factory=list)
+    """What ends the whole of it, the first one first."""
 
 
 def _run(sweep: str, setting: str, seed: int) -> str:
