@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "network_sparse.hpp"
 #include "network_sums.hpp"
 
 namespace racecraft::RC_ISA {
@@ -21,28 +22,6 @@ constexpr int kTileRows = 4;  // 8 of 16
 constexpr int kLaneCount = FloatLanes::kCount;
 constexpr size_t kSegment =
     256;  // inputs of a long run taken at once: 32 KB of weights, the size of an L1 cache
-
-#define RC_EACH_SUM                                          \
-    _Pragma("GCC unroll 16") for (int r = 0; r < kRows; ++r) \
-        _Pragma("GCC unroll 2") for (int v = 0; v < kVectors; ++v)
-
-// Calls add(arithmetic, sums) with the fastest arithmetic that is exact: what it adds to depends on it alone.
-template <int kRows, int kVectors, typename Add>
-[[gnu::always_inline]] inline void sum_up(FloatLanes (&sums)[kRows][kVectors],
-                                          [[maybe_unused]] bool fits_doubled, const Add& add) {
-#if defined(RC_HAS_DOUBLES)
-    if (fits_doubled) {
-        DoubledSums doubled;
-        DoubledSums::Lanes wide[kRows][kVectors];
-        RC_EACH_SUM wide[r][v] = doubled.lanes(sums[r][v]);
-        add(doubled, wide);
-        RC_EACH_SUM sums[r][v] = doubled.floats(wide[r][v]);
-        return;
-    }
-#endif
-    FusedSums fused;
-    add(fused, sums);
-}
 
 // sums[r] += rows[r][i] * weights[i], for i in [0, length).
 template <int kRows, int kVectors, typename Sums>
@@ -348,6 +327,12 @@ void layer_input_gradient(const LayerShape& shape, const float* transposed, cons
     std::fill_n(grad_in, samples * shape.in_size, 0.0f);
     const bool fits_doubled = fits_doubled_sums({grad_out, samples * shape.out_size(), 0, 1},
                                                 {transposed, shape.num_weights(), 0, 1}, {});
+#if defined(RC_HAS_SPARSE_GRADIENTS)
+    for (size_t i = 0; i < samples && has_sparse_input_gradient(shape); ++i)
+        sparse_input_gradient(shape, transposed, grad_out + i * shape.out_size(), fits_doubled,
+                              grad_in + i * shape.in_size);
+    if (has_sparse_input_gradient(shape)) return;
+#endif
     for (size_t run = 0; run < static_cast<size_t>(shape.num_runs); ++run) {
         for (size_t first = 0; first < static_cast<size_t>(shape.run_length); first += kPanel)
             input_gradient_panel(shape, run, first, transposed, grad_out, samples, grad_in, fits_doubled);
@@ -385,6 +370,21 @@ void layer_weight_gradient(const LayerShape& shape, int panel, size_t first, siz
     const bool fits_doubled = fits_doubled_sums(
         inputs, {grad_out + first_channel, width, channels, samples * shape.num_positions()},
         {panel_rows + first * width, (last - first) * width, 0, 1});
+#if defined(RC_HAS_SPARSE_GRADIENTS)
+    if (has_sparse_weight_gradient(shape, first, last)) {
+        Cursor cursor{shape};
+        const size_t all = samples * shape.num_positions(), most = kListed / width;
+        for (size_t begin = 0; begin < all; begin += most) {
+            const size_t count = std::min(most, all - begin);
+            uint32_t offsets[kListedRows];
+            for (size_t p = 0; p < count; ++p)
+                offsets[p] = static_cast<uint32_t>(cursor.next() * sizeof(float));
+            sparse_weight_gradient(shape, first, last, in, grad_out + begin * channels + first_channel,
+                                   offsets, count, fits_doubled, width, panel_rows);
+        }
+        return;
+    }
+#endif
     for (size_t run = first / length; run * length < last; ++run) {
         const size_t from = std::max(first, run * length) - run * length;
         const size_t to = std::min(last, (run + 1) * length) - run * length;

@@ -3,7 +3,7 @@
 // Every sum is one chain of fused multiply-adds in a fixed order: over the inputs of a position (forward),
 // over the outputs that a position has (input gradient, then positions in order), over positions in order
 // (weight gradient). Neither vector width nor tile size nor the number of threads changes that order, hence
-// no result.
+// no result. Nor does it matter that products with a gradient of 0 may be left out (network_sparse.hpp).
 #pragma once
 
 #include "dispatch.hpp"

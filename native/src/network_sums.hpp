@@ -23,7 +23,7 @@ struct FusedSums {
     // sums[v] += x * w[v]
     template <int kVectors>
     RC_HD void add_products(Lanes x, const Lanes (&w)[kVectors], Lanes (&sums)[kVectors]) {
-#pragma GCC unroll 2
+#pragma GCC unroll 8
         for (int v = 0; v < kVectors; ++v) sums[v] = fused_multiply_add(x, w[v], sums[v]);
     }
 };
@@ -43,7 +43,7 @@ struct DoubledSums {
     template <int kVectors>
     [[gnu::always_inline]] inline void add_products(Lanes x, const Lanes (&w)[kVectors],
                                                     Lanes (&sums)[kVectors]) {
-#pragma GCC unroll 2
+#pragma GCC unroll 8
         for (int v = 0; v < kVectors; ++v) {
             const Doubles low = add(x.low, w[v].low, sums[v].low);
             const Doubles high = add(x.high, w[v].high, sums[v].high);
@@ -74,7 +74,7 @@ struct DoubledSums {
 struct ExactSums : DoubledSums {
     template <int kVectors>
     RC_HD void add_products(Lanes x, const Lanes (&w)[kVectors], Lanes (&sums)[kVectors]) {
-#pragma GCC unroll 2
+#pragma GCC unroll 8
         for (int v = 0; v < kVectors; ++v) sums[v] = widen(fused_multiply_add(x, w[v], sums[v]));
     }
 };
@@ -125,7 +125,7 @@ template <typename Lanes, int kRows, int kVectors>
 RC_HD void copy_sums(Lanes (&to)[kRows][kVectors], const Lanes (&from)[kRows][kVectors]) {
 #pragma GCC unroll 16
     for (int r = 0; r < kRows; ++r)
-#pragma GCC unroll 2
+#pragma GCC unroll 8
         for (int v = 0; v < kVectors; ++v) to[r][v] = from[r][v];
 }
 
@@ -152,6 +152,28 @@ template <typename Sums, int kRows, int kVectors, typename Steps>
         }
 #endif
     }
+}
+
+#define RC_EACH_SUM                                          \
+    _Pragma("GCC unroll 16") for (int r = 0; r < kRows; ++r) \
+        _Pragma("GCC unroll 8") for (int v = 0; v < kVectors; ++v)
+
+// Calls add(arithmetic, sums) with the fastest arithmetic that is exact: what it adds to depends on it alone.
+template <int kRows, int kVectors, typename Add>
+[[gnu::always_inline]] inline void sum_up(FloatLanes (&sums)[kRows][kVectors],
+                                          [[maybe_unused]] bool fits_doubled, const Add& add) {
+#if defined(RC_HAS_DOUBLES)
+    if (fits_doubled) {
+        DoubledSums doubled;
+        DoubledSums::Lanes wide[kRows][kVectors];
+        RC_EACH_SUM wide[r][v] = doubled.lanes(sums[r][v]);
+        add(doubled, wide);
+        RC_EACH_SUM sums[r][v] = doubled.floats(wide[r][v]);
+        return;
+    }
+#endif
+    FusedSums fused;
+    add(fused, sums);
 }
 
 }  // namespace

@@ -414,6 +414,20 @@ TEST(the_same_bits_on_every_instruction_set) {
     set_isa(isa_name(before));
 }
 
+// Shaped like the default network: whole panels of inputs, and more positions of eight samples than a list
+// holds.
+TEST(the_same_bits_with_and_without_products_with_zero) {
+    const NetworkSpec spec{40, 48, 1, 4, {{10, 8, 4}, {20, 4, 2}, {32, 2, 1}}, {40}, 3, true, 5, {33}};
+    const Isa before = current_isa();
+    set_isa("portable");
+    const std::vector<float> expected = after_two_steps(spec, 1);
+    for (const Isa isa : available_isas()) {
+        set_isa(isa_name(isa));
+        CHECK(same_floats(after_two_steps(spec, 1), expected));
+    }
+    set_isa(isa_name(before));
+}
+
 // Equal for every compiler, optimisation level and CPU. A change here changes what every training ends in.
 constexpr uint64_t kGoldenHash = 11652473390277607315u;
 

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from racecraft.learn import PPO, NetworkSpec, PPOConfig
 from racecraft.learn.flat_weights import join_weights
 from racecraft.learn.learner import Weights, below
 from racecraft.learn.native_learner import NativeLearner
+from racecraft.learn.networks import ARCHITECTURES, Architecture, Conv
 from racecraft.sim import CameraSpec, Simulation, Start
 from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import ROW_COLUMNS, STATE_COLUMNS
@@ -57,7 +59,15 @@ AWS = PPOConfig(
     is_eps_hat=True,
     normalize_returns=False,
 )
-TRAININGS = {"plain": (PLAIN, "default"), "aws": (AWS, "default"), "continuous": (PLAIN, "continuous")}
+SMALL, NARROW = "RACECRAFT_SMALL", "NARROW"
+TRAININGS = {
+    "plain": (PLAIN, "default", SMALL),
+    "aws": (AWS, "default", SMALL),
+    "continuous": (PLAIN, "continuous", SMALL),
+    "narrow": (PLAIN, "default", NARROW),
+}
+OVERLAPPING = Architecture((Conv(16, 8, 4), Conv(16, 2, 1), Conv(20, 4, 2)), (128,), pool=2, sky=0.2)
+"""Of NARROW: neighbours in a row share inputs of one panel, which no network of ours has."""
 
 
 def digest(*arrays: NDArray[Any]) -> str:
@@ -127,10 +137,10 @@ class Road:
 
 def trained(name: str, pay: Pay = near_the_middle) -> tuple[dict[str, Any], dict[str, Any]]:
     """Two iterations of a training, and what the native core learned."""
-    config, actions = TRAININGS[name]
+    config, actions, network = TRAININGS[name]
     space = action_space(actions)
     is_discrete = space.kind == "discrete"
-    spec = NetworkSpec(num_actions=space.size, state_size=len(STATE_COLUMNS), is_discrete=is_discrete)
+    spec = NetworkSpec(num_actions=space.size, state_size=len(STATE_COLUMNS), is_discrete=is_discrete, name=network)
     shape = (CameraSpec(), Start(spread=True), config.num_envs, "forward")
     track = load_track("reinvent_2018")
     learner = NativeLearner(spec, seed=SEED, num_threads=1)
@@ -183,7 +193,8 @@ def broken_lines() -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def expected() -> list[tuple[dict[str, Any], Any]]:
-    return [*driven(), *(trained(name) for name in TRAININGS)]
+    with patch.dict(ARCHITECTURES, {NARROW: OVERLAPPING}):
+        return [*driven(), *(trained(name) for name in TRAININGS)]
 
 
 @pytest.fixture(scope="module", params=BUILDS)
