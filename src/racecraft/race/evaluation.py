@@ -40,7 +40,7 @@ _STATUS, _PROGRESS, _TIME = (ROW_COLUMNS.index(name) for name in ("status", "pro
 _LAP_COMPLETE = STATUS_NAMES.index("lap_complete")
 
 Driver = Callable[[NDArray[Any]], NDArray[np.float32]]
-"""From what N cars see to commands (N, 2), without chance: a `racecraft.race.policy.Policy`, or a state's."""
+"""From what N cars see to commands (N, 2), without chance: a `racecraft.race.policy.NetworkPolicy`, or a state's."""
 
 
 @runtime_checkable

@@ -66,7 +66,7 @@ def told_track(arrays: dict[str, Any]) -> dict[str, Any]:
 
 
 def told_road(track: Track) -> dict[str, Any]:
-    """What web/src/tab/verify/road.ts asks of a track in both directions, computed here: to the bit as a marshal's."""
+    """What web/src/tab/road.ts asks of a track in both directions, computed here: to the bit as a marshal's."""
     sides = (track, track.reversed())
     return {
         "arcs": packed(np.stack([side.arc_length for side in sides])),

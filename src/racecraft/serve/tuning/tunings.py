@@ -1,4 +1,4 @@
-"""Searches for better numbers of a model: folders beside the models; racecraft.serve.tuning_tasks fills them.
+"""Searches for better numbers of a model: folders beside the models; `racecraft.serve.tuning.tasks` fills them.
 
 runs/.racecraft/tunings/<id>/   what `racecraft tune` makes, too; a trial is a run folder
 """
