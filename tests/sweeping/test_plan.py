@@ -57,7 +57,7 @@ def test_what_varies_makes_every_combination() -> None:
     assert len(plan.settings) == 8
     assert plan.settings[-1].plan.settings.critic == "lap"
     assert plan.settings[-1].plan.settings.ppo.gamma == 0.95
-    assert [setting.name for setting in read_sweep("").settings] == ["plain"]
+    assert [setting.name for setting in read_sweep("seeds = [1]").settings] == ["plain"]
 
 
 FIVE = ("gamma", "learning_rate", "update_epochs", "clip_coef", "gae_lambda")
@@ -67,6 +67,8 @@ FIVE = ("gamma", "learning_rate", "update_epochs", "clip_coef", "gae_lambda")
     ("text", "says"),
     [
         ("seeds = ", "not TOML"),
+        ("", "says nothing"),
+        ("# a note\n", "says nothing"),
         ('seeds = "5..1"', "seeds is '5..1'"),
         ("seeds = [1, 1]", "seeds is"),
         ("seeds = [1.5]", "seeds"),

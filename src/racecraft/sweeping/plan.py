@@ -151,6 +151,8 @@ def _parsed(text: str) -> dict[str, Any]:
         raise ConfigError("The sweep is nested too deeply to be read.") from error
     except ValueError as error:  # among them a number of thousands of digits
         raise ConfigError(f"The sweep is not TOML: {error}.") from error
+    if not document:  # such as a file that another program is still writing
+        raise ConfigError("The sweep says nothing.", hint="[settings.plain] alone is a setting.")
     return document
 
 
