@@ -5,22 +5,18 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-import sqlalchemy as sa
+from full_consoles import full
 from running_consoles import RunningConsole
 
 from racecraft.race.rules import RaceRules
 from racecraft.replay import read_replay, verify
 from racecraft.serve.contests import ghosts
 from racecraft.serve.contests.terms import terms_of
-from racecraft.serve.settings import ServeSettings
-from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Job
 from racecraft.sim.objects import Bots, Objects, Obstacles
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.vehicle import PRESETS as VEHICLES
@@ -45,21 +41,6 @@ def over(console: RunningConsole, contest: str) -> Callable[[], Any]:
         return found if found["state"] == "done" else None
 
     return ended
-
-
-@contextmanager
-def busy(console: RunningConsole) -> Iterator[None]:
-    """The only place for such jobs is taken: none begins."""
-    database = Database(f"sqlite:///{console.runs / '.racecraft' / 'console.db'}")
-    home = ServeSettings(runs=console.runs).machine
-    with database.transaction() as session:
-        session.add(Job(id="busy", kind="store", run="", state="running", owner="nobody", machine=home))
-    try:
-        yield
-    finally:
-        with database.transaction() as session:
-            session.execute(sa.delete(Job).where(Job.id == "busy"))
-        database.close()
 
 
 def by_car(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -255,7 +236,7 @@ def test_a_heat_may_start_where_a_secret_says(
     console: RunningConsole, cars: list[dict[str, str]], tmp_path: Path
 ) -> None:
     asked = {"models": cars, "track": "oval", "secret": True, "max_resets": 1}
-    with busy(console):
+    with full(console, "store"):
         told = console.client.post("/api/contests/heats", json=asked).json()
         assert (len(told["commitment"]), told["secret"], told["seed"]) == (64, "", None)
         file = console.runs / ".racecraft" / "contests" / told["id"] / "race.replay"

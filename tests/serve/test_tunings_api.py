@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from full_consoles import full
 from running_consoles import RunningConsole
 
 pytest.importorskip("optuna")
@@ -63,12 +64,13 @@ def test_a_search_tells_what_of_the_models_files_has_no_effect(console: RunningC
 def test_a_search_whose_best_trial_becomes_a_model(console: RunningConsole, model: str) -> None:
     client, path = console.client, f"/api/models/{model}/tunings"
     search = [{"name": "BONUS", "low": 1, "high": 4}, GAMMA]
-    job = client.post(path, json={"search": search, "trials": 2, "trial_steps": 2000, "minutes": 5})
-    assert job.status_code == 202, job.text
-    card = client.get(path).json()[0]
-    assert card["job"] == job.json()["id"]
-    refused(client.delete(f"{path}/{card['id']}"), 409, "under way")
-    refused(client.post(f"{path}/{card['id']}/keep", json={}), 404, "yet")
+    with full(console, "train"):
+        job = client.post(path, json={"search": search, "trials": 2, "trial_steps": 2000, "minutes": 5})
+        assert job.status_code == 202, job.text
+        card = client.get(path).json()[0]
+        assert card["job"] == job.json()["id"]
+        refused(client.delete(f"{path}/{card['id']}"), 409, "under way")
+        refused(client.post(f"{path}/{card['id']}/keep", json={}), 404, "yet")
     ended = console.wait_for(console.job_ended(card["job"]))
     assert ended["state"] == "done", ended
     assert ended["result"]["trials"] == 2
