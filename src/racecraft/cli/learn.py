@@ -73,9 +73,10 @@ def learn(
     film = None
     if watch and learned.reason != "interrupted":
         from racecraft.classic.film import film_learned
+        from racecraft.classic.saved import FILM
 
         assert learned.run is not None
-        film = film_learned(learned.lesson, learned.policy, learned.run / "film.mp4")
+        film = film_learned(learned.lesson, learned.policy, learned.run / FILM)
     if as_json:
         print_json({**learned.to_dict(), **({"film": str(film)} if film is not None else {})})
     else:
@@ -88,10 +89,11 @@ def _film_saved(run: Path, *, as_json: bool) -> None:
     """Film what a run has learned; it learns nothing more."""
     from racecraft import classic
     from racecraft.classic.film import film_learned
+    from racecraft.classic.saved import FILM
     from racecraft.cli import learn_text
 
     lesson, policy = classic.recall(run)
-    film = film_learned(lesson, policy, run / "film.mp4")
+    film = film_learned(lesson, policy, run / FILM)
     if as_json:
         print_json({"run": str(run), "film": str(film)})
     else:

@@ -33,8 +33,6 @@ class NativeStateLearner(NativeLearner):
         ConfigError: The state has no column.
     """
 
-    observation_dtype = np.float32
-
     def __init__(self, spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0) -> None:
         super().__init__(replace(spec, name=networks.TEACHER), seed=seed, num_threads=num_threads)
 
