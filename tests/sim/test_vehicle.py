@@ -86,6 +86,11 @@ def test_a_folder_and_bytes_are_no_vehicle_files(tmp_path):
             load_vehicle(path)
 
 
+def test_a_file_that_cannot_be_written(tmp_path):
+    with pytest.raises(ConfigError, match=r"nowhere/v\.json cannot be written: No such file"):
+        load_vehicle("v5").save(tmp_path / "nowhere" / "v.json")
+
+
 def test_a_misspelt_preset_is_recognised():
     with pytest.raises(ConfigError) as caught:
         load_vehicle("v55")

@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -82,6 +83,16 @@ def test_a_misspelt_name_is_answered_with_the_right_one() -> None:
     assert "reinvent_2018" in error.value.hint
     with pytest.raises(TrackNotFound):
         course("nothing like it")
+
+
+def test_a_folder_is_no_track(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(TrackNotFound, match="'mine' is a folder; here one track is wanted"):
+        load_track("mine")
+    for name in ("x" * 5000, "a\0b"):
+        with pytest.raises(TrackNotFound, match="does not exist"):
+            load_track(name)
 
 
 def test_corners_without_room_are_refused() -> None:

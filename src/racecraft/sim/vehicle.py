@@ -74,8 +74,15 @@ class Vehicle:
         return [float(getattr(self, field.name)) for field in fields(self)]
 
     def save(self, path: str | Path) -> None:
-        """Write a vehicle file that `load_vehicle` reads."""
-        Path(path).write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+        """Write a vehicle file that `load_vehicle` reads.
+
+        Raises:
+            ConfigError: It cannot be written.
+        """
+        try:
+            Path(path).write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 LIMITS: Final[dict[str, tuple[float, float]]] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from racecraft.errors import TrackNotFound, did_you_mean
@@ -40,5 +41,7 @@ def load_track(name_or_path: str | Path) -> Track:
     path = Path(name)
     if path.suffix.lower() in {".npy", ".csv"} or len(path.parts) > 1:
         return read_track(place_of(path))
+    if os.path.isdir(name):  # False of names too long for one, too
+        raise TrackNotFound(f"{name[:80]!r} is a folder; here one track is wanted.", hint="Name a file in it.")
     hint = f"{did_you_mean(name, track_names())} List all with 'racecraft tracks'.".strip()
     raise TrackNotFound(f"Track {name[:80]!r} does not exist.", hint=hint)
