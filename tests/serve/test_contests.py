@@ -13,6 +13,7 @@ import pytest
 from full_consoles import full
 from running_consoles import RunningConsole
 
+from racecraft.errors import ConfigError
 from racecraft.race.rules import RaceRules
 from racecraft.replay import read_replay, verify
 from racecraft.serve.contests import ghosts
@@ -413,6 +414,14 @@ def test_a_model_learns_against_itself_or_against_others(console: RunningConsole
     assert "head-to-head" in alone.json()["error"]["message"]
     nobody = console.client.post("/api/models", json={**wanted, "opponents": ["nobody"]})
     assert nobody.status_code == 404
+
+
+@pytest.mark.parametrize("text", ["{}", '{"ghosts": 3}', '{"ghosts": [3]}', '{"ghosts": [{"name": "a"}]}', "{"])
+def test_a_damaged_file_of_ghosts_is_told(tmp_path: Path, text: str) -> None:
+    assert ghosts.read_beside(tmp_path) == []
+    (tmp_path / "ghosts.json").write_text(text)
+    with pytest.raises(ConfigError, match=r"ghosts\.json"):
+        ghosts.read_beside(tmp_path)
 
 
 def test_a_full_garage_lists_the_newest_evaluations(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -171,7 +171,11 @@ def read_beside(folder: Path) -> list[ReplayGhost]:
         return []
     from racecraft.serve.races.schemas import ReplayGhost  # as above
 
-    return [ReplayGhost(**ghost) for ghost in read_json_object(path, max_bytes=MAX_BESIDE)["ghosts"]]
+    document = read_json_object(path, max_bytes=MAX_BESIDE)
+    try:
+        return [ReplayGhost(**ghost) for ghost in document["ghosts"]]
+    except (KeyError, TypeError, ValueError) as error:
+        raise ConfigError("ghosts.json of the heat is damaged.", hint="Start the heat again.") from error
 
 
 def _whole(view: CarView | None) -> list[int]:
