@@ -130,6 +130,17 @@ print(sorted(name for name in sys.modules if name == "fastapi" or name.endswith(
 
 
 @pytest.mark.costly
+def test_a_console_starts_without_what_few_of_its_pages_need() -> None:
+    said = """
+import sys
+from racecraft.serve import serve
+print([name for name in ("fidelity", "sweeping", "tuning") if f"racecraft.{name}" in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", said], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.costly
 def test_a_worker_that_waited_has_all_that_a_training_needs(tmp_path: Path) -> None:
     run = train("oval", until="1 steps", num_envs=2, num_threads=1, root=tmp_path, name="calm").run
     said = f"""

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.fidelity.logs import Faults, Log, read_logs
-from racecraft.fidelity.rules import TrackRules
 from racecraft.reward.worker import RewardWorker, Rows
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.track import Track
+
+if TYPE_CHECKING:
+    from racecraft.fidelity.logs import Log
 
 MAX_LAPS: Final = 6
 FIRST: Final = 2
@@ -64,6 +65,9 @@ def pay_laps(
         RewardError: The function fails.
         RunError: The trace cannot be read.
     """
+    from racecraft.fidelity.logs import Faults, read_logs  # which a console's start does without
+    from racecraft.fidelity.rules import TrackRules
+
     rules = TrackRules(track)
     found: list[PaidLap] = []
     with RewardWorker(source, track, timeout_s=timeout_s, foreign=foreign) as worker:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.reward import load_preset, preset_names
@@ -17,7 +17,9 @@ from racecraft.serve.sweeps.schemas import NewSweep, SweepCard, SweepDetail, Swe
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.vehicle import PRESETS as VEHICLES
-from racecraft.sweeping import Sweep, make_sweep, read_sweep, sweep_names
+
+if TYPE_CHECKING:  # a console's start does without
+    from racecraft.sweeping import Sweep
 
 State = Literal["waiting", "queued", "running", "done", "stopped", "failed"]
 MAX_RUNS: Final = 200
@@ -57,6 +59,8 @@ class Sweeps:
             RacecraftError: It is none, or a setting cannot be trained.
             Conflict: There are too many, or the name is taken.
         """
+        from racecraft.sweeping import make_sweep, read_sweep, sweep_names
+
         runs, names = self._garage.runs, sweep_names(self._garage.runs)
         if request.name in names:
             raise Conflict(f"There is a sweep {request.name!r} already.", hint="Choose another name.")
@@ -93,6 +97,8 @@ class Sweeps:
 
     def cards(self) -> list[SweepCard]:
         """All of them, newest first; a damaged one is left out."""
+        from racecraft.sweeping import Sweep, sweep_names
+
         found = []
         for name in sweep_names(self._garage.runs):
             try:
@@ -126,6 +132,8 @@ class Sweeps:
         return SweepDetail(**self._card(sweep, jobs).model_dump(), places=places, runs=runs, notes=list(sweep.notes))
 
     def _sweep(self, name: str) -> Sweep:
+        from racecraft.sweeping import Sweep, sweep_names
+
         if name not in sweep_names(self._garage.runs):
             raise NotFound(f"There is no sweep {name[:80]!r}.")
         return Sweep(self._garage.runs, name)
