@@ -25,6 +25,9 @@ from command_line import Run
         (["train", "--resume", "runs/x", "--seed", "4"], "--seed does not go with --resume"),
         (["train", "--resume", "runs/x", "--track", "oval"], "--track does not go with --resume"),
         (["train", "--resume", "runs/x", "--from", "runs/y"], "--from does not go with --resume"),
+        (["replay", "log.csv", "--palette", "2020"], "--palette goes with --frame."),
+        (["replay", "--frame", "a.png", "--vehicle", "v4"], "--vehicle goes with logs."),
+        (["replay", "--frame", "a.png", "--rows", "a.csv"], "--rows goes with logs."),
     ],
 )
 def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str) -> None:

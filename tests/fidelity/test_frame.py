@@ -120,7 +120,7 @@ def test_files_that_are_no_frames(tmp_path):
     with pytest.raises(ConfigError, match="cannot be read"):
         fit_frame(tmp_path, track="oval")
     Image.new("RGB", (300, 300)).save(tmp_path / "square.png")
-    with pytest.raises(ConfigError, match="300 x 300 pixels; it must be 4:3"):
+    with pytest.raises(ConfigError, match=r"^Frame \S+ has 300 x 300 pixels; it must be 4:3, 160 to 4096 wide\.$"):
         fit_frame(tmp_path / "square.png", track="oval")
     whole = our_frame(tmp_path / "whole.png", load_track("oval"), (0.0, 0.0, 0.0)).read_bytes()
     (tmp_path / "cut.png").write_bytes(whole[: len(whole) // 2])

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
-from racecraft.cli.app import Json, TrackOption, app, print_json, text
+from racecraft.cli.app import Json, TrackOption, app, is_given, print_json, text
 from racecraft.errors import ConfigError
+
+OF_LOGS: Final = ("reward", "vehicle", "rows")
+OF_A_FRAME: Final = ("palette",)
 
 
 @app.command()
 def replay(
+    context: typer.Context,
     logs: Annotated[
         list[Path] | None, typer.Argument(help="Sim-traces: CSV or logs with SIM_TRACE_LOG lines, gzip or not.")
     ] = None,
@@ -38,6 +42,10 @@ def replay(
     """Compare logs or a frame of the original with ours."""
     if (frame is None) == (not logs):
         raise ConfigError("Nothing to replay, or too much: give either logs or one --frame FILE.")
+    for option in context.command.params:
+        name = str(option.name)
+        if name in (OF_LOGS if frame is not None else OF_A_FRAME) and is_given(context, name):
+            context.fail(f"{option.opts[0]} goes with {'logs' if name in OF_LOGS else '--frame'}.")
     if frame is not None:
         _replay_frame(frame, track, palette, picture, as_json)
         return

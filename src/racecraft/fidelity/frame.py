@@ -164,6 +164,8 @@ def _read(path: Path) -> NDArray[np.uint8]:
             return np.array(image.convert("RGB"))
     except FileNotFoundError:
         raise ConfigError(f"Frame {path} does not exist.", hint=hint) from None
+    except ConfigError:
+        raise
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         raise ConfigError(f"Frame {path} cannot be read as a picture: {error}.", hint=hint) from error
 
