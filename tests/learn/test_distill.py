@@ -59,6 +59,18 @@ def test_from_a_teacher_that_knows_nothing_nothing_is_learned(monkeypatch: pytes
     assert mean_reward(trained) < 0.7
 
 
+def test_the_teachers_steps_become_smaller() -> None:
+    moved = []
+    for teacher_rate_steps in (0, 10):
+        trained = make(replace(CONFIG, teacher_steps=10_000, teacher_rate_steps=teacher_rate_steps))
+        trained.iterate()
+        before = trained.teacher.learner.weights()
+        trained.iterate()
+        after = trained.teacher.learner.weights()
+        moved.append(sum(float(np.abs(after[name] - before[name]).sum()) for name in before))
+    assert 0 < moved[1] < 0.5 * moved[0]
+
+
 def test_the_students_steps_become_smaller() -> None:
     moved = []
     for rate_steps in (0, 10):
@@ -191,6 +203,7 @@ def test_a_student_that_refines_resumes_to_the_bit() -> None:
         ({"learning_rate": -1.0}, "learning_rate is -1.0"),
         ({"buffer_size": 100}, "at least num_envs x num_steps = 512"),
         ({"minibatch_size": 1.5}, "minibatch_size is 1.5"),
+        ({"teacher_rate_steps": -1}, "teacher_rate_steps is -1; allowed is a whole number from 0"),
         ({"rate_steps": -1}, "rate_steps is -1; allowed is a whole number from 0"),
         ({"student_steps": 0.5}, "student_steps is 0.5; allowed is a whole number from 0"),
     ],

@@ -15,6 +15,7 @@ from racecraft.training.regimes import (
     CUDA,
     DUEL,
     FAST_DISTILL,
+    LONG_FAST_DISTILL,
     MANY_TRACKS,
     METHODS,
     OBJECTS,
@@ -44,6 +45,8 @@ def test_the_last_row_decides_everything() -> None:
         ({"device": "cuda:1"}, {"ppo": CUDA, "evaluate_every": CUDA, "most_envs": CUDA, "start": TIME_TRIAL}),
         ({"device": "cuda", "num_tracks": 2}, {"ppo": CUDA, "evaluate_every": CUDA, "start": MANY_TRACKS}),
         ({"is_fast_distill": True}, {"distill": FAST_DISTILL, "start": FAST_DISTILL, "ppo": TIME_TRIAL}),
+        ({"is_fast_distill": True, "is_long": True}, {"distill": LONG_FAST_DISTILL, "start": FAST_DISTILL}),
+        ({"is_long": True}, {"distill": TIME_TRIAL}),
         ({"is_fast_distill": True, "num_tracks": 2}, {"distill": FAST_DISTILL, "start": MANY_TRACKS}),
     ],
 )

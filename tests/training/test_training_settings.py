@@ -17,7 +17,15 @@ from racecraft.training import Until, train
 from racecraft.training import settings as settings_module
 from racecraft.training.opponents import Opponents
 from racecraft.training.plan import make_plan
-from racecraft.training.regimes import DUEL, FAST_DISTILL, MANY_TRACKS, OBJECTS, TIME_TRIAL
+from racecraft.training.regimes import (
+    DUEL,
+    FAST_DISTILL,
+    LONG_FAST_DISTILL,
+    MANY_TRACKS,
+    OBJECTS,
+    TIME_TRIAL,
+    Regime,
+)
 from racecraft.training.settings import VEHICLE_OF_VERSION, TrainSettings, make_settings
 from racecraft.training.start import aws_hyperparameters, read_settings
 
@@ -297,6 +305,23 @@ def test_a_training_of_few_steps_has_a_teacher_of_few() -> None:
     assert teacher_steps("1000 steps") == teacher_steps("1000 steps or 5 minutes") == 5000
     assert teacher_steps("50000 steps") == teacher_steps("5 laps") == DistillConfig().teacher_steps
     assert teacher_steps("1000 steps", distill=DistillConfig(teacher_steps=9)) == 9
+
+
+@pytest.mark.parametrize(
+    ("track", "until", "regime"),
+    [
+        ("reinvent_2018", "no better lap or 10 minutes", FAST_DISTILL),  # 17.7 m
+        ("grand_circuit", "no better lap or 10 minutes", LONG_FAST_DISTILL),  # 68.3 m
+        ("grand_circuit", "19 s lap", LONG_FAST_DISTILL),
+        ("grand_circuit", "2 minutes", LONG_FAST_DISTILL),
+        ("grand_circuit", "119 s", FAST_DISTILL),
+        (["grand_circuit", "endurance"], "10 minutes", FAST_DISTILL),
+    ],
+)
+def test_who_is_to_be_fast_on_a_long_road_has_long_lessons(track: str | list[str], until: str, regime: Regime) -> None:
+    settings: dict[str, Any] = {"track": track, "until": Until.parse(until), "algorithm": "distill"}
+    assert make_settings(metadata=CONTINUOUS, **settings).distill == regime.distill
+    assert make_settings(metadata=DISCRETE, **settings).distill == DistillConfig()
 
 
 @pytest.mark.costly

@@ -29,9 +29,7 @@ from racecraft.learn.ledger import Ended, EpisodeLedger
 from racecraft.learn.native_state_learner import NativeStateLearner
 from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 
-TEACHER_PPO = PPOConfig(
-    num_envs=128, num_steps=32, minibatch_size=512, update_epochs=4, learning_rate=1.5e-3, rate_steps=700_000
-)
+TEACHER_PPO = PPOConfig(num_envs=128, num_steps=32, minibatch_size=512, update_epochs=4, learning_rate=1.5e-3)
 """How a teacher learns: rollouts are cheap, so they may be large."""
 
 REFINING_PPO = PPOConfig(
@@ -62,6 +60,8 @@ class DistillConfig:
     """Steps of each of them in one iteration."""
     teacher_steps: int = 250_000
     """Steps of the teacher before the student begins; they render no camera and do not count as camera steps."""
+    teacher_rate_steps: int = 700_000
+    """Of its steps, after as many its step size is a half of what it was, after twice as many a third; 0: never."""
     student_steps: int = 150_000
     """Camera steps after which the student goes on with PPO and the reward itself; 0: never."""
     learning_rate: float = 1.5e-3
@@ -86,7 +86,7 @@ class DistillConfig:
             "buffer_size",
         ):
             check_whole(name, getattr(self, name), 1, is_plain=True)
-        for name in ("student_steps", "rate_steps"):
+        for name in ("teacher_rate_steps", "student_steps", "rate_steps"):
             check_whole(name, getattr(self, name), 0, is_plain=True)
         check_number("learning_rate", self.learning_rate, 0.0, 1.0, is_plain=True)
         samples = self.num_envs * self.num_steps
@@ -153,7 +153,7 @@ class Distill:
         self.config, self.learner, self.environment, self.seed = config, learner, environment, seed
         self.state_size = environment.observe()[1].shape[1]
         teacher_spec = replace(learner.spec, state_size=self.state_size)
-        ppo = replace(TEACHER_PPO, num_envs=teacher_environment.num_envs)
+        ppo = replace(TEACHER_PPO, num_envs=teacher_environment.num_envs, rate_steps=config.teacher_rate_steps)
         if not learner.spec.is_discrete:
             ppo = replace(ppo, ent_coef=0.0)
         teacher = NativeStateLearner(teacher_spec, seed=seed, num_threads=num_threads)

@@ -112,6 +112,16 @@ FAST_DISTILL: Final = Regime(
     start=Start(advance=0.25, lateral_jitter=0.02, heading_jitter=math.radians(2.0)),
     distill=DistillConfig(teacher_steps=2_000_000),  # a teacher of continuous actions gets faster for so long
 )
+LONG_ROAD: Final = 55.0
+"""m; who is to be fast there learns as `LONG_FAST_DISTILL` says."""
+LONG_SECONDS: Final = 120.0
+"""Wall clock that such lessons must leave something of."""
+LONG_FAST_DISTILL: Final = Regime(
+    # A teacher that knows all of the road takes longer, and its student the more so: docs/log/fastest-lap.md.
+    distill=DistillConfig(
+        teacher_steps=4_000_000, teacher_rate_steps=2_000_000, student_steps=400_000, rate_steps=100_000
+    ),
+)
 TIME_TRIAL: Final = Regime(
     reward="racing",
     actions="default",
@@ -137,6 +147,7 @@ def regimes_of(
     num_tracks: int = 1,
     device: str = "cpu",
     is_fast_distill: bool = False,
+    is_long: bool = False,
 ) -> tuple[Regime, ...]:
     """The rows that apply, the most particular first."""
     rows = (
@@ -144,6 +155,7 @@ def regimes_of(
         (MANY_TRACKS, num_tracks > 1),
         (OBJECTS, objects != NO_OBJECTS),
         (DUEL, opponents is not None),
+        (LONG_FAST_DISTILL, is_fast_distill and is_long),
         (FAST_DISTILL, is_fast_distill),
         (TIME_TRIAL, True),
     )

@@ -17,10 +17,18 @@ from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import state_width
 from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import DIRECTIONS
-from racecraft.track import join_names, load_tracks
+from racecraft.track import Track, join_names, load_tracks
 from racecraft.training.lap_place import LAP_COLUMNS
 from racecraft.training.opponents import Opponents
-from racecraft.training.regimes import METHODS, TIME_TRIAL, AlgorithmConfig, check_regimes, regime_of
+from racecraft.training.regimes import (
+    LONG_ROAD,
+    LONG_SECONDS,
+    METHODS,
+    TIME_TRIAL,
+    AlgorithmConfig,
+    check_regimes,
+    regime_of,
+)
 from racecraft.training.stop import Until
 
 DEFAULT_TRACK: Final = "reinvent_2018"
@@ -239,10 +247,11 @@ def make_settings(
         vehicle = load_vehicle(vehicle or VEHICLE_OF_VERSION[metadata.version])
     if not isinstance(randomize, Randomization):
         randomize = load_randomization(randomize)
+    roads, until = load_tracks(track), settings.get("until")
     circumstances: dict[str, Any] = {
         "objects": settings.get("objects", NO_OBJECTS),
         "opponents": settings.get("opponents"),
-        "num_tracks": len(load_tracks(track)),
+        "num_tracks": len(roads),
         "device": settings.get("device", "cpu"),
     }
     network = network or metadata.neural_network
@@ -252,8 +261,9 @@ def make_settings(
         algorithm = regime_of(**circumstances).algorithm if is_taught else of_the_files(metadata)
     _check_actions(algorithm, metadata)
     method, is_continuous = METHODS[algorithm], metadata.action_space.kind == "continuous"
-    regime = regime_of(**circumstances, is_fast_distill=algorithm == "distill" and is_continuous)
-    lessons = _as_long_as(settings.get("until"), regime.distill)
+    is_fast = algorithm == "distill" and is_continuous
+    regime = regime_of(**circumstances, is_fast_distill=is_fast, is_long=_is_long(roads, until))
+    lessons = _as_long_as(until, regime.distill)
     usual = {"start": regime.start, "evaluation_trials": regime.evaluation_trials, "distill": lessons}
     settings = {**usual, **settings}
     if settings.get("evaluate_every", 0) == 0:
@@ -296,6 +306,12 @@ def make_settings(
 def of_the_files(metadata: ModelMetadata) -> str:
     """AWS's algorithm that a model's metadata names."""
     return "sac" if metadata.training_algorithm == "sac" else "ppo"
+
+
+def _is_long(roads: Sequence[Track], until: Until | None) -> bool:
+    """Whether the one road of a training is long, and the training long enough for it."""
+    is_short = isinstance(until, Until) and 0.0 < until.seconds < LONG_SECONDS
+    return len(roads) == 1 and roads[0].length >= LONG_ROAD and not is_short
 
 
 def _as_long_as(until: Until | None, distill: DistillConfig | None) -> DistillConfig | None:
