@@ -48,10 +48,11 @@ console: $(VENV)/.built $(VENV)/.serve $(PAGES)  ## set up if needed, build the 
 	$(BIN)/racecraft serve
 
 WASM = $(MAKE) --no-print-directory -j$$($(BIN)/python -c 'import os; print(os.cpu_count() or 1)') -f native/wasm/Makefile ZIG=$(CURDIR)/$(ZIG)
+CORES = $(patsubst %,build/wasm/%.wasm,core exact scalar threads)
 site: $(ZIG) $(SPHINX) $(VENV)/.built $(VENV)/.serve $(NODE)  ## build build/site: a page where cars learn in a browser's tab, for any static host
 	@$(WASM)
 	@cd web && npm run --silent site
-	@mkdir -p build/site/core && cp build/wasm/*.wasm build/site/core
+	@mkdir -p build/site/core && cp $(CORES) build/site/core
 	@PYTHONPATH=build/sphinx $(BIN)/python -m sphinx -q -W --keep-going -c tools/docs -d build/doctrees docs build/site/docs
 	@$(BIN)/python -m racecraft.site build/site web/node_modules/pyodide
 
