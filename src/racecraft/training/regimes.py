@@ -112,7 +112,7 @@ FAST_DISTILL: Final = Regime(
     start=Start(advance=0.25, lateral_jitter=0.02, heading_jitter=math.radians(2.0)),
     distill=DistillConfig(teacher_steps=2_000_000),  # a teacher of continuous actions gets faster for so long
 )
-LONG_ROAD: Final = 55.0
+LONG_ROAD: Final = 45.0
 """m; who is to be fast there learns as `LONG_FAST_DISTILL` says."""
 LONG_SECONDS: Final = 120.0
 """Wall clock that such lessons must leave something of."""
