@@ -313,8 +313,8 @@ def test_a_training_of_few_steps_has_a_teacher_of_few() -> None:
         ("reinvent_2018", "no better lap or 10 minutes", FAST_DISTILL),  # 17.7 m
         ("grand_circuit", "no better lap or 10 minutes", LONG_FAST_DISTILL),  # 68.3 m
         ("grand_circuit", "19 s lap", LONG_FAST_DISTILL),
-        ("grand_circuit", "2 minutes", LONG_FAST_DISTILL),
-        ("grand_circuit", "119 s", FAST_DISTILL),
+        ("grand_circuit", "3 minutes", LONG_FAST_DISTILL),
+        ("grand_circuit", "179 s", FAST_DISTILL),
         (["grand_circuit", "endurance"], "10 minutes", FAST_DISTILL),
     ],
 )

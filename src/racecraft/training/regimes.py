@@ -114,12 +114,12 @@ FAST_DISTILL: Final = Regime(
 )
 LONG_ROAD: Final = 45.0
 """m; who is to be fast there learns as `LONG_FAST_DISTILL` says."""
-LONG_SECONDS: Final = 120.0
+LONG_SECONDS: Final = 180.0
 """Wall clock that such lessons must leave something of."""
 LONG_FAST_DISTILL: Final = Regime(
     # A teacher that knows all of the road takes longer, and its student the more so: docs/log/fastest-lap.md.
     distill=DistillConfig(
-        teacher_steps=4_000_000, teacher_rate_steps=2_000_000, student_steps=400_000, rate_steps=100_000
+        teacher_steps=6_000_000, teacher_rate_steps=2_000_000, student_steps=600_000, rate_steps=150_000
     ),
 )
 TIME_TRIAL: Final = Regime(
