@@ -328,10 +328,12 @@ void layer_input_gradient(const LayerShape& shape, const float* transposed, cons
     const bool fits_doubled = fits_doubled_sums({grad_out, samples * shape.out_size(), 0, 1},
                                                 {transposed, shape.num_weights(), 0, 1}, {});
 #if defined(RC_HAS_SPARSE_GRADIENTS)
-    for (size_t i = 0; i < samples && has_sparse_input_gradient(shape); ++i)
-        sparse_input_gradient(shape, transposed, grad_out + i * shape.out_size(), fits_doubled,
-                              grad_in + i * shape.in_size);
-    if (has_sparse_input_gradient(shape)) return;
+    if (has_sparse_input_gradient(shape)) {
+        for (size_t i = 0; i < samples; ++i)
+            sparse_input_gradient(shape, transposed, grad_out + i * shape.out_size(), fits_doubled,
+                                  grad_in + i * shape.in_size);
+        return;
+    }
 #endif
     for (size_t run = 0; run < static_cast<size_t>(shape.num_runs); ++run) {
         for (size_t first = 0; first < static_cast<size_t>(shape.run_length); first += kPanel)
