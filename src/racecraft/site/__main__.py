@@ -21,8 +21,6 @@ from racecraft.track.library import course
 
 GENERATED: Final = tuple(f"generated:{seed}" for seed in range(1, 13))
 """Tracks of the generator that the page has beside the library's: it cannot draw others itself."""
-FALLBACKS: Final = ("core/exact.wasm", "core/scalar.wasm")  # that few browsers need: not kept by all
-
 
 PYTHON: Final = ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_stdlib.zip")
 
@@ -38,7 +36,7 @@ def main(site: Path, pyodide: Path) -> None:
 def write_files(site: Path) -> None:
     """What offline.js keeps in the browser, and a version that changes where one of them does."""
     names = sorted(path.relative_to(site).as_posix() for path in site.rglob("*") if path.is_file())
-    kept = [name for name in names if name not in ("files.js", *FALLBACKS)]
+    kept = [name for name in names if name != "files.js"]
     digest = hashlib.sha256()
     for name in kept:
         digest.update(name.encode() + b"\0" + hashlib.sha256((site / name).read_bytes()).digest())

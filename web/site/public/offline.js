@@ -4,14 +4,30 @@ self.importScripts("files.js");
 
 const { FILES, VERSION } = self;
 
+// Whatever the host says of its files' age, the browser asks whether each is still the newest: a kept page whose parts are
+// another version's would never open again. Until no tab shows the version before, this one waits, as parts of that are
+// loaded when they are needed, and the host has them no more.
 self.addEventListener("install", (event) => {
-  self.skipWaiting();
-  event.waitUntil(caches.open(VERSION).then((cache) => cache.addAll(["./", ...FILES])));
+  const newest = ["./", ...FILES].map((file) => new Request(file, { cache: "no-cache" }));
+  event.waitUntil(caches.open(VERSION).then((cache) => cache.addAll(newest)));
+});
+
+// A tab that has just been opened asks whether it is the only one, so that this version takes over.
+self.addEventListener("message", (event) => {
+  const ours = ({ url }) => url.startsWith(self.registration.scope);
+  const answer = async () => {
+    const tabs = await self.clients.matchAll({ type: "window", includeUncontrolled: true });
+    const isAlone = tabs.filter(ours).length < 2;
+    event.ports[0].postMessage(isAlone);
+    if (isAlone) await self.skipWaiting();
+  };
+  event.waitUntil(answer());
 });
 
 self.addEventListener("activate", (event) => {
   const old = (names) => names.filter((name) => name.startsWith("racecraft-") && name !== VERSION);
-  event.waitUntil(caches.keys().then((names) => Promise.all(old(names).map((name) => caches.delete(name)))));
+  const forget = caches.keys().then((names) => Promise.all(old(names).map((name) => caches.delete(name))));
+  event.waitUntil(forget.then(() => self.clients.claim())); // what the first visit's tab still needs is kept, too
 });
 
 // Alone in its process the page may have several threads over one memory; many hosts cannot say so themselves.

@@ -1,0 +1,109 @@
+"""A site published anew while a browser keeps the one before: every tab stays whole, and the next visit has the new one.
+
+Needs `make site`, and skips where that was not run.
+"""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import shutil
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from test_tab_page import CHROMIUM, OPTIONS, PATIENCE, SITE, Files
+
+from few_frames import FEW_FRAMES
+from racecraft.site.__main__ import write_files
+from until_true import until_true
+
+if TYPE_CHECKING:
+    from playwright.sync_api import BrowserContext
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (SITE / "data" / "plan.json").exists(), reason="the page is not built: make site"),
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
+]
+
+VERSIONS = "caches.keys().then((names) => names.length)"
+MADE = "meta[name=made]"
+
+
+class Cached(Files):
+    """A host whose files browsers may keep for an hour, as many hosts say."""
+
+    def end_headers(self) -> None:
+        self.send_header("Cache-Control", "max-age=3600")
+        super().end_headers()
+
+
+def publish_anew(site: Path) -> None:
+    """The same page, built another time: its parts have other names, and the old ones are gone."""
+    assets = site / "assets"
+    names = [path.name for path in assets.iterdir()]
+    new = {name: f"anew-{name}" for name in names}
+    for path in [*assets.glob("*.js"), *site.glob("*.html")]:
+        text = path.read_text(encoding="utf-8")
+        for name in names:
+            text = text.replace(f"/{name}", f"/{new[name]}")
+        path.write_text(text.replace("<head>", '<head><meta name="made" content="anew" />'), encoding="utf-8")
+    for name in names:
+        (assets / name).rename(assets / new[name])
+    write_files(site)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("host") / "site"
+    shutil.copytree(SITE, folder, ignore=shutil.ignore_patterns("docs", "lessons", "python"))
+    write_files(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def visitor(site: Path) -> Iterator[BrowserContext]:
+    from playwright.sync_api import sync_playwright
+
+    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Cached, directory=str(site.parent)))
+    threading.Thread(target=host.serve_forever, daemon=True).start()
+    complaints: list[str] = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        context = browser.new_context(base_url=f"http://127.0.0.1:{host.server_port}/site/")
+        context.set_default_timeout(PATIENCE)
+        context.add_init_script(FEW_FRAMES)
+        context.on("weberror", lambda error: complaints.append(str(error.error)))
+        yield context
+        browser.close()
+    host.shutdown()
+    host.server_close()
+    assert complaints == []
+
+
+def test_a_tab_keeps_its_version_and_the_last_tab_takes_the_new_one_when_it_is_loaded_again(
+    visitor: BrowserContext, site: Path
+) -> None:
+    first = visitor.new_page()
+    first.goto("./")
+    until_true(first, "navigator.serviceWorker.controller !== null")
+    publish_anew(site)
+    second = visitor.new_page()
+    second.goto("./")
+    until_true(second, f"{VERSIONS}.then((count) => count === 2)")  # the new one is there, and waits
+    assert second.locator(MADE).count() == 0
+    first.get_by_role("button", name="Draw a track").click()
+    first.get_by_role("dialog").get_by_role("button", name="Back").click()  # what the host has no more
+    first.close()
+    second.goto("./#replay")
+    second.reload()
+    second.locator(MADE).wait_for(state="attached")
+    until_true(second, f"{VERSIONS}.then((count) => count === 1)")
+    assert second.url.endswith("#replay")
+    second.get_by_role("button", name="Draw a track").click()
+    second.get_by_role("dialog").get_by_role("button", name="Back").click()
+    assert second.evaluate("crossOriginIsolated")
+    second.close()
