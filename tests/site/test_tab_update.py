@@ -1,4 +1,4 @@
-"""A site published anew while a browser keeps the one before: every tab stays whole, and the next visit has the new one.
+"""A site published anew while a browser keeps the one before: tabs stay whole, and the next visit has the new one.
 
 Needs `make site`, and skips where that was not run.
 """
