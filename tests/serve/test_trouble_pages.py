@@ -398,7 +398,14 @@ def test_when_a_training_ends_is_said_and_understood_in_german(visit: Visit) -> 
     goal.fill("64 Schritte oder 1,5 Minuten")
     page.get_by_role("button", name="Jetzt trainieren").click()
     page.get_by_role("button", name="Weiter trainieren").wait_for()
-    assert 64 <= console.client.get("/api/models/swift").json()["steps"] < 20_000
+    assert 64 <= (driven := console.client.get("/api/models/swift").json())["steps"] < 20_000
+    page.get_by_role("button", name="Weiter trainieren").click()
+    page.get_by_text("Modell 'swift' ist schon so weit, wie es kommen soll, und würde nichts lernen.").wait_for()
+    page.get_by_text(re.compile(r"Schritte und Minuten zählen von Anfang an, bisher [\d.]+ und \d,\d\.")).wait_for()
+    goal.and_(page.locator(":focus")).wait_for()
+    refused = console.client.post("/api/models/swift/train", json={"until": "64 steps", "reward": LEISURELY})
+    assert (refused.status_code, refused.json()["error"]["code"]) == (409, "Conflict")
+    assert console.client.get("/api/models/swift").json() == driven  # its reward, too
     visit.look("light")
 
 

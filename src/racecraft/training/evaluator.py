@@ -26,11 +26,10 @@ from racecraft.track import Track
 from racecraft.training.progress import EvaluationReport
 from racecraft.training.regimes import regime_of
 from racecraft.training.settings import TrainSettings
+from racecraft.training.stop import settled
 
 SLOWEST: Final = 0.3  # m/s; an evaluation does not wait for a car that needs longer for its lap
 SEED: Final = 0x6576616C  # evaluation starts never coincide with training's
-LEAST_WAIT: Final = 150_000  # camera steps without a better lap after which none is waited for
-SHARE_WAIT: Final = 0.5  # the same, of the steps it took to the best
 NO_LAP: Final = 1e6  # s, in a score, where no lap was completed
 _POSE: Final = [ROW_COLUMNS.index(name) for name in ("x", "y", "heading")]
 
@@ -95,9 +94,7 @@ class Evaluator:
     @property
     def has_settled(self) -> bool:
         """Whether every lap of some evaluation was complete, and for a good while none has been better."""
-        is_whole = self.best_score is not None and self.best_score[0] >= 1.0
-        waited = self.evaluated_at - self.gained_at
-        return is_whole and waited >= max(LEAST_WAIT, SHARE_WAIT * self.gained_at)
+        return settled(self.best_score, self.evaluated_at, self.gained_at)
 
     def evaluate(self, *, step: int, seconds: float, counter: EpisodeCounter) -> list[Episode]:
         """Drive the trials; the outcome is in `last`.
@@ -193,8 +190,7 @@ class Evaluator:
         """Continue from what `state` gave; KeyError or TypeError where it is not that."""
         last, score, lap = state["last"], state["best_score"], state["best_lap"]
         if last is not None:
-            tuples = {name: tuple(map(float, last[name])) for name in ("completions", "lap_times")}
-            self.last = EvaluationReport(**{**last, **tuples})
+            self.last = EvaluationReport.from_dict(last)
         self.best_score = None if score is None else tuple(map(float, score))
         self.best_lap = None if lap is None else float(lap)
         self.gained_at = int(state.get("gained_at", 0))  # runs of earlier versions have none

@@ -151,16 +151,9 @@ class Training:
             last = None  # what was driven before something changed is no end of what comes after
         if self._stop.is_set():
             return "interrupted"
-        if until.laps and last is not None and last.laps_completed >= until.laps:
-            return "laps"
-        if until.lap_time and last is not None and last.best_lap is not None and last.best_lap <= until.lap_time:
-            return "lap_time"
-        if until.no_better_lap and last is not None and session.evaluator.has_settled:
-            return "no_better_lap"
-        if until.steps and steps >= until.steps:
-            return "steps"
-        if until.seconds and self.meter.seconds >= until.seconds:
-            return "seconds"
+        has_settled = session.evaluator.has_settled
+        if reached := until.reached(steps=steps, seconds=self.meter.seconds, last=last, has_settled=has_settled):
+            return reached
         if session.hyperparameters is not None:
             if session.logs.counter.number >= session.hyperparameters.term_cond_max_episodes:
                 return "episodes"

@@ -21,6 +21,7 @@ from racecraft.learn import Learner, NetworkSpec
 from racecraft.learn.learner import below
 from racecraft.learn.networks import weight_shapes
 from racecraft.run import Checkpoint, RunFolder
+from racecraft.run.checkpoint import StoredCheckpoint
 
 WEIGHTS: Final = "weights/"
 HEADS: Final = ("policy.head.weight", "policy.head.bias", "policy.log_std")
@@ -127,7 +128,7 @@ def fitting(weights: Mapping[str, NDArray[Any]], spec: NetworkSpec) -> Arrays:
     return {name: given[name] for name in shapes if name in same}
 
 
-def is_weights_only(saved: Checkpoint) -> bool:
+def is_weights_only(saved: Checkpoint | StoredCheckpoint) -> bool:
     """Whether a checkpoint is what its run began with, weights from elsewhere and nothing of a training."""
     return "origin" in saved.metadata
 

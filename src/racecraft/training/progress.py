@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -28,6 +29,12 @@ class EvaluationReport:
     """s, of the trials that completed the lap."""
     is_best: bool
     """Better than every checkpoint before: more completion, then a faster lap."""
+
+    @classmethod
+    def from_dict(cls, document: Mapping[str, Any]) -> EvaluationReport:
+        """What `dataclasses.asdict` and JSON made of one; KeyError or TypeError where it is not that."""
+        tuples = {name: tuple(map(float, document[name])) for name in ("completions", "lap_times")}
+        return cls(**{**document, **tuples})
 
     def point(self) -> dict[str, Any]:
         """For the run's history."""

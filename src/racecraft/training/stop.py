@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from racecraft.errors import ConfigError
+
+if TYPE_CHECKING:
+    from racecraft.training.progress import EvaluationReport
 
 _UNITS: Final = {
     **dict.fromkeys(("lap", "laps"), ("laps", 1)),
@@ -21,6 +25,8 @@ _LIMIT: Final = re.compile(r"\s*(\d{1,3}(?:[,_]\d{3})+|\d+)(\.\d+)?\s*([a-z]+(?:
 _NO_BETTER: Final = re.compile(r"\s*no\s+better\s+lap\s*", re.ASCII | re.IGNORECASE)
 _EXAMPLES: Final = "'5 laps', '8.8 s lap', 'no better lap', '10 minutes', '90 s' or '200,000 steps'"
 _MAX_TEXT: Final = 400  # characters
+LEAST_WAIT: Final = 150_000  # camera steps without a better lap after which none is waited for
+SHARE_WAIT: Final = 0.5  # the same, of the steps it took to the best
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +95,27 @@ class Until:
         if not (self.laps or self.lap_time or self.no_better_lap or self.seconds or self.steps):
             raise ConfigError(f"until sets no limit; write it like {_EXAMPLES}.")
 
+    def reached(self, *, steps: int, seconds: float, last: EvaluationReport | None, has_settled: bool) -> str:
+        """Which of them a training has come to, by the name of its field; empty where it goes on.
+
+        Args:
+            steps: Camera steps of the run.
+            seconds: Wall clock of the run.
+            last: The evaluation that counts; None before there is one.
+            has_settled: Whether no lap has been better for a good while.
+        """
+        if self.laps and last is not None and last.laps_completed >= self.laps:
+            return "laps"
+        if self.lap_time and last is not None and last.best_lap is not None and last.best_lap <= self.lap_time:
+            return "lap_time"
+        if self.no_better_lap and last is not None and has_settled:
+            return "no_better_lap"
+        if self.steps and steps >= self.steps:
+            return "steps"
+        if self.seconds and seconds >= self.seconds:
+            return "seconds"
+        return ""
+
     def __str__(self) -> str:
         """The text that `parse` reads as the same limits, to the bit."""
         parts = []
@@ -104,3 +131,15 @@ class Until:
         if self.steps:
             parts.append(f"{self.steps} steps")
         return " or ".join(parts)
+
+
+def settled(best_score: Sequence[float] | None, evaluated_at: int, gained_at: int) -> bool:
+    """Whether the best evaluation was complete, and for a good while none has been better.
+
+    Args:
+        best_score: Of it, as `Evaluator.score` has it; None before there is one.
+        evaluated_at: Camera steps of training behind the last evaluation.
+        gained_at: The same behind the first that was as good as the best.
+    """
+    is_whole = best_score is not None and best_score[0] >= 1.0
+    return is_whole and evaluated_at - gained_at >= max(LEAST_WAIT, SHARE_WAIT * gained_at)

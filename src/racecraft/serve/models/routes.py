@@ -51,6 +51,7 @@ from racecraft.sim.vehicle import Vehicle
 from racecraft.training import Until
 from racecraft.training.opponents import SELF, Opponents
 from racecraft.training.parent import open_parent
+from racecraft.training.reached import is_reached
 from racecraft.training.regimes import TIME_TRIAL
 from racecraft.training.settings import TrainSettings, make_settings
 from racecraft.training.start import read_settings, replace_reward, start_run
@@ -214,10 +215,16 @@ def clone_model(name: str, request: CloneModel, context: InContext) -> ModelCard
 def train_model(name: str, request: TrainOn, context: InContext) -> JobInfo:
     """Train a model, or go on training it, if wanted with a changed reward function."""
     folder = context.garage.folder(name)
-    if request.until is not None:
-        Until.parse(request.until)
+    until = read_settings(folder).until if request.until is None else Until.parse(request.until)
+    _require_idle(context, folder)
+    if is_reached(folder, until, is_changed=request.reward is not None):
+        card = context.garage.card(name)
+        raise Conflict(
+            f"Model {folder.name!r} has come as far as it is to go already, and would learn nothing.",
+            hint="Say in the field when it is to end instead; steps and minutes count from its beginning, "
+            f"{card.steps:,} and {card.seconds / 60:.1f} so far.",
+        )
     if request.reward is not None:
-        _require_idle(context, folder)
         replace_reward(folder, request.reward, foreign=context.garage.is_foreign(request.reward))
     return _train(context, folder, until=request.until)
 
