@@ -1,6 +1,6 @@
 """Whether a training that is asked to go on would end before it learned anything.
 
-    run folder (last checkpoint, stretches) + until -> *is_reached* -> bool
+run folder (last checkpoint, stretches) + until -> *is_reached* -> bool
 """
 
 from __future__ import annotations
