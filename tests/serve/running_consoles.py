@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from loaded_servers import CAN_FORK, Forked
 
 PATIENCE = 300.0  # s; the machine may be busy, and a film takes twenty of a core of its own
 
@@ -26,7 +27,7 @@ LEISURELY = "import time\n\n\ndef reward_function(params):\n    time.sleep(0.001
 class RunningConsole:
     """A console's process and a signed-in client."""
 
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[str] | Forked
     link: str
     client: httpx.Client
     runs: Path
@@ -58,8 +59,7 @@ class RunningConsole:
 
 @contextmanager
 def running_console(runs: Path, *options: str) -> Iterator[RunningConsole]:
-    command = [sys.executable, "-m", "racecraft", "serve", "--json", "--no-browser", "--port", "0", "--runs", str(runs)]
-    process = subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True)
+    process = _started("serve", "--json", "--no-browser", "--port", "0", "--runs", str(runs), *options)
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
@@ -72,7 +72,13 @@ def running_console(runs: Path, *options: str) -> Iterator[RunningConsole]:
         end(process)
 
 
-def end(process: subprocess.Popen[str]) -> None:
+def _started(*words: str) -> subprocess.Popen[str] | Forked:
+    if CAN_FORK:
+        return Forked(words)
+    return subprocess.Popen([sys.executable, "-m", "racecraft", *words], stdout=subprocess.PIPE, text=True)
+
+
+def end(process: subprocess.Popen[str] | Forked) -> None:
     """Ask a process to stop, and kill one that does not."""
     if process.poll() is None:
         process.terminate()

@@ -1,0 +1,155 @@
+"""Servers that need not load what they consist of: each is a fork of a process that has, one for a process of tests.
+
+A server's start is 1.3 s of CPU, 1.15 of it imports. What is forked here is a process like any other, with its own id,
+folder, environment and files, killed and ended as one; only what `/proc` says of its command is its parent's.
+"""
+
+from __future__ import annotations
+
+import atexit
+import gc
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, TextIO
+
+CAN_FORK = sys.platform == "linux"
+_PARTS = (
+    "racecraft.serve.app",
+    "racecraft.serve.submissions.walls",
+    "sqlalchemy.dialects.sqlite.pysqlite",
+    "uvicorn.lifespan.on",
+    "uvicorn.loops.auto",
+    "uvicorn.protocols.http.auto",
+    "uvicorn.protocols.websockets.auto",
+)
+"""What a server has imported once it answers."""
+_LONGEST = 1 << 20  # bytes of a message: a server's words, folder and environment
+
+
+class Forked:
+    """A server's process, with what of `subprocess.Popen` its tests use."""
+
+    def __init__(self, words: Sequence[str]) -> None:
+        told = json.dumps({"words": words, "folder": os.getcwd(), "environment": dict(os.environ)})
+        reading, writing = os.pipe()
+        socket.send_fds(_nursery(), [told.encode()], [writing, 2])
+        os.close(writing)
+        answer, (self._life,), _, _ = socket.recv_fds(_nursery(), _LONGEST, 1)
+        self.pid = int(answer)
+        self.stdout: TextIO = os.fdopen(reading)
+
+    def _has_ended_within(self, seconds: float | None) -> bool:
+        if self._life != -1 and select.select([self._life], [], [], seconds)[0]:
+            os.close(self._life)
+            self._life = -1
+        return self._life == -1
+
+    def poll(self) -> int | None:
+        """None while it runs."""
+        return 0 if self._has_ended_within(0) else None
+
+    def wait(self, timeout: float | None = None) -> None:
+        """Until it has ended."""
+        if not self._has_ended_within(timeout):
+            raise subprocess.TimeoutExpired("serve", timeout or 0.0)
+
+    def terminate(self) -> None:
+        """Ask it to stop."""
+        os.kill(self.pid, signal.SIGTERM)
+
+    def kill(self) -> None:
+        """Stop it."""
+        os.kill(self.pid, signal.SIGKILL)
+
+
+@cache
+def _nursery() -> socket.socket:
+    """The way to the process that forks them, which ends with this one."""
+    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    command = [sys.executable, __file__, str(its.fileno())]
+    with its:
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, pass_fds=[its.fileno()])
+
+    def end() -> None:
+        ours.close()
+        process.wait()
+
+    atexit.register(end)
+    return ours
+
+
+def _load() -> None:
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # as whoever types the command does first
+    from racecraft.serve.quick import loading
+
+    with loading():
+        from racecraft.cli.entry import every_verb
+
+        every_verb()
+        for module in _PARTS:
+            import_module(module)
+
+
+def _bury(*_: Any) -> None:
+    while True:
+        try:
+            if os.waitpid(-1, os.WNOHANG)[0] == 0:
+                return
+        except ChildProcessError:
+            return
+
+
+def _nurse(tests: socket.socket) -> dict[str, Any] | None:
+    """Fork a server for each message; comes back in each of them with what it was told, and with None at the end."""
+    while True:
+        message, files, _, _ = socket.recv_fds(tests, _LONGEST, 2)
+        if not message:
+            return None
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGCHLD])  # or its id may be another's before it is looked up
+        if child := os.fork():
+            life = os.pidfd_open(child)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
+            socket.send_fds(tests, [str(child).encode()], [life])
+            for file in (life, *files):
+                os.close(file)
+            continue
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
+        tests.close()
+        for file, place in zip(files, (1, 2), strict=True):
+            os.dup2(file, place)
+            os.close(file)
+        told: dict[str, Any] = json.loads(message)
+        return told
+
+
+def _main() -> None:
+    _load()
+    gc.freeze()  # or every server that looks for garbage gets pages of its own
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the tests, with which this ends
+    signal.signal(signal.SIGCHLD, _bury)
+    told = _nurse(socket.socket(fileno=int(sys.argv[1])))
+    if told is None:
+        return
+    os.environ.clear()
+    os.environ.update(told["environment"])
+    os.chdir(told["folder"])
+    from racecraft import __main__ as command
+
+    sys.path[0] = told["folder"]
+    sys.argv = [str(Path(command.__file__)), *told["words"]]
+    command.main()
+
+
+if __name__ == "__main__":
+    _main()
