@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from full_consoles import full
 from running_consoles import RunningConsole
@@ -414,6 +415,23 @@ def test_a_model_learns_against_itself_or_against_others(console: RunningConsole
     assert "head-to-head" in alone.json()["error"]["message"]
     nobody = console.client.post("/api/models", json={**wanted, "opponents": ["nobody"]})
     assert nobody.status_code == 404
+
+
+def test_a_ghost_is_called_as_its_model_is_now() -> None:
+    from racecraft.film.ghost import Ghost
+
+    drove: dict[str, Any] = {
+        "poses": np.zeros((1, 3)),
+        "steering": np.zeros(1),
+        "clock": np.zeros(1),
+        "color": (0, 0, 0),
+    }
+    lap, *others = (Ghost(name, **drove) for name in ("fastest lap", "oval-2026", "bob@last", "Sunday"))
+    evaluated, driving = {"model": "heron", "evaluation": "2026"}, {"model": "bob", "checkpoint": "last"}
+    asked: list[str | dict[str, Any]] = ["best-lap", evaluated, driving, {"heat": "0" * 16}]
+    for found, names in (([lap, *others], ["fastest lap"]), (others, [])):  # nobody may have driven a lap
+        named = ghosts.named_as_asked(found, asked)
+        assert [ghost.name for ghost in named] == [*names, "heron", "bob@last", "Sunday"]
 
 
 @pytest.mark.parametrize("text", ["{}", '{"ghosts": 3}', '{"ghosts": [3]}', '{"ghosts": [{"name": "a"}]}', "{"])

@@ -163,6 +163,29 @@ describe("files", () => {
     expect(ticks(0, 1, 5)).toEqual([0, 0.2, 0.4, 0.6, 0.8, 1]);
     expect(ticks(2, 2)).toEqual([2]);
   });
+  it("begins a band no earlier than its points", () => {
+    const band = { number: 1, color: "gray", label: "" };
+    const svg = chartSvg({
+      title: "",
+      x: [5, 10],
+      lines: [],
+      xLabel: "",
+      bands: [
+        { ...band, from: 0, to: 7.5 },
+        { ...band, from: 7.5, to: 20 },
+        { ...band, from: 0, to: 4 },
+      ],
+      ink: "#000",
+      quiet: "#555",
+      grid: "#ddd",
+      card: "#fff",
+    });
+    const bands = [...svg.matchAll(/x="([\d.]+)" y="40" width="([\d.]+)"/g)].map((found) => found.slice(1).map(Number));
+    expect(bands).toEqual([
+      [70, 435],
+      [505, 435],
+    ]);
+  });
   it("counts in whole numbers, and marks what was best", () => {
     expect(ticks(0, 3, 8)).toContain(0.5);
     expect(ticks(0, 3, 8, true)).toEqual([0, 1, 2, 3]);

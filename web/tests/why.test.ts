@@ -89,6 +89,14 @@ describe("why a lap is faster", () => {
     const crashed = { ...drive(profile(6)), puts: [400] }; // 8 m
     expect(only(crashed, usual).reason).toBe("puts");
     expect(only({ ...crashed, puts: [100] }, usual).reason).not.toBe("puts"); // 2 m: before the corner
+    // of two that were put back the speeds are of standing, and say nothing of how they drove
+    const twice = { ...crashed, puts: [400, 420] };
+    const gain = only(twice, { ...usual, puts: [400] });
+    expect(sentenceOf(gain, ["A", "B"])).toEqual([
+      "why_fewer",
+      { who: "B", whom: "A", corner: 4, amount: gain.amount.toFixed(1) },
+    ]);
+    expect(only(crashed, { ...usual, puts: [400] }).reason).toBe("pace");
   });
 
   it("does not depend on where the laps began, also within the corner", () => {

@@ -28,6 +28,12 @@ export function ticks(low: number, high: number, count = 6, isWhole = false): nu
   return found;
 }
 
+/** What of bands lies where there are points: a stretch may begin before the first one, where the other axis stands. */
+export const bandsWithin = (bands: Band[], x: number[]): Band[] =>
+  bands
+    .map((band) => ({ ...band, from: Math.max(band.from, x[0] ?? 0), to: Math.min(band.to, x.at(-1) ?? 0) }))
+    .filter(({ from, to }) => to > from);
+
 export function chartSvg(chart: {
   title: string;
   x: number[];
@@ -60,10 +66,10 @@ export function chartSvg(chart: {
   const text = (x: number, y: number, words: string, more = "") =>
     `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" ${more}>${escape(words)}</text>`;
   const parts: string[] = [];
-  for (const band of chart.bands ?? []) {
+  for (const band of bandsWithin(chart.bands ?? [], chart.x)) {
     const [from, to] = [px(band.from), px(band.to)];
     parts.push(
-      `<rect x="${from.toFixed(1)}" y="${TOP}" width="${Math.max(to - from, 0).toFixed(1)}" height="${height - TOP - BOTTOM}" fill="${band.color}" fill-opacity="0.13"><title>${escape(band.label)}</title></rect>`,
+      `<rect x="${from.toFixed(1)}" y="${TOP}" width="${(to - from).toFixed(1)}" height="${height - TOP - BOTTOM}" fill="${band.color}" fill-opacity="0.13"><title>${escape(band.label)}</title></rect>`,
     );
   }
   for (const at of ticks(y0, y1)) {

@@ -20,7 +20,8 @@ export interface PlacedLap {
   puts: number[];
 }
 
-export type Reason = "puts" | "brakes" | "lifts" | "arrives" | "middle" | "accelerates" | "leaves" | "way" | "pace";
+export type Reason =
+  "puts" | "fewer" | "brakes" | "lifts" | "arrives" | "middle" | "accelerates" | "leaves" | "way" | "pace";
 
 export interface Gain {
   /** Of the corner. */
@@ -65,7 +66,7 @@ interface Passage {
   took: number[];
   driven: number[];
   seams: number[];
-  isPut: boolean;
+  /** How often it was put back. */ puts: number;
   /** m */ step: number;
 }
 
@@ -86,7 +87,7 @@ function through(lap: PlacedLap, sector: Sector, length: number): Passage | null
     took: between((index) => times[index + 1]! - times[index]!),
     driven: between((index) => Math.hypot(x[index + 1]! - x[index]!, y[index + 1]! - y[index]!)),
     seams,
-    isPut: lap.puts.some((row) => after(lap.place[row]!, sector.start) <= sector.end - sector.start),
+    puts: lap.puts.filter((row) => after(lap.place[row]!, sector.start) <= sector.end - sector.start).length,
     step,
   };
 }
@@ -119,7 +120,8 @@ function drivingOf(passage: Passage, from: number, to: number): Driving {
 
 /** What shows best why one passage is faster: of all differences the one where most of the time was gained. */
 function reasonOf(slow: Driving, fast: Driving): { reason: Reason; amount: number } {
-  if (slow.isPut && !fast.isPut) return { reason: "puts", amount: 0 };
+  if (slow.puts > fast.puts) return { reason: fast.puts ? "fewer" : "puts", amount: 0 };
+  if (fast.puts) return { reason: "pace", amount: 0 }; // where cars stand and are put, their driving tells nothing
   const gained = (from: number, to: number) => sum(slow.took.slice(from, to)) - sum(fast.took.slice(from, to));
   const faster = (at: number) => fast.speed[at]! - slow.speed[at]!;
   const last = slow.speed.length - 1;

@@ -15,6 +15,7 @@ import os
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -137,6 +138,20 @@ def sources_of(ghosts: Sequence[str | dict[str, Any]], *, folder: Path, runs: Pa
         else:
             raise ConfigError(f"The replay of ghost {number + 1} is not there.", hint="Start the heat again.")
     return found
+
+
+def named_as_asked(ghosts: Sequence[Ghost], asked: Sequence[str | dict[str, Any]]) -> list[Ghost]:
+    """Ghosts of a film, those of an evaluation by the model's name: it may have been renamed since it drove.
+
+    Args:
+        ghosts: In the order they were asked for; of the fastest lap there is none where nobody drove one.
+        asked: As the heat's payload has them.
+    """
+    there = [one for one in asked if len(ghosts) == len(asked) or not isinstance(one, str)]
+    return [
+        replace(ghost, name=one["model"]) if not isinstance(one, str) and "evaluation" in one else ghost
+        for ghost, one in zip(ghosts, there, strict=True)
+    ]
 
 
 def write_beside(ghosts: Sequence[Ghost], recordings: Sequence[Recording], *, first: int, folder: Path) -> None:

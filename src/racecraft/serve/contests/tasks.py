@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder, entry_name
-from racecraft.serve.contests.ghosts import sources_of, write_beside
+from racecraft.serve.contests.ghosts import named_as_asked, sources_of, write_beside
 from racecraft.serve.contests.terms import terms_of
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.settings import STATE_FOLDER
@@ -67,6 +67,7 @@ def heat(task: Task) -> dict[str, Any]:
     rows, first = contest.to_dict()["results"], contest.standings[0].car
     recordings = [trials[0].recording for trials in contest.trials]
     ghosts = load_ghosts(sources, terms.conditions, recordings=recordings, colors=LIVERY[len(entries) % len(LIVERY) :])
+    ghosts = named_as_asked(ghosts, payload.get("ghosts", ()))
     write_beside(ghosts, recordings, first=first, folder=folder)
     film(
         recordings[first].until(FILMED),

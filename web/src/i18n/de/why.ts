@@ -16,6 +16,7 @@ export const why: Record<keyof typeof english, string> = {
   why_leaves: "{who} ist aus Kurve {corner} heraus {amount} m/s schneller",
   why_way: "{who} fährt durch Kurve {corner} eine um {amount} m kürzere Linie",
   why_puts: "{who} kommt ohne Zurücksetzen durch Kurve {corner}, {whom} nicht",
+  why_fewer: "{who} wird in Kurve {corner} seltener zurückgesetzt als {whom}",
   why_pace: "{who} ist schneller durch Kurve {corner}",
   why_close: "In keiner Kurve unterscheiden sie sich um mehr als 0,02 s.",
   why_none: "Um zu sagen, warum, brauchen beide eine ganze Runde in einer Auswertung auf derselben Strecke.",

@@ -14,6 +14,7 @@ export const why = {
   why_leaves: "{who} is {amount} m/s faster out of corner {corner}",
   why_way: "{who} takes a line through corner {corner} that is {amount} m shorter",
   why_puts: "{who} gets through corner {corner} without being put back, {whom} does not",
+  why_fewer: "{who} is put back less often in corner {corner} than {whom}",
   why_pace: "{who} is faster through corner {corner}",
   why_close: "In no corner do they differ by more than 0.02 s.",
   why_none: "To say why, both need a complete lap in an evaluation on the same track.",
