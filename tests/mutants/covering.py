@@ -51,7 +51,7 @@ TOKENS: Final[Tests] = (
 MEMORY: Final = "tests/perception/test_memory.py"
 PERCEIVED: Final = "tests/perception/test_training.py"
 TRUTH: Final = "tests/perception/test_truth.py"
-WAYS: Final[Tests] = ("tests/training/test_algorithms.py", "tests/training/test_lap_place.py")
+WAYS: Final[Tests] = ("tests/training/test_algorithms.py", "tests/training/test_lap_view.py")
 
 COVERING: Final[dict[str, tuple[int, Tests]]] = {
     # a race: rules, placing, judging

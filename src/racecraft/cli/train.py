@@ -75,7 +75,7 @@ def train(
     ] = "",
     network: Annotated[str, typer.Option("--network", help="RACECRAFT_SMALL or one of AWS's three names.")] = "",
     critic: Annotated[
-        str, typer.Option("--critic", help="What the critic sees: privileged, lap (head to head) or camera.")
+        str, typer.Option("--critic", help="What the critic sees: privileged, lap (that and its lap) or camera.")
     ] = "",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
     camera: Annotated[

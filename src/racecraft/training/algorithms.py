@@ -66,8 +66,8 @@ class _WithoutCamera(TrainingEnvironment):
     """Cars that tell their state only."""
 
     def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """No frames, and the privileged state (N, S), a view."""
-        return np.zeros((self.num_envs, 0), np.uint8), self.simulation.state
+        """No frames, and the privileged state (N, S)."""
+        return np.zeros((self.num_envs, 0), np.uint8), self.tell_state()
 
 
 def teacher_environment(
@@ -112,7 +112,14 @@ def teacher_environment(
             foreign=foreign,
         )
     )
-    return _WithoutCamera(simulation, worker, action_space, counter=EpisodeCounter(num_envs), goes_on=True)
+    return _WithoutCamera(
+        simulation,
+        worker,
+        action_space,
+        counter=EpisodeCounter(num_envs),
+        goes_on=True,
+        lap_view=settings.lap_view,
+    )
 
 
 def _import(module: str, algorithm: str) -> Any:

@@ -23,7 +23,7 @@ from racecraft.sim import CudaSimulation, Simulation
 from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.track import Track
-from racecraft.training.lap_place import lap_place
+from racecraft.training.lap_view import NOTHING, LapTeller, LapView
 from racecraft.training.settings import TrainSettings
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class TrainingEnvironment:
         goes_on: Whether the road goes on behind the finish line for who learns. Who is to be fast must cross it as one
             who drives on, and neither camera nor state says how far it is, so an end there would only look like
             chance: with this a lap's end cuts the episode, and the critic's value stands for what follows.
-        tells_place: Whether the privileged state ends in where on the lap the car is, as `lap_place` has it.
+        lap_view: What of its lap the privileged state ends in.
         on_step: Called after every step, for who looks at the cars.
     """
 
@@ -66,7 +66,7 @@ class TrainingEnvironment:
         prints: PrintLog | None = None,
         opponents: OpponentPool | None = None,
         goes_on: bool = False,
-        tells_place: bool = False,
+        lap_view: LapView = NOTHING,
         on_step: Callable[[], None] = lambda: None,
     ) -> None:
         self.simulation = simulation
@@ -78,7 +78,7 @@ class TrainingEnvironment:
         self.prints = prints
         self.opponents = opponents
         self.goes_on = goes_on
-        self.tells_place = tells_place
+        self._lap = LapTeller(lap_view, simulation) if lap_view.size else None
         self._on_step = on_step
         self._own: slice | NDArray[np.intp] = slice(None) if opponents is None else opponents.own
         self.reward_seconds = 0.0
@@ -97,16 +97,13 @@ class TrainingEnvironment:
         return self.simulation.num_envs // self.simulation.cars_per_race
 
     def observe(self) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """What the sensors tell, as `SensorSuite.read` has it, and privileged state (N, S) at the current poses.
+        """What the sensors tell, as `SensorSuite.read` has it, and privileged state (N, S) at the current poses."""
+        return self.sensors.read(self.simulation)[self._own], self.tell_state()
 
-        The place on the lap is that of the last judged step.
-        """
-        simulation, own = self.simulation, self._own
-        frames, state = self.sensors.read(simulation)[own], simulation.state[own]
-        if self.tells_place:
-            distance, length = (simulation.column(name)[own] for name in ("projection_distance", "track_length"))
-            state = np.concatenate([state, lap_place(distance, length)], axis=1)
-        return frames, state
+    def tell_state(self) -> NDArray[np.float32]:
+        """The privileged state alone; what it ends in of the lap is of the last judged step."""
+        state = self.simulation.state[self._own]
+        return state if self._lap is None else np.concatenate([state, self._lap()[self._own]], axis=1)
 
     def step(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Drive one step: rewards, terminated, truncated, each (N,), the caller's to keep.

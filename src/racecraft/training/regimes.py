@@ -117,6 +117,7 @@ LONG_ROAD: Final = 45.0
 LONG_SECONDS: Final = 180.0
 """Wall clock that such lessons must leave something of."""
 LONG_FAST_DISTILL: Final = Regime(
+    critic="lap",
     # A teacher that knows all of the road takes longer, and its student the more so: docs/log/fastest-lap.md.
     distill=DistillConfig(
         teacher_steps=6_000_000, teacher_rate_steps=2_000_000, student_steps=600_000, rate_steps=150_000

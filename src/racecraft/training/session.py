@@ -393,6 +393,6 @@ def _make_environment(
         prints=logs.prints,
         opponents=opponents,
         goes_on=settings.algorithm == "distill" or opponents is not None,
-        tells_place=settings.critic == "lap",
+        lap_view=settings.lap_view,
         on_step=on_step,
     )

@@ -18,7 +18,7 @@ from racecraft.sim.columns import state_width
 from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import DIRECTIONS
 from racecraft.track import Track, join_names, load_tracks
-from racecraft.training.lap_place import LAP_COLUMNS
+from racecraft.training.lap_view import CRITICS_VIEW, NOTHING, TEACHERS_VIEW, LapView
 from racecraft.training.opponents import Opponents
 from racecraft.training.regimes import (
     LONG_ROAD,
@@ -114,10 +114,10 @@ class TrainSettings:
             raise ConfigError(f"opponents are {self.opponents!r}; use racecraft.training.Opponents(...), or None.")
         chosen = {"algorithm": self.algorithm, "device": self.device}
         check_regimes(chosen, objects=self.objects, opponents=self.opponents, device=self.device)
-        if self.critic == "lap" and (self.algorithm, self.device) != ("ppo", "cpu"):
+        if self.critic == "lap" and (self.algorithm not in ("ppo", "distill") or self.device != "cpu"):
             raise ConfigError(
-                f"critic is 'lap', which is for algorithm 'ppo' on device 'cpu'; it is {self.algorithm!r} on "
-                f"{self.device!r}. Allowed there are 'privileged' and 'camera'."
+                f"critic is 'lap', which is for algorithm 'ppo' or 'distill' on device 'cpu'; it is {self.algorithm!r} "
+                f"on {self.device!r}. Allowed there are 'privileged' and 'camera'."
             )
         check_type("until", self.until, Until, "allowed is a text such as '5 laps'")
         if self.until.laps > self.evaluation_trials:
@@ -168,7 +168,14 @@ class TrainSettings:
         """Columns of state that the critic sees; 0 where it sees the camera alone."""
         if self.critic == "camera":
             return 0
-        return state_width(self.num_objects) + (LAP_COLUMNS if self.critic == "lap" else 0)
+        return state_width(self.num_objects) + self.lap_view.size
+
+    @property
+    def lap_view(self) -> LapView:
+        """What of its lap the critic, and a teacher, is told."""
+        if self.critic != "lap":
+            return NOTHING
+        return TEACHERS_VIEW if self.algorithm == "distill" else CRITICS_VIEW
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON, for run.json."""

@@ -1,4 +1,4 @@
-"""Where on the lap a car is, as the critic of a race is told."""
+"""Where on the lap a car is, as the critic of a race and the teacher of a long road are told."""
 
 from __future__ import annotations
 
@@ -11,22 +11,26 @@ from tiny_runs import Train, weights
 
 from racecraft.agent import ModelMetadata, action_space
 from racecraft.errors import ConfigError
+from racecraft.learn import DistillConfig
 from racecraft.run import RunFolder
+from racecraft.sim import Simulation
 from racecraft.sim.columns import state_width
+from racecraft.track import load_track
 from racecraft.training.environment import TrainingEnvironment
 from racecraft.training.job import Training
-from racecraft.training.lap_place import LAP_COLUMNS, lap_place
+from racecraft.training.lap_view import CRITICS_VIEW, TEACHERS_VIEW, LapTeller, LapView, lap_place
 from racecraft.training.opponents import Opponents
 from racecraft.training.settings import TrainSettings, make_settings
 
+LAP_COLUMNS = CRITICS_VIEW.size
 METADATA = replace(ModelMetadata(neural_network="RACECRAFT_SMALL"), action_space=action_space("continuous"))
 
 
 def test_it_is_round_smooth_and_of_one_place_alone() -> None:
     length = 30.0
     at = np.linspace(0.0, length, 301)
-    columns = lap_place(at, np.full(301, length))
-    assert columns.shape == (301, LAP_COLUMNS)
+    columns = lap_place(at, np.full(301, length), num_harmonics=3)
+    assert columns.shape == (301, 6)
     assert columns.dtype == np.float32
     assert np.abs(columns).max() <= 1.0
     np.testing.assert_allclose(columns[0], columns[-1], atol=1e-6)  # both sides of the line
@@ -35,7 +39,27 @@ def test_it_is_round_smooth_and_of_one_place_alone() -> None:
     assert max(steps) < 1.01 * min(steps)  # everywhere as fine
     apart = np.linalg.norm(columns[:-1, None] - columns[None, :-1], axis=2)
     assert (apart + 9.0 * np.eye(300)).min() == pytest.approx(min(steps), rel=0.01)
-    np.testing.assert_allclose(lap_place(at / 3, np.full(301, length / 3)), columns, atol=1e-6)  # a share of the lap
+    np.testing.assert_allclose(
+        lap_place(at / 3, np.full(301, length / 3), num_harmonics=3), columns, atol=1e-6
+    )  # a share of the lap
+
+
+@pytest.mark.parametrize("direction", ["forward", "reverse"])
+def test_the_road_ahead_is_the_one_that_comes(direction: str) -> None:
+    tracks = [load_track(name) for name in ("oval", "kidney")]
+    simulation = Simulation(tracks, num_envs=2, camera=None, direction=direction)
+    tell = LapTeller(LapView(num_harmonics=1, ahead=(0.0, 2.5)), simulation)
+    for car, track in enumerate(tracks):
+        driven = track if direction == "forward" else track.reversed()
+        for at in (1.0, 0.6 * track.length, track.length - 1.0):  # the last one looks across the line
+            simulation.place(car, at)
+            simulation.step([[0.0, 1.0]] * 2)
+            told, here = tell()[car], simulation.column("projection_distance")[car]
+            angle = 2.0 * np.pi * here / track.length
+            curvatures = driven.curvature_at(here + np.array([0.0, 2.5]))
+            np.testing.assert_allclose(told[:2], [np.sin(angle), np.cos(angle)], atol=1e-6)
+            np.testing.assert_allclose(told[2:], curvatures, atol=0.05)  # within half a table's spacing of it
+    assert LapTeller(CRITICS_VIEW, simulation)().shape == (2, CRITICS_VIEW.size)
 
 
 def test_a_training_against_itself_is_told(tiny: Train) -> None:
@@ -60,6 +84,32 @@ def test_a_training_against_itself_is_told(tiny: Train) -> None:
     assert Training(RunFolder.open(result.run)).settings.critic == "lap"
 
 
+def test_the_teacher_of_a_long_road_and_the_critic_it_hands_on_are_told(tiny: Train) -> None:
+    seen: list[tuple[bool, np.ndarray]] = []
+    tell_state = TrainingEnvironment.tell_state
+
+    def listen(environment):
+        state = tell_state(environment)
+        assert np.isfinite(state).all()
+        seen.append((environment.simulation.frames.size == 0, state))
+        return state
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(TrainingEnvironment, "tell_state", listen)
+        result = tiny(
+            name="long",
+            actions="continuous",
+            track="grand_circuit",
+            algorithm="distill",
+            distill=DistillConfig(num_envs=2, num_steps=8, teacher_steps=4096, student_steps=32, buffer_size=64),
+            until="96 steps",
+        )
+    assert {(is_teacher, state.shape[1]) for is_teacher, state in seen} == {
+        (is_teacher, state_width(0) + TEACHERS_VIEW.size) for is_teacher in (True, False)
+    }
+    assert state_width(0) + TEACHERS_VIEW.size in weights(result.run)["weights/critic.dense1.weight"].shape
+
+
 @pytest.mark.parametrize(
     ("settings", "critic"),
     [
@@ -69,6 +119,9 @@ def test_a_training_against_itself_is_told(tiny: Train) -> None:
         ({"opponents": Opponents(), "critic": "privileged"}, "privileged"),
         ({"opponents": Opponents(), "track": ["oval", "speedway"]}, "privileged"),  # a place on which of them?
         ({"critic": "lap"}, "lap"),
+        ({"algorithm": "distill", "track": "grand_circuit"}, "lap"),
+        ({"algorithm": "distill", "track": "grand_circuit", "critic": "camera"}, "camera"),
+        ({"algorithm": "distill", "track": "oval"}, "privileged"),
     ],
 )
 def test_against_others_on_one_track_it_is_the_default(settings, critic) -> None:
@@ -81,7 +134,9 @@ def test_who_did_not_ask_for_it_is_not_told_of_it(name, value) -> None:
         make_settings(metadata=METADATA, opponents=Opponents(), **{name: value})
 
 
-@pytest.mark.parametrize("settings", [{"algorithm": "sac"}, {"algorithm": "distill"}, {"device": "cuda"}])
+@pytest.mark.parametrize("settings", [{"algorithm": "sac"}, {"algorithm": "sb3:ppo"}, {"device": "cuda"}])
 def test_who_cannot_be_told_says_so(settings) -> None:
-    with pytest.raises(ConfigError, match=r"critic is 'lap', which is for algorithm 'ppo' on device 'cpu'"):
+    with pytest.raises(
+        ConfigError, match=r"critic is 'lap', which is for algorithm 'ppo' or 'distill' on device 'cpu'"
+    ):
         TrainSettings(critic="lap", **settings)
