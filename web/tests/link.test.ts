@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { giftOf, linkTo } from "../src/tab/link";
+import { giftOf, isGift, linkTo } from "../src/tab/link";
 
 const PAGE = "https://example.org/racecraft/";
 const source = 'def reward_function(params):\n    """Für alle: 🏎."""\n    return params["speed"]\n';
@@ -34,3 +34,12 @@ test.each([
   "#about",
   `#${"a".repeat(1e6)}`,
 ])("an address without a gift brings none", async (hash) => expect(await giftOf(PAGE + hash)).toBeUndefined());
+
+test("a link that was cut short is told from an address that brings nothing", async () => {
+  const link = (await linkTo(PAGE, { source, track: "oval" }))!;
+  expect(isGift(link)).toBe(true);
+  const cut = link.slice(0, -9);
+  expect(await giftOf(cut)).toBeUndefined();
+  expect(isGift(cut)).toBe(true);
+  expect(["", "#", "#replay", "#track=oval"].some((hash) => isGift(PAGE + hash))).toBe(false);
+});

@@ -80,6 +80,8 @@ export const de: Record<TabKey, string> = {
     "Python wie bei AWS: reward_function(params) gibt für jeden Schritt eine Zahl. Sie läuft nur in diesem Tab.",
   change: "Ändern",
   python_loading: "Python wird geladen …",
+  python_unable: "Python ließ sich nicht laden: {why} Es wird wieder versucht, sobald sich die Belohnung ändert.",
+  python_broken: "An dieser Funktion ist Python zerbrochen: {why}.",
   reward_failed: "Die Belohnungsfunktion ist gescheitert.",
   reward_failed_kept: "Die Belohnungsfunktion ist nach {time} gescheitert. Was zuletzt bewertet wurde, steht unten.",
   pays: "Was sie zahlt",
@@ -90,6 +92,9 @@ export const de: Record<TabKey, string> = {
   gift: "Dieser Link bringt eine Belohnung mit",
   gift_lead:
     "Für die Strecke {track}. Nichts davon ist gelaufen. Lies sie und übernimm sie dann in den Editor, anstelle dessen, was dort steht.",
+  gift_elsewhere:
+    "Für die Strecke {track}, die es in dieser Seite nicht gibt: Es bleibt bei der gewählten. Nichts davon ist gelaufen. Lies sie und übernimm sie dann in den Editor, anstelle dessen, was dort steht.",
+  gift_broken: "Dieser Link bringt keine Belohnung mit: Er ist beschädigt oder unterwegs abgeschnitten worden.",
   gift_take: "Übernehmen",
   gift_leave: "Lassen",
   printed: "Was sie ausgegeben hat",

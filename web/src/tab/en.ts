@@ -73,6 +73,8 @@ export const en = {
   own_lead: "Python as at AWS: reward_function(params) gives a number for every step. It runs in this tab only.",
   change: "Change it",
   python_loading: "Loading Python …",
+  python_unable: "Python could not be loaded: {why} It is tried again when the reward is changed.",
+  python_broken: "Python broke down over this function: {why}.",
   reward_failed: "The reward function failed.",
   reward_failed_kept: "The reward function failed after {time}. What was judged last is kept below.",
   pays: "What it pays",
@@ -83,6 +85,9 @@ export const en = {
   gift: "This link brings a reward",
   gift_lead:
     "For the track {track}. Nothing of it has run. Read it, then take it into the editor, in place of what is there.",
+  gift_elsewhere:
+    "For the track {track}, which is not in this page: it stays at the one that is chosen. Nothing of it has run. Read it, then take it into the editor, in place of what is there.",
+  gift_broken: "This link brings no reward: it is damaged, or was cut short on its way.",
   gift_take: "Take it",
   gift_leave: "Leave it",
   printed: "What it printed",

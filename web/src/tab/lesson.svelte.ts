@@ -12,6 +12,7 @@ import type { Objects } from "./verify/header";
 import type { Among } from "./among";
 import type { Check, Hide, Load, Paint, Report, Show, Start } from "./worker";
 import { openWorker } from "./open";
+import { l } from "./text";
 
 const MOST = { alone: 400_000, among: 3_000_000 }; // camera steps
 const PATIENCE = 5; // s that a reward function may take for a step of all cars
@@ -76,6 +77,7 @@ export class Lesson {
   failedReward = $state(""); // what a reward of one's own did wrong
   printed = $state(""); // by it, the last of it
   isPythonReady = $state(false);
+  pythonFailure = $state(""); // why it did not come; it is asked for again when it is needed again
   painting = $state.raw<RewardPainting | undefined>(); // of the reward that was asked for last
   private readonly workers: Partial<Record<Kind, Worker>> = {};
   private running: Kind = "plain";
@@ -109,9 +111,12 @@ export class Lesson {
     this.workers[kind]?.terminate();
     const worker = (this.workers[kind] = openWorker());
     worker.onmessage = ({ data }: MessageEvent<Report>) => this.hear(data, kind);
-    worker.onerror = ({ message }) =>
-      this.hear({ kind: "failed", message: message || "worker", isReward: false }, kind);
-    if (kind === "python") this.isPythonReady = false;
+    worker.onerror = ({ message: said }) => {
+      const message = said || "worker";
+      if (kind === "python" && !this.isPythonReady) this.hear({ kind: "unloaded", message }, kind);
+      else this.hear({ kind: "failed", message, isReward: false }, kind);
+    };
+    if (kind === "python") [this.isPythonReady, this.pythonFailure] = [false, ""];
     const asked = { site: this.site, hasPython: kind === "python", isTeam: true };
     worker.postMessage({ kind: "load", ...asked } satisfies Load);
   }
@@ -235,6 +240,13 @@ export class Lesson {
           if (!this.isTraining("python")) this.asked?.post();
         } else this.onready();
         break;
+      case "unloaded":
+        if (kind === "plain") break; // is told when something is asked of it
+        this.pythonFailure = report.message;
+        this.workers.python!.terminate();
+        delete this.workers.python;
+        if (this.isTraining("python")) this.end("failed");
+        break;
       case "checked":
         if (report.question !== this.asked?.question) break; // of a text that has changed meanwhile
         clearTimeout(this.asked.timer);
@@ -292,10 +304,20 @@ export class Lesson {
         this.end(report.isReached ? "reached" : "unreached");
         break;
       case "failed":
+        if (kind === "python" && !this.isTraining("python")) return this.give(report.message);
         if (report.isReward) this.failedReward = report.message;
         else this.failure = report.message;
         this.end("failed");
     }
+  }
+
+  /** What broke Python itself while a reward was checked or painted: no training that runs beside it ends by that. */
+  private give(message: string): void {
+    clearTimeout(this.painter);
+    clearTimeout(this.asked?.timer);
+    this.asked?.answer(refusal(l("python_broken", { why: message })));
+    this.asked = undefined;
+    this.load("python");
   }
 
   private add(point: Point): void {

@@ -20,6 +20,9 @@ export async function linkTo(page: string, { source, track }: Gift): Promise<str
   return link.href;
 }
 
+/** Whether an address is meant to bring something, be it damaged or not. */
+export const isGift = (address: string): boolean => new RegExp(`^#(.*&)?${SOURCE}=`).test(new URL(address).hash);
+
 /** What an address brings; undefined where that is nothing, or nothing that makes sense. */
 export async function giftOf(address: string): Promise<Gift | undefined> {
   const hash = new URL(address).hash.slice(1);

@@ -8,5 +8,11 @@ import Tab from "./Tab.svelte";
 applyTheme();
 const site = new URL(".", location.href).href;
 await takeNewer(site);
-const plan = (await (await read(site, "data/plan.json")).json()) as Plan;
-mount(Tab, { target: document.getElementById("app")!, props: { site, plan, onready: () => keepSoon(site) } });
+const target = document.getElementById("app")!;
+try {
+  const plan = (await (await read(site, "data/plan.json")).json()) as Plan;
+  mount(Tab, { target, props: { site, plan, onready: () => keepSoon(site) } });
+} catch (error) {
+  target.textContent = (error as Error).message; // rather than nothing at all
+  throw error;
+}

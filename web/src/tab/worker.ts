@@ -142,6 +142,7 @@ type Watching = LookAtLaps | LookAtReplay | LookThrough | PayLaps;
 
 export type Report =
   | { kind: "ready" } // all that was asked for is loaded
+  | { kind: "unloaded"; message: string } // some of it did not come
   | { kind: "checked"; question: number; verdict: RewardVerdict }
   | { kind: "painting" }
   | { kind: "painted"; question: number; painting: RewardPainting }
@@ -190,7 +191,10 @@ onmessage = ({ data }: MessageEvent<Asked>) => {
 async function handle(asked: Asked): Promise<void> {
   if (asked.kind === "load") {
     loading = load(asked);
-    loading.then(() => tell({ kind: "ready" })).catch(() => {}); // is told when it is needed
+    loading.then(
+      () => tell({ kind: "ready" }),
+      (error: Error) => tell({ kind: "unloaded", message: error.message }),
+    );
     return;
   }
   const loaded = await loading!;

@@ -158,6 +158,9 @@ export const create: Record<keyof typeof english, string> = {
   painting: "Was sie entlang der Strecke zahlt",
   painting_lead: "Geradeaus mit 1,5 m/s, an jeder Stelle quer über die Straße.",
   painting_low: "wenig",
+  painting_failed: "Die Funktion scheitert unterwegs, also ist nichts zu malen. Ein Training kann dort enden.",
+  painting_failed_later:
+    "Die Funktion scheitert unterwegs, also ist nur gemalt, was davor war. Ein Training kann dort enden.",
   painting_objects: "Dunkle Quadrate sind die Kisten und Autos, wo sie zu Beginn einer Episode stehen.",
   painting_high: "viel",
   checking: "Prüft …",

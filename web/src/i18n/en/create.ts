@@ -155,6 +155,9 @@ export const create = {
   painting: "What it pays along the track",
   painting_lead: "Driving ahead at 1.5 m/s, at every place across the road.",
   painting_low: "least",
+  painting_failed: "The function fails on the way round, so there is nothing to paint. A training may end there.",
+  painting_failed_later:
+    "The function fails on the way round, so only what came before that is painted. A training may end there.",
   painting_objects: "Dark squares are the boxes and cars, where an episode has them at its beginning.",
   painting_high: "most",
   checking: "Checking…",

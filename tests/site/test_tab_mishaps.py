@@ -1,0 +1,109 @@
+"""What the page says on a phone where something goes wrong: a link cut short, no Python, a function that fails late.
+
+Needs `make site`, and skips where that was not run. Tests follow each other.
+"""
+
+from __future__ import annotations
+
+import functools
+import http.server
+import threading
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+from test_tab_page import CHROMIUM, OPTIONS, PATIENCE, SITE, Files
+
+from few_frames import FEW_FRAMES
+from until_true import until_true
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (SITE / "data" / "plan.json").exists(), reason="the page is not built: make site"),
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
+]
+
+CUT = "track=oval&reward=AAAA"
+FAILS = """def reward_function(params):
+    return 1 / (params["steps"] - 97)
+"""
+VISIBLE = """(() => {
+  const { top, bottom } = document.querySelector(".scene .view").getBoundingClientRect();
+  return top >= 0 && bottom <= innerHeight;
+})()"""
+
+
+@pytest.fixture(scope="module")
+def phone() -> Iterator[Page]:
+    from playwright.sync_api import sync_playwright
+
+    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE.parent)))
+    threading.Thread(target=host.serve_forever, daemon=True).start()
+    complaints: list[str] = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        context = browser.new_context(
+            base_url=f"http://127.0.0.1:{host.server_port}/site/",
+            viewport={"width": 390, "height": 844},
+            reduced_motion="reduce",
+        )
+        context.set_default_timeout(PATIENCE)
+        context.add_init_script(FEW_FRAMES)
+        page = context.new_page()
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        yield page
+        browser.close()
+    host.shutdown()
+    host.server_close()
+    assert complaints == []
+
+
+def test_a_link_that_was_cut_short_says_so(phone: Page) -> None:
+    phone.goto(f"./#{CUT}")
+    phone.get_by_role("alert").get_by_text("it is damaged, or was cut short").wait_for()
+    phone.goto("./#replay")
+    phone.get_by_role("alert").wait_for(state="detached")
+
+
+def test_a_link_for_a_track_that_is_not_here_says_so(phone: Page) -> None:
+    packed = phone.evaluate(
+        """async () => {
+          const whole = new Response(new Blob(["def reward_function(params): return 1.0"]).stream().pipeThrough(
+            new CompressionStream("deflate-raw")));
+          return btoa(String.fromCharCode(...new Uint8Array(await whole.arrayBuffer())));
+        }"""
+    )
+    phone.goto(f"./#track=<b>nowhere</b>&reward={packed.replace('+', '-').replace('/', '_').rstrip('=')}")
+    phone.get_by_text("For the track <b>nowhere</b>, which is not in this page").wait_for()
+    phone.get_by_role("button", name="Leave it").click()
+    assert phone.evaluate("location.hash") == ""
+
+
+def test_cars_that_learn_are_seen_by_who_pressed_train(phone: Page) -> None:
+    train = phone.get_by_role("button", name="Train", exact=True)
+    train.scroll_into_view_if_needed()
+    phone.get_by_role("img", name="What it pays along the track").wait_for()
+    train.click()
+    stop = phone.get_by_role("button", name="Stop")
+    stop.wait_for()
+    until_true(phone, VISIBLE)
+    stop.click()
+
+
+def test_python_that_does_not_come_is_told_and_asked_for_again(phone: Page) -> None:
+    phone.route("**/python/*", lambda route: route.abort())
+    phone.get_by_label("What it is paid for").select_option("own")
+    phone.get_by_text("Python could not be loaded").wait_for()
+    phone.unroute("**/python/*")
+    phone.locator(".cm-content").fill("def reward_function(params):\n    return 1.0\n")
+    phone.get_by_text("The function is fine.").wait_for()
+
+
+def test_a_function_that_fails_on_the_way_is_not_painted_as_if_it_paid(phone: Page) -> None:
+    phone.get_by_text("least").wait_for()
+    phone.locator(".cm-content").fill(FAILS)
+    phone.get_by_text("The function fails on the way round, so there is nothing to paint.").wait_for()
+    assert phone.get_by_text("least").count() == 0
