@@ -12,6 +12,7 @@ from racecraft.learn import PPOConfig
 from racecraft.sim import Bots, Objects
 from racecraft.training.opponents import Opponents
 from racecraft.training.regimes import (
+    BRISK_FAST_DISTILL,
     CUDA,
     DUEL,
     FAST_DISTILL,
@@ -45,8 +46,9 @@ def test_the_last_row_decides_everything() -> None:
         ({"device": "cuda:1"}, {"ppo": CUDA, "evaluate_every": CUDA, "most_envs": CUDA, "start": TIME_TRIAL}),
         ({"device": "cuda", "num_tracks": 2}, {"ppo": CUDA, "evaluate_every": CUDA, "start": MANY_TRACKS}),
         ({"is_fast_distill": True}, {"distill": FAST_DISTILL, "start": FAST_DISTILL, "ppo": TIME_TRIAL}),
-        ({"is_fast_distill": True, "is_long": True}, {"distill": LONG_FAST_DISTILL, "start": FAST_DISTILL}),
-        ({"is_long": True}, {"distill": TIME_TRIAL}),
+        ({"is_fast_distill": True, "lessons": "long"}, {"distill": LONG_FAST_DISTILL, "start": FAST_DISTILL}),
+        ({"is_fast_distill": True, "lessons": "brisk"}, {"distill": BRISK_FAST_DISTILL, "critic": BRISK_FAST_DISTILL}),
+        ({"lessons": "long"}, {"distill": TIME_TRIAL, "critic": TIME_TRIAL}),
         ({"is_fast_distill": True, "num_tracks": 2}, {"distill": FAST_DISTILL, "start": MANY_TRACKS}),
     ],
 )

@@ -18,6 +18,7 @@ from racecraft.training import settings as settings_module
 from racecraft.training.opponents import Opponents
 from racecraft.training.plan import make_plan
 from racecraft.training.regimes import (
+    BRISK_FAST_DISTILL,
     DUEL,
     FAST_DISTILL,
     LONG_FAST_DISTILL,
@@ -314,13 +315,17 @@ def test_a_training_of_few_steps_has_a_teacher_of_few() -> None:
         ("grand_circuit", "no better lap or 10 minutes", LONG_FAST_DISTILL),  # 68.3 m
         ("grand_circuit", "19 s lap", LONG_FAST_DISTILL),
         ("grand_circuit", "3 minutes", LONG_FAST_DISTILL),
-        ("grand_circuit", "179 s", FAST_DISTILL),
+        ("grand_circuit", "179 s", BRISK_FAST_DISTILL),
+        ("grand_circuit", "2 minutes or no better lap", BRISK_FAST_DISTILL),
+        ("grand_circuit", "99 s", FAST_DISTILL),
+        ("reinvent_2018", "2 minutes", FAST_DISTILL),
         (["grand_circuit", "endurance"], "10 minutes", FAST_DISTILL),
     ],
 )
 def test_who_is_to_be_fast_on_a_long_road_has_long_lessons(track: str | list[str], until: str, regime: Regime) -> None:
     settings: dict[str, Any] = {"track": track, "until": Until.parse(until), "algorithm": "distill"}
-    assert make_settings(metadata=CONTINUOUS, **settings).distill == regime.distill
+    made = make_settings(metadata=CONTINUOUS, **settings)
+    assert (made.distill, made.critic) == (regime.distill, regime.critic or "privileged")
     assert make_settings(metadata=DISCRETE, **settings).distill == DistillConfig()
 
 

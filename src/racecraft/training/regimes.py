@@ -113,14 +113,24 @@ FAST_DISTILL: Final = Regime(
     distill=DistillConfig(teacher_steps=2_000_000),  # a teacher of continuous actions gets faster for so long
 )
 LONG_ROAD: Final = 45.0
-"""m; who is to be fast there learns as `LONG_FAST_DISTILL` says."""
+"""m; who is to be fast there learns as `LONG_FAST_DISTILL` says, or `BRISK_FAST_DISTILL`."""
 LONG_SECONDS: Final = 180.0
-"""Wall clock that such lessons must leave something of."""
+"""Wall clock that long lessons must leave something of."""
+BRISK_SECONDS: Final = 100.0
+"""And brisk ones."""
 LONG_FAST_DISTILL: Final = Regime(
+    # A teacher that knows all of the road takes longer, and its student the more so; it is told where it is and what
+    # comes, or it drives each bend for itself: docs/log/fastest-lap.md.
     critic="lap",
-    # A teacher that knows all of the road takes longer, and its student the more so: docs/log/fastest-lap.md.
     distill=DistillConfig(
-        teacher_steps=6_000_000, teacher_rate_steps=2_000_000, student_steps=600_000, rate_steps=150_000
+        teacher_steps=5_000_000, teacher_rate_steps=2_000_000, student_steps=600_000, rate_steps=150_000
+    ),
+)
+BRISK_FAST_DISTILL: Final = Regime(
+    # The same for who has two minutes.
+    critic="lap",
+    distill=DistillConfig(
+        teacher_steps=3_000_000, teacher_rate_steps=1_200_000, student_steps=250_000, rate_steps=70_000
     ),
 )
 TIME_TRIAL: Final = Regime(
@@ -148,7 +158,7 @@ def regimes_of(
     num_tracks: int = 1,
     device: str = "cpu",
     is_fast_distill: bool = False,
-    is_long: bool = False,
+    lessons: str = "short",
 ) -> tuple[Regime, ...]:
     """The rows that apply, the most particular first."""
     rows = (
@@ -156,7 +166,8 @@ def regimes_of(
         (MANY_TRACKS, num_tracks > 1),
         (OBJECTS, objects != NO_OBJECTS),
         (DUEL, opponents is not None),
-        (LONG_FAST_DISTILL, is_fast_distill and is_long),
+        (LONG_FAST_DISTILL, is_fast_distill and lessons == "long"),
+        (BRISK_FAST_DISTILL, is_fast_distill and lessons == "brisk"),
         (FAST_DISTILL, is_fast_distill),
         (TIME_TRIAL, True),
     )

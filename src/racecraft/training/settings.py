@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from racecraft.track import Track, join_names, load_tracks
 from racecraft.training.lap_view import CRITICS_VIEW, NOTHING, TEACHERS_VIEW, LapView
 from racecraft.training.opponents import Opponents
 from racecraft.training.regimes import (
+    BRISK_SECONDS,
     LONG_ROAD,
     LONG_SECONDS,
     METHODS,
@@ -269,7 +271,7 @@ def make_settings(
     _check_actions(algorithm, metadata)
     method, is_continuous = METHODS[algorithm], metadata.action_space.kind == "continuous"
     is_fast = algorithm == "distill" and is_continuous
-    regime = regime_of(**circumstances, is_fast_distill=is_fast, is_long=_is_long(roads, until))
+    regime = regime_of(**circumstances, is_fast_distill=is_fast, lessons=_lessons(roads, until))
     lessons = _as_long_as(until, regime.distill)
     usual = {"start": regime.start, "evaluation_trials": regime.evaluation_trials, "distill": lessons}
     settings = {**usual, **settings}
@@ -315,10 +317,12 @@ def of_the_files(metadata: ModelMetadata) -> str:
     return "sac" if metadata.training_algorithm == "sac" else "ppo"
 
 
-def _is_long(roads: Sequence[Track], until: Until | None) -> bool:
-    """Whether the one road of a training is long, and the training long enough for it."""
-    is_short = isinstance(until, Until) and 0.0 < until.seconds < LONG_SECONDS
-    return len(roads) == 1 and roads[0].length >= LONG_ROAD and not is_short
+def _lessons(roads: Sequence[Track], until: Until | None) -> str:
+    """What a training has time for on a long road: ``long``, ``brisk`` or ``short`` lessons; elsewhere, short ones."""
+    if len(roads) != 1 or roads[0].length < LONG_ROAD:
+        return "short"
+    seconds = (isinstance(until, Until) and until.seconds) or math.inf
+    return "long" if seconds >= LONG_SECONDS else "brisk" if seconds >= BRISK_SECONDS else "short"
 
 
 def _as_long_as(until: Until | None, distill: DistillConfig | None) -> DistillConfig | None:
