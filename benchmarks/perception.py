@@ -2,12 +2,14 @@
 
     .venv/bin/python benchmarks/perception.py                       # everything, minutes of CPU time
     .venv/bin/python benchmarks/perception.py --only sight
+    .venv/bin/python benchmarks/perception.py --only sight --pictures 150
     .venv/bin/python benchmarks/perception.py --routes ../shared/tracks
 
-Errors are those of the lens, median and 90th percentile, over cars that drive badly near the road's middle: over all of
-them, and over those who have the road's middle in their picture; of each picture by itself, and with those before it
-remembered; over all pictures of drives of 30, and from the eighth of a drive on. Drivers by perception remember, and
-those "alone" do not. The last line on stdout is JSON.
+Errors are those of the lens, median and 90th percentile: over all cars, and over those who have the road's middle in
+their picture; of each picture by itself, with those before it remembered, and told what the car was told as well; over
+all pictures of drives from standing, and from the eighth of a drive on. Cars drive badly near the road's middle, and
+then by what is seen and remembered, at 1.5 m/s. Drivers by perception remember, and those "alone" do not. The last line
+on stdout is JSON.
 """
 
 from __future__ import annotations
@@ -39,6 +41,8 @@ STARTERS = ("steady", "quick")
 """Policies end to end that come along."""
 EARLY = 8
 """Pictures of a drive until memory has something to go by."""
+PACE = 1.5
+"""m/s on straights of who is watched while driving by what is seen."""
 SPEEDS = (1.0, 1.5, 2.0, 2.5)
 """m/s on straights of the driver by perception."""
 
@@ -49,6 +53,7 @@ def main() -> None:
     parser.add_argument("--routes", nargs="+", default=list(UNSEEN), help="tracks, as of evaluate --tracks")
     parser.add_argument("--randomize", nargs="+", default=list(CONDITIONS), help="presets of the conditions")
     parser.add_argument("--looks", type=int, default=24, help="of sight: times that 128 cars are looked at")
+    parser.add_argument("--pictures", type=int, default=30, help="of sight: those of a drive")
     parser.add_argument("--speeds", nargs="+", type=float, default=list(SPEEDS), help="m/s on straights, by perception")
     parser.add_argument("--starters", nargs="*", default=list(STARTERS), help="who drives end to end")
     parser.add_argument("--weights", type=Path, help="others than those brought along")
@@ -57,38 +62,64 @@ def main() -> None:
     perceiver = Perceiver(options.weights or WEIGHTS, num_threads=options.num_threads)
     found: dict[str, Any] = {}
     if options.only != "driving":
-        found["sight"] = [sight(perceiver, options.routes, each, looks=options.looks) for each in options.randomize]
+        episodes = Episodes(lateral=0.1, turned=0.15, sway=0.08, steps=options.pictures)
+        found["sight"] = [
+            sight(perceiver, options.routes, each, episodes, looks=options.looks, by_sight=by_sight)
+            for each in options.randomize
+            for by_sight in (False, True)
+        ]
     if options.only != "sight":
         found["driving"] = driving(perceiver, options)
     print(json.dumps(found))
 
 
-def sight(perceiver: Perceiver, routes: list[str], randomize: str, *, looks: int) -> dict[str, Any]:
+class Seeing(World):
+    """Cars that are driven by what is seen and remembered."""
+
+    driver: PerceptionDriver
+
+    def drive(self) -> NDArray[np.float32]:
+        self.driver.forget(self.begins)
+        return self.driver(self.simulation.frames)
+
+
+def sight(
+    perceiver: Perceiver, routes: list[str], randomize: str, episodes: Episodes, *, looks: int, by_sight: bool
+) -> dict[str, Any]:
     """Errors over some 3,000 pictures, of 24 looks, every third of which counts."""
-    episodes = Episodes(lateral=0.1, turned=0.15, sway=0.08)
-    world = World(routes, episodes, num_envs=128, seed=11, randomize=randomize)
-    watcher, ages = Watcher(perceiver), np.zeros(128, int)
+    world = (Seeing if by_sight else World)(routes, episodes, num_envs=128, seed=11, randomize=randomize)
+    if isinstance(world, Seeing):
+        world.driver = PerceptionDriver(perceiver, autopilot=Autopilot(speed=PACE))
+    alone, told, ages = Watcher(perceiver), Watcher(perceiver), np.zeros(128, int)
     parts: list[dict[str, Any]] = []
     for look in range(1, 3 * looks + 1):
         frames, truth = world.look()
-        watcher.forget(world.begins)
+        for watcher in (alone, told):
+            watcher.forget(world.begins)
+        told.tell(world.commands)
         ages = np.where(world.begins, 1, ages + 1)
-        remembering = watcher(frames)
+        remembering, knowing = alone(frames), told(frames)
         if look % 3 == 0:
-            there: dict[str, Any] = {"is_in_sight": _is_there(truth).any(axis=1), "is_late": ages >= EARLY}
-            after = {f"remembering {name}": errors for name, errors in _where(remembering, truth).items()}
-            parts.append(there | _where(perceiver(frames), truth) | _columns(remembering, truth) | after)
+            part: dict[str, Any] = {"is_in_sight": _is_there(truth).any(axis=1), "is_late": ages >= EARLY}
+            part |= _where(perceiver(frames), truth) | _columns(remembering, truth)
+            for name, belief in (("remembering", remembering), ("told commands", knowing)):
+                part |= {f"{name} {what}": errors for what, errors in _where(belief, truth).items()}
+            parts.append(part)
     errors = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     in_sight, late = errors.pop("is_in_sight"), errors.pop("is_late")
-    row: dict[str, Any] = {"randomize": randomize, "middle_in_sight": round(float(in_sight.mean()), 3)}
+    driver = f"by sight, {PACE:g} m/s" if by_sight else "badly"
+    row: dict[str, Any] = {
+        "randomize": randomize, "driven": driver, "pictures": episodes.steps,
+        "middle_in_sight": round(float(in_sight.mean()), 3),
+    }  # fmt: skip
     for name, values in errors.items():
         row[name] = _spread(values)
         if len(values) == len(in_sight):
             row[name]["in sight"] = _spread(values[in_sight])
             if late.any():
                 row[name][f"from the {EARLY}th on"] = _spread(values[late])
-    told = (f"{name} {row[name]['median']:.2f} / {row[name]['90 %']:.2f}" for name in errors)
-    print(f"{randomize:8}", *told)
+    told_of = (f"{name} {row[name]['median']:.2f} / {row[name]['90 %']:.2f}" for name in errors)
+    print(f"{randomize:8} driven {driver}:", *told_of)
     return row
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -24,15 +25,19 @@ def test_it_tells_how_well_roads_are_seen_and_driven() -> None:
     done = run(SCRIPT, *small)
     assert done.returncode == 0, done.stderr
     last = json.loads(done.stdout.splitlines()[-1])
-    (seen,), (driven, alone) = last["sight"], last["driving"]
+    (seen, watched), (driven, alone) = last["sight"], last["driving"]
+    assert [(row["driven"], row["pictures"]) for row in (seen, watched)] == [("badly", 30), ("by sight, 1.5 m/s", 30)]
     assert 0.7 < seen["middle_in_sight"] <= 1.0
     for name, most in {"offset_cm": 2.0, "heading_deg": 4.0, "heading_ahead_deg": 4.0, "middle_px": 3.0}.items():
         assert 0.0 < seen[name]["median"] < min(most, seen[name]["90 %"]), name
     assert seen["offset_cm"]["in sight"]["90 %"] <= seen["offset_cm"]["90 %"]
     for name in ("offset_cm", "heading_deg", "heading_ahead_deg"):
-        after = seen[f"remembering {name}"]
-        assert 0.0 < after["from the 8th on"]["median"] < after["from the 8th on"]["90 %"], name
-    assert seen["remembering heading_deg"]["from the 8th on"]["90 %"] < 0.8 * seen["heading_deg"]["90 %"]
+        for row, after in itertools.product((seen, watched), ("remembering", "told commands")):
+            late = row[f"{after} {name}"]["from the 8th on"]
+            assert 0.0 < late["median"] < late["90 %"], (name, after, row["driven"])
+    for after in ("remembering", "told commands"):
+        assert seen[f"{after} heading_deg"]["from the 8th on"]["90 %"] < 0.8 * seen["heading_deg"]["90 %"]
+    assert seen["told commands heading_deg"] != seen["remembering heading_deg"]
     for row, name in ((driven, "perception, 1.5 m/s"), (alone, "perception alone, 1.5 m/s")):
         assert (row["driver"], row["laps"], row["trials"]) == (name, 2, 2)
 

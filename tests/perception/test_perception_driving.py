@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from racecraft import load_track
-from racecraft.perception import PerceptionDriver
+from racecraft.perception import Perceiver, PerceptionDriver, Watcher
 from racecraft.perception.answers import NUM_OUTPUTS, NUM_TARGETS, NUMBERS
 from racecraft.perception.belief import Belief, believe
 from racecraft.perception.driving import state_of
+from racecraft.perception.memory import unknown
 from racecraft.race.generalization import generalize
 from racecraft.sim.columns import STATE_COLUMNS
 
@@ -64,6 +65,23 @@ def test_it_slows_for_bends_and_where_it_is_not_sure() -> None:
     assert 1.2 < fast < 1.5
     assert commands_of(belief_of(curvature_near=2.0, curvature=2.0))[1] < 0.8 * fast
     assert commands_of(belief_of(error=0.2))[1] < 0.5 * fast
+
+
+@pytest.mark.costly
+def test_it_remembers_what_it_did_last() -> None:
+    perceiver, cars, before = Perceiver(num_threads=1), np.array([3, 1]), unknown(2)
+    frames = np.random.default_rng(11).integers(40, 200, (4, 2, 120, 160)).astype(np.uint8)
+    driver, watcher, late = PerceptionDriver(perceiver), Watcher(perceiver), Watcher(perceiver)
+    for some in frames[:3]:
+        commands = driver(some, cars)
+        for one, told in ((watcher, commands), (late, before)):
+            one(some, cars)
+            one.tell(told, cars)
+        before = commands.copy()
+        assert np.isfinite(commands).all()
+        assert driver._watcher is not None
+    assert (driver._watcher(frames[3], cars).heading == watcher(frames[3], cars).heading).all()
+    assert (late(frames[3], cars).heading != watcher(frames[3], cars).heading).all()
 
 
 def test_a_belief_becomes_the_state_that_the_simulator_would_tell() -> None:

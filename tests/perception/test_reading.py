@@ -17,7 +17,7 @@ from racecraft.errors import ConfigError, ShapeError
 from racecraft.film.encoding import write_video
 from racecraft.learn.native_regressor import NativeRegressor
 from racecraft.learn.networks import PERCEIVER
-from racecraft.perception import Belief, Perceiver, perceive
+from racecraft.perception import Belief, Perceiver, Watcher, perceive
 from racecraft.perception.answers import NUM_OUTPUTS, NUMBERS
 from racecraft.perception.belief import believe
 from racecraft.perception.network import of_one_brightness
@@ -225,6 +225,31 @@ def test_a_replay_shows_what_the_driver_saw(tmp_path: Path, sensor: str, camera:
         assert np.abs(picture.seen.astype(int) - frame).mean() < 2.0
 
 
+def test_of_a_replay_it_knows_what_the_car_was_told(perceiver: Perceiver, tmp_path: Path) -> None:
+    asked: list[list[float]] = []
+
+    def driver(frames: NDArray[np.uint8]) -> NDArray[np.float32]:
+        asked.append([0.02 * len(asked), 1.0 + 0.1 * len(asked)])
+        return np.array(asked[-1:], np.float32)
+
+    evaluation = evaluate(
+        driver, load_track("oval"), rules=replace(RULE_SETS["first_lap"], time_limit=1.0), num_trials=1, num_threads=1
+    )
+    path = write_replay(Replay.of(evaluation), tmp_path / "a.replay")
+    film = list(read_pictures([path]))
+    assert [one.commands for one in film[:2]] == [None, None]  # of the start nobody was asked before
+    assert [one.commands for one in film[2:]] == [pytest.approx(one) for one in asked[: len(film) - 2]]
+    assert len(film) > 8
+    frames, begins = np.stack([one.seen for one in film]), np.array([one.is_first for one in film])
+    commands = np.array([one.commands or (np.nan, np.nan) for one in film], np.float32)
+    told = [one["heading_rad"] for one in perceive([path], perceiver=perceiver)]
+    knowing = Watcher(perceiver).film(frames, begins, commands=commands).heading
+    assert told == pytest.approx(knowing, abs=6e-5)
+    assert np.abs(knowing - Watcher(perceiver).film(frames, begins).heading)[2:].max() > 1e-3
+    late = np.concatenate([commands[:1], commands[:-1]])
+    assert np.abs(knowing - Watcher(perceiver).film(frames, begins, commands=late).heading)[2:].max() > 1e-3
+
+
 def test_a_car_that_is_put_back_is_in_another_place(tmp_path: Path) -> None:
     evaluation = evaluate(
         lambda frames: np.tile(np.array([0.3, 1.5], np.float32), (len(frames), 1)),
@@ -239,6 +264,12 @@ def test_a_car_that_is_put_back_is_in_another_place(tmp_path: Path) -> None:
     jumps = [step for step in range(1, len(poses)) if np.hypot(*(poses[step] - poses[step - 1])[:2]) > 0.2]
     assert len(jumps) > 0
     assert firsts == [0, *jumps]
+    stands = evaluation.best_trial.recording.is_placed
+    did = [not stands[step] and not stands[step - 1] for step in range(1, len(poses))]
+    assert 0 < sum(did) < len(did) - len(jumps)
+    assert [picture.commands is not None for picture in pictures] == [False, *did]
+    asked = {(round(one[0], 6), one[1]) for one in (picture.commands for picture in pictures) if one}
+    assert asked == {(0.3, 1.5)}
     assert all(picture.is_of_film for picture in pictures)
 
 

@@ -1,6 +1,7 @@
 """A driver that has learned nothing but to see: pure pursuit of the road that perception believes in.
 
 frames ──watcher──▶ Belief ──as the simulator's state──▶ autopilot ──caution──▶ commands
+            └──────────────────────── until the next frames ───────────────────────┘
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ class PerceptionDriver:
     Args:
         perceiver: Who looks; by default with the weights that the package brings along.
         autopilot: Who steers by what is seen.
-        remembers: Whether a car's pictures before are remembered; otherwise a picture always gives the same commands.
+        remembers: Whether a car's pictures before are remembered, and its commands since; otherwise a picture always
+            gives the same commands.
     """
 
     def __init__(
@@ -58,6 +60,8 @@ class PerceptionDriver:
         state[:, STATE_COLUMNS.index("speed")] = pace / TOP_SPEED
         commands = self.autopilot(state)
         commands[:, 1] /= 1.0 + CAUTION * belief.offset_error / _half_width(belief)
+        if self._watcher is not None:
+            self._watcher.tell(commands, cars)
         return commands
 
 

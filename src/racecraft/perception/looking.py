@@ -20,6 +20,8 @@ from racecraft.perception.watching import Watcher
 
 TOGETHER: Final = 64
 """Pictures that are looked at, and kept in memory, together."""
+UNKNOWN: Final = (np.nan, np.nan)
+"""Commands of a video's pictures."""
 
 
 def perceive(
@@ -30,6 +32,8 @@ def perceive(
     num_threads: int = 0,
 ) -> list[dict[str, Any]]:
     """Look at pictures. Those of a video, replay or run are in order, and looked at with those before in mind.
+
+    Of a replay or run it is known, too, what the car was told.
 
     Args:
         sources: Files, folders, a video, a replay or a run.
@@ -73,7 +77,9 @@ def _looked_at(
     while some := list(islice(pictures, TOGETHER)):
         seen = np.stack([picture.seen for picture in some])
         is_first = np.array([picture.is_first for picture in some])
-        belief = watcher.film(seen, is_first, np.array([picture.is_of_film for picture in some]))
+        is_of_film = np.array([picture.is_of_film for picture in some])
+        commands = np.array([picture.commands or UNKNOWN for picture in some], np.float32)
+        belief = watcher.film(seen, is_first, is_of_film, commands)
         for index, picture in enumerate(some):
             told.append(tell(picture.file, belief, index))
             yield picture.stem, paint(picture.shown, belief, index) if paints else picture.shown

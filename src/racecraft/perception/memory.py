@@ -1,8 +1,9 @@
 """What the pictures before tell of this one: a small recurrent network over the answers of the one that looks.
 
-answers to a picture, state ──Memory──▶ better answers, state
+answers to a picture, what the car was told since the last, state ──Memory──▶ better answers, state
 
-A lens sees the road from 16 cm ahead on. What lies beside it now lay ahead of it a moment ago.
+A lens sees the road from 16 cm ahead on. What lies beside it now lay ahead of it a moment ago. How far the car has come
+since no picture tells: its commands tell something of it, where they are known.
 
 Every sum of products here is exact: its factors are multiples of powers of two, and a float64 holds all of their sums.
 So neither the order of summing, which is the BLAS library's own affair, nor how many lenses are looked at together
@@ -27,7 +28,7 @@ from racecraft.perception.answers import (
     NUM_TARGETS,
     POSE,
 )
-from racecraft.perception.mirror import mirrored_answers
+from racecraft.perception.mirror import mirrored_answers, mirrored_commands
 
 Array = NDArray[np.float64]
 
@@ -39,10 +40,16 @@ REACH: Final = 0.25
 """What 1 of memory's own outputs adds to an answer, in units of the network."""
 MOST: Final = 4.0
 """In units of the network: numbers and logits beyond it are told as it."""
+COMMAND_UNITS: Final = (0.5, 2.0)
+"""What 1 of memory is of a steering angle, rad, and of a speed, m/s."""
+MOST_COMMANDED: Final = 2.5
+"""In those units, to either side: commands beyond it, which no car obeys, are told as it."""
+NUM_SEEN: Final = NUM_OUTPUTS + 1 + len(COMMAND_UNITS)
+"""Numbers that memory is told of a picture: outputs, whether commands are known, commands."""
 SEEN_PLACES, STATE_PLACES, WEIGHT_PLACES = 10, 14, 14
 """Binary places that are kept of what goes into sums."""
 SHAPES: Final = {
-    "seen": (NUM_OUTPUTS, 2 * UNITS),
+    "seen": (NUM_SEEN, 2 * UNITS),
     "state": (UNITS, 2 * UNITS),
     "bias": (1, 2 * UNITS),
     "answer": (UNITS, len(ANSWERS)),
@@ -74,19 +81,30 @@ class Memory:
             raise ValueError("the weights of its memory are others than a memory has")
         return cls(weights)
 
-    def __call__(self, outputs: NDArray[np.float32], state: Array) -> tuple[NDArray[np.float32], Array]:
-        """Better outputs (N, NUM_OUTPUTS) of a picture of each lens, and the state (N, 2, H) that it leaves."""
-        both = np.concatenate([seen_of(outputs), seen_of(mirrored_answers(outputs))])
+    def __call__(
+        self, outputs: NDArray[np.float32], commands: NDArray[np.float32], state: Array
+    ) -> tuple[NDArray[np.float32], Array]:
+        """Better outputs (N, NUM_OUTPUTS) of a picture of each lens, and the state (N, 2, H) that it leaves.
+
+        Args:
+            outputs: Of the network  (N, NUM_OUTPUTS).
+            commands: What the lens's car was told since its picture before, steering angle in rad and speed in m/s;
+                NaN where that is not known, and of a first picture  (N, 2).
+            state: That the picture before left  (N, 2, H).
+        """
+        straight = seen_of(outputs, commands)
+        turned = seen_of(mirrored_answers(outputs), mirrored_commands(commands))
+        both = np.concatenate([straight, turned])
         later, _ = self.step(both, np.concatenate([state[:, 0], state[:, 1]]))
-        straight, turned = np.split(self.answer(later), 2)
+        here, there = np.split(self.answer(later), 2)
         better = outputs.copy()
-        better[:, ANSWERS] += 0.5 * straight
+        better[:, ANSWERS] += 0.5 * here
         reflected = mirrored_answers(better)
-        reflected[:, ANSWERS] += 0.5 * turned
+        reflected[:, ANSWERS] += 0.5 * there
         return mirrored_answers(reflected), np.stack(np.split(later, 2), axis=1)
 
     def step(self, seen: Array, state: Array) -> tuple[Array, tuple[Array, Array]]:
-        """The state (B, H) after what is seen (B, NUM_OUTPUTS), and what is new of it and how much of the old stays."""
+        """The state (B, H) after what is seen (B, NUM_SEEN), and what is new of it and how much of the old stays."""
         weights = self.weights
         sums = seen @ weights["seen"] + state @ weights["state"] + weights["bias"]
         bent = bend(sums)
@@ -103,13 +121,23 @@ def unseen(count: int) -> Array:
     return np.zeros((count, 2, UNITS))
 
 
-def seen_of(outputs: NDArray[np.float32]) -> Array:
-    """Outputs as memory is told them: bounded, and no columns of rows in which the road's middle is not."""
+def unknown(count: int) -> NDArray[np.float32]:
+    """Commands of which nothing is known  (N, 2)."""
+    return np.full((count, len(COMMAND_UNITS)), np.nan, np.float32)
+
+
+def seen_of(outputs: NDArray[np.float32], commands: NDArray[np.float32]) -> Array:
+    """Outputs and commands as memory is told them  (B, NUM_SEEN).
+
+    They are bounded; of rows in which the road's middle is not there are no columns, of unknown commands only zeros.
+    """
     seen = outputs.astype(np.float64).clip(-MOST, MOST)
     seen[:, MIDDLES] *= seen[:, IN_SIGHT] > 0.0
     seen[:, NUM_CONTINUOUS:NUM_TARGETS] /= MOST
     seen[:, ERRORS] = outputs[:, ERRORS].clip(*LOG_LIMITS) / 3.0
-    return exact(seen, SEEN_PLACES)
+    is_known = ~np.isnan(commands).any(axis=1, keepdims=True)
+    told = (commands.astype(np.float64) / COMMAND_UNITS).clip(-MOST_COMMANDED, MOST_COMMANDED)
+    return exact(np.concatenate([seen, is_known, np.where(is_known, told, 0.0)], axis=1), SEEN_PLACES)
 
 
 def bend(sums: Array) -> Array:

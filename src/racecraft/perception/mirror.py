@@ -23,6 +23,11 @@ def mirrored_answers(answers: NDArray[np.float32]) -> NDArray[np.float32]:
     return answers[:, _ORDER[: answers.shape[1]]] * _SIGNS[: answers.shape[1]]
 
 
+def mirrored_commands(commands: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What a car there is told, steering angle and speed  (N, 2)."""
+    return commands * np.array([-1.0, 1.0], np.float32)
+
+
 def _order() -> NDArray[np.intp]:
     order = np.arange(NUM_OUTPUTS)
     order[REGIONS] = order[REGIONS].reshape(len(REGION_ROWS), len(REGION_COLUMNS))[:, ::-1].ravel()

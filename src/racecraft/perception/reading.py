@@ -65,6 +65,8 @@ class Picture:
     """Whether it is one of a video, replay or run, of which its neighbours tell more."""
     is_first: bool = True
     """Whether it has nothing to do with the picture before: the first of all, or the car was put somewhere else."""
+    commands: tuple[float, float] | None = None
+    """What the car did since the picture before, steering angle in rad and speed in m/s; None where nobody knows."""
 
 
 def read_pictures(sources: Sequence[str | Path]) -> Iterator[Picture]:
@@ -200,7 +202,11 @@ def _from_replay(path: Path) -> Iterator[Picture]:
     is_first = is_placed & ~np.append(False, is_placed[:-1])
     for step, (x, y, heading) in enumerate(recording.seen_from(camera.age).tolist()):
         pixels = view.draw(x, y, heading, cars=recording.objects(step))
-        yield _picture(path, pixels, frame=step, is_first=step == 0 or bool(is_first[step]))
+        picture = _picture(path, pixels, frame=step, is_first=step == 0 or bool(is_first[step]))
+        if step and not is_placed[step - 1 : step + 1].any():  # else it did not do what it was told
+            steering_angle, speed = recording.actions[step - 1].tolist()
+            picture = replace(picture, commands=(steering_angle, speed))
+        yield picture
 
 
 def _upright(image: Image) -> NDArray[np.uint8]:

@@ -6,17 +6,16 @@ worlds ──the network's answers, truth──▶ drives ──stretches of the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.perception.answers import NUM_OUTPUTS
 from racecraft.perception.lessons import Lessons
 from racecraft.perception.losses import slopes_of
-from racecraft.perception.memory import ANSWERS, REACH, SHAPES, UNITS, Array, Memory, exact, seen_of
-from racecraft.perception.mirror import mirrored_answers
+from racecraft.perception.memory import ANSWERS, NUM_SEEN, REACH, SHAPES, UNITS, Array, Memory, exact, seen_of
+from racecraft.perception.mirror import mirrored_answers, mirrored_commands
 from racecraft.perception.network import Perceiver
 from racecraft.perception.worlds import Episodes, World, roads_of
 
@@ -24,6 +23,8 @@ STRETCH: Final = 32
 """Pictures of a drive that are learned from together: two seconds."""
 TOGETHER: Final = 64
 """Stretches to a step of learning; half of them are looked at in a mirror."""
+WITHHELD: Final = 0.5
+"""Share of stretches whose commands are not told: memory is to do without them, too."""
 LEARNING_RATE: Final = 4e-3
 """Adam's step size after its first steps; it falls to nothing along a line."""
 SLOPE_PLACES: Final = 20
@@ -38,6 +39,8 @@ class Drives:
     """Of the network that looks  (T, N, NUM_OUTPUTS)."""
     targets: NDArray[np.float32]
     """(T, N, NUM_TARGETS)."""
+    commands: NDArray[np.float32]
+    """That the cars were told since the picture before, as `Memory` takes them  (T, N, 2)."""
     begins: NDArray[np.bool_]
     """Whether a car was put somewhere else before the picture  (T, N)."""
 
@@ -58,13 +61,14 @@ def drives_of(perceiver: Perceiver, lessons: Lessons) -> list[Drives]:
 
 
 def _driven(perceiver: Perceiver, place: World, length: int) -> Drives:
-    outputs, targets, begins = [], [], []
+    outputs, targets, commands, begins = [], [], [], []
     for _ in range(length):
         frames, truth = place.look()
         outputs.append(perceiver.outputs(frames))
         targets.append(truth)
+        commands.append(place.commands)
         begins.append(place.begins)
-    return Drives(np.stack(outputs), np.stack(targets), np.stack(begins))
+    return Drives(np.stack(outputs), np.stack(targets), np.stack(commands), np.stack(begins))
 
 
 def taught(drives: list[Drives], lessons: Lessons, *, tell: Callable[[int, float], None] = lambda *_: None) -> Memory:
@@ -79,17 +83,17 @@ def taught(drives: list[Drives], lessons: Lessons, *, tell: Callable[[int, float
     weights = _first_weights(rng)
     adam = _Adam()
     for update in range(1, lessons.memory_updates + 1):
-        outputs, targets, begins = _minibatch(drives, rng)
-        slopes, loss = gradient(Memory(weights), outputs, targets, begins)
+        some = _minibatch(drives, rng)
+        slopes, loss = gradient(Memory(weights), some)
         rate = LEARNING_RATE * min(1.0, update / 100) * (1.0 - (update - 1) / lessons.memory_updates)
-        adam.descend(weights, {name: slope / begins.size for name, slope in slopes.items()}, rate)
+        adam.descend(weights, {name: slope / some.begins.size for name, slope in slopes.items()}, rate)
         if update % 50 == 0 or update == lessons.memory_updates:
             tell(update, loss)
     return Memory({name: array.astype(np.float16) for name, array in weights.items()})
 
 
 def _first_weights(rng: np.random.Generator) -> dict[str, Array]:
-    sizes = {"seen": 0.5 / NUM_OUTPUTS**0.5, "state": 1.0 / UNITS**0.5, "answer": 0.0, "bias": 0.0, "answer_bias": 0.0}
+    sizes = {"seen": 0.5 / NUM_SEEN**0.5, "state": 1.0 / UNITS**0.5, "answer": 0.0, "bias": 0.0, "answer_bias": 0.0}
     weights = {name: sizes[name] * rng.standard_normal(shape) for name, shape in SHAPES.items()}
     weights["bias"][:, UNITS:] = 1.0  # at first most of the old stays
     return weights
@@ -114,19 +118,14 @@ class _Adam:
             weights[name] -= rate * unbiased / (np.sqrt(square / (1.0 - 0.999**self._updates)) + 1e-8)
 
 
-def gradient(
-    memory: Memory, outputs: NDArray[np.float32], targets: NDArray[np.float32], begins: NDArray[np.bool_]
-) -> tuple[dict[str, Array], float]:
-    """Slopes of the loss, summed over pictures, at each weight, and the loss's mean.
-
-    Args:
-        memory: Which.
-        outputs: Of stretches  (T, B, NUM_OUTPUTS).
-        targets: (T, B, NUM_TARGETS).
-        begins: Where memory begins anew  (T, B).
-    """
+def gradient(memory: Memory, stretches: Drives) -> tuple[dict[str, Array], float]:
+    """Slopes of the loss, summed over pictures, at each weight, and the loss's mean."""
+    begins = stretches.begins
     length, count = begins.shape
-    seen = seen_of(outputs.reshape(length * count, -1)).reshape(length, count, -1)
+    outputs, targets, commands = (
+        array.reshape(length * count, -1) for array in (stretches.outputs, stretches.targets, stretches.commands)
+    )
+    seen = seen_of(outputs, commands).reshape(length, count, -1)
     befores, steps, states = [], [], []
     state = np.zeros((count, UNITS))
     for here, is_new in zip(seen, begins, strict=True):
@@ -135,9 +134,9 @@ def gradient(
         steps.append(step)
         states.append(state)
     flat = np.concatenate(states)
-    better = outputs.reshape(length * count, -1).copy()
+    better = outputs.copy()
     better[:, ANSWERS] += memory.answer(flat)
-    all_slopes, loss = slopes_of(better, targets.reshape(length * count, -1))
+    all_slopes, loss = slopes_of(better, targets)
     told = exact(REACH * all_slopes[:, ANSWERS].astype(np.float64), SLOPE_PLACES)
     at_states = (told @ memory.weights["answer"].T).reshape(length, count, UNITS)
     sums = np.zeros((length, count, 2 * UNITS))
@@ -163,25 +162,27 @@ def gradient(
     }, loss
 
 
-def _minibatch(
-    drives: list[Drives], rng: np.random.Generator
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
-    """`TOGETHER` stretches of them, longer drives in proportion, as `gradient` takes them."""
+def _minibatch(drives: list[Drives], rng: np.random.Generator) -> Drives:
+    """`TOGETHER` stretches of them, longer drives in proportion."""
     shares = np.array([each.begins.size for each in drives], float)
     counts = rng.multinomial(TOGETHER, shares / shares.sum())
     parts = [_stretches(each, int(count), rng) for each, count in zip(drives, counts, strict=True)]
-    outputs, targets, begins = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
-    for array in (outputs, targets):
+    names = [field.name for field in fields(Drives)]
+    some = Drives(*(np.concatenate([getattr(part, name) for part in parts], axis=1) for name in names))
+    for array, mirrored in (
+        (some.outputs, mirrored_answers),
+        (some.targets, mirrored_answers),
+        (some.commands, mirrored_commands),
+    ):
         turned = array[:, ::2]
-        turned[:] = mirrored_answers(turned.reshape(-1, turned.shape[2])).reshape(turned.shape)
-    return outputs, targets, begins
+        turned[:] = mirrored(turned.reshape(-1, turned.shape[2])).reshape(turned.shape)
+    some.commands[:, rng.random(TOGETHER) < WITHHELD] = np.nan
+    return some
 
 
-def _stretches(
-    drives: Drives, count: int, rng: np.random.Generator
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
-    """Some stretches of them, as `gradient` takes them."""
+def _stretches(drives: Drives, count: int, rng: np.random.Generator) -> Drives:
+    """Copies of some stretches of them, each of `STRETCH` pictures."""
     length, cars = drives.begins.shape
     first, which = rng.integers(0, length - STRETCH + 1, count), rng.integers(0, cars, count)
     rows = first + np.arange(STRETCH)[:, None]
-    return drives.outputs[rows, which], drives.targets[rows, which], drives.begins[rows, which]
+    return Drives(*(getattr(drives, field.name)[rows, which] for field in fields(drives)))

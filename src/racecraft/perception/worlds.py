@@ -51,6 +51,8 @@ class World:
 
     begins: NDArray[np.bool_]
     """Cars that were put somewhere else by the last look  (N,)."""
+    commands: Floats
+    """What cars were told in it, steering angle in rad and speed in m/s; NaN of those that were put  (N, 2)."""
 
     def __init__(
         self,
@@ -78,11 +80,21 @@ class World:
         self._rng = np.random.default_rng([seed, 0x70657263])
         self._sway, self._fastest = episodes.sway, episodes.fastest
         self.begins = np.ones(num_envs, bool)
+        self.commands = np.full((num_envs, 2), np.nan, np.float32)
         self._aim = self._rng.normal(0.0, episodes.sway, num_envs)
         self._pace = self._rng.uniform(0.6, 2.5, num_envs)
 
     def look(self) -> tuple[NDArray[np.uint8], Floats]:
         """Drive a step; the pictures there, to be copied (N, 120, 160), and the targets (N, NUM_TARGETS)."""
+        simulation, commands = self.simulation, self.drive()
+        simulation.step(commands)
+        self.begins = simulation.terminated | simulation.truncated
+        self.commands = np.where(self.begins[:, None], np.float32(np.nan), commands)
+        simulation.reset(self.begins)
+        return simulation.frames, self._truth.targets()
+
+    def drive(self) -> Floats:
+        """What a bad driver does next, steering angle in rad and speed in m/s  (N, 2)."""
         simulation, rng = self.simulation, self._rng
         count = simulation.num_envs
         self._aim += rng.normal(0.0, 0.45 * self._sway, count) - 0.1 * self._aim
@@ -91,10 +103,7 @@ class World:
         aside = state["offset"] * state["half_width"] - self._aim
         steering = np.arctan(0.165 * state["curvature_1"]) - 1.2 * aside - 0.6 * state["sin_heading_error"]
         steering += rng.normal(0.0, 0.1, count)
-        simulation.step(np.stack([steering.clip(-0.5, 0.5), self._pace], axis=1))
-        self.begins = simulation.terminated | simulation.truncated
-        simulation.reset(self.begins)
-        return simulation.frames, self._truth.targets()
+        return np.stack([steering.clip(-0.5, 0.5), self._pace], axis=1).astype(np.float32)
 
 
 def roads_of(seed: int, num_roads: int) -> list[str]:
