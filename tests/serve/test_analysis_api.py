@@ -274,6 +274,11 @@ def test_a_track_that_was_redrawn_is_not_shown_under_older_laps(console: Running
     for model, stamp in stamps.items():
         assert [reply.status_code for reply in shown(model, stamp) + of_training(model)] == [200] * 5
 
+    assert client.delete("/api/tracks/mine").status_code == 204
+    for reply in [*(reply for model, stamp in stamps.items() for reply in shown(model, stamp)), *of_training(name)]:
+        refused(reply, 404, "The track 'mine' is not there any more.")
+    assert client.get(f"/api/models/{stranger}/maps").status_code == 200
+
 
 def test_the_report_is_a_file_to_keep(raced: tuple[RunningConsole, str, str]) -> None:
     console, name, _ = raced

@@ -343,6 +343,17 @@ def test_one_best_lap_for_training_and_races(console: RunningConsole) -> None:
     assert race("20260101000003", 5.0, track="hairpin")[0] == 9.6
 
 
+def test_a_card_says_how_long_a_training_was_that_ended_before_a_checkpoint(console: RunningConsole) -> None:
+    name = console.create(name="brief", train=False, track="oval")
+    history = console.runs / name / "metrics" / "history.jsonl"
+    history.parent.mkdir(exist_ok=True)
+    for seconds in (1.0, 5.5):
+        with history.open("a") as file:
+            file.write(json.dumps({"kind": "iteration", "step": 512, "seconds": seconds}) + "\n")
+        (card,) = (model for model in console.client.get("/api/models").json() if model["name"] == name)
+        assert card["seconds"] == seconds
+
+
 def test_the_medals_are_those_of_its_own_road_car_and_direction(console: RunningConsole) -> None:
     def medals(name: str, **settings: Any) -> Any:
         console.create(name=name, train=False, track="reinvent_2018", **settings)

@@ -199,6 +199,7 @@ def test_a_map_that_was_asked_for_before_does_not_come_after(studio: tuple[Runni
 
 def test_models_are_compared(studio: tuple[RunningConsole, Any]) -> None:
     page = visit(studio, "/compare/left")
+    page.locator(".picks button:first-child[aria-pressed=true]", has_text="left").wait_for()  # before newer ones
     page.get_by_role("button", name="right Paperclip").click()
     page.wait_for_url("**/compare/left/right")
     page.get_by_role("region", name="Reward code").wait_for()

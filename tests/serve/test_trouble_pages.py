@@ -368,6 +368,21 @@ def test_of_a_model_that_is_not_there_nothing_but_the_model_is_asked(visit: Visi
     assert [path for path in asked if "gone" in path] == ["models/gone"]
 
 
+def test_a_track_that_is_gone_is_no_mistake_of_the_reward(visit: Visit) -> None:
+    console = visit.console
+    drawing = console.client.get("/api/tracks/oval/sketch").json()
+    assert console.client.put("/api/tracks/mine", json=drawing).status_code == 200
+    console.create(name="homeless", track="mine", train=False)
+    assert console.client.delete("/api/tracks/mine").status_code == 204
+    page = visit.open("/models/homeless/watch")
+    page.get_by_label("Live").get_by_text("Track 'mine' does not exist.").wait_for()
+    page = visit.open("/models/homeless/setup")
+    said = page.get_by_text(re.compile("Track 'mine' does not exist"))
+    said.wait_for()
+    assert said.inner_text().strip() == "Track 'mine' does not exist."
+    assert page.locator(".cm-lint-marker, .cm-lintRange").count() == 0
+
+
 def test_what_one_tab_does_the_other_sees(visit: Visit) -> None:
     console, first = visit.console, visit.page
     console.create(name="two", track="oval", until="10 minutes", reward=LEISURELY, train=False)

@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { RewardCheck } from "../src/lib/rewardcheck.svelte";
-import type { RewardVerdict } from "../src/api/client";
+import { Problem, type RewardVerdict } from "../src/api/client";
 
 const verdict = (track: string): RewardVerdict =>
   ({ ok: true, problems: [], situations: [{ name: track }], painting: null, laps: [] }) as unknown as RewardVerdict;
@@ -23,6 +23,14 @@ test("of one text about two tracks the later question counts, whichever is answe
   answers.get("oval")!();
   await vi.advanceTimersByTimeAsync(0);
   expect(check.verdict).toEqual(verdict("kidney"));
+});
+
+test("what is wrong with something else than the text marks none of its lines", async () => {
+  const gone = () => Promise.reject(new Problem("NotFound", "Track 'mine' does not exist.", "", null, null));
+  const check = new RewardCheck(gone);
+  check.ask("return 1.0", "mine");
+  await vi.advanceTimersByTimeAsync(500);
+  expect(check.problems).toMatchObject([{ line: 0, message: "Track 'mine' does not exist." }]);
 });
 
 test("an answer about an earlier text does not count", async () => {

@@ -91,12 +91,14 @@ export function openEditor(parent: HTMLElement, text: string, label: string, onC
   view.scrollDOM.tabIndex = 0; // so that the keyboard can scroll long code without editing it
   const show = (mistakes: Mistake[]) => {
     const lines = view.state.doc.lines;
-    const found = mistakes.map((mistake) => {
-      const line = view.state.doc.line(Math.min(Math.max(mistake.line, 1), lines));
-      const severity = mistake.severity === "error" ? ("error" as const) : ("warning" as const);
-      const at = line.from + Math.max(mistake.column, 1) - 1;
-      return { from: at < line.to ? at : line.from, to: line.to, severity, message: mistake.message };
-    });
+    const found = mistakes
+      .filter(({ line }) => line > 0)
+      .map((mistake) => {
+        const line = view.state.doc.line(Math.min(mistake.line, lines));
+        const severity = mistake.severity === "error" ? ("error" as const) : ("warning" as const);
+        const at = line.from + Math.max(mistake.column, 1) - 1;
+        return { from: at < line.to ? at : line.from, to: line.to, severity, message: mistake.message };
+      });
     view.dispatch(setDiagnostics(view.state, found));
   };
   const paint = (isDark: boolean) => view.dispatch({ effects: theme.reconfigure(look(isDark)) });

@@ -31,6 +31,7 @@ export class RewardCheck {
     return this.#text !== "" && this.#of !== this.#text;
   }
 
+  /** A line of 0 says that it is not the text that is wrong: the track is not there any more, say. */
   get problems(): RewardVerdict["problems"] {
     const found = this.verdict?.problems ?? [];
     return found.map((one) => ({ ...one, message: said(one.message), hint: said(one.hint) }));
@@ -48,7 +49,7 @@ export class RewardCheck {
   /** What the server said when the text was to be trained with. */
   refuse(text: string, problem: Problem): void {
     const { message, hint } = problem;
-    const mistake = { line: problem.line ?? 1, column: 1, severity: "error" as const, message, hint };
+    const mistake = { line: problem.line ?? 0, column: 1, severity: "error" as const, message, hint };
     [this.#of, this.#found] = [text, { ok: false, problems: [mistake], situations: [], painting: null, laps: [] }];
   }
 

@@ -23,7 +23,7 @@ from racecraft.analysis import (
     sectors_of,
     start_place,
 )
-from racecraft.errors import ConfigError, RacecraftError
+from racecraft.errors import ConfigError, RacecraftError, TrackNotFound
 from racecraft.json_file import read_json_object
 from racecraft.judging.trained import is_road_of, trained_camera, trained_title, trained_tracks
 from racecraft.learn import NetworkSpec
@@ -224,9 +224,14 @@ def evaluation_track(context: Context, folder: RunFolder, stamp: str) -> Track:
     trace_of(folder, stamp)
     summary, info = read_json_object(folder.evaluation(stamp) / "evaluation.json"), folder.read_info()
     name = str(summary.get("track", ""))
-    track = next((track for track in load_tracks(info.track) if track.name == name), None)
-    if track is None:
-        track = context.courses.load(name)
+    try:
+        trained = load_tracks(info.track)
+    except TrackNotFound:
+        trained = ()
+    try:
+        track = next((track for track in trained if track.name == name), None) or context.courses.load(name)
+    except TrackNotFound as error:
+        raise NotFound(f"The track {name!r} is not there any more.") from error
     if not is_road_of(summary, info, track):
         raise Conflict(
             f"The track {name!r} was changed since this model was evaluated on it.", hint="Train a new model on it."
@@ -244,6 +249,8 @@ def _trained_road(folder: RunFolder) -> Track:
     info = folder.read_info()
     try:
         return trained_tracks(info)[0]
+    except TrackNotFound as error:
+        raise NotFound(f"The track {trained_title(info)!r} is not there any more.") from error
     except ConfigError as error:
         raise Conflict(
             f"The track {trained_title(info)!r} was changed since this model was trained on it.",

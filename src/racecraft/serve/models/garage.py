@@ -333,9 +333,9 @@ def race_of(info: RunInfo) -> str:
 
 
 def _fingerprint(folder: RunFolder) -> str:
-    """Changes when a card may change: the settings, the checkpoints, an evaluation."""
+    """Changes when a card may change: the settings, the checkpoints, an evaluation, how long it was trained."""
     marks = [SUMMARY]
-    for path in (folder.path, folder.path / "run.json", folder.path / "checkpoints"):
+    for path in (folder.path, folder.path / "run.json", folder.path / "checkpoints", folder.history):
         try:
             marks.append(str(path.stat().st_mtime_ns))
         except OSError:

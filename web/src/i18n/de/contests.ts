@@ -47,7 +47,7 @@ export const contests: Record<keyof typeof english, string> = {
   contests_ghost_add: "Einen Geist dazunehmen",
   contests_ghost_best_lap: "Die schnellste Runde, in jeder Runde wieder",
   contests_ghost_models: "Modelle, jedes allein im selben Rennen",
-  contests_ghost_evaluations: "Der beste Versuch einer Prüfung",
+  contests_ghost_evaluations: "Der beste Versuch einer Auswertung",
   contests_ghost_no_lap: "keine ganze Runde",
   contests_ghost_heats: "Das beste Auto eines früheren Laufs",
   contests_ghost_leave: "Den Geist herausnehmen: {name}",
