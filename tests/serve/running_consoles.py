@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-from loaded_servers import CAN_FORK, Forked
+from loaded_servers import Forked, started
 
 PATIENCE = 300.0  # s; the machine may be busy, and a film takes twenty of a core of its own
 
@@ -59,7 +58,7 @@ class RunningConsole:
 
 @contextmanager
 def running_console(runs: Path, *options: str) -> Iterator[RunningConsole]:
-    process = _started("serve", "--json", "--no-browser", "--port", "0", "--runs", str(runs), *options)
+    process = started("serve", "--json", "--no-browser", "--port", "0", "--runs", str(runs), *options)
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
@@ -70,12 +69,6 @@ def running_console(runs: Path, *options: str) -> Iterator[RunningConsole]:
             yield RunningConsole(process, link, client, runs)
     finally:
         end(process)
-
-
-def _started(*words: str) -> subprocess.Popen[str] | Forked:
-    if CAN_FORK:
-        return Forked(words)
-    return subprocess.Popen([sys.executable, "-m", "racecraft", *words], stdout=subprocess.PIPE, text=True)
 
 
 def end(process: subprocess.Popen[str] | Forked) -> None:

@@ -6,12 +6,12 @@ import json
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from loaded_servers import Forked, started, typed
 from running_consoles import end
 
 
@@ -19,7 +19,7 @@ from running_consoles import end
 class RunningWorker:
     """A worker's process."""
 
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[str] | Forked
     machine: str
     runs: Path
 
@@ -39,17 +39,16 @@ class RunningWorker:
 def running_worker(
     runs: Path, *options: str, database: str = "", artifacts: str = "", trusted: Path | None = None
 ) -> Iterator[RunningWorker]:
-    command = [sys.executable, "-m", "racecraft", "worker", "--json", "--runs", str(runs), "--machine", runs.name]
-    shared = {"RACECRAFT_DATABASE": database, "RACECRAFT_ARTIFACTS": artifacts} if database else {}
-    shared |= {} if trusted is None else {"SSL_CERT_FILE": str(trusted)}
-    with subprocess.Popen(
-        [*command, *options], env={**os.environ, **shared}, stdout=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            assert process.stdout is not None
-            yield RunningWorker(process, json.loads(process.stdout.readline())["machine"], runs)
-        finally:
-            end(process)
+    words = ["worker", "--json", "--runs", str(runs), "--machine", runs.name, *options]
+    if database:
+        process = started(*words, RACECRAFT_DATABASE=database, RACECRAFT_ARTIFACTS=artifacts)
+    else:  # of one with a token tests look at its environment and at how it ended, which a fork does not show
+        process = typed(*words, **({} if trusted is None else {"SSL_CERT_FILE": str(trusted)}))
+    try:
+        assert process.stdout is not None
+        yield RunningWorker(process, json.loads(process.stdout.readline())["machine"], runs)
+    finally:
+        end(process)
 
 
 def processes_on(runs: Path) -> list[int]:
