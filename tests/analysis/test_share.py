@@ -100,6 +100,25 @@ def test_a_medal_is_told(run: RunFolder, stamp: str, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.costly
+def test_speeds_have_the_decimals_of_the_language(run: RunFolder, stamp: str, tmp_path: Path) -> None:
+    for language, point, line in (("en", ".", "Racing line"), ("de", ",", "Ideallinie")):
+        text = share(run, stamp, language=language)
+        assert re.search(
+            rf'<figcaption class="bar">\d{re.escape(point)}\d m/s <span>.*</span> \d{re.escape(point)}\d m/s', text
+        )
+        assert f'aria-label="{line}"' in text
+    drive = read_replay(run.evaluation(stamp) / "evaluation.replay").cars[0].recording
+    dots, commas = (
+        np.asarray(Image.open(draw_racing_line(drive, tmp_path / f"{name}.png", point=point)).convert("L"), np.int16)
+        for name, point in (("dots", "."), ("commas", ","))
+    )
+    rows, columns = np.nonzero(dots - commas)
+    assert len(rows) > 0
+    assert rows.max() < 0.1 * dots.shape[1]  # below the colours, in the upper right corner
+    assert columns.min() > 0.7 * dots.shape[1]
+
+
+@pytest.mark.costly
 def test_a_picture_has_the_reward_and_the_replay_inside(run: RunFolder, stamp: str, tmp_path: Path) -> None:
     path = draw_share(run, stamp, tmp_path / "sent.png")
     plain = draw_racing_line(

@@ -48,6 +48,7 @@ table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums;font
 th{text-align:left;color:var(--quiet);font-weight:560;font-size:.84rem}
 th,td{padding:6px 14px 6px 0;border-bottom:1px solid var(--line);overflow-wrap:anywhere}
 tr:last-child td{border-bottom:0}.scroll{overflow-x:auto}
+.heat th,.heat td{white-space:nowrap}.heat td:nth-child(2){white-space:normal;min-width:6em}
 .settings{columns:2;column-gap:36px;font-size:.9rem}
 .settings p{display:flex;justify-content:space-between;gap:16px;margin:0;
 padding:4px 0;border-bottom:1px solid var(--line);

@@ -65,7 +65,7 @@ def share(folder: RunFolder, stamp: str, *, language: str = "en") -> str:
     if step:
         figures.append((words["trained"], f"{number(step, 0, words)} {words['steps']}", ""))
     sections = [
-        section(words["line"], line_of(lap)),
+        section(words["line"], line_of(lap, words)),
         section(words["reward"], f"<pre>{escape(_reward(folder, step))}</pre>"),
         section(words["proof"], proof(_file(folder, stamp), f"{folder.name}.replay", words["proof_lead"], words)),
     ]

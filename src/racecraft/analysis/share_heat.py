@@ -58,7 +58,7 @@ def share_heat(file: Path, rows: Sequence[Placed], *, title: str, language: str 
         [(what, value, "") for what, value in _figures(winner, words)],
         stage(cars, words, heading=words["heat"]) + _result(rows, words),
         [
-            section(f"{words['line_of']} {winner.name}", line_of(drives[0])),
+            section(f"{words['line_of']} {winner.name}", line_of(drives[0], words)),
             section(words["proof"], proof(file.read_bytes(), "heat.replay", words["proof_heat"], words)),
         ],
         versions={"racecraft": VERSION},
@@ -101,7 +101,7 @@ def _cells(row: Placed, words: dict[str, str]) -> list[str]:
 def _result(rows: Sequence[Placed], words: dict[str, str]) -> str:
     head = "".join(f'<th scope="col">{escape(words[key])}</th>' for key in ("place", "name", "total", "best", "gap"))
     body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in _cells(row, words))}</tr>" for row in rows)
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return f'<div class="scroll"><table class="heat"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def _lines(rows: Sequence[Placed], words: dict[str, str]) -> list[str]:

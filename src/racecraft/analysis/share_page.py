@@ -39,6 +39,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "bronze": "Bronze",
         "top": "Top speed",
         "speed": "Speed",
+        "point": ".",
         "trained": "Trained for",
         "steps": "steps",
         "replay": "The lap",
@@ -72,6 +73,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "bronze": "Bronze",
         "top": "Höchstgeschwindigkeit",
         "speed": "Tempo",
+        "point": ",",
         "trained": "Trainiert über",
         "steps": "Schritte",
         "replay": "Die Runde",
@@ -117,7 +119,7 @@ def words_of(language: str) -> dict[str, str]:
 def number(value: float, digits: int, words: dict[str, str]) -> str:
     """A number as the page's language writes it: 9.274 or 9,274."""
     text = f"{value:,.{digits}f}"
-    return text if words is not WORDS["de"] else text.translate(str.maketrans(",.", ".,"))
+    return text if words["point"] == "." else text.translate(str.maketrans(",.", ".,"))
 
 
 def script() -> str:
@@ -184,9 +186,10 @@ def _road(track: Track) -> dict[str, Any]:
     }
 
 
-def line_of(lap: Recording) -> str:
+def line_of(lap: Recording, words: dict[str, str]) -> str:
     """The racing line of a drive, coloured by speed."""
     numbers = [(sector.apex, str(sector.number)) for sector in sectors_of(lap.track) if sector.turn]
     statuses = lap.statuses
     puts = [row + 1 for row, status in enumerate(statuses[:-1]) if status in RESET_STATUSES]
-    return racing_line(lap.track, lap.origins, lap.column("actual_speed"), numbers, puts)
+    speeds = lap.column("actual_speed")
+    return racing_line(lap.track, lap.origins, speeds, numbers, puts, label=words["line"], point=words["point"])

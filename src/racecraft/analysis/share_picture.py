@@ -32,8 +32,16 @@ def draw_line(
     words: Mapping[str, str],
 ) -> None:
     """The racing line of a drive, with nothing in letters but what is given: see `draw_racing_line`."""
-    speed = words["speed"].upper()
-    draw_racing_line(drive, path, title=title, subtitle=subtitle, figures=figures, has_own_figures=False, speed=speed)
+    draw_racing_line(
+        drive,
+        path,
+        title=title,
+        subtitle=subtitle,
+        figures=figures,
+        has_own_figures=False,
+        speed=words["speed"].upper(),
+        point=words["point"],
+    )
 
 
 def finish_picture(path: Path, heading: str, reward: str, *, replay: bytes) -> Path:

@@ -121,6 +121,9 @@ def racing_line(
     speeds: Floats,
     numbers: Sequence[tuple[float, str]] = (),
     puts: Sequence[int] = (),
+    *,
+    label: str = "Racing line, coloured by speed",
+    point: str = ".",
 ) -> str:
     """A track with a line on it, coloured by speed, and labels beside places along the centre line.
 
@@ -130,6 +133,8 @@ def racing_line(
         speeds: m/s  (R,).
         numbers: Place in m, and what stands there.
         puts: Points that the car was put to, so that no line leads there.
+        label: What is read to who does not see it.
+        point: What stands before decimals.
     """
     view, unit = _frame(track)
     moving = speeds[speeds > 0.5 * np.median(speeds)] if len(speeds) and np.median(speeds) > 0 else speeds
@@ -153,10 +158,11 @@ def racing_line(
             f'text-anchor="middle">{escape(text)}</text>'
         )
     bar = "".join(f'<i style="background:rgb{speed_color((piece + 0.5) / 24)}"></i>' for piece in range(24))
+    slow, fast = (f"{speed:.1f}".replace(".", point) for speed in (low, high))
     return (
-        f'<figure><svg class="track" viewBox="{view}" role="img" aria-label="Racing line, coloured by speed">'
+        f'<figure><svg class="track" viewBox="{view}" role="img" aria-label="{escape(label, quote=True)}">'
         f"{parts[0]}{drawn}{''.join(labels)}</svg>"
-        f'<figcaption class="bar">{low:.1f} m/s <span>{bar}</span> {high:.1f} m/s</figcaption></figure>'
+        f'<figcaption class="bar">{slow} m/s <span>{bar}</span> {fast} m/s</figcaption></figure>'
     )
 
 

@@ -40,6 +40,7 @@ def draw_racing_line(
     figures: Sequence[tuple[str, str]] = (),
     has_own_figures: bool = True,
     speed: str = "SPEED",
+    point: str = ".",
     width_px: int = 1600,
 ) -> Path:
     """Write the picture of a trial's or lap's racing line.
@@ -52,6 +53,7 @@ def draw_racing_line(
         figures: (label, value) pairs beside what the line itself says.
         has_own_figures: Whether the line says its own: times, speeds, resets.
         speed: What the colours are called.
+        point: What stands before decimals.
         width_px: Width of the picture, pixels.
 
     Raises:
@@ -85,7 +87,7 @@ def draw_racing_line(
     name, description = describe(recording.track)
     own = _figures(recording) if has_own_figures else []
     picture.caption(title=title or name, subtitle=subtitle or description, figures=[*own, *figures])
-    color_bar(picture.canvas, unit, low, high, speed)
+    color_bar(picture.canvas, unit, low, high, speed, point)
     return picture.save(path)
 
 
@@ -150,7 +152,7 @@ def _figures(recording: Recording) -> list[tuple[str, str]]:
     return figures
 
 
-def color_bar(canvas: Canvas, unit: float, low: float, high: float, speed: str = "SPEED") -> None:
+def color_bar(canvas: Canvas, unit: float, low: float, high: float, speed: str = "SPEED", point: str = ".") -> None:
     """The colours from slow to fast in the upper right corner, with their speeds."""
     right, top, width, height, pieces = 95.0 * unit, 5.0 * unit, 20.0 * unit, 1.0 * unit, 100
     left = right - width
@@ -163,4 +165,10 @@ def color_bar(canvas: Canvas, unit: float, low: float, high: float, speed: str =
     for fraction, anchor in ((0.0, "ls"), (0.5, "ms"), (1.0, "rs")):
         value = low + fraction * (high - low)
         words = f"{value:.2f}".rstrip("0").rstrip(".") if fraction == 0.5 else f"{value:.1f}"
-        canvas.text((left + fraction * width, top + height + 1.9 * unit), words, INK, size=1.3 * unit, anchor=anchor)
+        canvas.text(
+            (left + fraction * width, top + height + 1.9 * unit),
+            words.replace(".", point),
+            INK,
+            size=1.3 * unit,
+            anchor=anchor,
+        )
