@@ -38,6 +38,17 @@ def test_a_lap_lies_over_the_picture_of_the_track(tmp_path):
     assert share_of(drawn, MISTAKE) < 1e-3
 
 
+def test_a_long_title_leaves_the_colours_alone(tmp_path):
+    recording = record(Autopilot(), laps=1)
+    short, *long = (
+        np.asarray(Image.open(draw_racing_line(recording, tmp_path / f"{len(title)}.png", title=title, width_px=640)))
+        for title in ("A", "badger@last - heron@last - otter - fox", " - ".join(8 * ["a" * 64]))
+    )
+    for drawn in long:
+        assert (drawn[:, :476] != short[:, :476]).any()
+        assert (drawn[:, 476:] == short[:, 476:]).all()  # where the bar stands
+
+
 def test_mistakes_are_marked_and_lines_do_not_jump(tmp_path):
     recording = record(lambda state: np.tile(np.float32([0, 1]), (len(state), 1)), laps=1, offtrack_penalty=1.0)
     with Image.open(draw_racing_line(recording, tmp_path / "line.png", width_px=640)) as image:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from racecraft.errors import ConfigError
-from racecraft.film.racing_line import OUTLINE, color_bar, speed_color, speed_range
+from racecraft.film.racing_line import BAR_ROOM, OUTLINE, color_bar, speed_color, speed_range
 from racecraft.limits import TrackLimit
 from racecraft.track.picture import TrackPicture, describe
 from racecraft.track.track import Track
@@ -45,6 +45,8 @@ def draw_limit(track: Track, limit: TrackLimit, path: str | Path, *, width_px: i
         ("GOLD", f"{medals.gold:.2f} s"),
     ]
     figures += [("SILVER", f"{medals.silver:.2f} s"), ("BRONZE", f"{medals.bronze:.2f} s")]
-    picture.caption(title=describe(track)[0], subtitle="The fastest lap that the car can do", figures=figures)
+    picture.caption(
+        title=describe(track)[0], subtitle="The fastest lap that the car can do", figures=figures, beside=BAR_ROOM
+    )
     color_bar(picture.canvas, unit, low, high)
     return picture.save(path)

@@ -27,6 +27,8 @@ OUTLINE: Final[Color] = (20, 22, 27)
 MISTAKE: Final[Color] = (224, 49, 49)
 INK: Final[Color] = (34, 38, 46)
 SOFT_INK: Final[Color] = (120, 120, 116)
+BAR_ROOM: Final = 0.22
+"""Of the bar of colours in the upper right corner, share of the picture's width."""
 SMOOTHING: Final = 8
 """Pieces that each piece between two steps is drawn with."""
 
@@ -86,7 +88,8 @@ def draw_racing_line(
         picture.canvas.disc(place, MISTAKE, radius_px=0.95 * width)
     name, description = describe(recording.track)
     own = _figures(recording) if has_own_figures else []
-    picture.caption(title=title or name, subtitle=subtitle or description, figures=[*own, *figures])
+    shown = [*own, *figures]
+    picture.caption(title=title or name, subtitle=subtitle or description, figures=shown, beside=BAR_ROOM)
     color_bar(picture.canvas, unit, low, high, speed, point)
     return picture.save(path)
 

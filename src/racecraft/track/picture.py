@@ -98,6 +98,7 @@ class TrackPicture:
         subtitle: str | None = None,
         figures: Sequence[tuple[str, str]] | None = None,
         has_scale: bool = True,
+        beside: float = 0.0,
     ) -> None:
         """Writes the title above the track, and figures and a scale bar below it.
 
@@ -106,13 +107,15 @@ class TrackPicture:
             subtitle: Default: the track's description.
             figures: (label, value) pairs. Default: length, width, tightest radius, corners, direction.
             has_scale: Whether there is a scale bar.
+            beside: Room for something else than the title in the upper right corner, share of the picture's width.
         """
         own_title, own_subtitle = describe(self.track)
         title = own_title if title is None else title
         subtitle = own_subtitle if subtitle is None else subtitle
         unit, canvas = self._unit, self.canvas
         left, right, top = 5.0 * unit, 95.0 * unit, self.size[1] - 7.6 * unit
-        _fitted(canvas, (left, 7.2 * unit), title, size=4.0 * unit, room=right - left, weight=0.03)
+        room = right - left - 100.0 * unit * beside
+        _fitted(canvas, (left, 7.2 * unit), title, size=4.0 * unit, room=room, weight=0.03)
         _fitted(canvas, (left, 10.0 * unit), subtitle, size=1.55 * unit, room=right - left, is_soft=True)
         canvas.box((left, top - 2.4 * unit, right, top - 2.4 * unit + max(1.0, 0.1 * unit)), RULE)
         x = left
