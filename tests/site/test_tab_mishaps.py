@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import http.server
+import json
 import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -107,3 +108,32 @@ def test_a_function_that_fails_on_the_way_is_not_painted_as_if_it_paid(phone: Pa
     phone.locator(".cm-content").fill(FAILS)
     phone.get_by_text("The function fails on the way round, so there is nothing to paint.").wait_for()
     assert phone.get_by_text("least").count() == 0
+
+
+DROP = """([name, text]) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([text], name));
+  scrollTo(0, 0);
+  window.dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
+}"""
+
+
+def test_what_is_dropped_is_taken_for_what_it_is_and_its_answer_is_seen(phone: Page) -> None:
+    from playwright.sync_api import expect
+
+    phone.evaluate(DROP, ["reward_function.py", "def reward_function(params):\r\n    return 2.0\r\n"])
+    brought = phone.get_by_role("region", name="This file brings a reward")
+    expect(brought).to_be_in_viewport()
+    brought.get_by_role("button", name="Take it").click()
+    phone.locator(".cm-content").get_by_text("return 2.0").wait_for()
+    metadata = {"action_space": [{"steering_angle": angle, "speed": 0.7} for angle in (-25, 25)], "version": "4"}
+    phone.evaluate(DROP, ["model_metadata.json", json.dumps(metadata)])
+    actions = phone.get_by_role("region", name="Actions")
+    actions.get_by_text("2 of at most 30").wait_for()
+    expect(actions).to_be_in_viewport()
+    phone.evaluate(DROP, ["stranger.replay", "nothing"])
+    expect(phone.get_by_text("This is no replay of Racecraft")).to_be_in_viewport()
+    phone.evaluate(DROP, ["MODEL.TAR.GZ", "nothing"])
+    expect(phone.get_by_text("This archive is damaged")).to_be_in_viewport()
+    phone.evaluate(DROP, ["holiday.jpg", "nothing"])
+    expect(phone.get_by_text("holiday.jpg is nothing that this page takes")).to_be_in_viewport()

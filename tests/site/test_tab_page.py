@@ -195,7 +195,11 @@ def test_a_models_laps_are_watched_again_corner_by_corner(page: Page) -> None:
 
 def test_a_model_stays_when_the_page_is_closed_and_goes_when_it_is_deleted(page: Page) -> None:
     page.reload()
-    page.get_by_role("button", name="Delete: oval-racing-1").click()
+    delete = page.get_by_role("button", name="Delete: oval-racing-1")
+    delete.click()
+    page.get_by_text("Nothing yet.").wait_for()
+    page.get_by_role("button", name="Undo").click()
+    delete.click()
     page.get_by_text("Nothing yet.").wait_for()
 
 

@@ -133,6 +133,9 @@ const ROUNDED = 1e-6; // degrees or m/s: what a number that was turned into radi
 const within = (value: unknown, low: number, high: number): number =>
   typeof value === "number" && value >= low - ROUNDED && value <= high + ROUNDED ? value : damaged();
 
+/** The actions of a model_metadata.json, of this page or of AWS's; an ArrivalProblem where it has none. */
+export const actionsOf = (metadata: string): ActionPreset => spaceOf(tableOf(metadata));
+
 const OLD = ["1", "2"]; // versions of the original's simulator whose files may say more than the wheels turn
 
 function spaceOf({ action_space_type: kind, action_space: given, version }: Table): ActionPreset {

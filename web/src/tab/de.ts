@@ -35,7 +35,10 @@ export const de: Record<TabKey, string> = {
   full_track:
     "Im Speicher dieses Browsers ist kein Platz mehr, darum blieb diese Strecke nicht erhalten: Lösche ein Modell, und speichere sie dann noch einmal.",
   full_lap: "Im Speicher dieses Browsers ist kein Platz mehr: Diese Runde bleibt deine beste, bis du aussteigst.",
-  drop_here: "Loslassen, um dieses Modell zu holen oder dieses Replay zu prüfen",
+  drop_here: "Loslassen, um ein Modell, eine Belohnung oder Aktionen zu holen oder ein Replay zu prüfen",
+  drop_unknown:
+    "{name} ist nichts, was diese Seite nimmt: ein Modell (.tar.gz), ein Replay (.replay), eine Belohnung (.py, höchstens 140 KB) oder die Aktionen einer model_metadata.json.",
+  dropped: "{name} ist gelöscht.",
   arrive: "Ein Modell holen",
   arrive_judging: "{name} fährt seine Auswertung …",
   arrive_not:
@@ -94,6 +97,9 @@ export const de: Record<TabKey, string> = {
     "Für die Strecke {track}. Nichts davon ist gelaufen. Lies sie und übernimm sie dann in den Editor, anstelle dessen, was dort steht.",
   gift_elsewhere:
     "Für die Strecke {track}, die es in dieser Seite nicht gibt: Es bleibt bei der gewählten. Nichts davon ist gelaufen. Lies sie und übernimm sie dann in den Editor, anstelle dessen, was dort steht.",
+  gift_file: "Diese Datei bringt eine Belohnung mit",
+  gift_file_lead:
+    "Nichts davon ist gelaufen. Lies sie und übernimm sie dann in den Editor, anstelle dessen, was dort steht.",
   gift_broken: "Dieser Link bringt keine Belohnung mit: Er ist beschädigt oder unterwegs abgeschnitten worden.",
   gift_take: "Übernehmen",
   gift_leave: "Lassen",

@@ -29,11 +29,14 @@ export const en = {
   model_about: "{track}, {laps} of {trials} {trials|lap|laps}, best {lap}, {steps} steps",
   download: "Download",
   drop: "Delete",
+  dropped: "{name} is deleted.",
   full: "There is no room left in this browser's storage: download this model now, or delete another one. It is here until the page is closed.",
   full_track:
     "There is no room left in this browser's storage, so this track was not kept: delete a model, then save it again.",
   full_lap: "There is no room left in this browser's storage: this lap stays your best until you leave the car.",
-  drop_here: "Let go to bring this model, or to check this replay",
+  drop_here: "Let go to bring a model, a reward or actions, or to check a replay",
+  drop_unknown:
+    "{name} is nothing that this page takes: a model (.tar.gz), a replay (.replay), a reward (.py, at most 140 KB), or the actions of a model_metadata.json.",
   arrive: "Bring a model",
   arrive_judging: "{name} drives its evaluation …",
   arrive_not:
@@ -87,6 +90,8 @@ export const en = {
     "For the track {track}. Nothing of it has run. Read it, then take it into the editor, in place of what is there.",
   gift_elsewhere:
     "For the track {track}, which is not in this page: it stays at the one that is chosen. Nothing of it has run. Read it, then take it into the editor, in place of what is there.",
+  gift_file: "This file brings a reward",
+  gift_file_lead: "Nothing of it has run. Read it, then take it into the editor, in place of what is there.",
   gift_broken: "This link brings no reward: it is damaged, or was cut short on its way.",
   gift_take: "Take it",
   gift_leave: "Leave it",

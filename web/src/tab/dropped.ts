@@ -1,0 +1,23 @@
+/** What a file is that somebody dropped onto the page, by its name: nobody reads more of one that this page has no use for. */
+import type { ActionPreset } from "../api/client";
+
+const MOST_BYTES = 140_000; // of a text, the most that AWS accepts of a reward
+
+export type Dropped =
+  { kind: "model" | "replay" } | { kind: "reward"; source: string } | { kind: "actions"; space: ActionPreset };
+
+/** Undefined where it is none of these, or does not hold what its name says. */
+export async function droppedOf(file: File): Promise<Dropped | undefined> {
+  const name = file.name.toLowerCase();
+  if (/\.(tar\.gz|tgz|gz)$/.test(name)) return { kind: "model" };
+  if (name.endsWith(".replay")) return { kind: "replay" };
+  if (!/\.(py|json)$/.test(name) || file.size > MOST_BYTES) return undefined;
+  try {
+    const text = new TextDecoder("utf-8", { fatal: true }).decode(await file.arrayBuffer());
+    if (name.endsWith(".py")) return { kind: "reward", source: text.replaceAll("\r\n", "\n") };
+    const { actionsOf } = await import("./arrive");
+    return { kind: "actions", space: actionsOf(text) };
+  } catch {
+    return undefined;
+  }
+}
