@@ -30,10 +30,10 @@ from racecraft.perception.memory import (
     unknown,
     unseen,
 )
-from racecraft.perception.mirror import mirrored_answers
+from racecraft.perception.mirror import mirrored_answers, mirrored_commands
 from racecraft.perception.network import MEMORY, WEIGHTS
 from racecraft.perception.reading import read_pictures
-from racecraft.perception.recalling import STRETCH, Drives, gradient, taught
+from racecraft.perception.recalling import STRETCH, Drives, _minibatch, gradient, taught
 from racecraft.perception.truth import Truth
 from racecraft.race.autopilot import Autopilot
 
@@ -151,6 +151,28 @@ def test_what_came_before_a_beginning_teaches_nothing() -> None:
 
 def part_of(drives: Drives, rows: slice) -> Drives:
     return Drives(*(array[rows] for array in vars(drives).values()))
+
+
+def test_it_learns_what_was_told_of_half_of_the_stretches_and_looks_at_half_in_a_mirror() -> None:
+    outputs, targets = some_outputs(STRETCH, 5), some_targets(STRETCH, 5)
+    commands = np.random.default_rng(9).uniform(0.1, 0.5, (STRETCH, 5, 2)).astype(np.float32)
+    before = commands.copy()
+    some = _minibatch(
+        [Drives(outputs, targets, commands, np.zeros((STRETCH, 5), bool))],
+        np.random.default_rng(3),
+    )
+    withheld = np.isnan(some.commands).all(axis=(0, 2))
+    assert (np.isnan(some.commands).any(axis=(0, 2)) == withheld).all()
+    assert 0.3 < withheld.mean() < 0.7
+    assert 0.2 < withheld[::2].mean() < 0.8  # not only of those in a mirror
+    for place in range(some.outputs.shape[1]):
+        seen, there, told = some.outputs[:, place], some.targets[:, place], some.commands[:, place]
+        if place % 2 == 0:
+            seen, there, told = mirrored_answers(seen), mirrored_answers(there), mirrored_commands(told)
+        (car,) = np.flatnonzero((outputs == seen[:, None]).all(axis=(0, 2)))
+        assert (targets[:, car] == there).all()
+        assert withheld[place] or (commands[:, car] == told).all()
+    assert (commands == before).all()  # what is remembered of drives stays as it was
 
 
 @pytest.mark.costly
