@@ -5,16 +5,13 @@ The browser needs `make site`, and is left out where that was not run.
 
 from __future__ import annotations
 
-import functools
-import http.server
 import json
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from test_tab_page import AXE, CHROMIUM, OPTIONS, PATIENCE, SITE, Files
+from built_page import AXE, CHROMIUM, OPTIONS, PATIENCE, SITE, hosted
 
 from racecraft.course import find_lesson, lessons
 from racecraft.course.page import LessonFacts, LessonPage, facts_of, page_of
@@ -41,20 +38,16 @@ def test_every_lesson_is_written_with_its_pictures(tmp_path: Path) -> None:
 def page() -> Iterator[Page]:
     from playwright.sync_api import sync_playwright
 
-    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE.parent)))
-    threading.Thread(target=host.serve_forever, daemon=True).start()
     complaints: list[str] = []
-    with sync_playwright() as playwright:
+    with hosted() as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.set_default_timeout(PATIENCE)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
-        page.goto(f"http://127.0.0.1:{host.server_port}/site/lessons.html")
+        page.goto(f"{address}lessons.html")
         yield page
         browser.close()
-    host.shutdown()
-    host.server_close()
     assert complaints == []
 
 

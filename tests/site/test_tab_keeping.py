@@ -5,15 +5,12 @@ Needs `make site`, and skips where that was not run. Tests follow each other.
 
 from __future__ import annotations
 
-import functools
-import http.server
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from test_tab_page import CHROMIUM, OPTIONS, PATIENCE, SITE, Files
+from built_page import CHROMIUM, NEEDS_THE_PAGE, OPTIONS, PATIENCE, hosted
 
 from few_frames import FEW_FRAMES
 from until_true import until_true
@@ -21,11 +18,7 @@ from until_true import until_true
 if TYPE_CHECKING:
     from playwright.sync_api import Page, Route
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not (SITE / "data" / "plan.json").exists(), reason="the page is not built: make site"),
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
-]
+pytestmark = NEEDS_THE_PAGE
 
 FULL = """() => {
   const [stores, ended] = [IDBObjectStore.prototype, IDBTransaction.prototype];
@@ -52,10 +45,8 @@ FULL = """() => {
 def tabs() -> Iterator[list[Page]]:
     from playwright.sync_api import sync_playwright
 
-    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE.parent)))
-    threading.Thread(target=host.serve_forever, daemon=True).start()
     complaints: list[str] = []
-    with sync_playwright() as playwright:
+    with hosted() as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         context = browser.new_context()
         context.set_default_timeout(PATIENCE)
@@ -63,13 +54,11 @@ def tabs() -> Iterator[list[Page]]:
         pages = [context.new_page(), context.new_page()]
         for page in pages:
             page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.goto(f"http://127.0.0.1:{host.server_port}/site/")
+            page.goto(address)
             page.get_by_role("combobox", name="Track").select_option("oval")
             page.get_by_label("What it is paid for").select_option("centerline")
         yield pages
         browser.close()
-    host.shutdown()
-    host.server_close()
     assert complaints == []
 
 

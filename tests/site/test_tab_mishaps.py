@@ -5,15 +5,12 @@ Needs `make site`, and skips where that was not run. Tests follow each other.
 
 from __future__ import annotations
 
-import functools
-import http.server
 import json
-import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
-from test_tab_page import CHROMIUM, OPTIONS, PATIENCE, SITE, Files
+from built_page import CHROMIUM, NEEDS_THE_PAGE, OPTIONS, PATIENCE, hosted
 
 from few_frames import FEW_FRAMES
 from until_true import until_true
@@ -21,11 +18,7 @@ from until_true import until_true
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not (SITE / "data" / "plan.json").exists(), reason="the page is not built: make site"),
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
-]
+pytestmark = NEEDS_THE_PAGE
 
 CUT = "track=oval&reward=AAAA"
 FAILS = """def reward_function(params):
@@ -41,13 +34,11 @@ VISIBLE = """(() => {
 def phone() -> Iterator[Page]:
     from playwright.sync_api import sync_playwright
 
-    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE.parent)))
-    threading.Thread(target=host.serve_forever, daemon=True).start()
     complaints: list[str] = []
-    with sync_playwright() as playwright:
+    with hosted() as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         context = browser.new_context(
-            base_url=f"http://127.0.0.1:{host.server_port}/site/",
+            base_url=address,
             viewport={"width": 390, "height": 844},
             reduced_motion="reduce",
         )
@@ -57,8 +48,6 @@ def phone() -> Iterator[Page]:
         page.on("pageerror", lambda error: complaints.append(str(error)))
         yield page
         browser.close()
-    host.shutdown()
-    host.server_close()
     assert complaints == []
 
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from built_page import SITE, Files
 from other_browsers import FIREFOX, SCREEN, WEBKIT, Tab, firefox, webkit
-from test_tab_page import SITE, Files
 from test_trainer_bits import bits
 
 from racecraft import train

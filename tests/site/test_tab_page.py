@@ -5,18 +5,16 @@ Needs `make site`, and skips where that was not run.
 
 from __future__ import annotations
 
-import functools
 import http.server
 import json
 import math
 import re
-import shutil
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from built_page import AXE, CHROMIUM, NEEDS_THE_PAGE, OPTIONS, PATIENCE, Files, hosted
 
 from few_frames import FEW_FRAMES
 from racecraft import evaluate
@@ -36,30 +34,13 @@ from until_true import until_true
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-ROOT = Path(__file__).parents[2]
-SITE = ROOT / "build" / "site"
-AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"]
-PATIENCE = 180_000  # ms; the machine may be busy
 THREADS = "crossOriginIsolated ? Math.min(navigator.hardwareConcurrency, 8) : 1"
 FADED = """new Promise(requestAnimationFrame)
   .then(() => document.getAnimations().filter((one) => one instanceof CSSTransition))
   .then((all) => Promise.allSettled(all.map((one) => one.finished)))
   .then(() => 0)"""  # once colours have changed
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not (SITE / "data" / "plan.json").exists(), reason="the page is not built: make site"),
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
-]
-
-
-class Files(http.server.SimpleHTTPRequestHandler):
-    """A static host, below a path of its own."""
-
-    def log_message(self, *_: object) -> None:
-        """Says nothing."""
+pytestmark = NEEDS_THE_PAGE
 
 
 @pytest.fixture(scope="module")
@@ -67,22 +48,18 @@ def page() -> Iterator[Page]:
     from playwright.sync_api import expect, sync_playwright
 
     expect.set_options(timeout=PATIENCE)
-    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, directory=str(SITE.parent)))
-    threading.Thread(target=host.serve_forever, daemon=True).start()
     complaints: list[str] = []
-    with sync_playwright() as playwright:
+    with hosted() as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.set_default_timeout(PATIENCE)
         page.add_init_script(FEW_FRAMES)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
-        page.goto(f"http://127.0.0.1:{host.server_port}/site/")
+        page.goto(address)
         page.get_by_role("button", name="Train", exact=True).wait_for()
         yield page
         browser.close()
-    host.shutdown()
-    host.server_close()
     assert complaints == []
 
 

@@ -5,17 +5,14 @@ Needs `make site`, and skips where that was not run.
 
 from __future__ import annotations
 
-import functools
-import http.server
 import shutil
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from test_tab_page import CHROMIUM, OPTIONS, PATIENCE, SITE, Files
+from built_page import CHROMIUM, NEEDS_THE_PAGE, OPTIONS, PATIENCE, SITE, Files, hosted
 
 from few_frames import FEW_FRAMES
 from racecraft.site.__main__ import write_files
@@ -24,11 +21,7 @@ from until_true import until_true
 if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not (SITE / "data" / "plan.json").exists(), reason="the page is not built: make site"),
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here"),
-]
+pytestmark = NEEDS_THE_PAGE
 
 VERSIONS = "caches.keys().then((names) => names.length)"
 MADE = "meta[name=made]"
@@ -69,19 +62,15 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def visitor(site: Path) -> Iterator[BrowserContext]:
     from playwright.sync_api import sync_playwright
 
-    host = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Cached, directory=str(site.parent)))
-    threading.Thread(target=host.serve_forever, daemon=True).start()
     complaints: list[str] = []
-    with sync_playwright() as playwright:
+    with hosted(site.parent, Cached) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        context = browser.new_context(base_url=f"http://127.0.0.1:{host.server_port}/site/")
+        context = browser.new_context(base_url=address)
         context.set_default_timeout(PATIENCE)
         context.add_init_script(FEW_FRAMES)
         context.on("weberror", lambda error: complaints.append(str(error.error)))
         yield context
         browser.close()
-    host.shutdown()
-    host.server_close()
     assert complaints == []
 
 
