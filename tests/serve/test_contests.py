@@ -17,8 +17,8 @@ from running_consoles import RunningConsole
 from racecraft.errors import ConfigError
 from racecraft.race.rules import RaceRules
 from racecraft.replay import read_replay, verify
-from racecraft.serve.contests import ghosts
 from racecraft.serve.contests.terms import terms_of
+from racecraft.serve.races import ghosts
 from racecraft.sim.objects import Bots, Objects, Obstacles
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.vehicle import PRESETS as VEHICLES
@@ -369,8 +369,8 @@ def test_a_heat_whose_ghost_is_gone_says_so(
 ) -> None:
     """As one that waited while its folder was lost."""
     from racecraft.errors import ConfigError
-    from racecraft.serve.contests.ghosts import keep, sources_of
     from racecraft.serve.problems import Conflict
+    from racecraft.serve.races.ghosts import keep, sources_of
 
     with pytest.raises(ConfigError, match=r"The replay of ghost 2 is not there\."):
         sources_of(["best-lap", evaluation], folder=console.runs / "nowhere", runs=console.runs)

@@ -22,27 +22,23 @@ from racecraft.contest.terms import TOGETHER, race_terms
 from racecraft.errors import ConfigError
 from racecraft.race.announcement import draw_secret
 from racecraft.race.conditions import Conditions
-from racecraft.serve.contests.files import REPLAY, VIDEO, contest_folder, count_matches, entry_name
-from racecraft.serve.contests.ghosts import evaluated, evaluation_replay, keep
+from racecraft.serve.contests.files import REPLAY, VIDEO, contest_folder, count_matches
 from racecraft.serve.contests.schemas import (
     ContestCard,
     ContestDetail,
-    EarlierHeat,
-    Evaluated,
-    EvaluatedCard,
-    Ghost,
     HeatRow,
     LadderMatch,
     LadderPlace,
     NewHeat,
     NewLadder,
-    Starter,
 )
 from racecraft.serve.contests.terms import Terms, settle, terms_of
 from racecraft.serve.jobs.queue import ENDED, JobQueue, new_job_id
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
 from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.races.ghost_schemas import EarlierHeat, Evaluated, EvaluatedCard, Ghost, Starter
+from racecraft.serve.races.ghosts import entry_name, evaluated, evaluation_replay, keep
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
 from racecraft.serve.tracks.courses import Courses

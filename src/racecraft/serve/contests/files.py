@@ -20,25 +20,13 @@ from racecraft.serve.problems import NotFound
 
 FOLDER: Final = "contests"
 REPLAY, VIDEO, MATCHES = "race.replay", "video.mp4", "matches.zip"
-BESIDE: Final = "ghosts.json"
 DRIVEN: Final = "driven.txt"
 """How many races of a ladder are decided."""
-
-
-def entry_name(starter: dict[str, Any]) -> str:
-    """A model at the start, with its checkpoint unless that is the best."""
-    model, checkpoint = starter["model"], starter["checkpoint"]
-    return str(model) if checkpoint == "best" else f"{model}@{checkpoint}"
 
 
 def contest_folder(state: Path, contest: str) -> Path:
     """Where they lie."""
     return state / FOLDER / contest
-
-
-def ghost_file(number: int) -> str:
-    """Of the replay of a heat's ghost, inside the heat's folder."""
-    return f"ghosts/{number}.replay"
 
 
 def count_matches(folder: Path) -> int:

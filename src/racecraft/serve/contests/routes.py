@@ -12,10 +12,11 @@ from fastapi.responses import FileResponse
 
 from racecraft.contest.terms import TOGETHER
 from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
-from racecraft.serve.contests.ghosts import read_beside
-from racecraft.serve.contests.schemas import ContestCard, ContestDetail, EvaluatedCard, NewHeat, NewLadder
+from racecraft.serve.contests.schemas import ContestCard, ContestDetail, NewHeat, NewLadder
 from racecraft.serve.context import Computes, InContext, TakesPlace
 from racecraft.serve.problems import NotFound
+from racecraft.serve.races.ghost_schemas import EvaluatedCard
+from racecraft.serve.races.ghosts import read_beside
 from racecraft.serve.races.replays import car_of, replay_of, road_of
 from racecraft.serve.races.schemas import RaceReplay, ReplayCar
 

@@ -9,44 +9,12 @@ from pydantic import Field
 
 from racecraft.contest.terms import MAX_GRID
 from racecraft.film.ghost import MAX_GHOSTS
-from racecraft.serve.races.schemas import CheckpointChoice, RaceKind, RaceSettings, Ranking
-from racecraft.serve.schemas import Message, RunName
+from racecraft.serve.races.ghost_schemas import Ghost, Starter
+from racecraft.serve.races.schemas import RaceKind, RaceSettings, Ranking
+from racecraft.serve.schemas import Message
 
 Title = Annotated[str, Field(max_length=100)]
 Among = Literal["none", "boxes", "bots"]
-
-
-class Starter(Message):
-    """A model at the start; the same one may stand there twice."""
-
-    model: RunName
-    checkpoint: CheckpointChoice = "best"
-
-
-class Evaluated(Message):
-    """The best trial of an evaluation that a model drove before, on the same road."""
-
-    model: RunName
-    evaluation: str = Field(max_length=40)
-    """When it began, as its folder says: YYYYmmddHHMMSS."""
-
-
-class EarlierHeat(Message):
-    """The best car of a heat that was driven before, on the same road."""
-
-    heat: str = Field(max_length=40)
-
-
-Ghost = Starter | Evaluated | EarlierHeat | Literal["best-lap"]
-"""A model that drives the same race alone, an evaluation's best trial, a car of an earlier heat, or the fastest lap of
-this one, lap after lap."""
-
-
-class EvaluatedCard(Evaluated):
-    """An evaluation that may be a ghost."""
-
-    best_lap: float | None
-    """s; None where it completed no lap."""
 
 
 class NewHeat(RaceSettings):

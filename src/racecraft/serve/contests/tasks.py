@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder, entry_name
-from racecraft.serve.contests.ghosts import named_as_asked, sources_of, write_beside
+from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder
 from racecraft.serve.contests.terms import terms_of
 from racecraft.serve.jobs.task import Task
+from racecraft.serve.races.ghosts import entry_name, named_as_asked, sources_of, write_beside
 from racecraft.serve.settings import STATE_FOLDER
 
 if TYPE_CHECKING:

@@ -24,17 +24,18 @@ from racecraft.errors import ConfigError, RacecraftError
 from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder, list_runs
 from racecraft.run.atomic import write_file
-from racecraft.serve.contests.files import BESIDE, entry_name, ghost_file
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.track import Track
 
 if TYPE_CHECKING:
     from racecraft.film.ghost import Ghost
     from racecraft.race.recording import Recording
-    from racecraft.serve.contests.schemas import EvaluatedCard
+    from racecraft.serve.races.ghost_schemas import EvaluatedCard
     from racecraft.serve.races.schemas import ReplayGhost
     from racecraft.sim.views import CarView
 
+BESIDE: Final = "ghosts.json"
+"""Where the ghosts of a heat were, beside its cars; in the heat's folder."""
 NEWEST: Final = 20
 """Evaluations of a model that are listed."""
 MAX_LISTED: Final = 500
@@ -42,6 +43,17 @@ MAX_READ: Final = 2000
 """Evaluations whose summaries are read for a list; it is to be there within a second."""
 MAX_BESIDE: Final = 64 << 20
 """Bytes of the file that says where a heat's ghosts were."""
+
+
+def entry_name(starter: dict[str, Any]) -> str:
+    """A model that drives, with its checkpoint unless that is the best."""
+    model, checkpoint = starter["model"], starter["checkpoint"]
+    return str(model) if checkpoint == "best" else f"{model}@{checkpoint}"
+
+
+def ghost_file(number: int) -> str:
+    """Of the copy of a ghost's replay, inside the heat's folder, by its place among the ghosts."""
+    return f"ghosts/{number}.replay"
 
 
 def evaluated(runs: Path, track: Track) -> list[EvaluatedCard]:
@@ -75,7 +87,7 @@ def _card(folder: RunFolder, stamp: str, track: Track) -> EvaluatedCard | None:
         return None
     if summary.get("track") != track.name or summary.get("track_digest", track.digest) != track.digest:
         return None
-    from racecraft.serve.contests.schemas import EvaluatedCard  # jobs do without messages
+    from racecraft.serve.races.ghost_schemas import EvaluatedCard  # jobs do without messages
 
     best = summary.get("best_lap_seconds")
     return EvaluatedCard(
