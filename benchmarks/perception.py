@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.perception import Belief, Perceiver, PerceptionDriver, Watcher
+from racecraft.perceiving import PerceptionDriver
+from racecraft.perception import Belief, Perceiver, Watcher
 from racecraft.perception.answers import HALF, IN_SIGHT, MIDDLES, NUMBERS, PLACES
 from racecraft.perception.network import WEIGHTS
 from racecraft.perception.worlds import Episodes, World

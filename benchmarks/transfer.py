@@ -29,7 +29,7 @@ from racecraft.car.calibration import CarCalibration
 from racecraft.car.driving import CarPolicy, car_picture
 from racecraft.car.export import export_run, read_exported
 from racecraft.film.encoding import write_video
-from racecraft.perception import PerceptionDriver
+from racecraft.perceiving import PerceptionDriver
 from racecraft.race.autopilot import Autopilot
 from racecraft.sim.camera import LUMA
 from racecraft.track import Track, load_track

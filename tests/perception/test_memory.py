@@ -14,7 +14,9 @@ from unseen_roads import unseen_roads
 
 from racecraft.errors import CheckpointError
 from racecraft.film.encoding import write_video
-from racecraft.perception import Belief, Perceiver, PerceptionDriver, Watcher, perceive
+from racecraft.perceiving import PerceptionDriver, perceive
+from racecraft.perceiving.reading import read_pictures
+from racecraft.perception import Belief, Perceiver, Watcher
 from racecraft.perception.answers import IN_SIGHT, MIDDLES, NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, NUMBERS
 from racecraft.perception.belief import believe
 from racecraft.perception.lessons import Lessons
@@ -32,7 +34,6 @@ from racecraft.perception.memory import (
 )
 from racecraft.perception.mirror import mirrored_answers, mirrored_commands
 from racecraft.perception.network import MEMORY, WEIGHTS
-from racecraft.perception.reading import read_pictures
 from racecraft.perception.recalling import STRETCH, Drives, _minibatch, gradient, taught
 from racecraft.perception.truth import Truth
 from racecraft.race.autopilot import Autopilot

@@ -11,7 +11,8 @@ from PIL import Image
 from unseen_roads import unseen_roads
 
 from racecraft.errors import ShapeError
-from racecraft.perception import Belief, Perceiver, PerceptionDriver, perceive
+from racecraft.perceiving import PerceptionDriver, perceive
+from racecraft.perception import Belief, Perceiver
 from racecraft.perception.answers import NUM_CONTINUOUS, NUM_TARGETS, NUMBERS, ROWS
 from racecraft.perception.network import of_one_brightness
 from racecraft.perception.truth import Truth

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from racecraft import load_track
-from racecraft.perception import Perceiver, PerceptionDriver, Watcher
+from racecraft.perceiving import PerceptionDriver
+from racecraft.perceiving.driving import state_of
+from racecraft.perception import Perceiver, Watcher
 from racecraft.perception.answers import NUM_OUTPUTS, NUM_TARGETS, NUMBERS
 from racecraft.perception.belief import Belief, believe
-from racecraft.perception.driving import state_of
 from racecraft.perception.memory import unknown
 from racecraft.race.generalization import generalize
 from racecraft.sim.columns import STATE_COLUMNS

@@ -17,12 +17,13 @@ from racecraft.errors import ConfigError, ShapeError
 from racecraft.film.encoding import write_video
 from racecraft.learn.native_regressor import NativeRegressor
 from racecraft.learn.networks import PERCEIVER
-from racecraft.perception import Belief, Perceiver, Watcher, perceive
+from racecraft.perceiving import perceive
+from racecraft.perceiving.painting import paint
+from racecraft.perceiving.reading import rate_of, read_pictures
+from racecraft.perception import Belief, Perceiver, Watcher
 from racecraft.perception.answers import NUM_OUTPUTS, NUMBERS
 from racecraft.perception.belief import believe
 from racecraft.perception.network import of_one_brightness
-from racecraft.perception.painting import paint
-from racecraft.perception.reading import rate_of, read_pictures
 from racecraft.perception.telling import tell
 from racecraft.race import RULE_SETS, evaluate
 from racecraft.replay import Replay, write_replay

@@ -50,8 +50,8 @@ def perceive(
     as_json: Json = False,
 ) -> None:
     """Say what pictures show of the road, and paint it."""
+    from racecraft.perceiving import perceive as look
     from racecraft.perception import Lessons, Perceiver
-    from racecraft.perception import perceive as look
     from racecraft.perception import train as learn
 
     meant = OF_LEARNING if train is not None else OF_DRIVING if drive else ()
@@ -113,7 +113,7 @@ def _drive(
     as_json: bool,
 ) -> None:
     """One lap on each of many tracks, both ways."""
-    from racecraft.perception import PerceptionDriver
+    from racecraft.perceiving import PerceptionDriver
     from racecraft.race.autopilot import Autopilot
     from racecraft.race.generalization import generalize
     from racecraft.sim.randomization import load_randomization

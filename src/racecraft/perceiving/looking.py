@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.film.encoding import write_video
+from racecraft.perceiving.painting import paint
+from racecraft.perceiving.reading import is_sequence, rate_of, read_pictures
 from racecraft.perception.network import Perceiver
-from racecraft.perception.painting import paint
-from racecraft.perception.reading import is_sequence, rate_of, read_pictures
 from racecraft.perception.telling import tell
 from racecraft.perception.watching import Watcher
 

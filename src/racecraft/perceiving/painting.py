@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.perceiving.reading import SHOWN
 from racecraft.perception.answers import CURVATURE_AT, REGION_COLUMNS, REGION_ROWS, ROWS
 from racecraft.perception.belief import Belief
-from racecraft.perception.reading import SHOWN
 from racecraft.perception.telling import DISTANT, distance_of, sees_middle
 from racecraft.track.canvas import Color
 
