@@ -43,6 +43,7 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     page.get_by_text("Nobody has arrived yet.").wait_for()
     page.get_by_role("checkbox", name="ada").check()
     page.get_by_role("checkbox", name="bob").check()
+    page.get_by_role("combobox", name="Add a ghost").select_option("model ada")
     page.get_by_role("button", name="Enter 2 and drive").click()
     page.get_by_role("link", name="ada", exact=True).wait_for()
     page.get_by_role("link", name="bob", exact=True).wait_for()
@@ -64,6 +65,7 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
 
     page.get_by_role("button", name="Replay all together").click()
     page.locator(".stage canvas").wait_for()
+    assert page.locator(".film li.ghost").inner_text().split() == ["ada", "ghost"]
     page.get_by_role("button", name="Full screen").click()
     page.locator(":fullscreen canvas").wait_for()
     page.locator(":fullscreen").get_by_role("button", name="Full screen").click()

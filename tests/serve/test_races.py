@@ -331,7 +331,7 @@ def test_what_an_entry_drives_by_is_what_was_announced(stewards: Stewards) -> No
     stewards.model("ada")
     stewards.races.enter(race, Enter(models=["ada"]), user_id=1)
     (job,) = stewards.queue.list(kind="race")
-    assert set(job.payload) == {"track", "announcement", "checkpoint"}
+    assert set(job.payload) == {"track", "announcement", "checkpoint", "ghosts"}
     announced = Announcement.from_dict(job.payload["announcement"])
     terms = announced_terms(announced, load_track("oval"))
     assert terms.conditions.seed == seed_of(bytes.fromhex(_row(stewards, race).secret))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, get_args
@@ -237,6 +238,57 @@ def test_a_kept_checkpoint_is_what_drives(console: RunningConsole) -> None:
     assert reply.status_code == 202, reply.text
     (drive,) = [one for one in client.get("/api/jobs", params={"run": name}).json() if one["kind"] == "race"]
     assert console.wait_for(console.job_ended(drive["id"]))["result"]["step"] == first["step"]
+
+
+def test_ghosts_accompany_the_film_of_an_entry(console: RunningConsole) -> None:
+    """They are in the video and beside the cars of the trial that it shows, and change nothing that was driven."""
+    client = console.client
+    for name, seed in (("gina", 1), ("hank", 2)):
+        console.create(name=name, track="oval", until="512 steps", seed=seed)
+        (job,) = client.get("/api/jobs", params={"run": name}).json()
+        assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    asked = {"laps": 1, "num_trials": 1, "seed": 9, "rules": "first_lap"}
+    job = client.post("/api/models/hank/evaluations", json=asked).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    (card,) = client.get("/api/contests/ghosts?track=oval").json()
+    before = {"model": "hank", "evaluation": card["evaluation"]}
+
+    race = make(console, laps=1, trials=2, max_resets=0, seed=1, time_limit=8)
+    entries = f"/api/races/{race['id']}/entries"
+    replay = console.runs / "hank" / f"evaluation-{card['evaluation']}" / "evaluation.replay"
+    ghosts = [before, {"model": "hank", "checkpoint": "last"}, {"model": "gina", "checkpoint": "best"}, "best-lap"]
+    for beside in ([], ghosts):
+        reply = client.post(entries, json={"models": ["gina"], "ghosts": beside})
+        assert reply.status_code == 202, reply.text
+    found = sorted(one["entry"] for one in reply.json()["undecided"] + reply.json()["standings"])
+    jobs = [one for one in client.get("/api/jobs", params={"run": "gina"}).json() if one["kind"] == "race"]
+    kept = replay.read_bytes()
+    replay.unlink()  # as when it is removed before the entry is driven
+    try:
+        driven = [console.wait_for(console.job_ended(job["id"])) for job in jobs]
+    finally:
+        replay.write_bytes(kept)
+    assert [job["state"] for job in driven] == ["done", "done"], driven
+    (plain, haunted) = sorted(driven, key=lambda job: job["created"])
+    folders = [console.runs / ".racecraft" / "races" / job["id"] for job in (plain, haunted)]
+    assert (folders[1] / "ghosts" / "0.replay").read_bytes() == kept
+    assert plain["result"]["lap_seconds"] == haunted["result"]["lap_seconds"]  # who drives does not see them
+    assert haunted["result"]["verification"]["is_genuine"]
+    films = [(folder / "video.mp4").read_bytes() for folder in folders]
+    assert films[0] != films[1]
+    shown = json.loads((folders[1] / "ghosts.json").read_bytes())["trial"]
+    for entry, trial, names in ((0, shown, []), (1, 1 - shown, []), (1, shown, ["hank", "hank@last"])):
+        told = client.get(f"/api/races/{race['id']}/replay", params={"entries": found[entry], "trial": trial}).json()
+        assert [ghost["name"] for ghost in told["ghosts"]][:2] == names
+    (car,), (_, _, itself, *_) = told["cars"], told["ghosts"]
+    assert itself["name"] == "gina"
+    assert [place for place in itself["trace"] if place] == car["trace"]  # the same model in the same trial
+    for ghost, status in (({"model": "nobody"}, 404), ({"heat": "0" * 16}, 404), ("@8192", 422)):
+        refused(client.post(entries, json={"models": ["gina"], "ghosts": [ghost]}), status)
+    back = make(console, seed=1, direction="reverse")
+    reply = client.post(f"/api/races/{back['id']}/entries", json={"models": ["gina"], "ghosts": [before]})
+    assert "in another direction or of another form" in refused(reply, 422)["message"]
+    assert client.get(f"/api/races/{back['id']}").json()["undecided"] == []
 
 
 def test_a_race_is_announced_by_all_that_was_asked(console: RunningConsole) -> None:

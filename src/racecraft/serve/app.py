@@ -118,6 +118,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     artifacts = Artifacts(settings.artifacts) if settings.artifacts else None
     follower = Follower(artifacts, settings=settings, queue=queue)
     mirror = Mirror(artifacts, settings=settings, queue=queue, supervisor=supervisor)
+    heats = Contests(settings.state, database, queue, garage, courses, mirror=mirror)
     context = Context(
         settings=settings,
         database=database,
@@ -128,8 +129,8 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
         follower=follower,
         drives=Drives(),
         ghosts=Ghosts(settings.runs, database),
-        races=Races(database, queue, garage, courses, share=mirror.share, see=follower.see),
-        contests=Contests(settings.state, database, queue, garage, courses, mirror=mirror),
+        races=Races(database, queue, garage, courses, share=mirror.share, see=follower.see, replays=heats.replays),
+        contests=heats,
         tunings=Tunings(settings.state, queue, garage, mirror=mirror, see=follower.see),
         sweeps=Sweeps(queue, garage, courses, mirror=mirror, see=follower.see),
         mirror=mirror,

@@ -151,6 +151,7 @@ def _console(owner: Context, user_id: int) -> Context:
     settings.tracks.mkdir(parents=True, exist_ok=True)
     garage = Garage(settings.runs, settings.state, database, user_id=user_id)
     courses, mirror = Courses(settings.tracks), owner.mirror.of(settings, queue)
+    heats = Contests(settings.state, database, queue, garage, courses, mirror=mirror)
     return replace(
         owner,
         settings=settings,
@@ -158,8 +159,17 @@ def _console(owner: Context, user_id: int) -> Context:
         garage=garage,
         courses=courses,
         ghosts=Ghosts(settings.runs, database),
-        races=Races(database, queue, garage, courses, share=mirror.share, see=owner.follower.see, user_id=user_id),
-        contests=Contests(settings.state, database, queue, garage, courses, mirror=mirror),
+        races=Races(
+            database,
+            queue,
+            garage,
+            courses,
+            share=mirror.share,
+            see=owner.follower.see,
+            replays=heats.replays,
+            user_id=user_id,
+        ),
+        contests=heats,
         tunings=Tunings(settings.state, queue, garage, mirror=mirror, see=owner.follower.see),
         sweeps=Sweeps(queue, garage, courses, mirror=mirror, see=owner.follower.see),
         mirror=mirror,

@@ -1,15 +1,14 @@
 /** Models against models: heats on one road, and ladders. */
 import { ask } from "./client";
-import type { RaceReplay } from "./races";
+import type { Ghost, RaceReplay, Starter } from "./races";
 import type { components } from "./schema";
 
 type Schemas = components["schemas"];
 export type ContestCard = Schemas["ContestCard"];
 export type ContestDetail = Schemas["ContestDetail"];
 export type LadderMatch = Schemas["LadderMatch"];
-export type Starter = Required<Schemas["Starter"]>;
+export type { Ghost, Starter };
 export type EvaluatedCard = Schemas["EvaluatedCard"];
-export type Ghost = Starter | Schemas["Evaluated"] | Required<Schemas["EarlierHeat"]> | "best-lap";
 export type NewHeat = Partial<Schemas["NewHeat"]> & { models: Starter[] };
 export type NewLadder = Partial<Schemas["NewLadder"]> & { models: Starter[]; tracks: string[] };
 

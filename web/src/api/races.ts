@@ -9,6 +9,8 @@ export type RaceReplay = Schemas["RaceReplay"];
 export type Standing = Schemas["Standing"];
 export type RuleSet = Schemas["RuleSet"];
 export type CheckpointChoice = NonNullable<Schemas["Enter"]["checkpoint"]>;
+export type Starter = Required<Schemas["Starter"]>;
+export type Ghost = Starter | Schemas["Evaluated"] | Required<Schemas["EarlierHeat"]> | "best-lap";
 export type NewRace = Partial<Schemas["NewRace"]> & { title: string };
 
 export const raceApi = {
@@ -19,8 +21,8 @@ export const raceApi = {
   remove: (id: number) => ask<void>("DELETE", `/races/${id}`),
   restore: (id: number) => ask<RaceDetail>("POST", `/races/${id}/restore`),
   rules: () => ask<RuleSet[]>("GET", "/races/rules"),
-  enter: (id: number, models: string[], checkpoint: CheckpointChoice) =>
-    ask<RaceDetail>("POST", `/races/${id}/entries`, { models, checkpoint }),
+  enter: (id: number, entered: { models: string[]; checkpoint: CheckpointChoice; ghosts: Ghost[] }) =>
+    ask<RaceDetail>("POST", `/races/${id}/entries`, entered),
   withdraw: (id: number, entry: number) => ask<void>("DELETE", `/races/${id}/entries/${entry}`),
   replay: (id: number, entries: number[]) => ask<RaceReplay>("GET", `/races/${id}/replay?entries=${entries.join(",")}`),
 };

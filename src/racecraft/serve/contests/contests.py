@@ -22,6 +22,7 @@ from racecraft.contest.terms import TOGETHER, race_terms
 from racecraft.errors import ConfigError
 from racecraft.race.announcement import draw_secret
 from racecraft.race.conditions import Conditions
+from racecraft.race.rules import RaceRules
 from racecraft.serve.contests.files import REPLAY, VIDEO, contest_folder, count_matches
 from racecraft.serve.contests.schemas import (
     ContestCard,
@@ -44,6 +45,7 @@ from racecraft.serve.store.tables import Job
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.randomization import load_randomization
 from racecraft.sim.vehicle import load_vehicle
+from racecraft.track import Track
 
 KINDS: Final = ("heat", "ladder")
 """Of the jobs."""
@@ -100,11 +102,7 @@ class Contests:
             minimum_laps=request.minimum_laps,
             secret=draw_secret() if request.secret else None,
         ).announcement
-        replays = self._replays(request.ghosts)
-        if replays:
-            from racecraft.film.ghost_source import check_sources
-
-            check_sources([str(path) for path in replays.values()], conditions.track, conditions.rules, run=None)
+        replays = self.replays(request.ghosts, conditions.track, conditions.rules)
         payload = request.model_dump() | {
             "kind": kind,
             "tracks": [request.track],
@@ -213,12 +211,18 @@ class Contests:
         found = [job for kind in KINDS for job in self._queue.list(kind=kind, limit=MAX_CONTESTS)]
         return sorted(found, key=lambda job: job.created, reverse=True)
 
-    def _replays(self, ghosts: Sequence[Ghost]) -> dict[int, Path]:
+    def replays(self, ghosts: Sequence[Ghost], track: Track, rules: RaceRules) -> dict[int, Path]:
         """The replays of those that drove before, by their places among the ghosts.
+
+        Args:
+            ghosts: As somebody asked for them.
+            track: Of the film.
+            rules: Of the film, which say in what direction it goes.
 
         Raises:
             NotFound: There is no such heat, model or evaluation.
             Conflict: An evaluation has no replay.
+            ConfigError: One is of another road.
         """
         found = {}
         for number, ghost in enumerate(ghosts):
@@ -226,6 +230,10 @@ class Contests:
                 found[number] = self.file(ghost.heat, REPLAY)
             elif isinstance(ghost, Evaluated):
                 found[number] = evaluation_replay(self._garage.folder(ghost.model), ghost.evaluation)
+        if found:
+            from racecraft.film.ghost_source import check_sources
+
+            check_sources([str(path) for path in found.values()], track, rules, run=None)
         return found
 
     def _add(

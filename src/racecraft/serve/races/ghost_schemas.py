@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from racecraft.serve.races.schemas import CheckpointChoice
 from racecraft.serve.schemas import Message, RunName
+
+CheckpointChoice = Literal["best", "last"] | Annotated[int, Field(ge=0, le=10**12)]
+"""Of a model; a number is that of the camera steps of training behind it."""
 
 
 class Starter(Message):

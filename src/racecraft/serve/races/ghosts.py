@@ -1,10 +1,10 @@
-"""Ghosts of a heat: evaluations that can be some, the replays of those that drove before, and where they were.
+"""Ghosts of a film: evaluations that can be some, the replays of those that drove before, and where they were.
 
-request ──replays_of──▶ replays ──keep──▶ the heat's own copies ──sources_of──▶ what `load_ghosts` takes
-                                          ghosts ──write_beside──▶ a file of the heat ──read_beside──▶ its page
+request ──▶ replays ──keep──▶ own copies ──sources_of──▶ what `load_ghosts` takes
+                                                ghosts ──write_beside──▶ a file ──read_beside──▶ the page
 
-The copies are made when the heat is asked for: they travel with it to whoever drives it, and what they were copied from
-may be removed meanwhile.
+Heats have them, and entries of races. The copies are made when one is asked for: they travel with it to whoever drives
+it, and what they were copied from may be removed meanwhile.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ if TYPE_CHECKING:
     from racecraft.sim.views import CarView
 
 BESIDE: Final = "ghosts.json"
-"""Where the ghosts of a heat were, beside its cars; in the heat's folder."""
+"""Where the ghosts were, beside those that drove; in the folder of the heat or entry."""
 NEWEST: Final = 20
 """Evaluations of a model that are listed."""
 MAX_LISTED: Final = 500
 MAX_READ: Final = 2000
 """Evaluations whose summaries are read for a list; it is to be there within a second."""
 MAX_BESIDE: Final = 64 << 20
-"""Bytes of the file that says where a heat's ghosts were."""
+"""Bytes of the file that says where the ghosts were."""
 
 
 def entry_name(starter: dict[str, Any]) -> str:
@@ -52,15 +52,15 @@ def entry_name(starter: dict[str, Any]) -> str:
 
 
 def ghost_file(number: int) -> str:
-    """Of the copy of a ghost's replay, inside the heat's folder, by its place among the ghosts."""
+    """Of the copy of a ghost's replay, inside the folder of the heat or entry, by its place among the ghosts."""
     return f"ghosts/{number}.replay"
 
 
 def evaluated(runs: Path, track: Track) -> list[EvaluatedCard]:
     """Evaluations on a track that have a replay, model by model, the newest first; of the newest `MAX_READ` of all.
 
-    Of those whose files do not tell their road only its name is known here; a replay itself is looked at by who starts
-    a heat with it.
+    Of those whose files do not tell their road only its name is known here; a replay itself is looked at by who asks
+    for it as a ghost.
     """
     folders = list_runs(runs)
     stamps = [(stamp, number) for number, folder in enumerate(folders) for stamp in _stamps(folder)]
@@ -113,7 +113,7 @@ def evaluation_replay(folder: RunFolder, stamp: str) -> Path:
 
 
 def keep(replays: Mapping[int, Path], folder: Path) -> None:
-    """Copy replays of ghosts into a heat's folder, by their places among its ghosts.
+    """Copy replays of ghosts into the folder of a heat or an entry, by their places among its ghosts.
 
     Raises:
         Conflict: One cannot be copied.
@@ -129,11 +129,11 @@ def keep(replays: Mapping[int, Path], folder: Path) -> None:
 
 
 def sources_of(ghosts: Sequence[str | dict[str, Any]], *, folder: Path, runs: Path) -> list[str]:
-    """The ghosts of a heat as `load_ghosts` takes them.
+    """The ghosts of a heat or an entry as `load_ghosts` takes them.
 
     Args:
-        ghosts: As the heat's payload has them.
-        folder: Of the heat.
+        ghosts: As the job's payload has them.
+        folder: Of the heat or entry.
         runs: Folder of the models.
 
     Raises:
@@ -148,7 +148,7 @@ def sources_of(ghosts: Sequence[str | dict[str, Any]], *, folder: Path, runs: Pa
         elif (kept := folder / ghost_file(number)).is_file():
             found.append(str(kept))
         else:
-            raise ConfigError(f"The replay of ghost {number + 1} is not there.", hint="Start the heat again.")
+            raise ConfigError(f"The replay of ghost {number + 1} is not there.", hint="Start it again.")
     return found
 
 
@@ -157,7 +157,7 @@ def named_as_asked(ghosts: Sequence[Ghost], asked: Sequence[str | dict[str, Any]
 
     Args:
         ghosts: In the order they were asked for; of the fastest lap there is none where nobody drove one.
-        asked: As the heat's payload has them.
+        asked: As the job's payload has them.
     """
     there = [one for one in asked if len(ghosts) == len(asked) or not isinstance(one, str)]
     return [
@@ -166,14 +166,17 @@ def named_as_asked(ghosts: Sequence[Ghost], asked: Sequence[str | dict[str, Any]
     ]
 
 
-def write_beside(ghosts: Sequence[Ghost], recordings: Sequence[Recording], *, first: int, folder: Path) -> None:
-    """Keep where the ghosts of a heat were.
+def write_beside(
+    ghosts: Sequence[Ghost], recordings: Sequence[Recording], *, folder: Path, first: int = 0, trial: int = 0
+) -> None:
+    """Keep where the ghosts of a film were.
 
     Args:
         ghosts: As its film has them.
         recordings: Of all its cars.
+        folder: Of the heat or entry.
         first: Number of the car that the film is about, with whose laps the fastest lap starts anew.
-        folder: Of the heat.
+        trial: That is filmed, from 0.
     """
     longest = max(recordings, key=len)
     told = [
@@ -184,11 +187,13 @@ def write_beside(ghosts: Sequence[Ghost], recordings: Sequence[Recording], *, fi
         }
         for ghost in ghosts
     ]
-    write_file(folder / BESIDE, json.dumps({"ghosts": told}, separators=(",", ":")).encode(), durable=False)
+    write_file(
+        folder / BESIDE, json.dumps({"trial": trial, "ghosts": told}, separators=(",", ":")).encode(), durable=False
+    )
 
 
-def read_beside(folder: Path) -> list[ReplayGhost]:
-    """Where the ghosts of a heat were; none in folders from before that was kept.
+def read_beside(folder: Path, *, trial: int = 0) -> list[ReplayGhost]:
+    """Where the ghosts of a trial were; none of one that was not filmed, and in folders from before that was kept.
 
     Raises:
         ConfigError: The file is damaged.
@@ -200,9 +205,9 @@ def read_beside(folder: Path) -> list[ReplayGhost]:
 
     document = read_json_object(path, max_bytes=MAX_BESIDE)
     try:
-        return [ReplayGhost(**ghost) for ghost in document["ghosts"]]
+        return [ReplayGhost(**ghost) for ghost in document["ghosts"]] if document.get("trial", 0) == trial else []
     except (KeyError, TypeError, ValueError) as error:
-        raise ConfigError("ghosts.json of the heat is damaged.", hint="Start the heat again.") from error
+        raise ConfigError("ghosts.json is damaged.", hint="Start it again.") from error
 
 
 def _whole(view: CarView | None) -> list[int]:

@@ -11,8 +11,10 @@ table says whose a race and an entry are.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+import shutil
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final
 
 import sqlalchemy as sa
@@ -24,9 +26,11 @@ from racecraft.race.announcement import Announcement, draw_secret
 from racecraft.race.conditions import Conditions
 from racecraft.race.rules import RaceRules
 from racecraft.serve.jobs.cargo import Cargo
-from racecraft.serve.jobs.queue import JobQueue, new_job
+from racecraft.serve.jobs.queue import JobQueue, new_job, new_job_id
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.races.ghost_schemas import Ghost, Starter
+from racecraft.serve.races.ghosts import keep
 from racecraft.serve.races.rules import randomization_name, rules_of
 from racecraft.serve.races.schemas import (
     Enter,
@@ -40,6 +44,7 @@ from racecraft.serve.races.standings import Entered, key_of, score_of, standings
 from racecraft.serve.races.state import announcement_of as announcement_of
 from racecraft.serve.races.state import is_withheld as is_withheld
 from racecraft.serve.races.state import state_of as state_of
+from racecraft.serve.races.tasks import entry_folder
 from racecraft.serve.road import road_objects
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
@@ -70,6 +75,7 @@ class Races:
         share: Has the store hold what an entry needs, where there is one.
         see: Is given each entry's job before somebody hears of it.
         user_id: Who holds them.
+        replays: Of an entry's ghosts that drove before: `racecraft.serve.contests.contests.Contests.replays`.
     """
 
     def __init__(
@@ -82,10 +88,11 @@ class Races:
         share: Callable[..., Cargo | None] = lambda *_, **__: None,
         see: Callable[[Job], Job] = lambda job: job,
         user_id: int = OWNER,
+        replays: Callable[[Sequence[Ghost], Track, RaceRules], dict[int, Path]] = lambda *_: {},
     ) -> None:
         self._database, self._queue, self._garage, self._courses = database, queue, garage, courses
         self._own = sa.and_(Race.owner_id == user_id, Race.group_id.is_(None), Race.deleted.is_(None))
-        self._share, self._see, self._user_id = share, see, user_id
+        self._share, self._see, self._replays, self._user_id = share, see, replays, user_id
 
     def create(
         self, request: NewRace, *, user_id: int, group_id: int | None = None, final: FinalTerms | None = None
@@ -209,35 +216,50 @@ class Races:
         """Enter models, each with a job of its own; the ids of the entries.
 
         Raises:
-            NotFound: There is no such race or model.
+            NotFound: There is no such race, model or ghost.
             Conflict: The race is not open, or a model has nothing to drive with.
+            ConfigError: A ghost is of another road.
         """
         models = list(dict.fromkeys(request.models))
         with self._database.transaction() as session:
-            road = self._courses.path_or_name(self._race(session, race_id).track)
-        cargo = {name: self._share(self._garage.folder(name), tracks=(road,)) for name in models}
-        with self._database.transaction() as session:
-            hold(session, race_id)
-            race = self._race(session, race_id)
-            for name in models:
-                self._garage.require_checkpoint(name, request.checkpoint)
-            if (state := state_of(race)) != "open":
-                raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
-            count = session.scalar(sa.select(sa.func.count(Entry.id)).where(Entry.race_id == race_id)) or 0
-            if count + len(models) > MAX_ENTRIES:
-                raise Conflict(f"A race takes {MAX_ENTRIES} entries.")
-            payload = {
-                "track": road,
-                "announcement": announcement_of(race).to_dict(),
-                "checkpoint": request.checkpoint,
-            }
-            jobs = [new_job(KIND, name, payload, cargo=cargo[name], user_id=user_id) for name in models]
-            session.add_all(jobs)
-            session.flush()  # entries name their jobs
-            entries = [Entry(race_id=race_id, user_id=user_id, run=job.run, job_id=job.id) for job in jobs]
-            session.add_all(entries)
-            session.flush()
-            return [entry.id for entry in entries]
+            race = self._open(session, race_id, more=len(models))
+        for name in models:
+            self._garage.require_checkpoint(name, request.checkpoint)
+        road, rivals = self._courses.path_or_name(race.track), []
+        for ghost in request.ghosts:
+            if isinstance(ghost, Starter):
+                self._garage.require_checkpoint(ghost.model, ghost.checkpoint)
+                rivals.append(self._garage.folder(ghost.model))
+        replays = {}
+        if request.ghosts:
+            replays = self._replays(request.ghosts, self._courses.load(race.track), RaceRules.from_dict(race.rules))
+        payload = {
+            "track": road,
+            "announcement": announcement_of(race).to_dict(),
+            "checkpoint": request.checkpoint,
+            "ghosts": request.model_dump()["ghosts"],
+        }
+        folders = {name: entry_folder(self._garage.runs, new_job_id()) for name in models}
+        try:
+            jobs = []
+            for name, folder in folders.items():
+                keep(replays, folder)
+                filled = folder if replays else None
+                cargo = self._share(self._garage.folder(name), *rivals, tracks=(road,), filled=filled)
+                jobs.append(new_job(KIND, name, payload, cargo=cargo, user_id=user_id, job_id=folder.name))
+            with self._database.transaction() as session:
+                hold(session, race_id)
+                self._open(session, race_id, more=len(models))
+                session.add_all(jobs)
+                session.flush()  # entries name their jobs
+                entries = [Entry(race_id=race_id, user_id=user_id, run=job.run, job_id=job.id) for job in jobs]
+                session.add_all(entries)
+                session.flush()
+                return [entry.id for entry in entries]
+        except Exception:
+            for folder in folders.values():
+                shutil.rmtree(folder, ignore_errors=True)
+            raise
 
     def withdraw(self, race_id: int, entry_id: int) -> None:
         """Take an entry back; if it is being driven, that ends."""
@@ -282,6 +304,16 @@ class Races:
                 raise NotFound(f"Entry {entry_id} has no replay in this race.")
             found.append((entry_id, self._see(job)))
         return found
+
+    def _open(self, session: Any, race_id: int, *, more: int) -> Race:
+        """A race that can be entered so many times more."""
+        race = self._race(session, race_id)
+        if (state := state_of(race)) != "open":
+            raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
+        count = session.scalar(sa.select(sa.func.count(Entry.id)).where(Entry.race_id == race_id)) or 0
+        if count + more > MAX_ENTRIES:
+            raise Conflict(f"A race takes {MAX_ENTRIES} entries.")
+        return race
 
     def _race(self, session: Any, race_id: int, *, is_deleted: bool = False) -> Race:
         race: Race | None = session.get(Race, race_id) if 0 <= race_id < 2**31 else None

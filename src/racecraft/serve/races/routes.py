@@ -15,6 +15,7 @@ from racecraft.judging.race import FORMAT
 from racecraft.serve.context import InConsoles, InContext, InUser, TakesPlace
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
+from racecraft.serve.races.ghosts import read_beside
 from racecraft.serve.races.replays import replay_of, trial_of
 from racecraft.serve.races.rules import rule_sets
 from racecraft.serve.races.schemas import (
@@ -127,7 +128,8 @@ def get_replay(
 ) -> RaceReplay:
     """One trial of some entries side by side, step by step.
 
-    `entries` are their ids joined by commas; by default it is the trial that the first of them is ranked by.
+    `entries` are their ids joined by commas; by default it is the trial that the first of them is ranked by, whose
+    ghosts are beside them.
     """
     wanted = list(dict.fromkeys(int(part) for part in entries.split(",")))
     if len(wanted) > MAX_CARS:
@@ -136,7 +138,8 @@ def get_replay(
     driven = context.races.driven(race_id, wanted)
     chosen = _median_trial(race, wanted[0]) if trial is None else min(trial, race.trials - 1)
     cars = [_old_car(entry, job, runs) if race.is_old else _car(entry, job, runs, chosen) for entry, job in driven]
-    return replay_of(race.track, context.courses.load(race.track), cars, trial=chosen)
+    ghosts = read_beside(entry_folder(runs, driven[0][1].id), trial=chosen)
+    return replay_of(race.track, context.courses.load(race.track), cars, trial=chosen, ghosts=ghosts)
 
 
 def _file(context: InContext, race_id: int, entry_id: int, name: str, *, media_type: str) -> FileResponse:

@@ -7,7 +7,9 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AwareDatetime, Field
 
+from racecraft.film.ghost import MAX_GHOSTS
 from racecraft.serve.evaluations.schemas import RoadObject
+from racecraft.serve.races.ghost_schemas import CheckpointChoice, Ghost
 from racecraft.serve.road import OnRoad
 from racecraft.serve.schemas import Message, RunName
 from racecraft.serve.tracks.schemas import TrackGeometry, TrackSector
@@ -17,8 +19,6 @@ Ranking = Literal["total", "best", "average"]
 RaceState = Literal["upcoming", "open", "closed"]
 Title = Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S")]
 Seconds = Annotated[float, Field(ge=0.0, le=600.0, allow_inf_nan=False)]
-CheckpointChoice = Literal["best", "last"] | Annotated[int, Field(ge=0, le=10**12)]
-"""Of a model; a number is that of the camera steps of training behind it."""
 
 MAX_CARS: Final = 12
 """Of a replay."""
@@ -189,6 +189,8 @@ class Enter(Message):
     models: list[RunName] = Field(min_length=1, max_length=50)
     checkpoint: CheckpointChoice = "best"
     """Of each of them."""
+    ghosts: list[Ghost] = Field(default_factory=list, max_length=MAX_GHOSTS)
+    """Cars in each one's film that were not there."""
 
 
 class ReplayCar(Message):
