@@ -23,4 +23,7 @@ export const why: Record<keyof typeof english, string> = {
   why_button: "Warum?",
   gaps: "Zeit hinter {who}, s",
   gaps_place: "Meter vom Start",
+  gaps_behind: "{who} liegt bis zu {time} zurück.",
+  gaps_ahead: "{who} liegt bis zu {time} vorn.",
+  gaps_whole: "Alles zeigen",
 };

@@ -21,4 +21,7 @@ export const why = {
   why_button: "Why?",
   gaps: "Time behind {who}, s",
   gaps_place: "Metres from the start",
+  gaps_behind: "{who} is up to {time} behind.",
+  gaps_ahead: "{who} is up to {time} ahead.",
+  gaps_whole: "Show it all",
 } as const;
