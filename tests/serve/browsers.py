@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,22 +12,15 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 from running_consoles import PATIENCE, RunningConsole
 
+from chromium import CHROMIUM, launched
 from few_frames import FEW_FRAMES
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 ROOT = Path(__file__).parents[2]
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
 THEMES: Final = ("light", "dark")
-# WebGL is drawn by the processor; the page around it in another way, or it costs ten times as much.
-SOFTWARE_3D = [
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-gpu-compositing",
-    "--no-sandbox",
-]
 needs_pages = pytest.mark.skipif(
     not (ROOT / "src" / "racecraft" / "serve" / "pages" / "index.html").exists(),
     reason="the pages are not built: make console builds them",
@@ -121,7 +113,7 @@ def visiting(console: RunningConsole) -> Iterator[Visit]:
 
     expect.set_options(timeout=1000 * PATIENCE)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
+        browser = launched(playwright)
         context = browser.new_context()
         context.add_init_script(FEW_FRAMES)  # of every tab
         context.set_default_timeout(1000 * PATIENCE)

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from browsers import (
-    CHROMIUM,
-    SOFTWARE_3D,
     THEMES,
     Visit,
     complaints_of,
@@ -21,6 +19,7 @@ from browsers import (
 from leagues import RunningLeague, ok, running_league, untrained_run
 from running_consoles import PATIENCE
 
+from chromium import launched
 from few_frames import FEW_FRAMES
 from racecraft.serve.store.tables import now
 
@@ -54,7 +53,7 @@ def lesson(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lesson]:
     from playwright.sync_api import sync_playwright
 
     with running_league(tmp_path_factory.mktemp("lesson") / "runs") as league, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
+        browser = launched(playwright)
         lesson = Lesson(league, browser, {})
         teacher = lesson.arrive("teacher")
         cookie = league.owner.cookies["racecraft_session"]

@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from browsers import CHROMIUM, SOFTWARE_3D, THEMES, Visit, needs_axe, needs_browser, needs_pages, violations_by_theme
+from browsers import THEMES, Visit, needs_axe, needs_browser, needs_pages, violations_by_theme
 from identity_providers import CLIENT, SECRET, identity_provider, needs_identity_provider
 from leagues import RunningLeague, ok, running_league
 from running_consoles import PATIENCE
+
+from chromium import launched
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -48,7 +50,7 @@ def school(tmp_path_factory: pytest.TempPathFactory) -> Iterator[School]:
         told["-domain"] = "school.example"
         options = [part for name, value in told.items() for part in (f"--provider{name}", value)]
         with running_league(folder / "runs", *options) as league:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)
+            browser = launched(playwright)
             assert league.group("Class 7b") == 1
             school = School(league, browser)
             yield school

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import http.server
-import shutil
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from chromium import CHROMIUM
+
 ROOT = Path(__file__).parents[2]
 SITE = ROOT / "build" / "site"
 AXE = ROOT / "web" / "node_modules" / "axe-core" / "axe.min.js"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox"]
 PATIENCE = 180_000  # ms; the machine may be busy
 
 NEEDS_THE_PAGE = [

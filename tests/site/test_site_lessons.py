@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from built_page import AXE, CHROMIUM, OPTIONS, PATIENCE, SITE, hosted
+from built_page import AXE, PATIENCE, SITE, hosted
 
+from chromium import CHROMIUM, launched
 from racecraft.course import find_lesson, lessons
 from racecraft.course.page import LessonFacts, LessonPage, facts_of, page_of
 from racecraft.site.lessons import write_lessons
@@ -40,7 +41,7 @@ def page() -> Iterator[Page]:
 
     complaints: list[str] = []
     with hosted() as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        browser = launched(playwright)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.set_default_timeout(PATIENCE)
         page.on("pageerror", lambda error: complaints.append(str(error)))

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from built_page import CHROMIUM, NEEDS_THE_PAGE, OPTIONS, PATIENCE, hosted
+from built_page import NEEDS_THE_PAGE, PATIENCE, hosted
 
+from chromium import launched
 from few_frames import FEW_FRAMES
 from until_true import until_true
 
@@ -47,7 +48,7 @@ def tabs() -> Iterator[list[Page]]:
 
     complaints: list[str] = []
     with hosted() as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        browser = launched(playwright)
         context = browser.new_context()
         context.set_default_timeout(PATIENCE)
         context.add_init_script(FEW_FRAMES)

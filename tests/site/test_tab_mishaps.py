@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
-from built_page import CHROMIUM, NEEDS_THE_PAGE, OPTIONS, PATIENCE, hosted
+from built_page import NEEDS_THE_PAGE, PATIENCE, hosted
 
+from chromium import launched
 from few_frames import FEW_FRAMES
 from until_true import until_true
 
@@ -36,11 +37,12 @@ def phone() -> Iterator[Page]:
 
     complaints: list[str] = []
     with hosted() as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        browser = launched(playwright)
         context = browser.new_context(
             base_url=address,
             viewport={"width": 390, "height": 844},
             reduced_motion="reduce",
+            service_workers="block",  # what one has kept is asked of no host, and could not be refused
         )
         context.set_default_timeout(PATIENCE)
         context.add_init_script(FEW_FRAMES)

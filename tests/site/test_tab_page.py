@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from built_page import AXE, CHROMIUM, NEEDS_THE_PAGE, OPTIONS, PATIENCE, Files, hosted
+from built_page import AXE, NEEDS_THE_PAGE, PATIENCE, Files, hosted
 
+from chromium import launched
 from few_frames import FEW_FRAMES
 from racecraft import evaluate
 from racecraft.importing import import_run
@@ -50,7 +51,7 @@ def page() -> Iterator[Page]:
     expect.set_options(timeout=PATIENCE)
     complaints: list[str] = []
     with hosted() as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        browser = launched(playwright)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.set_default_timeout(PATIENCE)
         page.add_init_script(FEW_FRAMES)

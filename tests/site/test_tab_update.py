@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from built_page import CHROMIUM, NEEDS_THE_PAGE, OPTIONS, PATIENCE, SITE, Files, hosted
+from built_page import NEEDS_THE_PAGE, PATIENCE, SITE, Files, hosted
 
+from chromium import launched
 from few_frames import FEW_FRAMES
 from racecraft.site.__main__ import write_files
 from until_true import until_true
@@ -64,7 +65,7 @@ def visitor(site: Path) -> Iterator[BrowserContext]:
 
     complaints: list[str] = []
     with hosted(site.parent, Cached) as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        browser = launched(playwright)
         context = browser.new_context(base_url=address)
         context.set_default_timeout(PATIENCE)
         context.add_init_script(FEW_FRAMES)
