@@ -159,3 +159,6 @@ def test_a_car_put_back_after_a_mistake_did_not_drive_there(tmp_path: Path, oval
     assert lap.speed[put - 1] == pytest.approx(1.0, abs=0.1)
     assert lap.speed[put] == 0.0
     assert lap.speed.max() < 3.0  # the half metre in one step would be 7.5 m/s
+    done = np.isfinite(lap.commands).all(axis=1)
+    assert np.flatnonzero(~done).tolist() == [0, *range(put, put + 7)]  # nor did it do what it was told as it stood
+    np.testing.assert_allclose(lap.commands[done], np.broadcast_to([np.radians(15), 1.0], (done.sum(), 2)), atol=1e-6)

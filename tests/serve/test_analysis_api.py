@@ -18,8 +18,11 @@ from running_consoles import RunningConsole
 from racecraft import load_track
 from racecraft.analysis import read_laps
 from racecraft.car.export import read_exported
+from racecraft.perceiving import perceive
+from racecraft.perceiving.reading import read_pictures
 from racecraft.perception import Perceiver, Watcher
 from racecraft.race.policy import load_policy
+from racecraft.replay import read_replay
 from racecraft.run import RunFolder
 from racecraft.serve.evaluations.beliefs import REMEMBERED
 from racecraft.serve.models.schemas import NewModel
@@ -145,15 +148,6 @@ def test_what_perception_believes_of_one_moment(raced: tuple[RunningConsole, str
         assert len(seen["line_rows"]) == len(seen["line_columns"]) == len(seen["line_error"]) > 3
         assert np.shape(seen["regions"]) == (len(seen["region_rows"]), len(seen["region_columns"]))
         assert seen["distance_m"] is None
-    last = len(lap["x"]) - 1
-    assert last > REMEMBERED
-    told = [console.client.get(path, params={"lap": 1, "row": row}).json() for row in range(last + 1)]
-    looks = [np.frombuffer(base64.b64decode(one["frame"]), np.uint8).reshape(120, 160) for one in told]
-    for row in (3, last):  # with the pictures before in mind, as far as there are any
-        frames = np.stack(looks[max(0, row - REMEMBERED + 1) : row + 1])
-        belief = Watcher(Perceiver(num_threads=1)).film(frames, np.arange(len(frames)) == 0)
-        assert told[row]["heading_rad"] == pytest.approx(float(belief.heading[-1]), abs=6e-5)
-        assert told[row]["half_width_m"] == pytest.approx(float(belief.half_width[-1]), abs=6e-5)
     sensors = console.runs / name / "model_metadata.json"
     document = sensors.read_text()
     sensors.write_text(json.dumps({**json.loads(document), "sensor": ["LEFT_CAMERA"]}))
@@ -168,6 +162,30 @@ def test_what_perception_believes_of_one_moment(raced: tuple[RunningConsole, str
     assert np.abs(looks[1] - looks[2]).mean() < 1.0
     refused(console.client.get(path, params={"lap": 9, "row": 3}), 404, "no step 3 in lap 9")
     refused(console.client.get(path, params={"lap": 1, "row": 10**6}), 404)
+
+
+def test_perception_believes_of_a_lap_what_its_command_says(raced: tuple[RunningConsole, str, str]) -> None:
+    """The command looks at the replay, the console at the trace; both know the pictures before and what was told."""
+    console, name, stamp = raced
+    folder = console.runs / name / f"evaluation-{stamp}"
+    number = read_replay(folder / "evaluation.replay").evaluation.best_trial.index + 1
+    lap = next(one for one in read_laps(folder / "evaluation-simtrace" / "0-iteration.csv") if one.number == number)
+    pictures = list(read_pictures([folder / "evaluation.replay"]))
+    commands = np.array([picture.commands or (np.nan, np.nan) for picture in pictures])
+    np.testing.assert_allclose(lap.commands, commands, atol=1e-7)
+    assert np.isfinite(commands).all(axis=1).sum() > 10
+
+    said = perceive([folder / "evaluation.replay"], num_threads=1)
+    path = f"/api/models/{name}/evaluations/{stamp}/belief"
+    rows = [row for row in range(min(len(said), REMEMBERED)) if said[row]["on_road"]]  # beside it nobody knows much
+    told = [console.client.get(path, params={"lap": number, "row": row}).json() for row in rows]
+    seen = np.stack([picture.seen for picture in pictures])
+    silent = Watcher(Perceiver(num_threads=1)).film(seen, np.array([picture.is_first for picture in pictures]))
+    without = np.stack([silent.heading, silent.offset], axis=1)[rows]
+    ours, theirs = (np.array([[one["heading_rad"], one["offset_m"]] for one in them]) for them in (told, said))
+    away, untold = (np.abs(them - theirs[rows]).mean(axis=0) for them in (ours, without))
+    assert (away < 0.003).all()  # rad and m: only how the pictures are made small differs
+    assert (untold > 2 * away).all()  # who is not told believes something else
 
 
 def test_a_model_for_a_car_and_driven_as_one(raced: tuple[RunningConsole, str, str], tmp_path: Path) -> None:

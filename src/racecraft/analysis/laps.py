@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.race.recording import REFERENCE_AHEAD, poses_seen
+from racecraft.race.recording import REFERENCE_AHEAD, STANDING, poses_seen
 from racecraft.run.simtrace import read_simtrace
 from racecraft.sim.simulation import CONTROL_DT
 from racecraft.track import Track
@@ -48,6 +48,8 @@ class TracedLap:
     throttle: Floats
     """Commanded speed, m/s."""
     reward: Floats
+    is_placed: NDArray[np.bool_]
+    """Whether the car did not drive to where it is: it was put there, or stands  (R,)."""
     penalty_seconds: float = 0.0
     """s that it stood for its mistakes."""
     puts: tuple[int, ...] = ()
@@ -78,6 +80,14 @@ class TracedLap:
         ahead = REFERENCE_AHEAD * np.stack([np.cos(self.heading), np.sin(self.heading)], axis=1)
         is_put = np.isin(np.arange(len(self.time)), self.puts)
         return poses_seen(np.column_stack([self.points - ahead, self.heading]), age, is_put=is_put)
+
+    @property
+    def commands(self) -> NDArray[np.float32]:
+        """Steering angle [rad] and speed [m/s] told since the row before; NaN where the car did not do it  (R, 2)."""
+        told = np.full((len(self.time), 2), np.nan, np.float32)
+        told[1:] = np.column_stack([self.steering_angle, self.throttle])[:-1]
+        told[1:][self.is_placed[1:] | self.is_placed[:-1]] = np.nan
+        return told
 
     def time_at(self, shares: Floats) -> Floats:
         """When it reached some shares of the lap, s since it began: a step before its first row."""
@@ -110,6 +120,7 @@ def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
         points = np.column_stack([columns["X"][rows], columns["Y"][rows]]).astype(np.float64)
         is_paused = np.zeros(end - begin, bool) if statuses is None else statuses[rows] == "pause"
         is_put = (is_paused[1:] & ~is_paused[:-1]) | (np.hypot(*np.diff(points, axis=0).T) > JUMP)
+        stands = np.zeros(end - begin, bool) if statuses is None else np.isin(statuses[rows], STANDING)
         laps.append(
             TracedLap(
                 number=int(episode[begin]) + 1,
@@ -121,6 +132,7 @@ def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
                 steering_angle=np.radians(columns["steer"][rows]),
                 throttle=columns["throttle"][rows].astype(np.float64),
                 reward=columns["reward"][rows].astype(np.float64),
+                is_placed=stands | np.append(False, is_put),
                 penalty_seconds=CONTROL_DT * int(is_paused.sum()),
                 puts=tuple((np.flatnonzero(is_put) + 1).tolist()),
             )

@@ -18,6 +18,8 @@ REFERENCE_AHEAD = 0.14
 """m from the car's origin to the point that x and y speak of."""
 SUBSTEPS = 8
 """Of physics in a control step, as `Simulation` has them unless it is told otherwise."""
+STANDING = ("prepare", "pause", "park")
+"""Statuses of steps in which a car does nothing that it is told."""
 
 
 def poses_seen(poses: NDArray[np.float64], age: float, *, is_put: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -85,7 +87,7 @@ class Recording:
     @cached_property
     def is_placed(self) -> NDArray[np.bool_]:
         """Whether the car did not drive to where it is in a step: it was put there, or stands  (T,)."""
-        return np.isin(self.column("status"), [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")])
+        return np.isin(self.column("status"), [STATUS_NAMES.index(name) for name in STANDING])
 
     @cached_property
     def distances(self) -> NDArray[np.float64]:
@@ -103,8 +105,7 @@ class Recording:
     @cached_property
     def rewards(self) -> NDArray[np.float64]:
         """AWS's default reward, which evaluations log whatever the policy learned from; 0 while a car stands  (T,)."""
-        stands = np.isin(self.column("status"), [STATUS_NAMES.index(name) for name in ("prepare", "pause", "park")])
-        return np.where(stands, 0.0, centerline_rewards(self.rows))
+        return np.where(self.is_placed, 0.0, centerline_rewards(self.rows))
 
     @cached_property
     def events(self) -> list[tuple[int, str]]:

@@ -1,4 +1,7 @@
-"""What perception believes of one moment of a lap and those before it, beside the camera's picture of it."""
+"""What perception believes of one moment of a lap and those before it, beside the camera's picture of it.
+
+As of `racecraft perceive` of a run, it is known what the car was told.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,8 @@ from racecraft.sim.views import BoxView, CarView, ObjectView, Scene
 if TYPE_CHECKING:
     from racecraft.perception import Perceiver
 
-REMEMBERED: Final = 12
-"""Pictures of a lap that are looked at for one, 0.8 s of driving: of more before it memory holds little."""
+REMEMBERED: Final = 150
+"""Pictures of a lap that are looked at for one, 10 s of driving in 0.1 s: of more before it memory holds nothing."""
 router = APIRouter(prefix="/api/models/{name}", tags=["analysis"])
 
 _LOOKING: Final = threading.Lock()
@@ -60,8 +63,10 @@ def get_belief(
     ]
     frames = (np.stack(pictures) + 0.5).astype(np.uint8)
     frame, last = frames[-1], row - first
+    commands = found.commands[first : row + 1]
+    commands[0] = np.nan  # of what was before it nothing is remembered
     with _LOOKING:
-        belief = Watcher(_perceiver()).film(frames, np.arange(first, row + 1) == first)
+        belief = Watcher(_perceiver()).film(frames, np.arange(first, row + 1) == first, commands=commands)
     told = tell("", belief, last)
     del told["file"]
     seen = [place for place in range(len(ROWS)) if sees_middle(belief, last, place)]
