@@ -4,6 +4,7 @@
     .venv/bin/python benchmarks/perception.py --only sight
     .venv/bin/python benchmarks/perception.py --only sight --pictures 150
     .venv/bin/python benchmarks/perception.py --routes ../shared/tracks
+    .venv/bin/python benchmarks/perception.py --only driving --speeds 1.5 --runs runs/mine runs/beliefs
 
 Errors are those of the lens, median and 90th percentile: over all cars, and over those who have the road's middle in
 their picture; of each picture by itself, with those before it remembered, and told what the car was told as well; over
@@ -57,6 +58,7 @@ def main() -> None:
     parser.add_argument("--pictures", type=int, default=30, help="of sight: those of a drive")
     parser.add_argument("--speeds", nargs="+", type=float, default=list(SPEEDS), help="m/s on straights, by perception")
     parser.add_argument("--starters", nargs="*", default=list(STARTERS), help="who drives end to end")
+    parser.add_argument("--runs", nargs="*", type=lambda path: (Path(path).name, path), default=[], help="others")
     parser.add_argument("--weights", type=Path, help="others than those brought along")
     parser.add_argument("--num-threads", type=int, default=1)
     options = parser.parse_args()
@@ -161,8 +163,8 @@ def driving(perceiver: Perceiver, options: argparse.Namespace) -> list[dict[str,
         for speed in options.speeds
         for name, remembers in (("", True), (" alone", False))
     }
-    for name in options.starters:
-        drivers[f"starter:{name}"] = load_policy(RunFolder.open(FOLDER / name), num_threads=threads)[1]
+    for name, folder in (*((f"starter:{name}", FOLDER / name) for name in options.starters), *options.runs):
+        drivers[name] = load_policy(RunFolder.open(folder), num_threads=threads)[1]
     tracks, rows = load_tracks(options.routes), []
     for name, driver in drivers.items():
         for randomize in options.randomize:

@@ -36,9 +36,9 @@ def minibatch_for(learner: Learner, size: int = 192, *, seed: int = 0) -> Miniba
 
 def parts_of(spec: NetworkSpec, sight) -> tuple[np.ndarray, np.ndarray]:
     """Images (N, lenses, H, W) and the LIDAR's bytes (N, L)."""
-    size = spec.lenses * int(np.prod(spec.frame_shape))
+    size = spec.lenses * int(np.prod(networks.picture_shape(spec)))
     flat = sight.reshape(len(sight), -1)
-    return flat[:, :size].reshape(-1, spec.lenses, *spec.frame_shape), flat[:, size:]
+    return flat[:, :size].reshape(-1, spec.lenses, *networks.picture_shape(spec)), flat[:, size:]
 
 
 def reference_tower(spec: NetworkSpec, weights, sight, tower: str) -> np.ndarray:

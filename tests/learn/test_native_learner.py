@@ -77,7 +77,7 @@ def assert_same_bits(a, b) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_frames_are_encoded_as_in_numpy(name):
     spec = NetworkSpec(name=name, num_actions=2)
-    frames = np.random.default_rng(0).integers(0, 256, (3, 120, 160), dtype=np.uint8)
+    frames = np.random.default_rng(0).integers(0, 256, (3, *networks.sight_shape(spec)), dtype=np.uint8)
     np.testing.assert_array_equal(
         NativeLearner(spec, seed=None).encode(frames[::-1]), networks.encode(spec, frames[::-1])
     )
@@ -88,7 +88,7 @@ def test_forward_agrees_with_numpy(name):
     spec = NetworkSpec(name=name, num_actions=6)
     learner = NativeLearner(spec, seed=None)
     randomize(learner)
-    frames = np.random.default_rng(0).integers(0, 256, (3, 120, 160), dtype=np.uint8)
+    frames = np.random.default_rng(0).integers(0, 256, (3, *networks.sight_shape(spec)), dtype=np.uint8)
     observations = learner.encode(frames)
     policy, critic = (reference_tower(spec, learner.weights(), frames, tower) for tower in ("policy", "critic"))
     np.testing.assert_allclose(learner.policy(observations), policy, atol=2e-5)

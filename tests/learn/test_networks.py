@@ -79,8 +79,9 @@ def test_encode_cuts_the_sky_averages_squares_and_folds_blocks():
 
 @pytest.mark.parametrize("name", network_names())
 def test_encode_returns_its_own_copy(name):
-    frames = np.zeros((2, 120, 160), np.uint8)
-    observations = networks.encode(NetworkSpec(name=name, num_actions=2), frames)
+    spec = NetworkSpec(name=name, num_actions=2)
+    frames = np.zeros((2, *networks.sight_shape(spec)), np.uint8)
+    observations = networks.encode(spec, frames)
     frames[:] = 9
     assert not observations.any()
     assert observations.flags.c_contiguous

@@ -73,7 +73,8 @@ class AnotherLearner:
 
     def __init__(self, spec: NetworkSpec) -> None:
         self.learner = make_learner(spec, seed=3, num_threads=1)
-        for name in ("spec", "observation_shape", "encode", "policy", "values", "update", "weights", "optimizer_state"):
+        shapes, does = ("sight_shape", "observation_shape"), ("encode", "policy", "values", "update")
+        for name in ("spec", *shapes, *does, "weights", "optimizer_state"):
             setattr(self, name, getattr(self.learner, name))
 
 

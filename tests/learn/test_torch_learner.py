@@ -20,7 +20,7 @@ def test_forward_agrees_with_numpy(name):
     learner = TorchLearner(spec, seed=2, precision="float32")
     weights = {key: array * (50 if key == "policy.head.weight" else 1) for key, array in learner.weights().items()}
     learner.load_weights(weights)
-    frames = np.random.default_rng(0).integers(0, 256, (2, 120, 160), dtype=np.uint8)
+    frames = np.random.default_rng(0).integers(0, 256, (2, *networks.sight_shape(spec)), dtype=np.uint8)
     observations = learner.encode(frames)
     expected = reference_tower(spec, weights, frames, "policy")
     np.testing.assert_allclose(learner.policy(observations), expected, atol=1e-4)

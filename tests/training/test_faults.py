@@ -16,6 +16,7 @@ from tiny_runs import Recorder, Train, assert_same
 
 from racecraft.errors import CheckpointError, RacecraftError, RewardError, RunError, TrainingError
 from racecraft.learn import UpdateStats, make_learner
+from racecraft.race import seeing
 from racecraft.reward import RewardWorker
 from racecraft.run import RunFolder, checkpoint, folder, metrics, simtrace
 from racecraft.training import resume, session
@@ -226,7 +227,7 @@ def test_a_loss_that_is_not_finite_stops_and_the_checkpoint_is_good(
             stats = self._learner.update(*minibatch)
             return stats if self._count < 9 else replace(stats, policy_loss=float("nan"))
 
-    monkeypatch.setattr(session, "make_learner", Spoiled)
+    monkeypatch.setattr(seeing, "learner_of", Spoiled)
     with pytest.raises(TrainingError) as caught:
         tiny(name="mine")
     assert isinstance(caught.value, RacecraftError)

@@ -21,6 +21,7 @@ from racecraft.importing.source import open_source
 from racecraft.importing.weights import open_model, read_weights
 from racecraft.json_file import parse_json_object
 from racecraft.learn import NetworkSpec, make_learner
+from racecraft.learn.networks import PERCEPTION
 from racecraft.race.policy import NetworkPolicy, load_policy
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file
@@ -67,8 +68,8 @@ def export_run(
     Raises:
         RunError: There is no such run, or the file cannot be written.
         CheckpointError: There is no such checkpoint, or it is damaged.
-        ConfigError: The car has not what the policy needs, or would not take the archive's name, or the library that
-            the target needs is not installed.
+        ConfigError: The network sees only what perception tells, the car has not what the policy needs, or would not
+            take the archive's name, or the library that the target needs is not installed.
     """
     check_choice("--to", to, TARGETS)
     folder = RunFolder.open(run)
@@ -80,6 +81,12 @@ def export_run(
     elif file.suffix != ending:
         raise ConfigError(f"The model is to be called {file.name!r}; the name of a model for {to} ends in {ending}.")
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=1)
+    if policy.learner.spec.name == PERCEPTION:
+        raise ConfigError(
+            f"The network {PERCEPTION} sees what perception tells of pictures, "
+            "and no exported file holds who tells it.",
+            hint="Train another network for a car.",
+        )
     metadata, spec, weights = folder.read_model_metadata(), policy.learner.spec, policy.learner.weights()
     files: dict[Path, bytes] = {}
     if to == "onnx":

@@ -73,7 +73,7 @@ def train(
     algorithm: Annotated[
         str, typer.Option("--algorithm", help="ppo, sac, distill, or Stable-Baselines3's sb3:ppo, a2c, dqn, sac, td3.")
     ] = "",
-    network: Annotated[str, typer.Option("--network", help="RACECRAFT_SMALL or one of AWS's three names.")] = "",
+    network: Annotated[str, typer.Option("--network", help="RACECRAFT_SMALL, AWS's three or PERCEPTION.")] = "",
     critic: Annotated[
         str, typer.Option("--critic", help="What the critic sees: privileged, lap (that and its lap) or camera.")
     ] = "",

@@ -3,6 +3,7 @@
 Nothing here imports torch unless ``make_learner`` is asked for the torch backend.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from racecraft.checks import check_choice
@@ -30,6 +31,7 @@ def make_learner(
     num_threads: int = 0,
     backend: str = "auto",
     device: str = "cpu",
+    native: Callable[..., Learner] | None = None,
 ) -> Learner:
     """The learner for this machine.
 
@@ -40,13 +42,14 @@ def make_learner(
         num_threads: Threads for forward and backward passes; 0 takes every core the process may use.
         backend: ``"native"``, ``"torch"`` (the reference, needs the extra ``torch``), or ``"auto"``: native.
         device: ``"cpu"``, or a GPU such as ``"cuda"``, which needs the extra ``cuda``.
+        native: Makes a learner on the native core of spec, seed and num_threads; by default `NativeLearner` does.
 
     Raises:
         ConfigError: There is no such backend or kind of weights, or torch is not installed.
     """
     check_choice("initial_weights", initial_weights, INITIAL_WEIGHTS)
     if initial_weights == "glorot" and seed is not None:
-        learner = make_learner(spec, seed=None, num_threads=num_threads, backend=backend, device=device)
+        learner = make_learner(spec, seed=None, num_threads=num_threads, backend=backend, device=device, native=native)
         learner.load_weights(glorot_weights(spec, seed=seed))
         return learner
     if device != "cpu":
@@ -57,7 +60,7 @@ def make_learner(
     if backend != "torch":
         from racecraft.learn.native_learner import NativeLearner  # loads the native core
 
-        return NativeLearner(spec, seed=seed, num_threads=num_threads)
+        return (native or NativeLearner)(spec, seed=seed, num_threads=num_threads)
     with needed_for("The torch backend"):
         from racecraft.learn.torch_learner import TorchLearner  # takes seconds
     return TorchLearner(spec, seed=seed, num_threads=num_threads)

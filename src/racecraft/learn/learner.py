@@ -148,6 +148,10 @@ class Learner(Protocol):
         """The network it was built with."""
 
     @property
+    def sight_shape(self) -> tuple[int, ...]:
+        """Shape of what `encode` takes for one car, as `racecraft.learn.networks.sight_shape` has it."""
+
+    @property
     def observation_shape(self) -> tuple[int, ...]:
         """Shape of one observation."""
 
@@ -156,7 +160,7 @@ class Learner(Protocol):
 
         Args:
             frames: What the sensors tell: camera images  (N, H, W), those of two lenses  (N, 2, H, W), or, with a
-                LIDAR, their bytes and behind them the LIDAR's  (N, `racecraft.learn.networks.sight_shape`).
+                LIDAR, their bytes and behind them the LIDAR's  (N, *sight_shape).
 
         Returns:
             New array  (N, *observation_shape).

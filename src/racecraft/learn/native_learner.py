@@ -39,6 +39,7 @@ class NativeLearner:
 
     def __init__(self, spec: NetworkSpec, *, seed: int | None = 0, num_threads: int = 0) -> None:
         self.spec = spec
+        self.sight_shape: tuple[int, ...] = networks.sight_shape(spec)
         self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
         try:
             self._native = self._make(spec, num_threads)
@@ -48,13 +49,13 @@ class NativeLearner:
             self.load_weights(networks.initial_weights(spec, seed=seed, orthonormalize=_native.orthonormalize))
 
     @property
-    def core(self) -> _native.Learner:
-        """What the core's loop trains."""
+    def core(self) -> _native.Learner | None:
+        """What the core's loop trains by itself; None where it has to ask here, as frames are encoded outside of it."""
         return self._native
 
     def _make(self, spec: NetworkSpec, num_threads: int) -> _native.Learner:
         arch = networks.architecture_of(spec)
-        height, width = spec.frame_shape
+        height, width = networks.picture_shape(spec)
         return _native.Learner(
             height=height,
             width=width,

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from racecraft import _native
 from racecraft.learn.learner import Learner, Minibatch, Objective
 from racecraft.learn.native_learner import NativeLearner, native_objective
-from racecraft.learn.networks import sight_shape
 
 
 def make_loop(learner: Learner, objective: Objective, **settings: Any) -> _native.Ppo:
@@ -27,10 +26,11 @@ def make_loop(learner: Learner, objective: Objective, **settings: Any) -> _nativ
         settings: The others of `_native.PpoConfig`.
     """
     spec = learner.spec
+    core = learner.core if isinstance(learner, NativeLearner) else None
     return _native.Ppo(
         config=_native.PpoConfig(objective=native_objective(objective), **settings),
-        learner=learner.core if isinstance(learner, NativeLearner) else OutsideLearner(learner, objective),
-        sight_size=math.prod(sight_shape(spec)),
+        learner=OutsideLearner(learner, objective) if core is None else core,
+        sight_size=math.prod(learner.sight_shape),
         observation_size=math.prod(learner.observation_shape),
         state_size=spec.state_size,
         num_actions=spec.num_actions,
@@ -49,11 +49,10 @@ class OutsideLearner:
     def __init__(self, learner: Learner, objective: Objective) -> None:
         self._learner = learner
         self._objective = objective
-        self._sight_shape = sight_shape(learner.spec)
 
     def encode(self, sight: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Bytes of what the sensors tell (N, ...) as those of observations (N, ...)."""
-        frames = sight.reshape(len(sight), *self._sight_shape)
+        frames = sight.reshape(len(sight), *self._learner.sight_shape)
         return np.ascontiguousarray(self._learner.encode(frames))
 
     def policy(self, observations: NDArray[np.uint8]) -> NDArray[np.float32]:

@@ -54,7 +54,14 @@ class Architecture:
     """Log standard deviation that a Gaussian policy begins with; 0 as AWS's."""
     lidar: tuple[int, ...] = (256, 256)
     """Units of the LIDAR's own dense layers, where there is one."""
+    told: int = 0
+    """Side of the square of bytes that the tower is told in place of the camera's image; 0: it sees the image."""
 
+
+PERCEPTION = "PERCEPTION"
+"""The network that sees nothing but what perception tells of a frame, for `racecraft.perception.learner`."""
+TOLD_SIDE = 10
+"""Side of the square that holds a byte for each number that perception tells."""
 
 ARCHITECTURES: dict[str, Architecture] = {
     "RACECRAFT_SMALL": Architecture(
@@ -67,6 +74,8 @@ ARCHITECTURES: dict[str, Architecture] = {
     "DEEP_CONVOLUTIONAL_NETWORK_DEEP": Architecture(
         (Conv(32, 8, 4), Conv(32, 4, 2), Conv(64, 4, 2), Conv(64, 3, 1), Conv(512, 1, 1), Conv(512, 1, 1)), (256, 128)
     ),
+    # one convolution over all that it is told is a dense layer
+    PERCEPTION: Architecture((Conv(64, TOLD_SIDE, 1),), (64,), log_std=-1.0, lidar=(64, 64), told=TOLD_SIDE),
 }
 """By name. What AWS's console calls the dense layers of 64, and of 512 and 512, units of the last two stands before the
 flattening in its trainer, so it acts at every position of the image by itself: a convolution whose kernel is one pixel.
@@ -135,10 +144,16 @@ def sky_rows(spec: NetworkSpec) -> int:
     return int(architecture_of(spec).sky * spec.frame_shape[0])
 
 
+def picture_shape(spec: NetworkSpec) -> tuple[int, int]:
+    """Height and width of what a network gets of each lens: the camera's image, or the square of what it is told."""
+    told = 0 if spec.name == TEACHER else architecture_of(spec).told
+    return (told, told) if told else spec.frame_shape
+
+
 def pooled_shape(spec: NetworkSpec) -> tuple[int, int]:
     """Height and width of what the first convolution sees, pixels."""
-    pool = architecture_of(spec).pool
-    return (spec.frame_shape[0] - sky_rows(spec)) // pool, spec.frame_shape[1] // pool
+    pool, (height, width) = architecture_of(spec).pool, picture_shape(spec)
+    return (height - sky_rows(spec)) // pool, width // pool
 
 
 def block_size(spec: NetworkSpec) -> int:
@@ -156,9 +171,10 @@ def block_size(spec: NetworkSpec) -> int:
 def sight_shape(spec: NetworkSpec) -> tuple[int, ...]:
     """Shape of what `encode` takes for one car: an image, the images of two lenses, or, with a LIDAR, plain bytes.
 
-    The bytes are the image, or the images of the lenses, and behind them the LIDAR's values times 255.
+    The bytes are the image, or the images of the lenses, and behind them the LIDAR's values times 255. The image of a
+    network that is told what there is to see is what it is told.
     """
-    height, width = spec.frame_shape
+    height, width = picture_shape(spec)
     if spec.lidar_size:
         return (spec.lenses * height * width + spec.lidar_size,)
     return (height, width) if spec.lenses == 1 else (spec.lenses, height, width)
@@ -208,7 +224,7 @@ def encode(spec: NetworkSpec, sight: NDArray[np.uint8]) -> NDArray[np.uint8]:
         ShapeError: It is not uint8 of that shape.
     """
     check_sight(spec, sight)
-    count, (height, width) = len(sight), spec.frame_shape
+    count, (height, width) = len(sight), picture_shape(spec)
     size = spec.lenses * height * width
     flat = sight.reshape(count, size + spec.lidar_size)
     frames = flat[:, :size].reshape(count * spec.lenses, height, width)

@@ -49,11 +49,13 @@ def grad_cam(spec: NetworkSpec, weights: Weights, frame: NDArray[np.uint8], *, t
         target: Which output; by default the largest one, of a continuous policy the steering.
 
     Raises:
-        ConfigError: The network sees through other sensors, too.
+        ConfigError: The network sees through other sensors, too, or no pictures at all.
         ShapeError: The frame is not of the network's size.
     """
     if spec.lenses != 1 or spec.lidar_size:
         raise ConfigError("Grad-CAM explains networks that see one camera alone; this one has other sensors, too.")
+    if architecture_of(spec).told:
+        raise ConfigError(f"Grad-CAM explains networks that see pictures; {spec.name} sees what is told of them.")
     if frame.shape != spec.frame_shape:
         raise ShapeError(f"frame has shape {frame.shape}, expected {spec.frame_shape}.")
     arch = architecture_of(spec)

@@ -34,6 +34,7 @@ class FlatNetwork:
     def __init__(self, spec: NetworkSpec, *, seed: int | None, device: torch.device, dtype: torch.dtype) -> None:
         self.spec = spec
         self.device = device
+        self.sight_shape: tuple[int, ...] = networks.sight_shape(spec)
         self.observation_shape: tuple[int, ...] = networks.observation_shape(spec)
         self._dtype = dtype
         self._shapes = networks.weight_shapes(spec)

@@ -19,8 +19,9 @@ from racecraft.agent.model_metadata import ModelMetadata
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.agent.sensors import FRAME_HEIGHT, FRAME_WIDTH
 from racecraft.errors import CheckpointError, NonFiniteAction
-from racecraft.learn import Learner, NetworkSpec, distributions, make_learner, network_names
+from racecraft.learn import Learner, NetworkSpec, distributions, network_names
 from racecraft.learn.networks import weight_shapes
+from racecraft.race.seeing import learner_of
 from racecraft.run.checkpoint import StoredCheckpoint
 from racecraft.run.folder import RunFolder
 
@@ -84,7 +85,7 @@ def policy_of(saved: StoredCheckpoint, metadata: ModelMetadata, *, num_threads: 
         CheckpointError: It does not fit its description, or holds what is not its network's.
     """
     spec = network_of(saved, metadata)
-    learner = make_learner(spec, seed=None, num_threads=num_threads)
+    learner = learner_of(spec, seed=None, num_threads=num_threads)
     critic = {name: array for name, array in learner.weights().items() if name.startswith("critic.")}
     learner.load_weights(driving_weights(saved, spec) | critic)
     return NetworkPolicy(learner, metadata.action_space, sensors=metadata.suite)

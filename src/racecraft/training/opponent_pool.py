@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.errors import CheckpointError
-from racecraft.learn import Algorithm, make_learner
+from racecraft.learn import Algorithm
 from racecraft.learn.learner import Weights
 from racecraft.race.policy import NetworkPolicy, load_driver
+from racecraft.race.seeing import learner_of
 from racecraft.sim import Simulation
 from racecraft.training.opponents import Opponents
 
@@ -141,7 +142,7 @@ class OpponentPool:
 
     def _add(self, weights: Weights, step: int) -> None:
         current = self._current
-        learner = make_learner(current.learner.spec, seed=None, num_threads=self._num_threads)
+        learner = learner_of(current.learner.spec, seed=None, num_threads=self._num_threads)
         blank = learner.weights()
         learner.load_weights({**blank, **{name: weights[name] for name in weights if name.startswith(_POLICY)}})
         self._policies.append(NetworkPolicy(learner, current.action_space, sensors=current.sensors))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
-from racecraft.learn import Algorithm, Learner, NetworkSpec, make_learner
+from racecraft.learn import Algorithm, Learner, NetworkSpec
 from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import (
     AwsLog,
@@ -197,7 +197,9 @@ def open_session(
         with ThreadPoolExecutor(1) as pool:
             open_cars = partial(open_simulation, settings, run.tracks, metadata.suite)
             cars_to_be = pool.submit(open_cars) if settings.device == "cpu" else None  # a GPU stays with its thread
-            learner = make_learner(
+            from racecraft.race.seeing import learner_of
+
+            learner = learner_of(
                 settings.network_spec(metadata),
                 seed=settings.seed,
                 initial_weights=settings.initial_weights,

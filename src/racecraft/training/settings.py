@@ -12,6 +12,7 @@ from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.checks import check_choice, check_type, check_whole
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.learn import DistillConfig, NetworkSpec, PPOConfig, SACConfig, network_names
+from racecraft.learn.networks import PERCEPTION
 from racecraft.learn.sb3 import SB3Config
 from racecraft.sim import Randomization, Start, Vehicle, load_randomization, load_vehicle
 from racecraft.sim.camera import CAMERAS
@@ -121,6 +122,8 @@ class TrainSettings:
                 f"critic is 'lap', which is for algorithm 'ppo' or 'distill' on device 'cpu'; it is {self.algorithm!r} "
                 f"on {self.device!r}. Allowed there are 'privileged' and 'camera'."
             )
+        if self.network == PERCEPTION and self.device != "cpu":
+            raise ConfigError(f"network is {PERCEPTION!r}, which learns on device 'cpu'; it is {self.device!r}.")
         check_type("until", self.until, Until, "allowed is a text such as '5 laps'")
         if self.until.laps > self.evaluation_trials:
             object.__setattr__(self, "evaluation_trials", self.until.laps)

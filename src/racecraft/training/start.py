@@ -11,6 +11,7 @@ from typing import Any
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import ConfigError
 from racecraft.learn import DistillConfig, PPOConfig, SACConfig
+from racecraft.learn.networks import PERCEPTION
 from racecraft.learn.sb3 import SB3Config
 from racecraft.reward import dry_run_on, load_preset, preset_names, validate_reward
 from racecraft.run import RunFolder, RunInfo, change_reward
@@ -182,6 +183,11 @@ def require_trainable(settings: TrainSettings, metadata: ModelMetadata) -> None:
         ConfigError: Settings exclude each other.
     """
     suite = metadata.suite
+    if settings.network == PERCEPTION and suite.lenses != 1:
+        raise ConfigError(
+            f"sensor is {', '.join(suite.names)}; the network {PERCEPTION} looks through one lens.",
+            hint="Train with FRONT_FACING_CAMERA, and a LIDAR if need be.",
+        )
     if not METHODS[settings.algorithm].sees_all and (suite.lenses != 1 or suite.lidar_name):
         raise ConfigError(
             f"sensor is {', '.join(suite.names)}; allowed with {settings.algorithm} is one camera of one lens.",
