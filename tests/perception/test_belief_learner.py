@@ -16,7 +16,7 @@ from racecraft.learn.networks import PERCEPTION
 from racecraft.learn.saliency import grad_cam
 from racecraft.perception import Perceiver
 from racecraft.perception.answers import IN_SIGHT, MIDDLES, NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS, PLACES
-from racecraft.perception.learner import USUAL_LOG_ERROR, BeliefLearner, bytes_of
+from racecraft.perception.learner import USUAL_LOG_ERROR, BeliefLearner, byte_slopes, bytes_of
 from racecraft.perception.mirror import SIDED, mirrored_answers
 from racecraft.race import evaluate
 from racecraft.race.policy import load_policy
@@ -77,6 +77,21 @@ def test_columns_of_a_middle_that_is_out_of_sight_are_not_told() -> None:
     assert (bytes_of(outputs)[:, MIDDLES] > 128).all()
 
 
+def test_slopes_say_how_far_a_byte_moves() -> None:
+    rng, step = np.random.default_rng(2), 0.1
+    outputs = rng.normal(size=(64, NUM_OUTPUTS)).astype(np.float32)
+    slopes = byte_slopes(outputs)
+    for place in set(range(NUM_OUTPUTS)) - set(range(IN_SIGHT.start, IN_SIGHT.stop)):
+        more, less = outputs.copy(), outputs.copy()
+        more[:, place] += step
+        less[:, place] -= step
+        moved = bytes_of(more)[:, place].astype(float) - bytes_of(less)[:, place]
+        assert slopes[:, place] == pytest.approx(moved / (2 * step), abs=1.0 / (2 * step) + 1.0), place
+    hidden = outputs[:, IN_SIGHT] <= 0.0
+    assert hidden.any()
+    assert not slopes[:, MIDDLES][hidden].any()
+
+
 def test_a_mirrors_numbers_are_told_as_far_to_the_other_side() -> None:
     outputs = np.random.default_rng(1).normal(size=(8, NUM_OUTPUTS)).astype(np.float32)
     straight, turned = bytes_of(outputs).astype(int), bytes_of(mirrored_answers(outputs)).astype(int)
@@ -130,7 +145,7 @@ def test_two_lenses_a_gpu_a_file_for_a_car_and_grad_cam_refuse_it(tmp_path: Path
         learner_of(replace(SPEC, lenses=2))
     with pytest.raises(ConfigError, match="learns on device 'cpu'"):
         TrainSettings(network=PERCEPTION, device="cuda")
-    with pytest.raises(ConfigError, match="sees what is told"):
+    with pytest.raises(ConfigError, match="sees what is told"):  # by itself: `explain` knows perception
         grad_cam(SPEC, make_learner(SPEC).weights(), np.zeros((120, 160), np.uint8))
     run = _trained(tmp_path, "1024 steps")
     for target in ("car", "onnx"):

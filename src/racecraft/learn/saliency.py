@@ -39,6 +39,26 @@ class Saliency:
     """The output that was explained."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Pass:
+    """What a policy's tower made of one image."""
+
+    maps: list[Floats]
+    """The image, and the map of each convolution, from the first on  (channels, rows, columns)."""
+    dense: list[Floats]
+    """The last map, flattened, and what each dense layer made of it  (units,)."""
+    outputs: Floats
+    """(A,)."""
+
+    @property
+    def shown(self) -> int:
+        """Which map a picture is made of: the deepest that still has rows and columns to show."""
+        chosen = len(self.maps) - 1
+        while chosen > 1 and (self.maps[chosen].shape[1] < LEAST_ROWS or self.maps[chosen].shape[2] < LEAST_COLUMNS):
+            chosen -= 1
+        return chosen
+
+
 def grad_cam(spec: NetworkSpec, weights: Weights, frame: NDArray[np.uint8], *, target: int | None = None) -> Saliency:
     """Explain one output of a policy for one camera image.
 
@@ -52,50 +72,85 @@ def grad_cam(spec: NetworkSpec, weights: Weights, frame: NDArray[np.uint8], *, t
         ConfigError: The network sees through other sensors, too, or no pictures at all.
         ShapeError: The frame is not of the network's size.
     """
-    if spec.lenses != 1 or spec.lidar_size:
-        raise ConfigError("Grad-CAM explains networks that see one camera alone; this one has other sensors, too.")
     if architecture_of(spec).told:
         raise ConfigError(f"Grad-CAM explains networks that see pictures; {spec.name} sees what is told of them.")
-    if frame.shape != spec.frame_shape:
-        raise ShapeError(f"frame has shape {frame.shape}, expected {spec.frame_shape}.")
-    arch = architecture_of(spec)
-    x = _pooled(spec, frame)[None] / np.float32(255.0)
-    maps = []
-    for index, conv in enumerate(arch.convs, 1):
-        weight, bias = weights[f"policy.conv{index}.weight"], weights[f"policy.conv{index}.bias"]
-        x = np.maximum(_convolved(x, weight, bias, conv), 0.0)
-        maps.append(x)
-    # the camera tower flattens in the order row, column, channel
-    layers = [np.ascontiguousarray(x.transpose(1, 2, 0)).ravel()]
-    names = [f"policy.dense{index}" for index in range(1, len(arch.dense) + 1)]
-    for name in names:
-        layers.append(np.maximum(weights[f"{name}.weight"] @ layers[-1] + weights[f"{name}.bias"], 0.0))
-    outputs = weights["policy.head.weight"] @ layers[-1] + weights["policy.head.bias"]
-    if target is None:
-        target = int(outputs.argmax()) if spec.is_discrete else 0
-
-    gradient = weights["policy.head.weight"][target]
-    for name, above in zip(reversed(names), reversed(layers[1:]), strict=True):
-        gradient = (gradient * (above > 0)) @ weights[f"{name}.weight"]
-    channels, rows, columns = maps[-1].shape
-    slope = gradient.reshape(rows, columns, channels).transpose(2, 0, 1)
-    chosen = len(maps) - 1
-    while chosen > 0 and (maps[chosen].shape[1] < LEAST_ROWS or maps[chosen].shape[2] < LEAST_COLUMNS):
-        weight = weights[f"policy.conv{chosen + 1}.weight"]
-        slope = _backward(slope * (maps[chosen] > 0), weight, arch.convs[chosen], maps[chosen - 1].shape)
-        chosen -= 1
-    picture = np.maximum((slope.mean(axis=(1, 2))[:, None, None] * maps[chosen]).sum(axis=0), 0.0)
+    check_explained(spec, frame)
+    seen = forward(spec, weights, pooled(spec, frame)[None] / np.float32(255.0))
+    chosen = target_of(spec, seen.outputs) if target is None else target
+    slope = slope_at(spec, weights, seen, np.eye(len(seen.outputs), dtype=np.float32)[chosen], seen.shown)
+    cells = cells_of(seen, slope)
     return Saliency(
-        picture=_on_the_frame(spec, picture, arch.convs[: chosen + 1]),
-        cells=picture,
-        layer=f"conv{chosen + 1}",
-        outputs=outputs.astype(np.float32),
-        target=target,
+        picture=on_the_frame(spec, cells, seen.shown),
+        cells=cells,
+        layer=f"conv{seen.shown}",
+        outputs=seen.outputs,
+        target=chosen,
     )
 
 
-def _pooled(spec: NetworkSpec, frame: NDArray[np.uint8]) -> Floats:
-    """The image as the first convolution sees it, rounded as training rounds it."""
+def check_explained(spec: NetworkSpec, frame: NDArray[np.uint8]) -> None:
+    """Refuse what cannot be explained by one picture.
+
+    Raises:
+        ConfigError: The network sees through other sensors, too.
+        ShapeError: The frame is not of the network's size.
+    """
+    if spec.lenses != 1 or spec.lidar_size:
+        raise ConfigError("Grad-CAM explains networks that see one camera alone; this one has other sensors, too.")
+    if frame.shape != spec.frame_shape:
+        raise ShapeError(f"frame has shape {frame.shape}, expected {spec.frame_shape}.")
+
+
+def target_of(spec: NetworkSpec, outputs: Floats) -> int:
+    """The output to explain where none is named: the largest, of a continuous policy the steering."""
+    return int(outputs.argmax()) if spec.is_discrete else 0
+
+
+def forward(spec: NetworkSpec, weights: Weights, x: Floats) -> Pass:
+    """What the policy's tower makes of an image of 0 to 1  (1, rows, columns)."""
+    arch = architecture_of(spec)
+    maps = [x]
+    for index, conv in enumerate(arch.convs, 1):
+        weight, bias = weights[f"policy.conv{index}.weight"], weights[f"policy.conv{index}.bias"]
+        maps.append(np.maximum(_convolved(maps[-1], weight, bias, conv), 0.0))
+    # the camera tower flattens in the order row, column, channel
+    dense = [np.ascontiguousarray(maps[-1].transpose(1, 2, 0)).ravel()]
+    for index in range(1, len(arch.dense) + 1):
+        weight, bias = weights[f"policy.dense{index}.weight"], weights[f"policy.dense{index}.bias"]
+        dense.append(np.maximum(weight @ dense[-1] + bias, 0.0))
+    outputs = weights["policy.head.weight"] @ dense[-1] + weights["policy.head.bias"]
+    return Pass(maps=maps, dense=dense, outputs=outputs.astype(np.float32))
+
+
+def slope_at(spec: NetworkSpec, weights: Weights, seen: Pass, slope: Floats, layer: int) -> Floats:
+    """How a sum of outputs changes with a map, 0 for the image itself  (channels, rows, columns).
+
+    Args:
+        spec: The network.
+        weights: Its parameters.
+        seen: What it made of an image.
+        slope: How much each output counts  (A,).
+        layer: Which map.
+    """
+    gradient = slope @ weights["policy.head.weight"]
+    for index in range(len(seen.dense) - 1, 0, -1):
+        gradient = (gradient * (seen.dense[index] > 0)) @ weights[f"policy.dense{index}.weight"]
+    channels, rows, columns = seen.maps[-1].shape
+    found = gradient.reshape(rows, columns, channels).transpose(2, 0, 1)
+    convs = architecture_of(spec).convs
+    for index in range(len(convs), layer, -1):
+        weight = weights[f"policy.conv{index}.weight"]
+        found = _backward(found * (seen.maps[index] > 0), weight, convs[index - 1], seen.maps[index - 1].shape)
+    return found
+
+
+def cells_of(seen: Pass, slope: Floats) -> Floats:
+    """What remains positive of the weighted sum of the map that is shown  (rows, columns)."""
+    return np.asarray(np.maximum((slope.mean(axis=(1, 2))[:, None, None] * seen.maps[seen.shown]).sum(axis=0), 0.0))
+
+
+def pooled(spec: NetworkSpec, frame: NDArray[np.uint8]) -> Floats:
+    """The image as the first convolution sees it, rounded as training rounds it, of 0 to 255."""
     pixels = frame[sky_rows(spec) :].astype(np.uint16)
     if architecture_of(spec).pool == 2:
         height, width = pooled_shape(spec)
@@ -125,10 +180,10 @@ def _backward(slope: Floats, weight: Floats, conv: Conv, shape: tuple[int, ...])
     return found
 
 
-def _on_the_frame(spec: NetworkSpec, picture: Floats, convs: tuple[Conv, ...]) -> Floats:
-    """Enlarged to the camera's image: every place of a map stands at the middle of what it sees."""
+def on_the_frame(spec: NetworkSpec, picture: Floats, layer: int) -> Floats:
+    """The cells of a map enlarged to the camera's image: each stands at the middle of what it sees  (H, W)."""
     stride, first = 1, 0.0
-    for conv in convs:
+    for conv in architecture_of(spec).convs[:layer]:
         first += 0.5 * (conv.kernel - 1) * stride
         stride *= conv.stride
     pool, sky = architecture_of(spec).pool, sky_rows(spec)

@@ -75,8 +75,21 @@ def bytes_of(outputs: NDArray[np.float32]) -> NDArray[np.uint8]:
     A step of the offset is 2 mm in the middle of the road, of a heading 0.1 degrees. Columns of the road's middle are
     told where it is in sight.
     """
+    return np.rint(128.0 + 127.0 * bend(_told(outputs))).astype(np.uint8)
+
+
+def byte_slopes(outputs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """How a byte changes with its output, were it not rounded  (N, NUM_OUTPUTS)."""
+    numbers, step = _told(outputs), np.ones(outputs.shape)
+    step[:, MIDDLES] = outputs[:, IN_SIGHT] > 0.0
+    step[:, NUM_CONTINUOUS:NUM_TARGETS] /= SURE
+    return np.asarray(127.0 * step * (1.0 + numbers * numbers) ** -1.5, np.float32)
+
+
+def _told(outputs: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Outputs before they are bent: columns out of sight, and errors as large as usual, are 0."""
     numbers = outputs.astype(np.float64)
     numbers[:, MIDDLES] *= numbers[:, IN_SIGHT] > 0.0
     numbers[:, NUM_CONTINUOUS:NUM_TARGETS] /= SURE
     numbers[:, ERRORS] -= USUAL_LOG_ERROR
-    return np.rint(128.0 + 127.0 * bend(numbers)).astype(np.uint8)
+    return numbers

@@ -26,10 +26,9 @@ from racecraft.analysis import (
 from racecraft.errors import ConfigError, RacecraftError, TrackNotFound
 from racecraft.json_file import read_json_object
 from racecraft.judging.trained import is_road_of, trained_camera, trained_title, trained_tracks
-from racecraft.learn import NetworkSpec
-from racecraft.learn.learner import Weights
-from racecraft.learn.saliency import grad_cam
+from racecraft.learn import Learner
 from racecraft.race.policy import WEIGHTS, load_policy
+from racecraft.race.seeing import explain
 from racecraft.run import RunFolder
 from racecraft.serve.context import Computes, Context, InContext
 from racecraft.serve.evaluations.objects import objects_of
@@ -102,12 +101,13 @@ def get_saliency(
     if found is None or row >= len(found.time):
         raise NotFound(f"Evaluation {stamp} of {name!r} has no step {row} in lap {lap}.")
     summary = read_json_object(folder.evaluation(stamp) / "evaluation.json")
-    step, spec, weights = _network(folder, summary.get("step"))
+    step, learner = _network(folder, summary.get("step"))
+    spec = learner.spec
     driven, camera = driven_direction(track, [found.points]), lens_of(folder)
     frame = driver_frames(driven, [found.seen_from(camera.age)[row]], camera)[0]
     if target is not None and target >= spec.num_actions:
         raise NotFound(f"The policy of {name!r} has no output {target}; allowed are 0 to {spec.num_actions - 1}.")
-    seen = grad_cam(spec, weights, frame, target=target)
+    seen = explain(learner, frame, target=target)
     outputs = seen.outputs.astype(float)
     shares = np.exp(outputs - outputs.max()) if spec.is_discrete else outputs.clip(-1.0, 1.0)
     return SaliencyPicture(
@@ -259,18 +259,18 @@ def _trained_road(folder: RunFolder) -> Track:
 
 
 @lru_cache(maxsize=4)
-def _weights(folder: Path, checkpoint: int | str, _: str) -> tuple[int, NetworkSpec, Weights]:
+def _loaded(folder: Path, checkpoint: int | str, _: str) -> tuple[int, Learner]:
     step, policy = load_policy(RunFolder(folder), checkpoint=checkpoint, num_threads=1)
-    return step, policy.learner.spec, policy.learner.weights()
+    return step, policy.learner
 
 
-def _network(folder: RunFolder, step: Any) -> tuple[int, NetworkSpec, Weights]:
+def _network(folder: RunFolder, step: Any) -> tuple[int, Learner]:
     """The network that drove an evaluation, or the best there is where its checkpoint is no longer kept."""
     entries = folder.checkpoints.entries()
     kept: int | str = step if any(entry.step == step for entry in entries) else "best"
     mark = ",".join(entry.file for entry in entries)
     try:
-        return _weights(folder.path, kept, mark)
+        return _loaded(folder.path, kept, mark)
     except RacecraftError:
         raise
     except (KeyError, ValueError) as error:
