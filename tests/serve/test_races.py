@@ -140,7 +140,7 @@ def _trial(times: list[float], resets: int, completion: float) -> Trial:
 
 @pytest.mark.parametrize("ranking", ["total", "best", "average"])
 def test_a_race_is_ranked_in_the_console_as_on_the_command_line(stewards: Stewards, ranking: str) -> None:
-    race = stewards.race(laps=3, ranking=ranking, minimum_laps=2 if ranking == "average" else 1)
+    race = stewards.race(laps=3, ranking=ranking, minimum_laps=2 if ranking == "average" else None)
     trials = [_trial(*driven) for driven in FIELD]
     for number, (times, resets, completion) in enumerate(FIELD):
         stewards.drive(race, f"model-{number}", times, mean_completion=completion, resets=resets)
@@ -185,11 +185,25 @@ def test_an_average_is_of_laps_in_a_row(stewards: Stewards) -> None:
     assert (card.leader, card.leader_score, card.models) == ("wild", 9.5, 2)
 
 
-def test_only_an_average_needs_as_many_laps_as_it_is_over(stewards: Stewards) -> None:
+def test_a_best_lap_may_need_others_beside_it(stewards: Stewards) -> None:
+    race = stewards.race(ranking="best", laps=3, minimum_laps=2)
+    stewards.drive(race, "steady", [10.0, 10.5])
+    stewards.drive(race, "wild", [8.0])
+    assert stewards.table(race) == [(1, "steady", 10.0, 0.0), (None, "wild", None, None)]
+    assert stewards.races.cards()[0].leader == "steady"
+
+
+def test_no_race_needs_more_laps_than_it_has(stewards: Stewards) -> None:
     with pytest.raises(ConfigError, match="An average over 3 laps cannot be had from 2"):
         stewards.race(ranking="average", laps=2, minimum_laps=3)
     stewards.race(ranking="average", laps=3, minimum_laps=3)
-    stewards.race(ranking="total", laps=2, minimum_laps=3)
+    with pytest.raises(ConfigError, match="minimum_laps is 3; allowed is 1 to 2"):
+        stewards.race(ranking="best", laps=2, minimum_laps=3)
+    assert stewards.races.get(stewards.race(ranking="total", laps=4, minimum_laps=1)).minimum_laps == 4  # as ever
+    usual = {ranking: stewards.race(ranking=ranking, laps=4) for ranking in ("total", "average", "best")}
+    assert {ranking: stewards.races.get(race).minimum_laps for ranking, race in usual.items()} == {
+        **{"total": 4, "average": 3, "best": 1}
+    }
 
 
 def test_a_failed_entry_is_not_ranked_but_shown(stewards: Stewards) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import httpx
 import pytest
@@ -14,7 +14,7 @@ from running_consoles import RunningConsole
 from racecraft.judging.verification import published
 from racecraft.race.announcement import commitment_of, seed_of
 from racecraft.replay import read_replay, verify
-from racecraft.serve.races.schemas import RaceSettings, RuleSet
+from racecraft.serve.races.schemas import RuleSet
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.vehicle import PRESETS
 
@@ -294,7 +294,6 @@ def test_ghosts_accompany_the_film_of_an_entry(console: RunningConsole) -> None:
 def test_a_race_is_announced_by_all_that_was_asked(console: RunningConsole) -> None:
     sets = {one["name"]: one for one in console.client.get("/api/races/rules").json()}
     assert list(sets) == ["drfc", "worker", "droa", "live"]
-    assert set(get_args(RaceSettings.model_fields["randomize"].annotation)) == set(RANDOMIZATIONS)
     race = make(console, rules="live", randomize="strong", offtrack_penalty=1.5, direction="reverse")
     assert (race["randomize"], race["laps"], race["rules"]["direction"]) == ("strong", 15, "reverse")
     document = console.client.get(f"/api/races/{race['id']}/race.json").json()["document"]

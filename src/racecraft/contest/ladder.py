@@ -193,7 +193,7 @@ def hold_ladder(
             for pair in pairs:
                 meet(pair, course)
     else:
-        _hold_swiss(len(entries), rounds or max((len(entries) - 1).bit_length() + 1, len(plan)), plan, meet)
+        _hold_swiss(len(entries), rounds or _usual_rounds(len(entries), len(plan)), plan, meet)
     return Ladder(
         names=tuple(entry.name for entry in entries),
         kind=kind,
@@ -203,6 +203,19 @@ def hold_ladder(
         matches=tuple(matches),
         ratings=tuple(ratings),
     )
+
+
+def planned_matches(num_entries: int, num_courses: int, *, schedule: str, starts: int, rounds: int) -> int:
+    """How many matches a ladder has, by the settings of `hold_ladder`."""
+    num_starts = num_courses * starts
+    if schedule == "round-robin":
+        return num_entries * (num_entries - 1) // 2 * num_starts
+    return (rounds or _usual_rounds(num_entries, num_starts)) * (num_entries // 2)
+
+
+def _usual_rounds(num_entries: int, num_starts: int) -> int:
+    """Of a Swiss schedule: enough to find the best, and one for every start."""
+    return max((num_entries - 1).bit_length() + 1, num_starts)
 
 
 def _hold_swiss(num_entries: int, rounds: int, plan: Sequence[Course], meet: Callable[[Pair, Course], Match]) -> None:

@@ -71,7 +71,7 @@ def race_terms(
         num_cars: Entries; where each drives alone their number means nothing.
         ranking: ``total`` time, ``best`` lap or ``average`` of the best `minimum_laps` laps in a row.
         minimum_laps: Completed laps that a trial must have for a score: all for ``total``, which would else be won by
-            who gave up first; by default three for ``average`` and one for ``best``.
+            who gave up first; by default `laps_needed`: three for ``average`` and one for ``best``.
         num_trials: Of each entry that drives alone, 5 by default; cars on one road have one.
         secret: 32 bytes that the seed is drawn from, or None for one that everybody may know.
         final: What else is announced of a race of duels, from `racecraft.contest.finals.FinalTerms`.
@@ -80,9 +80,9 @@ def race_terms(
         ConfigError: No such race or ranking, or the number of entries, laps or trials does not go with it.
     """
     check_kind(kind, num_cars)
-    trials, laps = check_trials(kind, num_trials), conditions.rules.laps
-    needed = {"total": laps, "average": min(3, laps)}.get(ranking, 1) if minimum_laps is None else minimum_laps
     check_choice("ranking", ranking, RANKINGS)
+    trials, laps = check_trials(kind, num_trials), conditions.rules.laps
+    needed = laps_needed(ranking, laps) if minimum_laps is None else minimum_laps
     require("minimum_laps", needed, 1 <= needed <= laps, f"1 to {laps}, the laps of the race")
     if ranking == "total" and needed < laps:
         raise ConfigError(
@@ -108,6 +108,11 @@ def race_terms(
         num_trials=trials,
         announcement=announcement,
     )
+
+
+def laps_needed(ranking: str, laps: int) -> int:
+    """Completed laps that a trial of so many must have for a score unless a race asks for another number."""
+    return {"total": laps, "average": min(3, laps)}.get(ranking, 1)
 
 
 def announced_terms(announcement: Announcement, track: Track) -> RaceTerms:

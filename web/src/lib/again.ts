@@ -1,6 +1,7 @@
 /** A model's own request, as what somebody typed for a new one: a copy whose every setting can be changed. */
 import type { ActionPreset, Choices, RewardPreset } from "../api/client";
 import { saidBy } from "./awsfiles";
+import { wholeCar } from "./conditions";
 import { presetOf, usualObjects, type Numbers } from "./newmodel";
 import { roadOf } from "./raceterms";
 import type { Typed } from "./newdraft";
@@ -35,7 +36,12 @@ export function typedOf(request: Request, { rewards, spaces, choices }: Offered)
     source: rewards.find((reward) => reward.name === request.reward)?.source ?? request.reward,
     until: request.until,
     seed: request.seed,
-    vehicle: request.vehicle === "v5" ? "" : request.vehicle,
+    vehicle:
+      request.vehicle === "v5"
+        ? ""
+        : typeof request.vehicle === "string"
+          ? request.vehicle
+          : wholeCar(request.vehicle, choices),
     network: request.network === "RACECRAFT_SMALL" ? "" : request.network,
     algorithm: request.algorithm,
     critic: request.critic,

@@ -1,10 +1,10 @@
 /** What a person chose for a new model, and the request that it becomes. */
 import type { ActionPreset, Choices, NewModel, RewardPreset } from "../api/client";
 import { metadataOf, sameSpace } from "./actions";
+import type { AskedCar, AskedRanges } from "./conditions";
 import { askedRoad, thingsOf, type Road } from "./raceterms";
 
 export type Learning = "learning_fast" | "learning_aws";
-export type Ranges = Record<string, [number, number]>;
 export type Numbers = Record<string, number | string>;
 
 export interface Wishes {
@@ -17,11 +17,11 @@ export interface Wishes {
   source: string;
   until: string;
   seed: number;
-  vehicle: string | Record<string, number>; // a preset, or every parameter
+  vehicle: AskedCar;
   network: string;
   algorithm: string;
   critic: string;
-  randomize: string | Ranges; // a preset, or what differs by its quantity
+  randomize: AskedRanges;
   race: string;
   opponents: string[]; // of a race head to head; none: itself, as it is and as it was
   cars: number;

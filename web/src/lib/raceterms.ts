@@ -3,6 +3,7 @@ import type { RuleSet } from "../api/races";
 import type { components } from "../api/schema";
 import type { Key } from "../i18n/en";
 import { t } from "../i18n/index.svelte";
+import type { AskedCar, AskedRanges } from "./conditions";
 import { plain, withUnit } from "./numbers";
 
 type Asked = components["schemas"]["NewHeat"];
@@ -17,6 +18,14 @@ export interface Road {
   places: { at: number; lane: Lane }[]; // % of a lap
 }
 
+export type Ranking = NonNullable<Asked["ranking"]>;
+
+/** Laps that a score takes, by what is ranked; a total takes all. */
+export interface Needed {
+  best: number;
+  average: number;
+}
+
 export interface Terms {
   rules: Asked["rules"];
   offtrack_penalty: number; // s, as all that follow
@@ -24,13 +33,12 @@ export interface Terms {
   max_resets: number;
   time_limit: number; // 0: none
   direction: Asked["direction"];
-  vehicle: Asked["vehicle"];
-  randomize: Asked["randomize"];
+  vehicle: AskedCar;
+  randomize: AskedRanges;
   seed: number | null; // none: drawn
 }
 
 export const RULES = ["drfc", "worker", "droa", "live"] as const;
-export const RANDOMIZATIONS = ["none", "light", "strong", "real", "aws"] as const;
 
 export const newRoad = (placement: Road["placement"] = "even"): Road => ({
   botSpeed: 0.2,
@@ -55,6 +63,21 @@ export const byRules = (terms: Terms, { name, ...numbers }: RuleSet): Terms => (
   max_resets: numbers.max_resets,
   time_limit: numbers.time_limit,
 });
+
+export const newNeeded = (): Needed => ({ best: 1, average: 3 });
+
+/** What a request says of a ranking. */
+export const askedRanking = (ranking: Ranking, needed: Needed, laps: number) => ({
+  ranking,
+  minimum_laps: ranking === "total" ? null : Math.min(needed[ranking], laps),
+});
+
+/** What places go by, in words. */
+export function toldRanking(ranking: Ranking, needed: number): string {
+  const name = t(`races_ranking_${ranking}`);
+  if (ranking === "average") return `${name} (${t("races_in_a_row", { count: needed })})`;
+  return ranking === "best" && needed > 1 ? `${name} (${t("races_at_least", { count: needed })})` : name;
+}
 
 /** What a request said of the road. */
 export const roadOf = (

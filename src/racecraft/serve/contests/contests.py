@@ -17,12 +17,13 @@ from typing import Any, Final
 
 import sqlalchemy as sa
 
-from racecraft.contest.ladder import check_ladder
-from racecraft.contest.terms import TOGETHER, race_terms
+from racecraft.contest.ladder import check_ladder, planned_matches
+from racecraft.contest.terms import TOGETHER, laps_needed, race_terms
 from racecraft.errors import ConfigError
 from racecraft.race.announcement import draw_secret
 from racecraft.race.conditions import Conditions
 from racecraft.race.rules import RaceRules
+from racecraft.serve.conditions import told_randomization, told_vehicle
 from racecraft.serve.contests.files import REPLAY, VIDEO, contest_folder, count_matches
 from racecraft.serve.contests.schemas import (
     ContestCard,
@@ -43,13 +44,13 @@ from racecraft.serve.races.ghosts import entry_name, evaluated, evaluation_repla
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job
 from racecraft.serve.tracks.courses import Courses
-from racecraft.sim.randomization import load_randomization
-from racecraft.sim.vehicle import load_vehicle
 from racecraft.track import Track
 
 KINDS: Final = ("heat", "ladder")
 """Of the jobs."""
 MAX_CONTESTS: Final = 500
+MAX_MATCHES: Final = 20_000
+"""Of a ladder."""
 _ID: Final = re.compile(r"[0-9a-f]{16}")
 
 
@@ -90,9 +91,9 @@ class Contests:
         conditions = Conditions(
             track=self._courses.load(request.track),
             rules=terms.rules,
-            vehicle=load_vehicle(request.vehicle),
+            vehicle=terms.vehicle,
             objects=terms.objects,
-            randomize=load_randomization(request.randomize),
+            randomize=terms.randomize,
         )
         announced = race_terms(
             conditions,
@@ -130,7 +131,16 @@ class Contests:
             raise ConfigError(f"rounds are those of a swiss schedule; this one is {request.schedule}.")
         if request.objects is not None and request.kind not in TOGETHER:
             raise ConfigError(f"objects go with the ladder head-to-model; a {request.kind} has its own.")
-        payload = request.model_dump() | {"paths": [self._courses.path_or_name(name) for name in request.tracks]}
+        paths = self._courses.paths(request.tracks)
+        planned = planned_matches(
+            len(request.models), len(paths), schedule=request.schedule, starts=request.starts, rounds=request.rounds
+        )
+        if planned > MAX_MATCHES:
+            raise ConfigError(
+                f"This ladder would have {planned} races; allowed are {MAX_MATCHES}.",
+                hint="Choose fewer models, tracks or starts, or the Swiss schedule.",
+            )
+        payload = request.model_dump() | {"paths": paths, "planned": planned}
         return self._add("ladder", payload, request.models, settle(request))
 
     def evaluated(self, track: str) -> list[EvaluatedCard]:
@@ -145,19 +155,21 @@ class Contests:
         """A heat or a ladder with its result."""
         job = self.job(contest)
         payload, result = job.payload, job.result or {}
-        terms = terms_of(payload)
+        terms, ranking = terms_of(payload), payload.get("ranking", "total")
         return ContestDetail(
             **self._card(job).model_dump(),
-            **terms.to_dict(),
+            rules=terms.rules.to_dict(),
+            objects=terms.objects.to_dict(),
             laps=payload["laps"],
-            vehicle=payload["vehicle"],
-            randomize=payload.get("randomize", "none"),
+            vehicle=told_vehicle(terms.vehicle),
+            randomize=told_randomization(terms.randomize),
             seed=payload["seed"],
             commitment=payload.get("commitment", ""),
             secret=payload.get("secret", "") if job.state in ENDED else "",
             ghosts=payload.get("ghosts", []),
             direction=terms.rules.direction,
-            ranking=payload.get("ranking", "total"),
+            ranking=ranking,
+            minimum_laps=payload.get("minimum_laps") or laps_needed(ranking, payload["laps"]),
             schedule=payload.get("schedule", ""),
             starts=payload.get("starts", 0),
             rounds=payload.get("rounds", 0),
@@ -276,6 +288,7 @@ class Contests:
             driven=count_matches(self.folder(job.id))
             if is_ladder and job.state == "running"
             else len(result.get("matches", ())),
+            planned=payload.get("planned", 0),
             error=str((job.error or {}).get("message", "")),
         )
 

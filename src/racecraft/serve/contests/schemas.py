@@ -9,15 +9,17 @@ from pydantic import Field
 
 from racecraft.contest.terms import MAX_GRID
 from racecraft.film.ghost import MAX_GHOSTS
+from racecraft.serve.conditions import AskedRanges, AskedVehicle
 from racecraft.serve.races.ghost_schemas import Ghost, Starter
-from racecraft.serve.races.schemas import RaceKind, RaceSettings, Ranking
+from racecraft.serve.races.schemas import RaceKind, RaceSettings, RankedSettings, Ranking
 from racecraft.serve.schemas import Message
+from racecraft.sim.objects import MAX_OBJECTS
 
 Title = Annotated[str, Field(max_length=100)]
 Among = Literal["none", "boxes", "bots"]
 
 
-class NewHeat(RaceSettings):
+class NewHeat(RankedSettings):
     """A race of two to eight models on one road, who see and hit each other."""
 
     models: list[Starter] = Field(min_length=2, max_length=MAX_GRID)
@@ -25,13 +27,9 @@ class NewHeat(RaceSettings):
     title: Title = ""
     track: str = Field("reinvent_2018", max_length=200)
     laps: int = Field(1, ge=1, le=20)
-    ranking: Ranking = "total"
-    minimum_laps: int | None = Field(None, ge=1, le=20)
-    """That a car must have for a score; always all for the total, by default three in a row for the average, one for
-    the best."""
     objects: Among = "none"
     """What else is on the road."""
-    count: int = Field(3, ge=1, le=20)
+    count: int = Field(3, ge=1, le=MAX_OBJECTS)
     """How many boxes or bot cars."""
     secret: bool = False
     """Draw the starts and objects from a secret instead of a seed; its commitment is told first."""
@@ -45,7 +43,8 @@ class NewLadder(RaceSettings):
     models: list[Starter] = Field(min_length=2, max_length=20)
     title: Title = ""
     kind: RaceKind | Literal["head-to-model"] = "head-to-model"
-    tracks: list[Annotated[str, Field(max_length=200)]] = Field(min_length=1, max_length=10)
+    tracks: list[Annotated[str, Field(max_length=200)]] = Field(min_length=1, max_length=100)
+    """Each by its name, ``library``, ``generated:0..9`` with the generator's options, or ``all``."""
     schedule: Literal["round-robin", "swiss"] = "round-robin"
     """Everyone meets everyone at every start, or each meets one of about the same strength in each round."""
     starts: int = Field(4, ge=1, le=20)
@@ -57,7 +56,7 @@ class NewLadder(RaceSettings):
     """s on the clock that end a race; 0 for none."""
     objects: Among | None = None
     """What else is on the road that two share; the other kinds have their own."""
-    count: int | None = Field(None, ge=1, le=20)
+    count: int | None = Field(None, ge=1, le=MAX_OBJECTS)
     """How many boxes or bot cars; 6 and 3 otherwise."""
 
 
@@ -116,6 +115,7 @@ class ContestCard(Message):
     """``head-to-model``, ``grid``, or what a ladder compares by."""
     title: str
     tracks: list[str]
+    """As they were asked for."""
     models: list[str]
     """With the checkpoint where it is not the best: ``heron@last``."""
     state: Literal["queued", "running", "done", "failed", "cancelled"]
@@ -123,6 +123,8 @@ class ContestCard(Message):
     winner: str | None
     driven: int
     """Races of a ladder that are decided."""
+    planned: int
+    """Races that a ladder has; 0 of a heat, and where it is not known."""
     error: str
 
 
@@ -134,8 +136,8 @@ class ContestDetail(ContestCard):
     """All that it is held by."""
     objects: dict[str, Any]
     """What stands or drives on the road besides the models."""
-    vehicle: str
-    randomize: str
+    vehicle: AskedVehicle
+    randomize: AskedRanges
     seed: int | None
     """None where it is drawn from a secret."""
     commitment: str
@@ -147,6 +149,8 @@ class ContestDetail(ContestCard):
     direction: str
     ranking: Ranking
     """Of a heat: what places go by."""
+    minimum_laps: int
+    """Of a heat: that a car must have for a score."""
     schedule: str
     """Of a ladder."""
     starts: int

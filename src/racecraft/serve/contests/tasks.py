@@ -34,8 +34,6 @@ def heat(task: Task) -> dict[str, Any]:
     from racecraft.race.conditions import Conditions
     from racecraft.race.entry import load_entries
     from racecraft.replay.replay import write_replay
-    from racecraft.sim.randomization import load_randomization
-    from racecraft.sim.vehicle import load_vehicle
     from racecraft.track import load_track
 
     payload, folder = task.job.payload, _folder(task)
@@ -44,9 +42,9 @@ def heat(task: Task) -> dict[str, Any]:
         track=load_track(payload["paths"][0]),
         rules=held.rules,
         seed=payload["seed"] or 0,
-        vehicle=load_vehicle(payload["vehicle"]),
+        vehicle=held.vehicle,
         objects=held.objects,
-        randomize=load_randomization(payload.get("randomize", "none")),
+        randomize=held.randomize,
     )
     entries = load_entries(_models(task))
     terms = race_terms(
@@ -103,15 +101,13 @@ def ladder(task: Task) -> dict[str, Any]:
 
     payload, folder = task.job.payload, _folder(task)
     held = terms_of(payload)
-    names = dict(zip(payload["paths"], payload["tracks"], strict=True))
-    shown = {Path(path).stem: name for path, name in names.items()}
     unfinished = folder / f".{MATCHES}.{os.getpid()}"  # hidden: nobody copies it while it grows
     with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
 
         def watch(match: Match, trials: Sequence[Trial]) -> None:
             number = len(archive.namelist())
             cars = [_driven(trial) for trial in trials]
-            document = {"track": shown.get(match.track, match.track), "cars": cars}
+            document = {"track": match.track, "cars": cars}
             archive.writestr(f"{number}.json", json.dumps(document, separators=(",", ":")))
             (folder / DRIVEN).write_text(str(number + 1), encoding="ascii")
 
@@ -125,8 +121,8 @@ def ladder(task: Task) -> dict[str, Any]:
             laps=payload["laps"],
             rules=held.rules,
             objects=held.objects,
-            vehicle=payload["vehicle"],
-            randomize=payload.get("randomize", "none"),
+            vehicle=held.vehicle,
+            randomize=held.randomize,
             seed=payload["seed"],
             watch=watch,
         )

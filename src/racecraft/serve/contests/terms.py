@@ -6,13 +6,16 @@ request -> *settle* -> payload["terms"] -> *terms_of* -> the job, the page
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from racecraft.contest.terms import TOGETHER
 from racecraft.race.rules import RaceRules
-from racecraft.serve.races.rules import rules_of
+from racecraft.serve.conditions import randomization_of, vehicle_of
+from racecraft.serve.races.rules import car_of, rules_of
 from racecraft.sim.objects import Objects
+from racecraft.sim.randomization import Randomization
+from racecraft.sim.vehicle import Vehicle
 
 if TYPE_CHECKING:  # jobs do without messages
     from racecraft.serve.contests.schemas import NewHeat, NewLadder
@@ -23,14 +26,21 @@ RACES: Final = {"none": "time-trial", "boxes": "object-avoidance", "bots": "head
 
 @dataclass(frozen=True, kw_only=True)
 class Terms:
-    """Rules and objects, whole."""
+    """Everything but the models, the roads and the seed, whole."""
 
     rules: RaceRules
     objects: Objects
+    vehicle: Vehicle
+    randomize: Randomization
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
-        return {"rules": self.rules.to_dict(), "objects": self.objects.to_dict()}
+        return {
+            "rules": self.rules.to_dict(),
+            "objects": self.objects.to_dict(),
+            "vehicle": asdict(self.vehicle),
+            "randomize": asdict(self.randomize),
+        }
 
 
 def settle(request: NewHeat | NewLadder) -> Terms:
@@ -47,13 +57,23 @@ def settle(request: NewHeat | NewLadder) -> Terms:
         rules = replace(rules, is_continuous=True)  # as `shared_road` holds it
     else:
         race = request.kind
-    return Terms(rules=rules, objects=road_objects(request, race, count=request.count))
+    vehicle, randomize = car_of(request)
+    objects = road_objects(request, race, count=request.count)
+    return Terms(rules=rules, objects=objects, vehicle=vehicle, randomize=randomize)
 
 
 def terms_of(payload: Mapping[str, Any]) -> Terms:
     """What the job of a heat or a ladder is held by; of one from before that was kept, what its request says."""
     if kept := payload.get("terms"):
-        return Terms(rules=RaceRules.from_dict(kept["rules"]), objects=Objects.from_dict(kept["objects"]))
+        has_car = "vehicle" in kept  # else it is from before that was kept, too
+        return Terms(
+            rules=RaceRules.from_dict(kept["rules"]),
+            objects=Objects.from_dict(kept["objects"]),
+            vehicle=Vehicle(**kept["vehicle"]) if has_car else vehicle_of(payload["vehicle"]),
+            randomize=Randomization(**kept["randomize"])
+            if has_car
+            else randomization_of(payload.get("randomize", "none")),
+        )
     from racecraft.serve.contests.schemas import NewHeat, NewLadder
 
     kind: type[NewHeat] | type[NewLadder] = NewLadder if "schedule" in payload else NewHeat

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Final, Literal, cast
+from typing import Literal, cast
 
 from racecraft.learn import PPOConfig
 from racecraft.run import RunFolder
+from racecraft.serve.conditions import told_randomization, told_vehicle
 from racecraft.serve.models.garage import RACED, race_of
 from racecraft.serve.models.schemas import ModelCard, NewModel, Tuning
 from racecraft.serve.road import Lane, Place, Placement
 from racecraft.sim.objects import Bots, Obstacles
-from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
-from racecraft.sim.randomization import Randomization
-from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import single_names
 from racecraft.training.opponents import SELF
 from racecraft.training.start import read_settings
-
-VEHICLES: Final = ("v5", "v4", "v6")
 
 
 def again(folder: RunFolder, card: ModelCard) -> NewModel:
@@ -51,11 +46,11 @@ def again(folder: RunFolder, card: ModelCard) -> NewModel:
         parked_cars=objects.obstacles is not None and objects.obstacles.kind == "car",
         placement=cast(Placement, group.placement) if group is not None else None,
         positions=_places(group),
-        randomize=_randomization(settings.randomize),
+        randomize=told_randomization(settings.randomize),
         algorithm=settings.algorithm,
         critic=settings.critic,
         network=settings.network,
-        vehicle=_vehicle(settings.vehicle),
+        vehicle=told_vehicle(settings.vehicle),
         seed=settings.seed,
         until=str(settings.until),
     )
@@ -65,17 +60,6 @@ def _places(group: Bots | Obstacles | None) -> list[Place]:
     if group is None or group.placement != "fixed":
         return []
     return [(at, cast(Lane, lane)) for at, lane in group.positions]
-
-
-def _vehicle(vehicle: Vehicle) -> str | dict[str, float]:
-    return next((name for name in VEHICLES if load_vehicle(name) == vehicle), asdict(vehicle))
-
-
-def _randomization(found: Randomization) -> str | dict[str, tuple[float, float]]:
-    """A preset's name, or the ranges that change something."""
-    ranges, nothing = asdict(found), asdict(RANDOMIZATIONS["none"])
-    own = {name: ends for name, ends in ranges.items() if ends != nothing[name]}
-    return next((name for name, one in RANDOMIZATIONS.items() if one == found), own)
 
 
 def _tuning(ppo: PPOConfig) -> Tuning:

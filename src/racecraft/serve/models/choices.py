@@ -14,6 +14,7 @@ from racecraft.agent.sensors import SENSOR_NAMES
 from racecraft.errors import RacecraftError
 from racecraft.learn import PPOConfig
 from racecraft.learn.networks import network_names
+from racecraft.serve.conditions import VEHICLES
 from racecraft.serve.context import Context, InContext
 from racecraft.serve.models.garage import RACED, race_of
 from racecraft.serve.models.schemas import Choices, NumberChoice
@@ -26,7 +27,6 @@ from racecraft.training.start import aws_hyperparameters
 
 router = APIRouter(prefix="/api/choices", tags=["choices"])
 
-VEHICLES: Final = ("v5", "v4", "v6")
 OLD_NAMES: Final = ("observation",)
 """Of sensors; files may have them, nobody needs to choose them."""
 

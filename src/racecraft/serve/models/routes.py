@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -10,12 +10,13 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.errors import ConfigError
 from racecraft.learn import PPOConfig
 from racecraft.reward import load_preset, preset_names
 from racecraft.run import RunFolder, read_stretches, stretch_at
 from racecraft.run.history import read_history
 from racecraft.run.starters import starter_names, unpack_starter
+from racecraft.serve.conditions import randomization_of, vehicle_of
 from racecraft.serve.context import (
     Computes,
     Context,
@@ -45,9 +46,6 @@ from racecraft.serve.models.schemas import (
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.road import road_objects
 from racecraft.sim import Objects
-from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
-from racecraft.sim.randomization import Randomization
-from racecraft.sim.vehicle import Vehicle
 from racecraft.training import Until
 from racecraft.training.opponents import SELF, Opponents
 from racecraft.training.parent import open_parent
@@ -82,12 +80,12 @@ def create_model(request: NewModel, context: InContext, consoles: InConsoles, us
         track=[context.courses.path_or_name(name) for name in dict.fromkeys((request.track, *request.more_tracks))],
         direction=request.direction,
         network=request.network,
-        vehicle=_vehicle(request.vehicle),
+        vehicle="" if request.vehicle == "" else vehicle_of(request.vehicle),
         seed=request.seed,
         until=Until.parse(request.until),
         objects=_objects(request),
         opponents=_opponents(context, request),
-        randomize=_randomization(request.randomize),
+        randomize=randomization_of(request.randomize),
         critic=request.critic,
         algorithm=request.algorithm or ("" if request.tuning is None else "ppo"),
     )
@@ -337,18 +335,6 @@ def _objects(request: NewModel) -> Objects:
     return road_objects(request, race, count=request.objects, placement="random")
 
 
-def _randomization(asked: str | dict[str, tuple[float, float]]) -> Randomization:
-    if isinstance(asked, str):
-        if asked not in RANDOMIZATIONS:  # never a path
-            raise ConfigError(f"randomize is {asked[:40]!r}; allowed are {', '.join(RANDOMIZATIONS)}.")
-        return RANDOMIZATIONS[asked]
-    known = [field.name for field in fields(Randomization)]
-    for name in asked:
-        if name not in known:
-            raise ConfigError(f"randomize has no quantity {name[:40]!r}.", hint=did_you_mean(name, known))
-    return Randomization(**asked)
-
-
 def _tuned(ppo: PPOConfig, tuning: Tuning) -> PPOConfig:
     changes: dict[str, Any] = {
         "learning_rate": tuning.lr,
@@ -359,15 +345,3 @@ def _tuned(ppo: PPOConfig, tuning: Tuning) -> PPOConfig:
         "value_loss": None if tuning.loss_type is None else "huber" if tuning.loss_type == "huber" else "mse",
     }
     return replace(ppo, **{name: value for name, value in changes.items() if value is not None})
-
-
-def _vehicle(asked: str | dict[str, float]) -> Vehicle | str:
-    if isinstance(asked, str):
-        if asked not in ("", "v4", "v5", "v6"):  # never a path
-            raise ConfigError(f"vehicle is {asked[:40]!r}; allowed are v4, v5 and v6.")
-        return asked
-    known = [field.name for field in fields(Vehicle)]
-    for name in asked:
-        if name not in known:
-            raise ConfigError(f"A vehicle has no parameter {name[:40]!r}.", hint=did_you_mean(name, known))
-    return Vehicle(**asked)

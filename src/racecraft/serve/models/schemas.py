@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from racecraft.serve.conditions import AskedRanges, AskedVehicle
 from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.jobs.schemas import JobInfo
 from racecraft.serve.road import OnRoad
@@ -25,10 +26,6 @@ class Tuning(Message):
     num_epochs: int | None = Field(None, ge=1, le=20)
     batch_size: int | None = Field(None, ge=16, le=512)
     loss_type: Literal["huber", "mean squared error"] | None = None
-
-
-Parameter = Annotated[float, Field(allow_inf_nan=False)]
-Name = Annotated[str, Field(max_length=40)]
 
 
 class NewModel(OnRoad):
@@ -59,14 +56,14 @@ class NewModel(OnRoad):
     """To a head-to-head race, the learner's included; 2 otherwise."""
     objects: int | None = Field(None, ge=1, le=32)
     """How many boxes or bot cars; 6 and 3 otherwise."""
-    randomize: Name | dict[Name, tuple[Parameter, Parameter]] = "none"
+    randomize: AskedRanges = "none"
     """What differs from episode to episode: a preset, or ranges by their quantity."""
     algorithm: str = Field("", max_length=40)
     """``ppo`` or ``sac``, which needs a continuous action space; by default the metadata's."""
     critic: str = Field(TIME_TRIAL.critic, max_length=40)
     """What the critic sees while training: ``privileged`` state, that and the ``lap``'s place, or the ``camera``."""
     network: str = ""
-    vehicle: Name | dict[Name, Parameter] = ""
+    vehicle: AskedVehicle = ""
     """``v4``, ``v5``, ``v6`` or parameters of one's own; those left out are v5's."""
     seed: int = Field(0, ge=0, le=2**32 - 1)
     until: str = Field(TIME_TRIAL.until, max_length=200)

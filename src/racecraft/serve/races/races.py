@@ -31,7 +31,7 @@ from racecraft.serve.models.garage import Garage
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.ghost_schemas import Ghost, Starter
 from racecraft.serve.races.ghosts import keep
-from racecraft.serve.races.rules import randomization_name, rules_of
+from racecraft.serve.races.rules import car_of, rules_of
 from racecraft.serve.races.schemas import (
     Enter,
     NewRace,
@@ -41,6 +41,7 @@ from racecraft.serve.races.schemas import (
     Undecided,
 )
 from racecraft.serve.races.standings import Entered, key_of, score_of, standings_of
+from racecraft.serve.races.state import OWN, told_car, told_ranges
 from racecraft.serve.races.state import announcement_of as announcement_of
 from racecraft.serve.races.state import is_withheld as is_withheld
 from racecraft.serve.races.state import state_of as state_of
@@ -50,8 +51,6 @@ from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Entry, Job, Race, User, now
 from racecraft.serve.tracks.courses import Courses
-from racecraft.sim.randomization import load_randomization
-from racecraft.sim.vehicle import load_vehicle
 from racecraft.track import Track
 
 KIND: Final = "race"
@@ -74,8 +73,8 @@ class Races:
         courses: Of tracks.
         share: Has the store hold what an entry needs, where there is one.
         see: Is given each entry's job before somebody hears of it.
-        user_id: Who holds them.
         replays: Of an entry's ghosts that drove before: `racecraft.serve.contests.contests.Contests.replays`.
+        user_id: Who holds them.
     """
 
     def __init__(
@@ -87,8 +86,8 @@ class Races:
         *,
         share: Callable[..., Cargo | None] = lambda *_, **__: None,
         see: Callable[[Job], Job] = lambda job: job,
-        user_id: int = OWNER,
         replays: Callable[[Sequence[Ghost], Track, RaceRules], dict[int, Path]] = lambda *_: {},
+        user_id: int = OWNER,
     ) -> None:
         self._database, self._queue, self._garage, self._courses = database, queue, garage, courses
         self._own = sa.and_(Race.owner_id == user_id, Race.group_id.is_(None), Race.deleted.is_(None))
@@ -112,7 +111,7 @@ class Races:
         if request.closes is not None and request.closes <= opens:
             raise ConfigError("The race closes before it opens.", hint="Choose a later end, or none.")
         rules = rules_of(request, laps=request.laps)
-        if request.ranking == "average" and request.minimum_laps > rules.laps:
+        if request.ranking == "average" and (request.minimum_laps or 1) > rules.laps:
             raise ConfigError(
                 f"An average over {request.minimum_laps} laps cannot be had from {rules.laps}.",
                 hint="Ask for more laps, or average over fewer.",
@@ -136,7 +135,7 @@ class Races:
                 track=request.track,
                 rules=terms.conditions.rules.to_dict(),
                 objects=terms.conditions.objects.to_dict(),
-                vehicle=request.vehicle,
+                vehicle=request.vehicle if isinstance(request.vehicle, str) else OWN,
                 seed=request.seed or 0,
                 ranking=request.ranking,
                 minimum_laps=terms.minimum_laps,
@@ -176,8 +175,8 @@ class Races:
             **_card(race, entries),
             rules=race.rules,
             objects=race.objects,
-            vehicle=race.vehicle,
-            randomize=randomization_name(race.document["randomize"]) if race.document else "none",
+            vehicle=told_car(race),
+            randomize=told_ranges(race),
             seed=None if race.secret else race.seed,
             commitment=race.commitment,
             secret="" if is_withheld(race) else race.secret,
@@ -354,20 +353,21 @@ def time_limit(track: Track, *, laps: int) -> float:
 
 def _terms(request: NewRace, track: Track, final: FinalTerms | None, rules: RaceRules) -> RaceTerms:
     """What a new race is held by, with a secret unless its seed is given."""
+    vehicle, randomize = car_of(request)
     conditions = Conditions(
         track=track,
         rules=rules,
         seed=request.seed or 0,
-        vehicle=load_vehicle(request.vehicle),
+        vehicle=vehicle,
         objects=road_objects(request, request.kind, count=request.objects),
-        randomize=load_randomization(request.randomize),
+        randomize=randomize,
     )
     return race_terms(
         conditions,
         kind=request.kind if final is None else "head-to-model",
         num_cars=1 if final is None else 2,
         ranking=request.ranking,
-        minimum_laps=request.minimum_laps if request.ranking == "average" else None,
+        minimum_laps=None if request.ranking == "total" else request.minimum_laps,  # pages of before sent 1 for it
         num_trials=request.trials if final is None else None,
         secret=draw_secret() if request.seed is None else None,
         final=None if final is None else final.to_dict(),

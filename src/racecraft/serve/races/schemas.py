@@ -8,11 +8,13 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AwareDatetime, Field
 
 from racecraft.film.ghost import MAX_GHOSTS
+from racecraft.serve.conditions import AskedRanges, AskedVehicle
 from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.races.ghost_schemas import CheckpointChoice, Ghost
 from racecraft.serve.road import OnRoad
 from racecraft.serve.schemas import Message, RunName
 from racecraft.serve.tracks.schemas import TrackGeometry, TrackSector
+from racecraft.sim.objects import MAX_OBJECTS
 
 RaceKind = Literal["time-trial", "object-avoidance", "head-to-bot"]
 Ranking = Literal["total", "best", "average"]
@@ -50,15 +52,24 @@ class RaceSettings(OnRoad):
     time_limit: float | None = Field(None, ge=0.0, le=86_400.0, allow_inf_nan=False)
     """s on the clock, penalties included, that end a trial; 0 for none."""
     direction: Literal["forward", "reverse"] = "forward"
-    vehicle: Literal["v4", "v5", "v6"] = "v5"
+    vehicle: AskedVehicle = "v5"
     """Everybody's, whatever they were trained with."""
-    randomize: Literal["none", "light", "strong", "real", "aws"] = "none"
+    randomize: AskedRanges = "none"
     """What differs from what the models know; the same for all."""
     seed: int | None = Field(None, ge=0, le=2**32 - 1)
     """Of starts and objects; by default drawn."""
 
 
-class NewRace(RaceSettings):
+class RankedSettings(RaceSettings):
+    """The same, and what places go by where models are not only compared two at a time."""
+
+    ranking: Ranking = "total"
+    minimum_laps: int | None = Field(None, ge=1, le=20)
+    """That a trial must have for a score; always all for the total, by default three in a row for the average, one for
+    the best."""
+
+
+class NewRace(RankedSettings):
     """A race; but for the title every field has a good default."""
 
     title: Title
@@ -67,10 +78,7 @@ class NewRace(RaceSettings):
     track: str = Field("reinvent_2018", max_length=200)
     laps: int | None = Field(None, ge=1, le=20)
     """By default the rules'."""
-    ranking: Ranking = "total"
-    minimum_laps: int = Field(1, ge=1, le=20)
-    """Laps in a row that an average is taken over, and that have to be completed."""
-    objects: int = Field(6, ge=1, le=20)
+    objects: int = Field(6, ge=1, le=MAX_OBJECTS)
     """Boxes or bot cars, where the kind has them."""
     trials: int = Field(5, ge=1, le=15)
     """Of each entry, from as many places of the lap; the median of their scores counts."""
@@ -168,9 +176,9 @@ class RaceDetail(RaceCard):
 
     rules: dict[str, Any]
     objects: dict[str, Any]
-    vehicle: str
-    randomize: str
-    """A preset's name; empty where it is none of this version's."""
+    vehicle: AskedVehicle
+    """Of an old race empty for the one that each model was trained with."""
+    randomize: AskedRanges
     seed: int | None
     """None where it is drawn from a secret."""
     commitment: str

@@ -20,6 +20,7 @@ from racecraft.limits.limit import known_limit
 from racecraft.race.announcement import Announcement
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, hold, is_withheld, state_of
+from racecraft.serve.races.state import car_of, told_car
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, now
 from racecraft.serve.submissions.board import NONE, Board
@@ -27,7 +28,6 @@ from racecraft.serve.submissions.finalists import board_of, published_final
 from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, NewLeagueRace, Stage
 from racecraft.serve.submissions.stages import announced_final, final_of, let_follow, require_alone
 from racecraft.serve.tracks.courses import Courses
-from racecraft.sim.vehicle import load_vehicle
 from racecraft.track import Track
 
 Part = Literal["organiser", "racer", "spectator"]
@@ -178,7 +178,7 @@ class League:
         with suppress(RacecraftError):
             track = self._courses(race.owner_id).load(race.track)
             driven = track.reversed() if race.rules.get("direction") == "reverse" else track
-            limit = known_limit(driven, load_vehicle(race.vehicle))
+            limit = known_limit(driven, car_of(race))
             return None if limit is None else limit.medals
         return None
 
@@ -236,6 +236,7 @@ def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
     return LeagueRace.model_validate(
         {
             **{name: getattr(race, name) for name in LeagueRace.model_fields if hasattr(race, name)},
+            "vehicle": told_car(race),
             "group": race.group_id,
             "after": race.after_id,
             "group_title": group_title,

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AwareDatetime, Field
 
+from racecraft.serve.conditions import AskedVehicle
 from racecraft.serve.races.schemas import NewRace, RaceKind, RaceState, Ranking, Title
 from racecraft.serve.schemas import Message, RunName
 
@@ -47,7 +48,7 @@ class LeagueRace(Message):
     ranking: Ranking
     minimum_laps: int
     trials: int
-    vehicle: str
+    vehicle: AskedVehicle
     opens: datetime
     closes: datetime | None
     attempts_per_day: int

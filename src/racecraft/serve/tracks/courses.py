@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
@@ -25,13 +26,18 @@ from racecraft.track import (
     load_track,
     read_track,
     save_route,
+    single_names,
     sketch_of,
     track_names,
     validate,
 )
+from racecraft.track.load import GENERATED
+from racecraft.track.selection import JOINT
 
 OUTLINE = 120  # points of a thumbnail
 MAX_TRACKS: Final = 1000
+MAX_AT_ONCE: Final = 200
+"""Tracks that are chosen together; drawing one from its seed takes some milliseconds."""
 TRASH: Final = "trash"  # inside the folder of tracks
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 """Of a user's own track."""
@@ -59,11 +65,30 @@ class Courses:
         Raises:
             TrackNotFound: There is no such track.
         """
-        if name in track_names() or name.startswith("generated:"):
+        if name in track_names() or (name.startswith(GENERATED) and JOINT not in name):
             return name
         if name in self.own_names():
             return str(self._folder / f"{name}.npy")
         raise TrackNotFound(f"Track {name[:80]!r} does not exist.")
+
+    def paths(self, names: Iterable[str]) -> list[str]:
+        """What `load_track` takes for each of several tracks, without repetition.
+
+        Args:
+            names: Of ours, or selections of several: ``library``, ``all``, ``generated:0..9`` with the generator's
+                options.
+
+        Raises:
+            TrackNotFound: There is no such track.
+            TrackError: The seeds are too many, or an option is not allowed.
+        """
+        single = [one for name in names for one in (single_names(name) if _is_selection(name) else (name,))]
+        found = list(dict.fromkeys(self.path_or_name(name) for name in single))
+        if len(found) > MAX_AT_ONCE:
+            raise TrackError(f"{len(found)} tracks are more than the {MAX_AT_ONCE} that go together.")
+        for name in found:
+            load_track(name)
+        return found
 
     def load(self, name: str) -> Track:
         """A track by its name.
@@ -200,6 +225,10 @@ class Courses:
         if (source / f"{name}.json").is_file():
             os.replace(source / f"{name}.json", target / f"{name}.json")
         os.replace(source / f"{name}.npy", target / f"{name}.npy")
+
+
+def _is_selection(name: str) -> bool:
+    return name in ("library", "all") or (name.startswith(GENERATED) and ".." in name and JOINT not in name)
 
 
 @lru_cache(maxsize=512)
