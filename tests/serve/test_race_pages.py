@@ -195,7 +195,7 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
     page.get_by_label("Which state of it").select_option(str(kept["step"]))
     with page.expect_request("**/entries") as sent:
         page.get_by_role("button", name="Enter 1 and drive").click()
-    assert sent.value.post_data_json == {"models": ["bob"], "checkpoint": kept["step"]}
+    assert sent.value.post_data_json == {"models": ["bob"], "checkpoint": kept["step"], "ghosts": []}
 
 
 def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> None:
