@@ -47,11 +47,11 @@ class NewLadder(RaceSettings):
     """Each by its name, ``library``, ``generated:0..9`` with the generator's options, or ``all``."""
     schedule: Literal["round-robin", "swiss"] = "round-robin"
     """Everyone meets everyone at every start, or each meets one of about the same strength in each round."""
-    starts: int = Field(4, ge=1, le=20)
+    starts: int = Field(4, ge=1, le=100)
     """On each track."""
     rounds: int = Field(0, ge=0, le=200)
     """Of ``swiss``; 0 for one for every start, and as many as find the best."""
-    laps: int = Field(1, ge=1, le=10)
+    laps: int = Field(1, ge=1, le=20)
     time_limit: float | None = Field(180.0, ge=0.0, le=86_400.0, allow_inf_nan=False)
     """s on the clock that end a race; 0 for none."""
     objects: Among | None = None
