@@ -107,6 +107,7 @@ def training() -> list[Figure]:
     """A click to the first moving car; the API beside a training; a training beside viewers."""
     with tempfile.TemporaryDirectory() as folder, console(Path(folder)) as running:
         client = running.client
+        client.get("/").raise_for_status()
         begun = time.perf_counter()
         client.post("/api/models", json={"name": "busy", "until": "30 minutes"}).raise_for_status()
         moving = _first_moving_car(running, "busy") - begun

@@ -377,6 +377,7 @@ def classroom() -> Row:
     with tempfile.TemporaryDirectory() as folder, league(Path(folder)) as running:
         _, cards = running.fill(CLASS)
         people = [running.came_in(card) for card in cards]
+        people[0].get("/").raise_for_status()
         time.sleep(6.0)  # until a worker waits
         begun, laps = time.perf_counter(), dict[int, float]()
 

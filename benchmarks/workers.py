@@ -63,6 +63,7 @@ def train(client: httpx.Client, name: str, runs: Path, until: str) -> tuple[floa
     """
     settings = {"name": name, "track": "oval", "seed": 1, "until": until, "train": False}
     client.post("/api/models", json=settings).raise_for_status()
+    client.get("/").raise_for_status()
     time.sleep(6.0)  # until a process waits for the job, as it does for somebody who reads before the click
     before = job_processes(runs)
     after = dict(before)

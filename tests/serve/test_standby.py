@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import select
 import subprocess
@@ -10,12 +11,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from running_consoles import running_console
+from running_workers import processes_on
 
 from racecraft.errors import RunError
 from racecraft.run.lock import exclusive_lock
 from racecraft.serve.jobs.access import Access
 from racecraft.serve.jobs.queue import JobQueue
-from racecraft.serve.jobs.supervisor import Standby
+from racecraft.serve.jobs.supervisor import Standby, Supervisor
 from racecraft.serve.settings import ServeSettings
 from racecraft.serve.store.database import Database
 from racecraft.training import train
@@ -80,6 +83,27 @@ def test_after_a_short_job_it_waits_for_another(settings: ServeSettings, standby
         assert standby.take(name, workers[-1])
     assert workers[0] is workers[1]
     assert not standby.take("another", workers[0]), "one is enough"
+    database.close()
+
+
+@pytest.mark.costly
+@pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
+def test_a_worker_waits_once_somebody_looks_at_a_page(tmp_path: Path) -> None:
+    with running_console(tmp_path) as console:
+        for _ in range(3):
+            assert console.client.get("/api/jobs").status_code == 200
+        assert processes_on(tmp_path) == []
+        assert console.client.get("/").status_code == 200
+        console.wait_for(lambda: len(processes_on(tmp_path)) == 1)
+
+
+def test_on_another_machine_a_worker_waits_from_the_start(settings: ServeSettings) -> None:
+    database = Database(settings.database_url)
+    database.migrate()
+    supervisor = Supervisor(settings, JobQueue(database), Access.of(settings), is_home=False)
+    supervisor._tend()
+    assert len(list((settings.state / "workers").iterdir())) == 1
+    asyncio.run(supervisor.stop())
     database.close()
 
 

@@ -199,6 +199,7 @@ def create_app(settings: ServeSettings, *, hosts: set[str]) -> FastAPI:
     def page(path: str, request: Request) -> Response:
         if path == "api" or path.startswith("api/"):
             return replies.problem(404, "NotFound", f"There is nothing at /{path[:80]}.")
+        supervisor.expect()
         nonce = secrets.token_urlsafe(16)
         try:
             text = (PAGES / "index.html").read_text(encoding="utf-8")

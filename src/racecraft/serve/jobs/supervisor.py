@@ -2,8 +2,9 @@
 
 A child holds a lock on a file of its own, which the system drops with it. So a server sees at once that a child of the
 server before it is dead, too; what ran on another machine is taken over when its lease has run out. One child more has
-loaded what jobs need and waits for one, so that a click is followed by driving and not by imports. After a short job a
-child waits for another one itself. All ring a bell when a job has ended: a pipe that the server listens at.
+loaded what jobs need and waits for one, as soon as somebody looks at a page: a click is followed by driving and not by
+imports. After a short job a child waits for another one itself. All ring a bell when a job has ended: a pipe that the
+server listens at.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ class Supervisor:
         self._staying: set[str] = set()  # those of them that wait for another job after theirs
         self._awake = asyncio.Event()
         self._is_stopping = False
+        self._is_expecting = not is_home  # elsewhere nobody is seen
         self._loop: asyncio.AbstractEventLoop | None = None
         log = settings.state / "jobs.log"
         self._started = float("-inf")  # the newest job, in `time.monotonic()` seconds
@@ -65,6 +67,10 @@ class Supervisor:
         """There is something new in the queue; safe from any thread."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._look)
+
+    def expect(self) -> None:
+        """Somebody looks at a page, and may have something done at any moment."""
+        self._is_expecting = True
 
     def _look(self) -> None:
         self._awake.set()
@@ -116,7 +122,8 @@ class Supervisor:
         for slot, count in places.items():
             while not self._is_stopping and self._start(slot, count):
                 pass
-        if not self._is_stopping and time.monotonic() - self._started > CALM:
+        is_calm = time.monotonic() - self._started > CALM
+        if self._is_expecting and is_calm and not self._is_stopping:
             self._standby.prepare()
 
     def _doable(self, kinds: tuple[str, ...]) -> tuple[str, ...]:
