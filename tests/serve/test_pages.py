@@ -187,7 +187,13 @@ def test_mistakes_are_shown_where_they_are(visited: tuple[RunningConsole, Any]) 
     page.keyboard.press("ControlOrMeta+a")
     page.keyboard.insert_text("def reward_function(params):\n    return parms['speed']\n")
     page.get_by_text("parms").nth(1).wait_for()
-    assert page.get_by_role("button", name="Train now").first.is_disabled()
+    trains = page.get_by_role("button", name="Train now")
+    assert [trains.nth(place).is_disabled() for place in range(2)] == [True, True]
+    assert page.get_by_text("There is a mistake in the reward function.").count() == 2  # beside each of them
+    page.keyboard.press("ControlOrMeta+a")
+    page.keyboard.press("Delete")
+    page.get_by_text("Write a reward function, or choose a preset.").nth(2).wait_for()  # and below the editor
+    assert [trains.nth(place).is_disabled() for place in range(2)] == [True, True]
 
 
 @pytest.fixture(scope="module")

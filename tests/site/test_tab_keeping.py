@@ -107,6 +107,26 @@ def test_two_tabs_train_at_once_and_one_that_slept_goes_on(tabs: list[Page]) -> 
         assert models(page) == ["oval-centerline-1", "oval-centerline-2"]
 
 
+def test_a_model_is_given_another_name_that_no_other_one_has(tabs: list[Page]) -> None:
+    page, other = tabs
+    for name, shown in (
+        ("oval-centerline-1", "There is a model called oval-centerline-1 already."),
+        ("heron", "heron"),
+    ):
+        page.get_by_role("button", name="Rename: oval-centerline-2").click()
+        page.get_by_label("New name").fill(name)
+        page.get_by_role("button", name="Save", exact=True).click()
+        page.get_by_text(shown, exact=True).wait_for()
+        if name != "heron":
+            page.get_by_role("button", name="Cancel").click()
+    other.get_by_text("heron", exact=True).wait_for()
+    assert models(page) == models(other) == ["heron", "oval-centerline-1"]
+    other.get_by_role("button", name="Rename: heron").click()
+    other.get_by_label("New name").fill("oval-centerline-2")
+    other.get_by_label("New name").press("Enter")
+    page.get_by_text("oval-centerline-2", exact=True).wait_for()
+
+
 def test_what_a_full_browser_cannot_keep_is_told_and_stays_until_there_is_room(
     tabs: list[Page], tmp_path: Path
 ) -> None:

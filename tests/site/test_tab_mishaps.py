@@ -101,9 +101,23 @@ def test_a_function_that_fails_on_the_way_is_not_painted_as_if_it_paid(phone: Pa
     assert phone.get_by_text("least").count() == 0
 
 
-DROP = """([name, text]) => {
+def test_who_cannot_train_without_a_reward_is_told_so(phone: Page) -> None:
+    from playwright.sync_api import expect
+
+    train = phone.get_by_role("button", name="Train", exact=True)
+    beside = train.locator("xpath=following-sibling::p[1]")
+    phone.locator(".cm-content").fill("")
+    expect(beside).to_have_text("Write a reward function, or choose a preset.")
+    expect(train).to_be_disabled()
+    phone.locator(".cm-content").fill("def reward_function(params):\n    return nothing\n")
+    expect(beside).to_have_text("There is a mistake in the reward function.")
+    phone.locator(".cm-content").fill("def reward_function(params):\n    return 1.0\n")
+    expect(train).to_be_enabled()
+
+
+DROP = """files => {
   const dataTransfer = new DataTransfer();
-  dataTransfer.items.add(new File([text], name));
+  for (const [name, text] of files) dataTransfer.items.add(new File([text], name));
   scrollTo(0, 0);
   window.dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
 }"""
@@ -112,19 +126,44 @@ DROP = """([name, text]) => {
 def test_what_is_dropped_is_taken_for_what_it_is_and_its_answer_is_seen(phone: Page) -> None:
     from playwright.sync_api import expect
 
-    phone.evaluate(DROP, ["reward_function.py", "def reward_function(params):\r\n    return 2.0\r\n"])
+    phone.evaluate(DROP, [["reward_function.py", "def reward_function(params):\r\n    return 2.0\r\n"]])
     brought = phone.get_by_role("region", name="This file brings a reward")
     expect(brought).to_be_in_viewport()
     brought.get_by_role("button", name="Take it").click()
     phone.locator(".cm-content").get_by_text("return 2.0").wait_for()
     metadata = {"action_space": [{"steering_angle": angle, "speed": 0.7} for angle in (-25, 25)], "version": "4"}
-    phone.evaluate(DROP, ["model_metadata.json", json.dumps(metadata)])
+    phone.evaluate(DROP, [["model_metadata.json", json.dumps(metadata)]])
     actions = phone.get_by_role("region", name="Actions")
     actions.get_by_text("2 of at most 30").wait_for()
     expect(actions).to_be_in_viewport()
-    phone.evaluate(DROP, ["stranger.replay", "nothing"])
+    phone.evaluate(DROP, [["stranger.replay", "nothing"]])
     expect(phone.get_by_text("This is no replay of Racecraft")).to_be_in_viewport()
-    phone.evaluate(DROP, ["MODEL.TAR.GZ", "nothing"])
+    phone.evaluate(DROP, [["MODEL.TAR.GZ", "nothing"]])
     expect(phone.get_by_text("This archive is damaged")).to_be_in_viewport()
-    phone.evaluate(DROP, ["holiday.jpg", "nothing"])
+    phone.evaluate(DROP, [["holiday.jpg", "nothing"]])
     expect(phone.get_by_text("holiday.jpg is nothing that this page takes")).to_be_in_viewport()
+
+
+def test_of_files_dropped_together_all_are_taken_that_there_is_a_place_for(phone: Page) -> None:
+    from playwright.sync_api import expect
+
+    reward = "def reward_function(params):\n    return %s\n"
+    metadata = {"action_space": [{"steering_angle": angle, "speed": 0.6} for angle in (-20, 0, 20)], "version": "4"}
+    files = [
+        ("reward_function.py", reward % "3.0"),
+        ("model_metadata.json", json.dumps(metadata)),
+        ("other.py", reward % "4.0"),
+        ("one.tar.gz", "nothing"),
+        ("two.tar.gz", "nothing"),
+        ("holiday.jpg", "nothing"),
+        ("cat.jpg", "nothing"),
+    ]
+    phone.evaluate(DROP, [list(file) for file in files])
+    brought = phone.get_by_role("region", name="This file brings a reward")
+    expect(brought).to_be_in_viewport()
+    expect(brought).to_contain_text("return 3.0")
+    phone.get_by_role("region", name="Actions").get_by_text("3 of at most 30").wait_for()
+    phone.get_by_text("Left: other.py. There is a place for one reward").wait_for()
+    phone.get_by_text("holiday.jpg, cat.jpg is nothing that this page takes").wait_for()
+    for name in ("one.tar.gz", "two.tar.gz"):
+        phone.get_by_text(f"{name}: This archive is damaged").wait_for()

@@ -43,3 +43,20 @@ test("an answer about an earlier text does not count", async () => {
   await vi.advanceTimersByTimeAsync(0);
   expect([check.verdict, check.isChecking]).toEqual([undefined, true]);
 });
+
+test("what stands in the way of a training is said, of no function as of a wrong one", async () => {
+  const wrong = { ...verdict("oval"), ok: false };
+  const check = new RewardCheck((text) => Promise.resolve(text === "wrong" ? wrong : verdict("oval")));
+  const obstacles = [];
+  for (const text of ["", " \n", "wrong", "return 1.0"]) {
+    check.ask(text, "oval");
+    await vi.advanceTimersByTimeAsync(500);
+    obstacles.push([check.obstacle, check.isChecking]);
+  }
+  expect(obstacles).toEqual([
+    ["reward_empty", false],
+    ["reward_empty", false],
+    ["reward_faulty", false],
+    [undefined, false],
+  ]);
+});

@@ -27,8 +27,18 @@ export class RewardCheck {
     return this.#of === this.#text ? this.#found : undefined;
   }
 
+  get isEmpty(): boolean {
+    return this.#text.trim() === "";
+  }
+
+  /** Why nobody trains with the present text, as the key of a sentence; undefined where nothing speaks against it. */
+  get obstacle(): "reward_empty" | "reward_faulty" | undefined {
+    if (this.isEmpty) return "reward_empty";
+    return this.verdict?.ok === false ? "reward_faulty" : undefined;
+  }
+
   get isChecking(): boolean {
-    return this.#text !== "" && this.#of !== this.#text;
+    return !this.isEmpty && this.#of !== this.#text;
   }
 
   /** A line of 0 says that it is not the text that is wrong: the track is not there any more, say. */
@@ -42,7 +52,7 @@ export class RewardCheck {
     this.#text = text;
     clearTimeout(this.#timer);
     const number = ++this.#asked;
-    if (!text) return;
+    if (this.isEmpty) return;
     this.#timer = setTimeout(() => void this.#check(number, text, track, tried), PAUSE);
   }
 

@@ -36,9 +36,11 @@ export const de: Record<TabKey, string> = {
     "Im Speicher dieses Browsers ist kein Platz mehr, darum blieb diese Strecke nicht erhalten: Lösche ein Modell, und speichere sie dann noch einmal.",
   full_lap: "Im Speicher dieses Browsers ist kein Platz mehr: Diese Runde bleibt deine beste, bis du aussteigst.",
   drop_here: "Loslassen, um ein Modell, eine Belohnung oder Aktionen zu holen oder ein Replay zu prüfen",
+  drop_left: "Nicht genommen: {names}. Platz ist für je eine Belohnung, eine Datei mit Aktionen und ein Replay.",
   drop_unknown:
     "{name} ist nichts, was diese Seite nimmt: ein Modell (.tar.gz), ein Replay (.replay), eine Belohnung (.py, höchstens 140 KB) oder die Aktionen einer model_metadata.json.",
   dropped: "{name} ist gelöscht.",
+  model_taken: "Ein Modell namens {name} gibt es schon.",
   arrive: "Ein Modell holen",
   arrive_judging: "{name} fährt seine Auswertung …",
   arrive_not:

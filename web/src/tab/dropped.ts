@@ -1,10 +1,17 @@
-/** What a file is that somebody dropped onto the page, by its name: nobody reads more of one that this page has no use for. */
+/** What files are that somebody dropped onto the page, by their names: nobody reads more of one that this page has no use for. */
 import type { ActionPreset } from "../api/client";
 
 const MOST_BYTES = 140_000; // of a text, the most that AWS accepts of a reward
 
 export type Dropped =
   { kind: "model" | "replay" } | { kind: "reward"; source: string } | { kind: "actions"; space: ActionPreset };
+
+/** Of several files those that there is a place for: every model, and the first of each other kind; the others are left. */
+export function placedOf<Found extends { dropped: Dropped }>(found: Found[]): { placed: Found[]; left: Found[] } {
+  const hasPlace = ({ dropped }: Found, index: number) =>
+    dropped.kind === "model" || found.findIndex((one) => one.dropped.kind === dropped.kind) === index;
+  return { placed: found.filter(hasPlace), left: found.filter((one, index) => !hasPlace(one, index)) };
+}
 
 /** Undefined where it is none of these, or does not hold what its name says. */
 export async function droppedOf(file: File): Promise<Dropped | undefined> {

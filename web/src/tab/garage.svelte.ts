@@ -1,7 +1,7 @@
 /** The models of this browser as the page shows them. One for which the storage has no room stays as long as the page is open, and is kept once
  * there is some. */
 import type { Model } from "./model";
-import { drop, freeName, keep, keepNew, kept } from "./shelf";
+import { drop, freeName, keep, keepNew, kept, rename } from "./shelf";
 
 export class Garage {
   /** Newest first. */
@@ -45,6 +45,20 @@ export class Garage {
       this.hold({ ...model, name }, error);
       return name;
     }
+  }
+
+  /** Give a model another name; false where another one has it. */
+  async rename(model: Model, name: string): Promise<boolean> {
+    if (this.models.some((one) => one.name === name)) return false;
+    try {
+      await rename(model, name);
+    } catch (error) {
+      if ((error as Error).name !== "ConstraintError") throw error;
+      return false; // another tab kept one under it, a moment ago
+    }
+    this.forget(model.name);
+    await this.list();
+    return true;
   }
 
   async drop(name: string): Promise<void> {

@@ -55,6 +55,13 @@ export function freeName(nameOf: (number: number) => string, taken: string[]): s
 
 export const drop = (name: string): Promise<unknown> => ask("models", "readwrite", (store) => store.delete(name));
 
+/** Keep a model under another name instead of its own; where one has that already, a ConstraintError, and nothing changes. */
+export const rename = (model: Model, name: string): Promise<unknown> =>
+  ask("models", "readwrite", (store) => {
+    store.delete(model.name);
+    return store.add({ ...model, name });
+  });
+
 export const drivenLap = (key: string): Promise<DrivenLap | undefined> =>
   ask("laps", "readonly", (store) => store.get(key) as IDBRequest<DrivenLap | undefined>);
 

@@ -165,6 +165,8 @@ export const create: Record<keyof typeof english, string> = {
   painting_objects: "Dunkle Quadrate sind die Kisten und Autos, wo sie zu Beginn einer Episode stehen.",
   painting_high: "viel",
   checking: "Prüft …",
+  reward_empty: "Schreibe eine Belohnungsfunktion oder wähle eine Vorlage.",
+  reward_faulty: "In der Belohnungsfunktion ist ein Fehler.",
   reward_good: "Die Funktion ist in Ordnung.",
   situations: "Situationen",
   situation: "Situation",

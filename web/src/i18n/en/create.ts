@@ -162,6 +162,8 @@ export const create = {
   painting_objects: "Dark squares are the boxes and cars, where an episode has them at its beginning.",
   painting_high: "most",
   checking: "Checking…",
+  reward_empty: "Write a reward function, or choose a preset.",
+  reward_faulty: "There is a mistake in the reward function.",
   reward_good: "The function is fine.",
   situations: "Situations",
   situation: "Situation",
