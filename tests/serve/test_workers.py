@@ -180,7 +180,7 @@ def test_races_and_searches_and_own_tracks_travel_too(place: Place) -> None:
 
 
 @pytest.mark.costly
-def test_the_ghosts_of_a_heat_travel_with_it(place: Place) -> None:
+def test_the_ghosts_of_a_heat_and_of_an_entry_travel_with_it(place: Place) -> None:
     """An evaluation's and an earlier heat's, also where both are removed before anybody drives."""
     console, client = place.console, place.console.client
     console.create(name="haunter", track="oval", until="512 steps", seed=3)
@@ -196,14 +196,22 @@ def test_the_ghosts_of_a_heat_travel_with_it(place: Place) -> None:
     ghosts = [{"heat": earlier}, "best-lap", {"model": "haunter", "evaluation": card["evaluation"]}]
     with busy_at_home(place):
         heat = client.post("/api/contests/heats", json=asked | {"ghosts": ghosts}).json()["id"]
+        cup = {"title": "Cup", "track": "oval", "laps": 1, "trials": 1, "max_resets": 0, "seed": 1, "time_limit": 8}
+        race = client.post("/api/races", json=cup).json()["id"]
+        alone = {"models": ["haunter"], "ghosts": [*ghosts, {"model": "haunter"}]}
+        (entry,) = client.post(f"/api/races/{race}/entries", json=alone).json()["undecided"]
+        (drive,) = (one for one in client.get("/api/jobs", params={"run": "haunter"}).json() if one["kind"] == "race")
         assert client.delete(f"/api/contests/{earlier}").status_code == 204
         (console.runs / "haunter" / f"evaluation-{card['evaluation']}" / "evaluation.replay").unlink()
         unwanted = client.post("/api/contests/heats", json=asked | {"ghosts": ghosts[1:]})
         assert unwanted.json()["error"]["message"].endswith("has no replay.")
         with place.worker("lab-4"):
-            assert place.done(heat)["machine"] == "lab-4"
+            assert place.done(heat)["machine"] == place.done(drive["id"])["machine"] == "lab-4"
         assert client.get(f"/api/contests/{heat}/video").status_code == 200
-    assert Artifacts(place.artifacts).shelf("contests").names() == []
+        film = client.get(f"/api/races/{race}/replay", params={"entries": entry["entry"]}).json()
+        assert len([ghost for ghost in film["ghosts"] if not ghost["is_lap"]]) == 3
+    for shelf in ("contests", "races"):
+        assert Artifacts(place.artifacts).shelf(shelf).names() == []
 
 
 @pytest.mark.costly
