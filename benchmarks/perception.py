@@ -56,7 +56,7 @@ def main() -> None:
     parser.add_argument("--randomize", nargs="+", default=list(CONDITIONS), help="presets of the conditions")
     parser.add_argument("--looks", type=int, default=24, help="of sight: times that 128 cars are looked at")
     parser.add_argument("--pictures", type=int, default=30, help="of sight: those of a drive")
-    parser.add_argument("--speeds", nargs="+", type=float, default=list(SPEEDS), help="m/s on straights, by perception")
+    parser.add_argument("--speeds", nargs="*", type=float, default=list(SPEEDS), help="m/s on straights, by perception")
     parser.add_argument("--starters", nargs="*", default=list(STARTERS), help="who drives end to end")
     parser.add_argument("--runs", nargs="*", type=lambda path: (Path(path).name, path), default=[], help="others")
     parser.add_argument("--weights", type=Path, help="others than those brought along")
