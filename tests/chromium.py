@@ -18,8 +18,12 @@ SOFTWARE_3D: Final = (
     "--disable-gpu-compositing",
     "--no-sandbox",
 )
+PATIENCE: Final = 300_000  # ms
 
 
 def launched(playwright: Playwright) -> Browser:
-    """A browser of its own."""
+    """A browser of its own; what is expected of its pages is waited for, as the machine may be busy."""
+    from playwright.sync_api import expect
+
+    expect.set_options(timeout=PATIENCE)
     return playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_3D)

@@ -109,9 +109,8 @@ def complaints_of(message: Any) -> list[str]:
 
 @contextmanager
 def visiting(console: RunningConsole) -> Iterator[Visit]:
-    from playwright.sync_api import expect, sync_playwright
+    from playwright.sync_api import sync_playwright
 
-    expect.set_options(timeout=1000 * PATIENCE)
     with sync_playwright() as playwright:
         browser = launched(playwright)
         context = browser.new_context()

@@ -46,9 +46,8 @@ pytestmark = NEEDS_THE_PAGE
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Page]:
-    from playwright.sync_api import expect, sync_playwright
+    from playwright.sync_api import sync_playwright
 
-    expect.set_options(timeout=PATIENCE)
     complaints: list[str] = []
     with hosted() as address, sync_playwright() as playwright:
         browser = launched(playwright)
