@@ -158,7 +158,7 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
     held = page.get_by_role("heading", name="Held by these rules").locator("..")
     bots = "Bot cars: 2 · 0.5 m/s · change lanes · 40 % inner lane, 50 % outer lane"
     for told in ("9 s", bots, "The other way", "7"):
-        assert held.get_by_text(told, exact=True).is_visible()
+        held.get_by_text(told, exact=True).wait_for()
 
     page = visit.open("/contests/new")
     page.get_by_role("button", name="Ladder").click()
@@ -188,9 +188,10 @@ def test_all_that_a_race_can_be_is_asked_for_in_words_and_told_afterwards(visit:
     page.get_by_label("Otherwise than they know").select_option("strong")
     page.get_by_label("Where they are").select_option("random")
     page.get_by_role("button", name="Make the race").click()
+    page.get_by_role("checkbox", name="bob").wait_for()  # what comes later moves what is below it
     page.get_by_text("Held by these rules").click()
     for told in ("6 s", "Bot cars: 6 · 0.2 m/s · elsewhere each time", "Much of everything", "15"):
-        assert page.locator("details dl").get_by_text(told, exact=True).is_visible()
+        page.locator("details dl").get_by_text(told, exact=True).wait_for()
     page.get_by_role("checkbox", name="bob").check()
     page.get_by_label("Which state of it").select_option(str(kept["step"]))
     with page.expect_request("**/entries") as sent:
