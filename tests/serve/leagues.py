@@ -82,13 +82,14 @@ def untrained_run(
     seed: int = 1,
     sensors: tuple[str, ...] = ("FRONT_FACING_CAMERA",),
     actions: str = "default",
+    network: str = "RACECRAFT_SMALL",
 ) -> RunFolder:
     """A run with a checkpoint of a network that was never trained: it drives, badly."""
     metadata = ModelMetadata(action_space=action_space(actions), neural_network="RACECRAFT_SMALL", sensors=sensors)
-    settings = make_settings(metadata=metadata, track="oval", seed=seed)
+    settings = make_settings(metadata=metadata, track="oval", seed=seed, network=network)
     folder = start_run(settings, reward=load_preset("racing"), metadata=metadata, root=root, name=name)
     spec = NetworkSpec(
-        name="RACECRAFT_SMALL",
+        name=network,
         num_actions=metadata.action_space.size,
         is_discrete=actions != "continuous",
         lidar_size=metadata.suite.lidar_size,

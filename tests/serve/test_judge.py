@@ -8,6 +8,7 @@ import os
 import resource
 import shutil
 import socket
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any
 import pytest
 from leagues import untrained_run
 
+from racecraft.learn.networks import PERCEPTION
 from racecraft.race.announcement import Announcement, draw_secret
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry_file import pack_entry
@@ -217,6 +219,22 @@ def test_a_heat_s_two_drive_from_their_own_files_under_their_own_names(told: Tol
     assert said == json.dumps({"steps": [128, 64]})
     assert status == DROVE
     assert read_replay(results / JUDGED).names == ("second", "first")
+
+
+def test_what_sees_by_perception_is_judged_by_a_judge_that_never_saw_any(told: Told, tmp_path: Path) -> None:
+    """Its weights are read within the walls: in a process of its own, where nothing else had loaded them."""
+    run = untrained_run(tmp_path, "seer", network=PERCEPTION)
+    (Path(told["folder"]) / ENTRY).write_bytes(pack_entry(run))
+    asked = [sys.executable, "-P", "-m", "racecraft.serve.submissions.judge"]
+    with subprocess.Popen(asked, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(json.dumps(told) + "\n")
+        process.stdin.flush()
+        verdict = json.loads(process.stdout.readline())
+        process.stdin.close()
+    assert verdict["status"] == DROVE
+    assert json.loads(verdict["said"])["step"] == 64
 
 
 @locked
