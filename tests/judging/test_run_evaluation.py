@@ -15,6 +15,7 @@ from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunEr
 from racecraft.film.replay_film import film_replay
 from racecraft.judging import evaluation
 from racecraft.learn import PPOConfig
+from racecraft.replay.header import header_of
 from racecraft.run import RunFolder
 from racecraft.sim import CameraSpec, Vehicle
 from racecraft.sim.camera import CAMERAS
@@ -81,6 +82,7 @@ def test_a_seed_repeats_an_evaluation_and_each_has_a_folder_of_its_own(tmp_path:
     assert traces[0] == traces[1]
     expected = {**first.evaluation.summary(), "step": first.step, "video": None, "driven": first.to_dict()["driven"]}
     expected |= {"vehicle": "v5", "track_digest": first.evaluation.track.digest}
+    expected |= {"conditions": json.loads(json.dumps(header_of(first.evaluation.conditions)))}
     assert json.loads(first.files["summary"].read_text()) == expected
 
 

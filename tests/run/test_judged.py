@@ -79,6 +79,18 @@ def test_a_completion_is_the_mean_of_its_trials_and_what_is_no_number_counts_now
     assert [one.best_lap for one in judged_laps(run)] == [None] * 4
 
 
+def test_a_lap_in_another_car_or_under_other_conditions_does_not_count(run: RunFolder) -> None:
+    learned = {"mass": 3.0, "speed_gain": 1.0}
+    run.write_info(RunInfo(seed=1, track="oval", track_digest="", settings={"vehicle": learned}))
+    now = {"driven": {"randomize": ""}, "conditions": {"vehicle": learned | {"new_in_this_version": 1.0}}}
+    race(run, "20260101000000", best_lap_seconds=9.0, **now)
+    race(run, "20260101000001", best_lap_seconds=5.0, conditions={"vehicle": learned | {"speed_gain": 2.0}})
+    race(run, "20260101000002", best_lap_seconds=5.0, driven={"randomize": "under the randomisation 'light'"})
+    race(run, "20260101000003", best_lap_seconds=5.0, conditions="none")
+    race(run, "20260101000004", best_lap_seconds=9.5)  # of an earlier version
+    assert [one.best_lap for one in judged_laps(run)] == [9.0, 9.5]
+
+
 def test_damaged_files_are_passed_over(run: RunFolder) -> None:
     train(run, [10.0])
     with run.history.open("a") as file:

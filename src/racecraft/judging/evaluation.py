@@ -33,6 +33,7 @@ from racecraft.race.provenance import Provenance, provenance, vehicle_note
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RaceRules, rules_by_name
 from racecraft.race.yardstick import Placing, placings
+from racecraft.replay.header import header_of
 from racecraft.replay.replay import Replay, write_replay
 from racecraft.run.atomic import write_json
 from racecraft.run.aws_log import AwsLog
@@ -266,8 +267,14 @@ def _write(
     }
     write_replay(Replay.of(evaluation, title=folder.name), files["replay"])
     driven = provenance(evaluation.conditions).to_dict()
-    vehicle = vehicle_note(evaluation.conditions.vehicle)
-    told = {"track_digest": evaluation.track.digest, "vehicle": vehicle, "driven": driven, "step": step, "video": None}
+    told = {
+        "track_digest": evaluation.track.digest,
+        "vehicle": vehicle_note(evaluation.conditions.vehicle),
+        "driven": driven,
+        "conditions": header_of(evaluation.conditions),
+        "step": step,
+        "video": None,
+    }
     try:
         if is_filmed:
             with _new_video(folder.videos / "camera-pip") as path:

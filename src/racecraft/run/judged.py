@@ -1,7 +1,8 @@
 """A run's evaluations, during training and afterwards, and with them its best lap.
 
 The best lap of a run is the fastest whole lap, penalties included, that it drove in any evaluation on the track it
-learns on, or on one of several: those during training, and those by the rules of a race afterwards.
+learns on, or on one of several: those during training, and those by the rules of a race afterwards, unless they were
+driven in another car or under a randomisation.
 """
 
 from __future__ import annotations
@@ -76,9 +77,9 @@ def _during_training(history: Path) -> Iterator[Judged]:
 
 def _afterwards(folder: RunFolder, info: RunInfo) -> Iterator[Judged]:
     for path in sorted(folder.path.glob("evaluation-*/evaluation.json")):
-        with suppress(ConfigError, RunError, TypeError, ValueError):
+        with suppress(ConfigError, RunError, AttributeError, TypeError, ValueError):
             summary = read_json_object(path)
-            if _is_own_track(summary, info):
+            if _is_own_track(summary, info) and _is_as_learned(summary, info):
                 yield Judged(
                     step=int(summary.get("step") or 0),
                     completion=_number(summary.get("mean_completion")),
@@ -95,6 +96,13 @@ def _is_own_track(summary: dict[str, Any], info: RunInfo) -> bool:
             return told == info.track_digest or told in _roads(info.track, info.track_digest)
         return False
     return Path(str(summary.get("track", ""))).stem in {Path(part).stem for part in info.track.split(" + ")}
+
+
+def _is_as_learned(summary: dict[str, Any], info: RunInfo) -> bool:
+    """Whether a lap of an evaluation compares with those in training; older ones do not tell, and count."""
+    conditions, driven = summary.get("conditions") or {}, summary.get("driven") or {}
+    learned, car = info.settings.get("vehicle") or {}, conditions.get("vehicle") or {}
+    return not driven.get("randomize") and all(car.get(name, value) == value for name, value in learned.items())
 
 
 @lru_cache(maxsize=64)

@@ -17,6 +17,8 @@ Lane = Literal[1, -1]
 Placement = Literal["even", "random", "fixed"]
 Place = tuple[Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)], Lane]
 """Fraction of a lap in driving direction, and lane: 1 inner, -1 outer."""
+Seconds = Annotated[float, Field(ge=0.0, le=600.0, allow_inf_nan=False)]
+"""That a mistake costs."""
 
 _NEEDS: Final = (
     ("parked_cars", "object-avoidance"),

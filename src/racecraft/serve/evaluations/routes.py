@@ -12,12 +12,17 @@ from fastapi import APIRouter
 from racecraft.checks import is_number
 from racecraft.errors import RacecraftError
 from racecraft.json_file import read_json_object
-from racecraft.race.rules import RULE_SETS
+from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.run import RunFolder
+from racecraft.serve.conditions import told_randomization, told_vehicle
 from racecraft.serve.context import InContext, TakesPlace
-from racecraft.serve.evaluations.schemas import EvaluateModel, EvaluationCard, Telemetry
+from racecraft.serve.evaluations.asked import settle
+from racecraft.serve.evaluations.schemas import EvaluateModel, EvaluationCard, EvaluationTerms, Telemetry
 from racecraft.serve.jobs.schemas import JobInfo, job_info
 from racecraft.serve.problems import NotFound
+from racecraft.sim.objects import Objects
+from racecraft.sim.randomization import Randomization
+from racecraft.sim.vehicle import Vehicle
 
 router = APIRouter(prefix="/api/models/{name}/evaluations", tags=["evaluations"])
 
@@ -64,10 +69,11 @@ def evaluate_model(name: str, request: EvaluateModel, context: InContext) -> Job
     folder = context.garage.folder(name)
     if request.rules not in RULE_SETS:
         raise NotFound(f"There are no rules {request.rules[:40]!r}; allowed are {', '.join(RULE_SETS)}.")
-    payload: dict[str, Any] = request.model_dump(exclude_none=True)
+    info = folder.read_info()
+    payload = settle(request, info)
     if request.track is not None:
         payload["track"] = context.courses.path_or_name(request.track)
-    road = payload.get("track") or folder.read_info().track
+    road = payload.get("track") or info.track
     cargo = context.mirror.share(folder, tracks=(road,))
     job = context.queue.add("evaluate", folder.name, payload, cargo=cargo)
     context.supervisor.wake()
@@ -98,6 +104,7 @@ def get_telemetry(name: str, stamp: str, context: InContext) -> Telemetry:
 def _card(folder: RunFolder, path: Path) -> EvaluationCard:
     stamp = path.parent.name.removeprefix("evaluation-")
     summary = read_json_object(path)
+    conditions = summary.pop("conditions", None)
     metrics = folder.evaluation_metrics(stamp)
     laps = read_json_object(metrics)["metrics"] if metrics.is_file() else []
     picture, commands = path.parent / "racing-line.png", path.parent / "as-car.png"
@@ -111,5 +118,17 @@ def _card(folder: RunFolder, path: Path) -> EvaluationCard:
         video=summary.get("video"),
         telemetry=stamp if trace.is_file() else None,
         as_car="as_car" in summary,
+        held=None if conditions is None else _terms(conditions),
         commands=f"{path.parent.name}/{commands.name}" if commands.is_file() else None,
+    )
+
+
+def _terms(conditions: dict[str, Any]) -> EvaluationTerms:
+    """What a summary says of how it was driven."""
+    return EvaluationTerms(
+        rules=RaceRules.from_dict(conditions["rules"]).to_dict(),
+        objects=Objects.from_dict(conditions["objects"]).to_dict(),
+        vehicle=told_vehicle(Vehicle(**conditions["vehicle"])),
+        randomize=told_randomization(Randomization(**conditions["randomize"])),
+        seed=conditions["seed"],
     )

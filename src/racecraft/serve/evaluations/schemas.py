@@ -6,13 +6,16 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from racecraft.serve.conditions import AskedRanges, AskedVehicle
+from racecraft.serve.road import OnRoad, Seconds
 from racecraft.serve.schemas import Message
 from racecraft.serve.tracks.schemas import TrackSector
+from racecraft.sim.objects import MAX_OBJECTS
 
 # ---- races against the clock
 
 
-class EvaluateModel(Message):
+class EvaluateModel(OnRoad):
     """Race a model against the clock."""
 
     track: str | None = Field(None, max_length=200)
@@ -23,6 +26,30 @@ class EvaluateModel(Message):
     seed: int = Field(0, ge=0, le=2**32 - 1)
     as_car: bool = False
     """Drive the exported file through a physical car's own steps."""
+    direction: Literal["forward", "reverse"] | None = None
+    """By default as it was trained."""
+    vehicle: AskedVehicle | None = None
+    """By default the one that it was trained with."""
+    randomize: AskedRanges = "none"
+    """What differs from what the model knows."""
+    offtrack_penalty: Seconds | None = None
+    """By default the rules', as the two that follow."""
+    collision_penalty: Seconds | None = None
+    max_resets: int | None = Field(None, ge=0, le=10_000)
+    race: Literal["time-trial", "object-avoidance", "head-to-bot"] | None = None
+    """What is on the road; by default what the model was trained among."""
+    objects: int | None = Field(None, ge=1, le=MAX_OBJECTS)
+    """Boxes or bot cars; by default as many as the race has."""
+
+
+class EvaluationTerms(Message):
+    """All that an evaluation was driven under, besides its road."""
+
+    rules: dict[str, Any]
+    objects: dict[str, Any]
+    vehicle: AskedVehicle
+    randomize: AskedRanges
+    seed: int
 
 
 class EvaluationCard(Message):
@@ -38,8 +65,10 @@ class EvaluationCard(Message):
     telemetry: str | None
     as_car: bool
     """Whether it was driven as a physical car drives."""
+    held: EvaluationTerms | None
+    """None of one from before that was written down."""
     commands: str | None
-    """Then a picture: what was commanded, against what became of it."""
+    """If it was driven as a car: a picture: what was commanded, against what became of it."""
 
 
 class Telemetry(Message):

@@ -7,6 +7,7 @@ from typing import Any
 from racecraft.errors import ConfigError
 from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
+from racecraft.serve.evaluations.asked import settings_of
 from racecraft.serve.jobs.task import Task
 
 
@@ -18,9 +19,9 @@ def evaluate(task: Task) -> dict[str, Any]:
     folder = task.folder
     if task.job.attempts > 1 and (done := _evaluated(folder, task.job.id)) is not None:
         return done
-    payload = dict(task.job.payload)
-    judge = evaluate_as_car if payload.pop("as_car", False) else evaluate_run
-    return judge(folder.path, job=task.job.id, **payload).to_dict()
+    settings = settings_of(task.job.payload)
+    judge = evaluate_as_car if settings.pop("as_car", False) else evaluate_run
+    return judge(folder.path, job=task.job.id, **settings).to_dict()
 
 
 def _evaluated(folder: RunFolder, job: str) -> dict[str, Any] | None:

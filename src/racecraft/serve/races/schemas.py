@@ -11,7 +11,7 @@ from racecraft.film.ghost import MAX_GHOSTS
 from racecraft.serve.conditions import AskedRanges, AskedVehicle
 from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.races.ghost_schemas import CheckpointChoice, Ghost
-from racecraft.serve.road import OnRoad
+from racecraft.serve.road import OnRoad, Seconds
 from racecraft.serve.schemas import Message, RunName
 from racecraft.serve.tracks.schemas import TrackGeometry, TrackSector
 from racecraft.sim.objects import MAX_OBJECTS
@@ -20,7 +20,6 @@ RaceKind = Literal["time-trial", "object-avoidance", "head-to-bot"]
 Ranking = Literal["total", "best", "average"]
 RaceState = Literal["upcoming", "open", "closed"]
 Title = Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S")]
-Seconds = Annotated[float, Field(ge=0.0, le=600.0, allow_inf_nan=False)]
 
 MAX_CARS: Final = 12
 """Of a replay."""
