@@ -171,4 +171,14 @@ describe("a film of several cars", () => {
     expect(fastestLap({ ...one, laps: [110] }, places)!.puts).toContain(5);
     expect(fastestLap({ ...one, laps: [] }, places)).toBeUndefined();
   });
+
+  it("knows where a car was put from the border to the middle and stood, which on a narrow road is no leap", () => {
+    const [before, after] = [car(0.07, 60, []), car(0.07, 231, [], 6.13)];
+    before.trace = before.trace.map(([x, y]) => [x!, y! - 300, 0]);
+    const stood = Array.from({ length: 75 }, () => after.trace[0]!);
+    const one = { ...before, trace: [...before.trace, ...stood, ...after.trace], laps: [360] };
+    const lap = fastestLap(one, placesOf({ geometry, is_reversed: false }, one))!;
+    expect(lap.puts).toEqual([60]);
+    expect(Math.max(...lap.speed)).toBeCloseTo(0.07 * 15, 1); // and not of the hand that put it
+  });
 });

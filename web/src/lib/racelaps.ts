@@ -5,6 +5,8 @@ import type { PlacedLap } from "./why";
 
 export const RATE = 15; // rows a second
 const JUMP = 0.5; // m in a row: it was put somewhere else
+const SIDESTEP = 0.02; // m farther than in the row before, and then a stop: it was put from the border to the middle
+const STOP = 0.1; // m less in the next row, which no brake does
 const REACH = 2; // rows on either side of a speed
 
 type Film = Pick<RaceReplay, "geometry" | "is_reversed">;
@@ -76,7 +78,9 @@ export function fastestLap(car: Car, places: number[]): PlacedLap | undefined {
   if (end - from < 2 * REACH + 1) return undefined;
   const [x, y] = [0, 1].map((axis) => rows.map((row) => row[axis]! / 1000)) as [number[], number[]];
   const step = (row: number) => Math.hypot(x[row + 1]! - x[row]!, y[row + 1]! - y[row]!);
-  const steps = rows.slice(1).map((_, row) => (step(row) > JUMP ? 0 : step(row)));
+  const isPut = (row: number) =>
+    step(row) > JUMP || (step(row) > step(row - 1) + SIDESTEP && step(row) > step(row + 1) + STOP);
+  const steps = rows.slice(1).map((_, row) => (isPut(row) ? 0 : step(row)));
   const speed = rows.map((_, row) => {
     const around = steps.slice(Math.max(0, row - REACH), row + REACH);
     return (RATE * around.reduce((sum, one) => sum + one, 0)) / around.length;
@@ -84,7 +88,7 @@ export function fastestLap(car: Car, places: number[]): PlacedLap | undefined {
   return {
     place: places.slice(from, end + 1),
     time: rows.map((_, row) => row / RATE),
-    puts: rows.map((_, row) => row).filter((row) => row > 0 && step(row - 1) > JUMP),
+    puts: rows.map((_, row) => row).filter((row) => row > 0 && isPut(row - 1)),
     ...{ x, y, speed },
   };
 }
