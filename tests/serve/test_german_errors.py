@@ -20,7 +20,7 @@ PLACES = (
     *("importing", "sim/objects.py", "training/stop.py", "training/parent.py", "training/start.py"),
     *("training/settings.py", "learn/ppo.py", "learn/sac.py", "learn/distill.py", "learn/saliency.py"),
     *("run/checkpoint.py", "run/lock.py", "run/stretches.py", "race/entry.py", "race/entry_file.py", "race/policy.py"),
-    *("contest", "film", "judging/trained.py", "judging/evaluation.py", "judging/demonstration.py"),
+    *("race/rules.py", "contest", "film", "judging/trained.py", "judging/evaluation.py", "judging/demonstration.py"),
     *("replay", "json_file.py", "analysis/share.py", "run/simtrace.py", "run/metrics.py", "run/judged.py"),
     *("run/training_params.py", "sim/randomization.py", "sim/vehicle.py", "sim/parameter_file.py"),
     *("reward/sandbox/confinement.py", "sweeping/plan.py", "tuning/space.py", "tuning/start.py"),
@@ -69,6 +69,14 @@ def sentence(node: ast.expr) -> str | None:
     return None
 
 
+def named_in(call: ast.Call) -> ast.JoinedStr | None:
+    """What a check calls the setting that it refuses, where that is words and a name: ``Vehicle parameter {}``."""
+    match call:
+        case ast.Call(func=ast.Name(id=check), args=[ast.JoinedStr(values=[ast.Constant(), *_]) as name, *_]):
+            return name if check == "require" or check.startswith("check_") else None
+    return None
+
+
 def said_in(path: Path) -> Iterator[str]:
     """The errors and hints of one file."""
     for node in ast.walk(ast.parse(path.read_text())):
@@ -77,6 +85,8 @@ def said_in(path: Path) -> Iterator[str]:
             name = call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
             if not PLAIN.fullmatch(name):
                 texts = call.args[:1] + [word.value for word in call.keywords if word.arg == "hint"]
+        elif isinstance(node, ast.Call) and (named := named_in(node)):
+            texts = [named]
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             places = {"problem": slice(2, 4), "Problem": slice(2, 4), "_at": slice(1, 3)}
             texts = node.args[places[node.func.id]] if node.func.id in places else []

@@ -50,6 +50,9 @@ describe("what the server says, in another language", () => {
     expect(german("0.replay says it holds 40,000 bytes; allowed are 4 to 1,234,567 in a file of its size.")).toBe(
       `0.replay soll ${fixed(40_000, 0)} Byte enthalten; in einer Datei dieser Größe sind 4 bis ${fixed(1_234_567, 0)} erlaubt.`,
     );
+    expect(german("Vehicle parameter mass is -5.0; allowed is a number from 0.1 to 1000.")).toBe(
+      `Der Wert mass des Autos ist ${fixed(-5, 1)}; erlaubt ist eine Zahl von ${fixed(0.1, 1)} bis 1000.`,
+    );
     expect(german("params has no key 'sped'.")).toBe("params hat keinen Schlüssel 'sped'.");
     expect(german("Did you mean 'speed'?")).toBe("Meintest du 'speed'?");
     expect(german("Track 'x': its centre line crosses or touches itself, near (1.2, 3.4).")).toBe(
