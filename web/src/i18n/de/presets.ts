@@ -42,7 +42,7 @@ export const presets: Record<keyof typeof english, string> = {
   preset_name_racing: "Rennen",
   preset_name_speed_gate: "Mindesttempo",
   preset_name_stay_inside: "Drinnen bleiben",
-  preset_name_touring: "touring",
+  preset_name_touring: "Fremde Straßen",
   space_name_default: "Standard",
   space_name_aws: "AWS",
   space_name_fast: "Schnell",
