@@ -27,6 +27,12 @@ export const evaluation: Record<keyof typeof english, string> = {
   end_immobilized: "Stehen geblieben",
   end_time_up: "Zeit abgelaufen",
   end_in_progress: "Unterwegs",
+  evaluate_otherwise: "Anders als gelernt",
+  evaluate_otherwise_lead:
+    "Ein anderes Auto, andersherum, andere Bedingungen. Runden in anderem Auto oder unter anderen Bedingungen zählen nicht als beste Runde des Modells.",
+  evaluate_as_learned: "Wie gelernt",
+  evaluate_randomize: "Anders als gewohnt",
+  evaluate_randomize_hint: "Für jeden Versuch neu gezogen.",
   as_car: "So, wie ein Auto es fährt",
   as_car_hint:
     "Fährt die Datei, die ein Auto nimmt, durch dessen eigene Schritte: sein Bild, seine Anteile, seine Gaskurve.",

@@ -15,7 +15,8 @@ export const garage: Record<keyof typeof english, string> = {
   sort_name: "Name",
   nothing_found: "Nichts passt zur Suche.",
   best_lap_is: "Die schnellste ganze Runde samt Strafen:",
-  best_lap_of_model: "aus allen Auswertungen auf der Strecke des Modells, im Training und danach.",
+  best_lap_of_model:
+    "aus allen Auswertungen auf der Strecke des Modells in seinem Auto und wie gewohnt, im Training und danach.",
   best_lap_of_stretch: "aus allen Auswertungen dessen, was in dem Abschnitt des Trainings gelernt wurde.",
   best_lap_of_checkpoint: "aus der Auswertung, mit der dieser Zwischenstand gespeichert wurde.",
   best_lap_of_evaluation: "aus dieser Auswertung.",

@@ -25,6 +25,12 @@ export const evaluation = {
   end_immobilized: "Stood still",
   end_time_up: "Time up",
   end_in_progress: "Under way",
+  evaluate_otherwise: "Otherwise than it learned",
+  evaluate_otherwise_lead:
+    "Another car, another way round, other conditions. Laps in another car or conditions do not count for the model's best lap.",
+  evaluate_as_learned: "As it learned",
+  evaluate_randomize: "Otherwise than it knows",
+  evaluate_randomize_hint: "Drawn anew for each trial.",
   as_car: "As a car drives it",
   as_car_hint: "Drives the file that a car takes, through the car's own steps: its picture, its shares, its throttle.",
   as_car_mark: "as a car",

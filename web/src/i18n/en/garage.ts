@@ -13,7 +13,8 @@ export const garage = {
   sort_name: "Name",
   nothing_found: "Nothing fits the search.",
   best_lap_is: "The fastest whole lap, penalties included:",
-  best_lap_of_model: "of all evaluations on the model's track, during training and afterwards.",
+  best_lap_of_model:
+    "of all evaluations on the model's track in its own car, as it knows the world, during training and afterwards.",
   best_lap_of_stretch: "of all evaluations of what was learned in that stretch of the training.",
   best_lap_of_checkpoint: "of the evaluation that this checkpoint was saved with.",
   best_lap_of_evaluation: "of this evaluation.",
