@@ -29,11 +29,8 @@ from racecraft.car.calibration import CarCalibration
 from racecraft.car.driving import CarPolicy, car_picture
 from racecraft.car.export import export_run, read_exported
 from racecraft.film.encoding import write_video
-from racecraft.learn.networks import PERCEPTION
 from racecraft.perceiving import PerceptionDriver
 from racecraft.race.autopilot import Autopilot
-from racecraft.race.policy import NetworkPolicy, load_policy
-from racecraft.run import RunFolder
 from racecraft.sim.camera import LUMA
 from racecraft.track import Track, load_track
 
@@ -66,23 +63,16 @@ class Lap:
 
 
 def exported(run: Path, car: CarCalibration) -> Driver:
-    """The file that a car takes, or who sees only beliefs, through the steps of a car's software."""
-    driver = CarPolicy(_policy(run), car)
+    """The file that a car takes, through the steps of a car's software."""
+    with tempfile.TemporaryDirectory(prefix="racecraft-transfer-") as place:
+        policy = read_exported(export_run(run, output=Path(place) / "model.tar.gz").file)
+    driver = CarPolicy(policy, car)
 
     def drive(picture: NDArray[np.uint8] | None, _: Pose) -> tuple[float, float]:
         angle, speed = driver(np.asarray(picture)[None])[0]
         return float(angle), float(speed)
 
     return drive
-
-
-def _policy(run: Path) -> NetworkPolicy:
-    """The policy of a run's exported file; of a run that sees only beliefs, which no file holds, its own."""
-    policy = load_policy(RunFolder.open(run))[1]
-    if policy.learner.spec.name == PERCEPTION:
-        return policy
-    with tempfile.TemporaryDirectory(prefix="racecraft-transfer-") as place:
-        return read_exported(export_run(run, output=Path(place) / "model.tar.gz").file)
 
 
 def perception(speed: float) -> Driver:

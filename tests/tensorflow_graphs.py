@@ -229,6 +229,7 @@ def _run(node: ParsedNode, inputs: list[Any]) -> Any:
         count, height, width, channels = inputs[0].shape
         squares = inputs[0].reshape(count, height // rows, rows, width // columns, columns, channels)
         return squares.mean(axis=(2, 4), dtype=np.float32)
-    if kind == "Floor":
-        return np.floor(inputs[0])
+    plain = {"Floor": np.floor, "Sqrt": np.sqrt, "Sign": np.sign, "Maximum": np.maximum, "Minimum": np.minimum}
+    if kind in plain:
+        return plain[kind](*inputs)
     raise AssertionError(f"the graph has a node {kind}")

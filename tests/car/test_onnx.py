@@ -8,7 +8,22 @@ import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from test_policy_graph import DEEP, FRONT, LEFT, OLD, REAL, SHALLOW, SMALL, STEREO, answers, fed, made, suite_and_spec
+from test_policy_graph import (
+    DEEP,
+    FRONT,
+    LEFT,
+    OLD,
+    REAL,
+    SEES,
+    SHALLOW,
+    SMALL,
+    STEREO,
+    TOLERANCES,
+    answers,
+    fed,
+    made,
+    suite_and_spec,
+)
 
 from racecraft.car.policy_graph import policy_onnx, policy_output
 from real_frames import floor_frames, simulated_frames
@@ -21,6 +36,7 @@ MODELS = [
     (SMALL, (OLD, "LIDAR"), "continuous"),
     (SHALLOW, (LEFT, "SECTOR_LIDAR"), "sac"),
     (DEEP, (FRONT,), "discrete"),
+    (SEES, (FRONT, "LIDAR"), "continuous"),
 ]
 
 
@@ -90,6 +106,14 @@ def compute(operation: str, given: list[NDArray[Any]], settings: dict[str, Any])
     if operation == "Reshape":
         return given[0].reshape(given[1].tolist())
     plain = {"Add": np.add, "Div": np.divide, "MatMul": np.matmul, "Floor": np.floor, "Tanh": np.tanh}
+    plain |= {
+        "Sub": np.subtract,
+        "Mul": np.multiply,
+        "Sqrt": np.sqrt,
+        "Sign": np.sign,
+        "Max": np.maximum,
+        "Min": np.minimum,
+    }
     plain |= {"Identity": np.positive, "Relu": lambda values: np.maximum(values, 0)}
     return np.asarray(plain[operation](*given))
 
@@ -103,8 +127,8 @@ def check(network: str, sensors: tuple[str, ...], kind: str, sight: NDArray[np.u
     results = run_onnx(policy_onnx(learner.weights(), spec, suite), dict(fed(spec, suite, sight)))
     assert list(results) == [policy_output(spec)]
     ours, (theirs,) = answers(learner, sight), results.values()
-    np.testing.assert_allclose(theirs, ours, atol=1e-5 if network in (SMALL, SHALLOW) else 2e-4)
-    if kind == "discrete" and network == SMALL:
+    np.testing.assert_allclose(theirs, ours, atol=TOLERANCES.get(network, 2e-4))
+    if kind == "discrete" and network in (SMALL, SEES):
         assert (theirs.argmax(1) == ours.argmax(1)).all()
 
 
@@ -117,5 +141,6 @@ def test_the_model_answers_as_the_network(network: str, sensors: tuple[str, ...]
 
 
 @REAL
-def test_real_pictures_get_the_same_choice() -> None:
-    check(SMALL, (FRONT,), "discrete", np.concatenate([simulated_frames(), floor_frames()]))
+@pytest.mark.parametrize("network", [SMALL, SEES])
+def test_real_pictures_get_the_same_choice(network: str) -> None:
+    check(network, (FRONT,), "discrete", np.concatenate([simulated_frames(), floor_frames()]))

@@ -9,6 +9,7 @@ NeuralNetwork = Literal[
     "DEEP_CONVOLUTIONAL_NETWORK",
     "DEEP_CONVOLUTIONAL_NETWORK_DEEP",
     "RACECRAFT_SMALL",  # ours, much faster to train
+    "PERCEPTION",  # ours, which sees what perception tells
 ]
 NEURAL_NETWORKS: Final[tuple[NeuralNetwork, ...]] = get_args(NeuralNetwork)
 VERSIONS: Final = ("1", "2", "3", "4", "5", "6")

@@ -20,9 +20,9 @@ from racecraft.importing.model_files import ModelFiles
 from racecraft.importing.source import open_source
 from racecraft.importing.weights import open_model, read_weights
 from racecraft.json_file import parse_json_object
-from racecraft.learn import NetworkSpec, make_learner
-from racecraft.learn.networks import PERCEPTION
+from racecraft.learn import NetworkSpec
 from racecraft.race.policy import NetworkPolicy, load_policy
+from racecraft.race.seeing import learner_of
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_file
 
@@ -68,8 +68,8 @@ def export_run(
     Raises:
         RunError: There is no such run, or the file cannot be written.
         CheckpointError: There is no such checkpoint, or it is damaged.
-        ConfigError: The network sees only what perception tells, the car has not what the policy needs, or would not
-            take the archive's name, or the library that the target needs is not installed.
+        ConfigError: The car has not what the policy needs, or would not take the archive's name, or the library that
+            the target needs is not installed.
     """
     check_choice("--to", to, TARGETS)
     folder = RunFolder.open(run)
@@ -81,12 +81,6 @@ def export_run(
     elif file.suffix != ending:
         raise ConfigError(f"The model is to be called {file.name!r}; the name of a model for {to} ends in {ending}.")
     step, policy = load_policy(folder, checkpoint=checkpoint, num_threads=1)
-    if policy.learner.spec.name == PERCEPTION:
-        raise ConfigError(
-            f"The network {PERCEPTION} sees what perception tells of pictures, "
-            "and no exported file holds who tells it.",
-            hint="Train another network for a car.",
-        )
     metadata, spec, weights = folder.read_model_metadata(), policy.learner.spec, policy.learner.weights()
     files: dict[Path, bytes] = {}
     if to == "onnx":
@@ -120,7 +114,7 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def read_exported(archive: str | Path, *, num_threads: int = 1) -> NetworkPolicy:
-    """The policy in an archive that `export_run` wrote.
+    """The policy in an archive that `export_run` wrote; one that is told by perception, by that of this version.
 
     Args:
         archive: The file.
@@ -143,6 +137,6 @@ def read_exported(archive: str | Path, *, num_threads: int = 1) -> NetworkPolicy
         )
         with open_model(source, ModelFiles(graph=GRAPH)) as tensors:
             weights = read_weights(tensors, spec, suite, [])
-    learner = make_learner(spec, seed=None, num_threads=num_threads)
+    learner = learner_of(spec, seed=None, num_threads=num_threads)
     learner.load_weights({**learner.weights(), **weights})
     return NetworkPolicy(learner, space, sensors=suite)

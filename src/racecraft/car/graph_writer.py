@@ -52,7 +52,7 @@ class GraphWriter:
         return self.apply(f"{name}/read", "Identity", self.constant(name, values))
 
     def apply(self, name: str, operation: str, *inputs: str) -> str:
-        """An operation on floats that has no settings: Add, Floor, Identity, RealDiv, Relu, Softmax, Tanh."""
+        """An operation on floats that has no settings, such as Add, Floor, Maximum, Relu, Sign, Softmax or Tanh."""
         return self._node(name, operation, *inputs, T=_FLOATS)
 
     def convolution(self, name: str, image: str, kernel: str, *, stride: int) -> str:

@@ -17,7 +17,7 @@ from racecraft.importing.protobuf import bytes_field, number_field, varint
 IR_VERSION: Final = 8
 OPSET: Final = 13
 _FLOAT, _INT64 = 1, 7  # TensorProto.DataType
-_CALLED: Final = {"RealDiv": "Div"}
+_CALLED: Final = {"RealDiv": "Div", "Maximum": "Max", "Minimum": "Min"}
 _CHANNELS_FIRST, _CHANNELS_LAST = (0, 3, 1, 2), (0, 2, 3, 1)
 
 

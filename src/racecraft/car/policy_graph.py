@@ -93,6 +93,8 @@ class _PolicyGraph:
         spec, writer, camera = self.spec, self.writer, self.sensors.camera_name
         below = f"{self.scope}/{camera}"
         x = writer.placeholder(sensor_input(spec, camera), [-1, *spec.frame_shape, spec.lenses])
+        if self.arch.told:
+            return self._convolved(self._told(f"{below}/perception", x))
         if sky_rows(spec):
             x = writer.below(f"{below}/below_sky", x, row=sky_rows(spec))
         if self.arch.pool > 1:
@@ -100,6 +102,19 @@ class _PolicyGraph:
             x = writer.apply(f"{below}/half", "Add", x, writer.constant(f"{below}/half/y", np.float32(0.5)))
             x = writer.apply(f"{below}/whole", "Floor", x)
         x = writer.apply(f"{below}/truediv", "RealDiv", x, writer.constant(f"{below}/truediv/y", np.float32(MAX_BYTE)))
+        return self._convolved(x)
+
+    def _told(self, below: str, x: str) -> str:
+        """What perception tells of pictures, with the weights that the package brings along."""
+        from racecraft.car.perception_graph import tell
+        from racecraft.perception import Perceiver
+
+        network = Perceiver(num_threads=1).network
+        return tell(self.writer, below, x, spec=network.spec, weights=network.weights())
+
+    def _convolved(self, x: str) -> str:
+        """What the camera's convolutions end in, of an image of 0 to 1, or of what is told in its place."""
+        spec, writer, below = self.spec, self.writer, f"{self.scope}/{self.sensors.camera_name}"
         (height, width), channels = pooled_shape(spec), spec.lenses
         for i, conv in enumerate(self.arch.convs):
             layer = f"conv{i + 1}"
