@@ -11,6 +11,7 @@ import pytest
 from racecraft import load_track
 from racecraft.car.export import export_run, read_exported
 from racecraft.errors import ConfigError
+from racecraft.importing import import_run
 from racecraft.learn import NetworkSpec, make_learner
 from racecraft.learn.networks import PERCEPTION
 from racecraft.learn.saliency import grad_cam
@@ -167,9 +168,12 @@ def test_a_loaded_policy_drives_as_the_one_that_was_trained(tmp_path: Path, fram
     commands = policy(frames)
     assert isinstance(policy.learner, BeliefLearner)
     assert np.isfinite(commands).all()
-    exported = read_exported(export_run(run.path, checkpoint="last").file)
+    file = export_run(run.path, checkpoint="last").file
+    exported = read_exported(file)
     assert isinstance(exported.learner, BeliefLearner)
     np.testing.assert_array_equal(exported(frames), commands)
+    back = RunFolder.open(import_run(file, root=tmp_path, name="back", track="oval").run)
+    np.testing.assert_array_equal(load_policy(back)[1](frames), commands)
     evaluation = evaluate(policy, load_track("oval"), num_trials=1, seed=0)
     assert len(evaluation.trials) == 1
 
