@@ -29,6 +29,7 @@ export const analysis: Record<keyof typeof english, string> = {
   saliency_chosen: "die gewählte Aktion",
   saliency_strength: "Stärke",
   saliency_how: "Grad-CAM an {layer} der Strategie nach {step} Schritten.",
+  saliency_how_told: "Grad-CAM an {layer} der Wahrnehmung, durch die Strategie nach {step} Schritten hindurch.",
   belief: "Was die Wahrnehmung sieht",
   belief_lead:
     "Ein Netz, das Straßen kennt, aber nicht diese: Grün ist Straße, gelb ihre Mitte, Balken sagen, wie weit es sich irren mag.",

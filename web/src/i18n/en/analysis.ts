@@ -26,6 +26,7 @@ export const analysis = {
   saliency_chosen: "the action it takes",
   saliency_strength: "Strength",
   saliency_how: "Grad-CAM on {layer} of the policy after {step} steps.",
+  saliency_how_told: "Grad-CAM on {layer} of perception, through the policy after {step} steps.",
   belief: "What perception sees",
   belief_lead:
     "A network that knows roads, but not this one: green is road, yellow its middle, bars say how far off it may be.",
