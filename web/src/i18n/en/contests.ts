@@ -55,7 +55,7 @@ export const contests = {
   contests_rounds_hint: "0: as many as find the best.",
   contests_more_tracks: "One more track",
   contests_no_track: "none",
-  contests_races_of: "{count} of {planned} races driven",
+  contests_races_of: "{count} of {planned} {planned|race|races} driven",
   contests_more_matches: "Show more races ({count})",
   road_library: "All tracks of the library",
   road_generated: "From the generator",
