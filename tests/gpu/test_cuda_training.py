@@ -38,7 +38,7 @@ def device_on_the_cpu(monkeypatch):
     monkeypatch.setattr("racecraft.gpu.open_device", lambda name: device)
     monkeypatch.setattr("racecraft.sim.cuda_simulation.open_device", lambda name: device)
     monkeypatch.setattr(
-        "racecraft.training.session.make_learner",
+        "racecraft.race.seeing.make_learner",
         lambda spec, *, seed, device, **_: CudaLearner(spec, seed=seed, device="cpu"),
     )
     return device
