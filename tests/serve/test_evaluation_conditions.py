@@ -11,7 +11,7 @@ from running_consoles import RunningConsole
 from racecraft.race.recording import Recording
 from racecraft.replay import Replay, read_replay, verify
 from racecraft.run import RunFolder
-from racecraft.serve.evaluations.asked import settings_of
+from racecraft.serve.evaluations.tasks import settings_of
 from racecraft.sim.objects import Obstacles
 from racecraft.sim.randomization import Randomization
 from racecraft.sim.vehicle import PRESETS, Vehicle

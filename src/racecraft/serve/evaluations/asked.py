@@ -1,11 +1,10 @@
 """What an evaluation is asked for otherwise than its model learned: checked when it is asked, kept in its job.
 
-request -> *settle* -> the job's payload -> *settings_of* -> `evaluate_run`
+request -> *settle* -> the job's payload -> `tasks.evaluate`
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,11 +13,8 @@ from racecraft.judging.trained import trained_camera, trained_vehicle
 from racecraft.run import RunInfo
 from racecraft.serve.conditions import randomization_of, vehicle_of
 from racecraft.serve.road import OnRoad, road_objects
-from racecraft.sim.objects import Objects
-from racecraft.sim.randomization import Randomization
-from racecraft.sim.vehicle import Vehicle
 
-if TYPE_CHECKING:  # jobs do without messages
+if TYPE_CHECKING:
     from racecraft.serve.evaluations.schemas import EvaluateModel
 
 NUMBERED: Final = {"vehicle", "randomize"}
@@ -46,15 +42,3 @@ def settle(request: EvaluateModel, info: RunInfo) -> dict[str, Any]:
     elif given := sorted(OF_ROAD & request.model_fields_set):
         raise ConfigError(f"{given[0]} goes with a race: time-trial, object-avoidance or head-to-bot.")
     return payload
-
-
-def settings_of(payload: Mapping[str, Any]) -> dict[str, Any]:
-    """What `evaluate_run` is called with; of a job from before there was a choice, less."""
-    settings = dict(payload)
-    if "vehicle" in payload:
-        settings["vehicle"] = Vehicle(**payload["vehicle"])
-    if "randomize" in payload:
-        settings["randomize"] = Randomization(**payload["randomize"])
-    if "objects" in payload:
-        settings["objects"] = Objects.from_dict(payload["objects"])
-    return settings

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from racecraft.errors import ConfigError
 from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
-from racecraft.serve.evaluations.asked import settings_of
 from racecraft.serve.jobs.task import Task
+from racecraft.sim.objects import Objects
+from racecraft.sim.randomization import Randomization
+from racecraft.sim.vehicle import Vehicle
 
 
 def evaluate(task: Task) -> dict[str, Any]:
@@ -34,3 +37,15 @@ def _evaluated(folder: RunFolder, job: str) -> dict[str, Any] | None:
         if document.get("job") == job:
             return {"run": str(folder.path), **document}
     return None
+
+
+def settings_of(payload: Mapping[str, Any]) -> dict[str, Any]:
+    """What `evaluate_run` is called with; of a job from before there was a choice, less."""
+    settings = dict(payload)
+    if "vehicle" in payload:
+        settings["vehicle"] = Vehicle(**payload["vehicle"])
+    if "randomize" in payload:
+        settings["randomize"] = Randomization(**payload["randomize"])
+    if "objects" in payload:
+        settings["objects"] = Objects.from_dict(payload["objects"])
+    return settings
