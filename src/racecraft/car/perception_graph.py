@@ -20,8 +20,8 @@ from racecraft.car.graph_writer import GraphWriter
 from racecraft.car.onnx_writer import OnnxWriter
 from racecraft.learn.learner import NetworkSpec
 from racecraft.learn.networks import TOLD_SIDE, architecture_of, pooled_shape, sky_rows
-from racecraft.perception.answers import ERRORS, IN_SIGHT, MIDDLES, NUM_CONTINUOUS, NUM_OUTPUTS, NUM_TARGETS
-from racecraft.perception.learner import SURE, USUAL_LOG_ERROR
+from racecraft.perception.answers import IN_SIGHT, MIDDLES, NUM_OUTPUTS
+from racecraft.perception.learner import NOTHING, REACH, TOLD_AS_NOTHING, TOLD_UNITS
 from racecraft.perception.mirror import mirrored_answers
 from racecraft.perception.network import LEAST_SPREAD, MEAN, SPREAD
 
@@ -65,7 +65,9 @@ class _Telling:
         squared = self._apply("squared", "Mul", numbers, numbers)
         length = self._apply("length", "Sqrt", self._with("longer", "Add", squared, 1.0))
         bent = self._apply("bent", "RealDiv", numbers, length)
-        whole = self._apply("whole", "Floor", self._with("level", "Add", self._with("wide", "Mul", bent, 127.0), 128.5))
+        whole = self._apply(
+            "whole", "Floor", self._with("level", "Add", self._with("wide", "Mul", bent, REACH), NOTHING + 0.5)
+        )
         shares = np.zeros((1, PLACES), np.float32)
         shares[:, :NUM_OUTPUTS] = 1.0 / 255.0
         told = self._apply("told", "Mul", whole, writer.constant(f"{name}/shares", shares))
@@ -113,11 +115,9 @@ class _Telling:
         kernel, bias = self.weights["policy.head.weight"].T, self.weights["policy.head.bias"]
         both = np.concatenate([kernel, mirrored_answers(kernel)]) * np.float32(0.5)
         middle = np.float32(0.5) * (bias + mirrored_answers(bias[None])[0])
-        scale, shift = np.ones(NUM_OUTPUTS, np.float32), np.zeros(NUM_OUTPUTS, np.float32)
-        scale[NUM_CONTINUOUS:NUM_TARGETS] = 1.0 / SURE
-        shift[ERRORS] = -USUAL_LOG_ERROR
-        behind = ((0, 0), (0, PLACES - NUM_OUTPUTS))
-        return np.pad(both * scale, behind), np.pad((middle * scale + shift)[None], behind)[0]
+        behind = PLACES - NUM_OUTPUTS
+        told = (middle - TOLD_AS_NOTHING) / TOLD_UNITS
+        return np.pad(both / TOLD_UNITS, ((0, 0), (0, behind))), np.pad(told, (0, behind))
 
     def _mean(self, name: str, values: str) -> str:
         """Of each row  (N, 1)."""

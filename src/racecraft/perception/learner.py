@@ -26,6 +26,19 @@ SURE: Final = 3.0
 """A yes or no is told by its logit over this, which is 95 or 5 %."""
 USUAL_LOG_ERROR: Final = -2.0
 """In units of the network: logarithm of how far off, that is told as neither far nor near."""
+NOTHING, REACH = 128.0, 127.0
+"""The byte of 0, and how far from it the bytes of any number lie at most."""
+
+
+def _units() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    units, usual = np.ones(NUM_OUTPUTS, np.float32), np.zeros(NUM_OUTPUTS, np.float32)
+    units[NUM_CONTINUOUS:NUM_TARGETS] = SURE
+    usual[ERRORS] = USUAL_LOG_ERROR
+    return units, usual
+
+
+TOLD_UNITS, TOLD_AS_NOTHING = _units()
+"""What 1 of a told number is of an output, and the output that is told as 0  (NUM_OUTPUTS,)."""
 
 
 class BeliefLearner(NativeLearner):
@@ -75,21 +88,18 @@ def bytes_of(outputs: NDArray[np.float32]) -> NDArray[np.uint8]:
     A step of the offset is 2 mm in the middle of the road, of a heading 0.1 degrees. Columns of the road's middle are
     told where it is in sight.
     """
-    return np.rint(128.0 + 127.0 * bend(_told(outputs))).astype(np.uint8)
+    return np.rint(NOTHING + REACH * bend(_told(outputs))).astype(np.uint8)
 
 
 def byte_slopes(outputs: NDArray[np.float32]) -> NDArray[np.float32]:
     """How a byte changes with its output, were it not rounded  (N, NUM_OUTPUTS)."""
-    numbers, step = _told(outputs), np.ones(outputs.shape)
-    step[:, MIDDLES] = outputs[:, IN_SIGHT] > 0.0
-    step[:, NUM_CONTINUOUS:NUM_TARGETS] /= SURE
-    return np.asarray(127.0 * step * (1.0 + numbers * numbers) ** -1.5, np.float32)
+    numbers, step = _told(outputs), np.ones(outputs.shape) / TOLD_UNITS
+    step[:, MIDDLES] *= outputs[:, IN_SIGHT] > 0.0
+    return np.asarray(REACH * step * (1.0 + numbers * numbers) ** -1.5, np.float32)
 
 
 def _told(outputs: NDArray[np.float32]) -> NDArray[np.float64]:
     """Outputs before they are bent: columns out of sight, and errors as large as usual, are 0."""
     numbers = outputs.astype(np.float64)
     numbers[:, MIDDLES] *= numbers[:, IN_SIGHT] > 0.0
-    numbers[:, NUM_CONTINUOUS:NUM_TARGETS] /= SURE
-    numbers[:, ERRORS] -= USUAL_LOG_ERROR
-    return numbers
+    return (numbers - TOLD_AS_NOTHING) / TOLD_UNITS
