@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import pytest
-from running_consoles import PATIENCE, RunningConsole
+from running_consoles import PATIENCE, RunningConsole, running_console
 
 from chromium import CHROMIUM, launched
 from few_frames import FEW_FRAMES
@@ -124,3 +124,15 @@ def visiting(console: RunningConsole) -> Iterator[Visit]:
         page.on("pageerror", lambda error: visit.complaints.append(str(error)))
         yield visit
         browser.close()
+
+
+@contextmanager
+def visiting_two_drivers(runs: Path) -> Iterator[Visit]:
+    """A tab of a console whose models `ada` and `bob` have learned a little; nothing may have complained at the end."""
+    with running_console(runs) as console, visiting(console) as visit:
+        for name in ("ada", "bob"):
+            console.create(name=name, track="oval", until="3000 steps", seed=ord(name[0]))
+        for job in console.client.get("/api/jobs").json():
+            assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+        yield visit
+        assert visit.complaints == []

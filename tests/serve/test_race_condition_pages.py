@@ -7,22 +7,16 @@ import re
 from collections.abc import Iterator
 
 import pytest
-from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
+from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting_two_drivers
 from playwright.sync_api import FilePayload, Page
-from running_consoles import running_console
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 
 @pytest.fixture(scope="module")
 def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
-    with running_console(tmp_path_factory.mktemp("pages") / "runs") as console, visiting(console) as visit:
-        for name in ("ada", "bob"):
-            console.create(name=name, track="oval", until="3000 steps", seed=ord(name[0]))
-        for job in console.client.get("/api/jobs").json():
-            assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    with visiting_two_drivers(tmp_path_factory.mktemp("pages") / "runs") as visit:
         yield visit
-        assert visit.complaints == []
 
 
 def _file(name: str, document: object) -> FilePayload:

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from browsers import Visit, make_untrained, needs_axe, needs_browser, needs_pages, visiting
-from running_consoles import running_console
+from browsers import Visit, make_untrained, needs_axe, needs_browser, needs_pages, visiting_two_drivers
 
 from racecraft.judging.evaluation import evaluate_run
 from racecraft.reward.sandbox import find_confinement
@@ -17,13 +16,8 @@ pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 @pytest.fixture(scope="module")
 def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
-    with running_console(tmp_path_factory.mktemp("pages") / "runs") as console, visiting(console) as visit:
-        for name in ("ada", "bob"):
-            console.create(name=name, track="oval", until="3000 steps", seed=ord(name[0]))
-        for job in console.client.get("/api/jobs").json():
-            assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    with visiting_two_drivers(tmp_path_factory.mktemp("pages") / "runs") as visit:
         yield visit
-        assert visit.complaints == []
 
 
 def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
