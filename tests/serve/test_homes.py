@@ -11,7 +11,7 @@ from racecraft.serve.groups import groups as groups_module
 from racecraft.serve.groups.groups import Groups
 from racecraft.serve.people.people import People, add_person
 from racecraft.serve.problems import Conflict, NotFound
-from racecraft.serve.store.database import Database
+from racecraft.serve.store.database import Database, upgrade
 from racecraft.serve.store.tables import Member
 
 CLASS, CLUB, TEACHER, TRAINER, ADA = 1, 2, 2, 3, 4
@@ -89,7 +89,8 @@ def test_who_has_a_password_or_makes_groups_becomes_nobodys(groups: Groups, data
 
 
 def test_of_groups_of_before_the_first_is_the_one_that_they_came_in_by(database: Database) -> None:
-    database._upgrade("0015")
+    with database._alone() as connection:
+        upgrade(connection, "0015")
     with database.engine.begin() as connection:
         moments = {"early": "2026-01-01 00:00:00+00:00", "late": "2026-02-01 00:00:00+00:00"}
         for number in (TEACHER, ADA):

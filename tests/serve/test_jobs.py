@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
+from postgres_servers import PostgresServer
 from running_consoles import LEISURELY, running_console
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.serve.jobs.queue import KINDS, MAX_DEATHS, MAX_LOSSES, JobQueue, kinds_of
 from racecraft.serve.jobs.turns import waiting_line
 from racecraft.serve.settings import ServeSettings
-from racecraft.serve.store.database import Database
+from racecraft.serve.store.database import Database, upgrade
 from racecraft.serve.store.tables import Job, Table, User, now
 
 
@@ -58,12 +61,63 @@ def test_the_migrations_and_the_tables_made_at_once_are_the_same(database_url: s
     from alembic.migration import MigrationContext
 
     database = Database(database_url)
-    database._upgrade()
+    with database._alone() as connection:
+        upgrade(connection)
     with database.engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": False})
         assert compare_metadata(context, Table.metadata) == []
     database.migrate()  # nothing is left to do, and the local user is there
     database.close()
+
+
+OPENS = """
+import sys
+from racecraft.serve.store.database import Database
+
+for url in sys.stdin:
+    print(flush=True)
+    input()
+    database = Database(url.strip())
+    database.migrate()
+    database.close()
+    print("migrated", flush=True)
+"""
+
+
+def opened_together(urls: Sequence[str]) -> None:
+    """Two processes bring each of some databases up to date, both at the same moment."""
+    both = [
+        subprocess.Popen([sys.executable, "-c", OPENS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    for url in urls:
+        for said, answer in ((url, "\n"), ("", "migrated\n")):
+            for process in both:
+                print(said, file=process.stdin, flush=True)
+            assert [process.stdout.readline() for process in both if process.stdout] == [answer] * 2
+    for process in both:
+        process.communicate()
+        assert process.returncode == 0
+
+
+def test_two_servers_that_make_a_database_at_the_same_moment_make_one(tmp_path: Path) -> None:
+    opened_together([f"sqlite:///{tmp_path / f'{number}.db'}" for number in range(20)])
+
+
+def test_two_servers_bring_an_old_database_up_to_date_once(database_url: str) -> None:
+    database = Database(database_url)
+    with database._alone() as connection:
+        upgrade(connection, "0015")
+    opened_together([database_url])
+    database.require_current()
+    with database.transaction() as session:
+        assert list(session.scalars(sa.select(User.name))) == ["you"]
+    database.close()
+
+
+@pytest.mark.costly
+def test_two_servers_that_fill_an_empty_postgresql_fill_it_once(postgres: PostgresServer) -> None:
+    opened_together([postgres.new_database() for _ in range(10)])
 
 
 def test_a_database_that_cannot_be_opened_is_told(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
@@ -19,6 +21,10 @@ from racecraft.serve.store.tables import Table, User, now
 MIGRATIONS = Path(__file__).parent / "migrations"
 SQLITE: Final = "sqlite:///"
 LOCAL_USER = "you"  # of a console of one's own
+PATIENCE: Final = 10.0
+"""s that SQLite waits for another who writes."""
+LOCK: Final = 0x7261636563726166
+"""Of PostgreSQL: who holds it changes tables."""
 
 
 class Database:
@@ -45,17 +51,16 @@ class Database:
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
 
     def migrate(self) -> None:
-        """Bring the tables up to date; a fresh database gets them all."""
+        """Bring the tables up to date; a fresh database gets them all. Of those who begin together one does it."""
         try:
-            version = self._version()
-            if version == "":
-                with self.engine.begin() as connection:
+            with self._alone() as connection:
+                version = _version(connection)
+                if version == "":
                     _make(connection, _newest())
-            elif version != _newest():
-                self._upgrade()
-            with self.transaction() as session:
-                if session.scalar(sa.select(User.id).limit(1)) is None:
-                    session.add(User(name=LOCAL_USER, handle=LOCAL_USER, role="admin"))
+                elif version != _newest():
+                    upgrade(connection)
+                if connection.scalar(sa.select(User.id).limit(1)) is None:
+                    connection.execute(sa.insert(User).values(name=LOCAL_USER, handle=LOCAL_USER, role="admin"))
         except SQLAlchemyError as error:
             raise RunError(f"The console's database cannot be opened: {_reason(error)}.") from error
 
@@ -107,27 +112,17 @@ class Database:
         except SQLAlchemyError as error:
             raise RunError(f"The database does not take this: {_reason(error)}.") from error
 
-    def _version(self) -> str:
-        """Of the tables; empty for a fresh database."""
-        with self.engine.connect() as connection:
-            if not sa.inspect(connection).has_table("alembic_version"):
-                return ""
-            return str(connection.scalar(sa.text("SELECT version_num FROM alembic_version")))
-
-    def _upgrade(self, to: str = "head") -> None:
-        from alembic import command  # takes its time to load, and most starts do without
-        from alembic.config import Config
-
-        config = Config()
-        config.set_main_option("script_location", str(MIGRATIONS))
+    @contextmanager
+    def _alone(self) -> Iterator[sa.Connection]:
+        """A transaction to change tables in; another process that wants one waits for its end."""
         with self.engine.connect() as connection:
             is_sqlite = connection.dialect.name == "sqlite"
             if is_sqlite:  # it changes a table by making it anew, while others refer to it
                 connection.exec_driver_sql("PRAGMA foreign_keys=OFF")
                 connection.commit()
             with connection.begin():
-                config.attributes["connection"] = connection
-                command.upgrade(config, to)
+                connection.exec_driver_sql("BEGIN IMMEDIATE" if is_sqlite else f"SELECT pg_advisory_xact_lock({LOCK})")
+                yield connection
             if is_sqlite:
                 connection.exec_driver_sql("PRAGMA foreign_keys=ON")
                 connection.commit()
@@ -171,6 +166,24 @@ def _opened(url: str) -> str | sa.URL:
     return url if file == url else sa.URL.create("sqlite", database=file)
 
 
+def _version(connection: sa.Connection) -> str:
+    """Of the tables; empty for a fresh database."""
+    if not sa.inspect(connection).has_table("alembic_version"):
+        return ""
+    return str(connection.scalar(sa.text("SELECT version_num FROM alembic_version")))
+
+
+def upgrade(connection: sa.Connection, to: str = "head") -> None:
+    """Bring tables up to a version, in a transaction of `Database._alone`."""
+    from alembic import command  # takes its time to load, and most starts do without
+    from alembic.config import Config
+
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS))
+    config.attributes["connection"] = connection
+    command.upgrade(config, to)
+
+
 def _make(connection: sa.Connection, version: str) -> None:
     """All tables as they are now; tests hold the migrations to giving the same."""
     Table.metadata.create_all(connection)
@@ -192,6 +205,15 @@ def _newest() -> str:
 def _prepare_sqlite(connection: Any, _: object) -> None:
     """Readers beside a writer, no lost commits, and a wait instead of an error when two write."""
     cursor = connection.cursor()
-    for pragma in ("journal_mode=WAL", "synchronous=NORMAL", "busy_timeout=10000", "foreign_keys=ON"):
+    for pragma in (f"busy_timeout={1000 * PATIENCE:.0f}", "synchronous=NORMAL", "foreign_keys=ON"):
         cursor.execute(f"PRAGMA {pragma}")
+    until = time.monotonic() + PATIENCE
+    while True:  # of two who make one file write-ahead together SQLite refuses one at once
+        try:
+            cursor.execute("PRAGMA journal_mode=WAL")
+            break
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > until:
+                raise
+            time.sleep(0.01)
     cursor.close()
