@@ -22,6 +22,7 @@ from racecraft.race.entry import load_entries, load_entry
 from racecraft.race.entry_file import _digest
 from racecraft.replay import read_replay
 from racecraft.run import CheckpointStore
+from racecraft.run.checkpoint import header_of
 from racecraft.sim import MAX_STEERING, Simulation, Start
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.vehicle import PRESETS
@@ -221,6 +222,7 @@ def network(**values: Any) -> Callable[[Arrays, dict[str, Any]], object]:
         (lambda arrays, document: arrays.update({"weights/policy.head.bias": np.zeros(11, np.float32)}), r"\(11,\)"),
         (lambda arrays, document: arrays.update({"weights/policy.head.bias": np.zeros((10, 1), np.float32)}), "shape"),
         (lambda arrays, document: arrays.update({"weights/policy.head.bias": np.zeros(10)}), "F64"),
+        (lambda arrays, document: arrays.update({"weights/policy.head.bias": np.zeros(10, np.float16)}), "F16"),
         (lambda arrays, document: arrays.update({"weights/policy.head.bias": np.zeros(10, np.int32)}), "I32"),
     ],
 )
@@ -239,6 +241,56 @@ def test_weights_that_are_no_numbers_do_not_start(run: Path, value: float) -> No
 
     resave(run, poison)
     with pytest.raises(CheckpointError, match=r"NaN or infinite: policy\.conv1\.weight"):
+        load_entry(run)
+
+
+def in_halves(value: float | None = None) -> Callable[[Arrays, dict[str, Any]], object]:
+    """The weights alone, as a starter keeps them; one of them this number, if given."""
+
+    def change(arrays: Arrays, document: dict[str, Any]) -> None:
+        for name in list(arrays):
+            if name.startswith("weights/"):
+                arrays[name] = arrays[name].astype(np.float16)
+            else:
+                del arrays[name]
+        if value is not None:
+            arrays["weights/policy.conv1.weight"][3, 0, 2, 2] = value
+        document["origin"] = {"format": "racecraft"}
+
+    return change
+
+
+def test_weights_alone_drive_from_halves_as_their_numbers_say(honest: Path, run: Path) -> None:
+    resave(run, in_halves())
+    (path,) = (run / "checkpoints").glob("*.safetensors")
+    assert {kind for kind, _ in header_of(path)[1].values()} == {"F16"}
+    whole, driving = load_entry(honest).policy.learner.weights(), load_entry(run).policy.learner.weights()
+    for name in (name for name in whole if name.startswith("policy.")):
+        rounded = whole[name].astype(np.float16).astype(np.float32)
+        assert driving[name].tobytes() == rounded.tobytes(), name
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_halves_that_are_no_numbers_do_not_start(run: Path, value: float) -> None:
+    resave(run, in_halves(value))
+    with pytest.raises(CheckpointError, match=r"NaN or infinite: policy\.conv1\.weight"):
+        load_entry(run)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda arrays: arrays.update({"weights/policy.wing": np.zeros(3, np.float16)}), "policy.wing"),
+        (lambda arrays: arrays.pop("weights/policy.head.bias"), "is missing in the file"),
+        (lambda arrays: arrays.update({"weights/policy.head.bias": np.zeros(11, np.float16)}), r"F32 of shape \(11,\)"),
+        (lambda arrays: arrays.update({"weights/policy.head.bias": np.zeros(10, np.int16)}), "I16"),
+    ],
+)
+def test_halves_are_exactly_the_networks_weights_as_well(
+    run: Path, change: Callable[[Arrays], object], words: str
+) -> None:
+    resave(run, lambda arrays, document: (in_halves()(arrays, document), change(arrays)))
+    with pytest.raises(CheckpointError, match=words):
         load_entry(run)
 
 

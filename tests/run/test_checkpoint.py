@@ -62,6 +62,39 @@ def test_every_kind_of_array_comes_back_bit_for_bit(store):
         loaded[name][...] = 0  # the caller's own
 
 
+def test_weights_alone_may_lie_in_halves_and_a_trainings_own_arrays_never_change(store):
+    """Every finite half is a number of float32 to the bit, and what is none stays none."""
+    halves = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
+    saved = {"weights/a": halves, "weights/b": np.float32([1 / 3]), "counts": np.arange(3, dtype=np.int8)}
+    store.save(0, saved, metadata={"origin": {"format": "racecraft"}})
+    found = store.find()
+    assert found.kinds["weights/a"] == ("F32", halves.shape)
+    assert found.path.stat().st_size < 2 * halves.size + 1000
+    for arrays in (store.load().arrays, found.read(saved)):
+        assert {name: array.dtype for name, array in arrays.items()} == {
+            **{"weights/a": np.float32, "weights/b": np.float32, "counts": np.int8}
+        }
+        np.testing.assert_array_equal(arrays["weights/a"].astype(np.float16), halves)
+        assert np.array_equal(np.isfinite(arrays["weights/a"]), np.isfinite(halves))
+        assert arrays["weights/b"] == np.float32(1 / 3)
+
+    store.save(64, saved, metadata={"network": {}})
+    own = store.load()
+    assert store.find().kinds["weights/a"] == ("F16", halves.shape)
+    assert own.arrays["weights/a"].tobytes() == halves.tobytes()
+    with pytest.raises(CheckpointError, match="weights/a is float16 instead of float32"):
+        own.check_arrays({"weights/a": np.zeros(1 << 16, np.float32)})
+
+
+def test_a_file_of_a_given_time_repeats_to_the_bit(store, tmp_path):
+    again = CheckpointStore(tmp_path / "again")
+    for each in (store, again):
+        each.save(0, arrays(0), time_stamp=1.5e9)
+    (entry,) = store.entries()
+    assert entry == again.entries()[0]
+    assert entry.time_stamp == 1.5e9
+
+
 def test_metadata_keeps_large_integers_and_numpy_scalars(store):
     state = np.random.default_rng(7).bit_generator.state
     store.save(1, {}, metadata={"generator": state, "share": np.float64(0.5)}, metrics={"loss": np.nan, "reward": 2})

@@ -4,7 +4,8 @@
     checkpoints/manifest.json                    size, checksum, score, metrics of each; best and last
 
 A file is believed only when its size and checksum are right. When the manifest itself is lost, the files and
-their names are enough to do without it. Nothing here is ever unpickled.
+their names are enough to do without it. Nothing here is ever unpickled. Weights alone, of a run with an ``origin`` and
+no training yet, may lie there as float16; they are read as float32.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ class StoredCheckpoint:
     score: tuple[float, ...] | None
     path: Path
     kinds: dict[str, tuple[str, tuple[int, ...]]]
-    """Type, as the format calls it (``F32``), and shape of every array by name."""
+    """Type that it is read as, by the format's name (``F32``), and shape of every array by name."""
 
     def read(self, names: Iterable[str]) -> dict[str, NDArray[Any]]:
         """Some of its arrays; they are writable and belong to the caller.
@@ -115,9 +116,13 @@ class StoredCheckpoint:
 
         try:
             with safe_open(self.path, framework="numpy") as file:
-                return {name: np.array(file.get_tensor(name)) for name in names}
+                arrays = {name: np.array(file.get_tensor(name)) for name in names}
         except (OSError, SafetensorError, TypeError, ValueError) as error:
             raise CheckpointError(f"{self.path} cannot be read: {error}.") from error
+        return {
+            name: array.astype(np.float32) if array.dtype == np.float16 and self.kinds[name][0] == "F32" else array
+            for name, array in arrays.items()
+        }
 
 
 class CheckpointStore:
@@ -142,6 +147,7 @@ class CheckpointStore:
         metadata: Mapping[str, Any] | None = None,
         metrics: Mapping[str, float] | None = None,
         score: Sequence[float] | None = None,
+        time_stamp: float | None = None,
     ) -> Path:
         """Save a checkpoint, then remove what need not be kept.
 
@@ -151,11 +157,12 @@ class CheckpointStore:
             metadata: Any JSON: settings, counters, states of random generators.
             metrics: Numbers to show in lists of checkpoints.
             score: Most important number first, larger is better; of equal ones the later is best, as at AWS.
+            time_stamp: When it was made, s since 1970, where its file is to repeat to the bit; now by default.
 
         Raises:
             CheckpointError: It could not be saved; the earlier ones are as good as before.
         """
-        step, time_stamp = int(step), time.time()
+        step, time_stamp = int(step), time.time() if time_stamp is None else float(time_stamp)
         if step < 0:
             raise CheckpointError(f"step is {step}; allowed is 0 or more.")
         shown = {name: float(v) if math.isfinite(v) else None for name, v in (metrics or {}).items()}
@@ -339,6 +346,8 @@ class CheckpointStore:
             metadata = dict(header["metadata"])
         except (ValueError, KeyError, TypeError) as error:
             raise CheckpointError(f"{path} is not a checkpoint of Racecraft: {error}.") from error
+        if "origin" in metadata:  # weights alone may be kept in halves; what a training goes on with never is
+            kinds = {name: ("F32" if kind == "F16" else kind, shape) for name, (kind, shape) in kinds.items()}
         return StoredCheckpoint(entry.step, metadata, entry.metrics, entry.score, path, kinds)
 
     def _prune(self) -> None:
