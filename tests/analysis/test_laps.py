@@ -11,8 +11,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from racecraft.analysis import draw_maps, driven_direction, iterations_of, passages, read_laps, sectors_of, start_place
+from racecraft.agent import ContinuousActionSpace
+from racecraft.analysis import (
+    TracedLap,
+    draw_maps,
+    driven_direction,
+    in_one,
+    iterations_of,
+    passages,
+    read_laps,
+    sectors_of,
+    start_place,
+)
 from racecraft.errors import RunError
+from racecraft.race.artifacts import write_simtrace
+from racecraft.race.autopilot import Autopilot
+from racecraft.race.evaluation import evaluate
+from racecraft.race.rules import RaceRules
 from racecraft.run.simtrace import WRITTEN
 from racecraft.track import Track, load_track
 
@@ -88,6 +103,28 @@ def test_steps_that_a_car_stands_are_its_penalty(tmp_path: Path, oval: Track) ->
     )
     (lap,) = read_laps(path)
     assert lap.penalty_seconds == pytest.approx(2.0)
+
+
+def test_laps_that_follow_each_other_without_a_stop_are_one_drive(tmp_path: Path) -> None:
+    def laps(**rules: Any) -> list[TracedLap]:
+        given = RaceRules(laps=2, **rules)
+        driven = evaluate(Autopilot(speed=2.0), load_track("oval"), rules=given, num_trials=2, sees="state")
+        write_simtrace(driven, tmp_path, action_space=ContinuousActionSpace(low=(-0.5, 0.1), high=(0.5, 4.0)))
+        return read_laps(tmp_path / "0-iteration.csv")
+
+    assert [lap.goes_on for lap in laps(is_continuous=False)] == [False] * 4
+    both = laps()
+    assert [lap.goes_on for lap in both] == [False, True, False, True]
+    drive, half = in_one(both[2:]), len(both[2].time)
+    assert (drive.number, len(drive.time), drive.puts) == (4, half + len(both[3].time), ())
+    assert drive.seconds == pytest.approx(both[2].seconds + both[3].seconds)
+    assert (drive.seen_from(0.0)[half:] == both[3].seen_from(0.0)).all()
+    before, then, now = (drive.seen_from(age)[half - at] for age, at in ((0.0, 1), (DT / 2, 0), (0.0, 0)))
+    assert then == pytest.approx((before + now) / 2), "where the lap before ended is known"
+    told = both[2].steering_angle[-1], both[2].throttle[-1]
+    assert drive.commands[half] == pytest.approx(told)
+    put = in_one([replace(both[2], puts=(7,)), replace(both[3], puts=(9,))])
+    assert put.puts == (7, half + 9)
 
 
 @pytest.mark.parametrize("name", ["oval", "reinvent_2018", "hairpin"])

@@ -24,6 +24,7 @@ from racecraft.perception import Perceiver, Watcher
 from racecraft.race.policy import load_policy
 from racecraft.replay import read_replay
 from racecraft.run import RunFolder
+from racecraft.run.starters import unpack_starter
 from racecraft.serve.evaluations.beliefs import REMEMBERED
 from racecraft.serve.models.schemas import NewModel
 from racecraft.sim.camera import CAMERAS
@@ -186,6 +187,22 @@ def test_perception_believes_of_a_lap_what_its_command_says(raced: tuple[Running
     away, untold = (np.abs(them - theirs[rows]).mean(axis=0) for them in (ours, without))
     assert (away < 0.003).all()  # rad and m: only how the pictures are made small differs
     assert (untold > 2 * away).all()  # who is not told believes something else
+
+
+def test_perception_remembers_a_lap_in_the_next_one(console: RunningConsole) -> None:
+    folder = unpack_starter("quick", console.runs)
+    request = {"track": "oval", "laps": 2, "num_trials": 1, "rules": "drfc"}
+    job = console.client.post(f"/api/models/{folder.name}/evaluations", json=request).json()
+    assert console.wait_for(console.job_ended(job["id"]))["state"] == "done"
+    (evaluation,) = folder.glob("evaluation-*/evaluation.replay")
+    laps = read_laps(evaluation.parent / "evaluation-simtrace" / "0-iteration.csv")
+    assert [lap.goes_on for lap in laps] == [False, True]
+    said = perceive([evaluation], num_threads=1)[len(laps[0].time) :]
+    path = f"/api/models/{folder.name}/evaluations/{evaluation.parent.name.removeprefix('evaluation-')}/belief"
+    for row in range(4):
+        told = console.client.get(path, params={"lap": 2, "row": row}).json()
+        for name, most in (("heading_rad", 0.002), ("offset_m", 0.002)):
+            assert told[name] == pytest.approx(said[row][name], abs=most), (name, row)
 
 
 def test_a_model_for_a_car_and_driven_as_one(raced: tuple[RunningConsole, str, str], tmp_path: Path) -> None:

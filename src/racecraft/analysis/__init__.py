@@ -4,7 +4,7 @@ sim-traces, history, checkpoints ──▶ analysis ──▶ the console's page
 """
 
 from racecraft.analysis.corners import Passage, Sector, passages, sectors_of
-from racecraft.analysis.laps import TracedLap, driven_direction, read_laps, split_laps, start_place
+from racecraft.analysis.laps import TracedLap, driven_direction, in_one, read_laps, split_laps, start_place
 from racecraft.analysis.maps import TrackMaps, draw_maps, iterations_of
 from racecraft.analysis.paid_laps import PaidLap, pay_laps
 from racecraft.analysis.report import report, write_report
@@ -17,6 +17,7 @@ __all__ = [
     "TrackMaps",
     "draw_maps",
     "driven_direction",
+    "in_one",
     "iterations_of",
     "passages",
     "pay_laps",

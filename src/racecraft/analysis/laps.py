@@ -5,8 +5,9 @@ A trace holds commands; the speed that a car really had comes from its places a 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -54,6 +55,8 @@ class TracedLap:
     """s that it stood for its mistakes."""
     puts: tuple[int, ...] = ()
     """Rows in which the car stands where it was put after a mistake: it did not drive there."""
+    goes_on: bool = False
+    """Whether the car drove on from the lap before, instead of starting anew."""
 
     @property
     def is_complete(self) -> bool:
@@ -111,7 +114,7 @@ def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
         return []
     starts = np.concatenate([[0], np.flatnonzero(np.diff(episode)) + 1, [len(episode)]])
     statuses = columns.get("episode_status")
-    laps = []
+    laps: list[TracedLap] = []
     for begin, end in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
         if end - begin < MIN_ROWS:
             continue
@@ -135,9 +138,23 @@ def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
                 is_placed=stands | np.append(False, is_put),
                 penalty_seconds=CONTROL_DT * int(is_paused.sum()),
                 puts=tuple((np.flatnonzero(is_put) + 1).tolist()),
+                goes_on=bool(laps) and not stands[0] and math.dist(laps[-1].points[-1], points[0]) <= JUMP,
             )
         )
     return laps
+
+
+def in_one(laps: Sequence[TracedLap]) -> TracedLap:
+    """Laps of which each goes on from the one before, as a single one with the last one's number."""
+    names = ("share", "points", "heading", "steering_angle", "throttle", "reward", "is_placed")
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(lap, name) for lap in laps]) for name in names}
+    begins = np.cumsum([0, *(len(lap.time) for lap in laps)]).tolist()
+    return replace(
+        laps[-1],
+        time=np.arange(begins[-1]) * CONTROL_DT,
+        puts=tuple(begin + row for begin, lap in zip(begins, laps, strict=False) for row in lap.puts),
+        **arrays,
+    )
 
 
 def _on_steps(seconds: Floats) -> Floats:

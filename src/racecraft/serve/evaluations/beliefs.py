@@ -1,4 +1,4 @@
-"""What perception believes of one moment of a lap and those before it, beside the camera's picture of it.
+"""What perception believes of one moment of a drive and those before it, beside the camera's picture of it.
 
 As of `racecraft perceive` of a run, it is known what the car was told.
 """
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from fastapi import APIRouter, Query
 
-from racecraft.analysis import driven_direction, read_laps
+from racecraft.analysis import driven_direction, in_one, read_laps
 from racecraft.serve.context import Computes, InContext
 from racecraft.serve.evaluations.analysis import evaluation_track, lens_of, trace_of
 from racecraft.serve.evaluations.objects import objects_of
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from racecraft.perception import Perceiver
 
 REMEMBERED: Final = 150
-"""Pictures of a lap that are looked at for one, 10 s of driving in 0.1 s: of more before it memory holds nothing."""
+"""Pictures of a drive that are looked at for one, 10 s of driving in 0.1 s: of more before it memory holds nothing."""
 router = APIRouter(prefix="/api/models/{name}", tags=["analysis"])
 
 _LOOKING: Final = threading.Lock()
@@ -49,24 +49,26 @@ def get_belief(
     folder = context.garage.folder(name)
     track = evaluation_track(context, folder, stamp)
     laps = read_laps(trace_of(folder, stamp))
-    found = next((traced for traced in laps if traced.number == lap), None)
-    if found is None or row >= len(found.time):
+    last = next((place for place, traced in enumerate(laps) if traced.number == lap), None)
+    if last is None or row >= len(laps[last].time):
         raise NotFound(f"Evaluation {stamp} of {name!r} has no step {row} in lap {lap}.")
-    camera = lens_of(folder)
-    poses = found.seen_from(camera.age)
-    view = Scene(driven_direction(track, [found.points]), palette=camera.palette).driver_view(camera, lit_walls=False)
-    objects = objects_of(folder, stamp, laps).get(lap, [])
-    first = max(0, row - REMEMBERED + 1, *(put for put in found.puts if put <= row))
-    pictures = [
-        view.draw(*poses[step].tolist(), cars=[_view(one, step) for one in objects]) @ np.array(LUMA)
-        for step in range(first, row + 1)
-    ]
+    begun = max(place for place in range(last + 1) if not laps[place].goes_on)
+    driven, camera = in_one(laps[begun : last + 1]), lens_of(folder)
+    poses, step = driven.seen_from(camera.age), len(driven.time) - len(laps[last].time) + row
+    view = Scene(driven_direction(track, [driven.points]), palette=camera.palette).driver_view(camera, lit_walls=False)
+    objects = objects_of(folder, stamp, laps)
+    rows = [(traced.number, place) for traced in laps[begun : last + 1] for place in range(len(traced.time))]
+    first = max(0, step - REMEMBERED + 1, *(put for put in driven.puts if put <= step))
+    pictures = []
+    for pose, (number, place) in zip(poses[first : step + 1].tolist(), rows[first:], strict=False):
+        cars = [_view(one, place) for one in objects.get(number, [])]
+        pictures.append(view.draw(*pose, cars=cars) @ np.array(LUMA))
     frames = (np.stack(pictures) + 0.5).astype(np.uint8)
-    frame, last = frames[-1], row - first
-    commands = found.commands[first : row + 1]
+    commands = driven.commands[first : step + 1]
     commands[0] = np.nan  # of what was before it nothing is remembered
     with _LOOKING:
-        belief = Watcher(_perceiver()).film(frames, np.arange(first, row + 1) == first, commands=commands)
+        belief = Watcher(_perceiver()).film(frames, np.arange(len(frames)) == 0, commands=commands)
+    frame, last = frames[-1], len(frames) - 1
     told = tell("", belief, last)
     del told["file"]
     seen = [place for place in range(len(ROWS)) if sees_middle(belief, last, place)]
