@@ -258,6 +258,41 @@ DIFFERENCE = """async ([films, at]) => {
 
 def test_an_evaluation_drives_along_as_a_ghost(visit: Visit) -> None:
     client, console = visit.console.client, visit.console
+def test_keys_look_through_a_list_and_add_one_of_it(visit: Visit) -> None:
+    page = visit.open("/contests/new")
+    add = page.get_by_role("combobox", name="Add a model")
+    add.locator("option", has_text="bob").wait_for(state="attached")
+    added = page.get_by_role("button", name="Take out: ")
+    add.focus()
+    for key, shown in (("b", "bob"), ("ArrowDown", "ada"), ("ArrowUp", "bob")):
+        page.keyboard.press(key)
+        assert (add.input_value(), added.count()) == (shown, 0)
+    page.keyboard.press("Enter")
+    page.get_by_role("status").filter(has_text="bob").filter(has_text="is added").wait_for()
+    assert (add.input_value(), added.count(), page.url[-13:]) == ("", 1, "/contests/new")
+    page.keyboard.press("ArrowDown")  # from where the list begins: the choice is still the keyboard's
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")  # on the button beside it
+    page.get_by_role("button", name="Take out: bob").nth(1).wait_for()
+    assert add.evaluate("one => one === document.activeElement")
+    add.select_option("ada")  # after keys that is one more look
+    assert added.count() == 2
+    add.dispatch_event("pointerdown")
+    add.select_option("ada")
+    assert added.count() == 3
+
+    visit.look("light", "de")
+    page = visit.open("/contests/new", width=390)
+    page.get_by_role("combobox", name="Einen Geist dazunehmen").focus()
+    page.keyboard.press("ArrowDown")
+    page.get_by_role("button", name="Dazunehmen", exact=True).wait_for()
+    assert page.get_by_role("button", name="Den Geist herausnehmen").count() == 0
+    assert visit.overflow() == 0
+    page.keyboard.press("Enter")
+    page.get_by_role("button", name="Den Geist herausnehmen").wait_for()
+    visit.look("light", "en")
+
+
     # as on the command line, where resets can be few and a film be left out, or a beginner is filmed for minutes
     evaluate_run(console.runs / "bob", laps=1, num_trials=1, max_resets=2, video=False, num_threads=1)
     (stamp,) = (card["stamp"] for card in client.get("/api/models/bob/evaluations").json())
