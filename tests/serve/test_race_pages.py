@@ -65,6 +65,8 @@ def test_a_race_is_made_entered_and_watched(visit: Visit) -> None:
     page.locator(":fullscreen").get_by_role("button", name="Full screen").click()
     page.locator(":fullscreen").wait_for(state="detached")
     page.get_by_role("img", name="Time behind").wait_for()
+    assert page.get_by_role("button", name="Close", exact=True).count() == 0  # the film, or a camera?
+    assert page.get_by_role("button", name="Close: Replay").count() == 1
     assert page.get_by_role("button", name="Why is").count() == 1
     clock = page.locator(".controls .number")
     visit.console.wait_for(lambda: float(clock.inner_text().split()[0]) > 0.5)

@@ -26,7 +26,7 @@ export const drive = {
   drive_laps: "Your laps",
   drive_no_laps: "Each lap you complete is listed here.",
   drive_camera: "Camera",
-  drive_camera_chase: "Close",
+  drive_camera_chase: "Near",
   drive_camera_follow: "Far",
   drive_camera_top: "Whole track",
   drive_left: "Left",
