@@ -434,6 +434,27 @@ def test_a_ghost_is_called_as_its_model_is_now() -> None:
         assert [ghost.name for ghost in named] == [*names, "heron", "bob@last", "Sunday"]
 
 
+def test_ghosts_of_one_model_are_told_apart() -> None:
+    from racecraft.film.ghost import Ghost
+
+    drove: dict[str, Any] = {
+        "poses": np.zeros((1, 3)),
+        "steering": np.zeros(1),
+        "clock": np.zeros(1),
+        "color": (0, 0, 0),
+    }
+    found = [Ghost(name, **drove) for name in ("ada-old", "ada-old", "ada", "ada@last", "ada")]
+    asked: list[str | dict[str, Any]] = [
+        {"model": "ada", "evaluation": "20261128103821"},
+        {"model": "ada", "evaluation": "20261128103825"},
+        {"model": "ada", "checkpoint": "best"},
+        {"model": "ada", "checkpoint": "last"},
+        {"heat": "0" * 16},
+    ]
+    named = [ghost.name for ghost in ghosts.named_as_asked(found, asked)]
+    assert named == ["ada 20261128103821", "ada 20261128103825", "ada", "ada@last", "ada-2"]
+
+
 @pytest.mark.parametrize("text", ["{}", '{"ghosts": 3}', '{"ghosts": [3]}', '{"ghosts": [{"name": "a"}]}', "{"])
 def test_a_damaged_file_of_ghosts_is_told(tmp_path: Path, text: str) -> None:
     assert ghosts.read_beside(tmp_path) == []

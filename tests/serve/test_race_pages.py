@@ -258,8 +258,6 @@ DIFFERENCE = """async ([films, at]) => {
 """How many pixels of two films differ in a moment, and where: in the middle of them."""
 
 
-def test_an_evaluation_drives_along_as_a_ghost(visit: Visit) -> None:
-    client, console = visit.console.client, visit.console
 def test_keys_look_through_a_list_and_add_one_of_it(visit: Visit) -> None:
     page = visit.open("/contests/new")
     add = page.get_by_role("combobox", name="Add a model")
@@ -295,6 +293,8 @@ def test_keys_look_through_a_list_and_add_one_of_it(visit: Visit) -> None:
     visit.look("light", "en")
 
 
+def test_an_evaluation_drives_along_as_a_ghost(visit: Visit) -> None:
+    client, console = visit.console.client, visit.console
     # as on the command line, where resets can be few and a film be left out, or a beginner is filmed for minutes
     evaluate_run(console.runs / "bob", laps=1, num_trials=1, max_resets=2, video=False, num_threads=1)
     (stamp,) = (card["stamp"] for card in client.get("/api/models/bob/evaluations").json())
@@ -316,7 +316,7 @@ def test_keys_look_through_a_list_and_add_one_of_it(visit: Visit) -> None:
     page.get_by_label("Resets allowed").fill("1")
     page.get_by_role("button", name="Start the heat with 2").click()
     page.get_by_role("heading", name="The heat in 3D").wait_for()
-    assert page.locator("dd", has_text="bob · ").count() == 1
+    assert page.locator("dd", has_text="bob (").count() == 1
     page.locator(".stage li").nth(2).wait_for()
     assert page.locator(".stage li").all_inner_texts()[2:] == ["bob\nghost"]
     film = str(page.get_by_role("link", name="Video").get_attribute("href"))

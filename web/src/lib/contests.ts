@@ -1,8 +1,10 @@
 /** What heats and ladders are called. */
 import type { ContestCard, Ghost } from "../api/contests";
+import type { RaceReplay } from "../api/races";
 import type { Key } from "../i18n/en";
 import { t } from "../i18n/index.svelte";
 import { ofStamp } from "./dates";
+import { plain } from "./numbers";
 
 /** How they race: a heat by its cars, a ladder by what it compares by. */
 export const kindOf = (contest: Pick<ContestCard, "kind" | "models">): string =>
@@ -23,8 +25,23 @@ export const contestName = (contest: Pick<ContestCard, "title" | "models" | "is_
 /** A ghost of a film, by what there is to know of earlier heats. */
 export function ghostName(ghost: Ghost, heats: ContestCard[]): string {
   if (ghost === "best-lap") return t("contests_ghost_best_lap");
-  if ("evaluation" in ghost) return `${ghost.model} · ${ofStamp(ghost.evaluation)}`;
+  if ("evaluation" in ghost) return `${ghost.model} (${ofStamp(ghost.evaluation)})`;
   if ("model" in ghost) return ghost.checkpoint === "best" ? ghost.model : `${ghost.model}@${ghost.checkpoint}`;
   const heat = heats.find((one) => one.id === ghost.heat);
   return heat ? contestName(heat) : t("contests_ghost_heats");
 }
+
+/** What is called alike, told apart. */
+export const apart = (names: string[]): string[] =>
+  names.map((name, index) => {
+    const before = names.slice(0, index).filter((one) => one === name).length;
+    return before ? `${name} (${plain(before + 1)})` : name;
+  });
+
+/** Ghosts of a film as its legend has them; behind a name may stand of which evaluation it is. */
+export const ghostLabels = (ghosts: RaceReplay["ghosts"]): string[] =>
+  apart(
+    ghosts.map(({ name, is_lap }) =>
+      is_lap ? t("contests_ghost_best_lap") : name.replace(/ (\d{14})$/, (_, stamp: string) => ` (${ofStamp(stamp)})`),
+    ),
+  );

@@ -153,17 +153,29 @@ def sources_of(ghosts: Sequence[str | dict[str, Any]], *, folder: Path, runs: Pa
 
 
 def named_as_asked(ghosts: Sequence[Ghost], asked: Sequence[str | dict[str, Any]]) -> list[Ghost]:
-    """Ghosts of a film, those of an evaluation by the model's name: it may have been renamed since it drove.
+    """Ghosts of a film, each by a name of its own.
+
+    Those of an evaluation are called as the model is now, which may have been renamed since it drove, and with the
+    evaluation's stamp where others are called so, too; what is still alike is numbered, as cars of a grid are.
 
     Args:
         ghosts: In the order they were asked for; of the fastest lap there is none where nobody drove one.
         asked: As the job's payload has them.
     """
     there = [one for one in asked if len(ghosts) == len(asked) or not isinstance(one, str)]
-    return [
-        replace(ghost, name=one["model"]) if not isinstance(one, str) and "evaluation" in one else ghost
+    stamps = [one.get("evaluation", "") if isinstance(one, dict) else "" for one in there]
+    names = [
+        one["model"] if isinstance(one, dict) and "evaluation" in one else ghost.name
         for ghost, one in zip(ghosts, there, strict=True)
     ]
+    told: list[str] = []
+    for name, stamp in zip(names, stamps, strict=True):
+        own = f"{name} {stamp}" if stamp and names.count(name) > 1 else name
+        number, label = 2, own
+        while label in told:
+            label, number = f"{own}-{number}", number + 1
+        told.append(label)
+    return [replace(ghost, name=name) for ghost, name in zip(ghosts, told, strict=True)]
 
 
 def write_beside(
