@@ -18,7 +18,9 @@ export const firstGenerated = (road: string): string | undefined =>
 /** What roads are called, by the title of one that is in a list. */
 export function roadName(road: string, titleOf: (name: string) => string | undefined): string {
   if (road === "library") return t("road_library");
-  const seeds = seedsOf(road);
-  if (seeds && seeds[0] !== seeds[1]) return t("road_seeds", { first: String(seeds[0]), last: String(seeds[1]) });
-  return titleOf(road) ?? road;
+  const found = /^generated:(\d+)(?:\.\.(\d+))?(,.*)?$/.exec(road);
+  if (!found) return titleOf(road) ?? road;
+  const [, first, last = first, options = ""] = found;
+  const name = first === last ? t("road_seed_of", { seed: first! }) : t("road_seeds", { first: first!, last: last! });
+  return name + options.replaceAll(",", ", ");
 }

@@ -1,5 +1,6 @@
 /** What tracks are called on every page; the server, addresses and settings know them by their names. */
 import { api } from "../api/client";
+import { roadName } from "./roads";
 
 let titles = $state.raw<ReadonlyMap<string, string>>(new Map());
 const asked: string[] = []; // names that were looked for: one that is gone is not looked for again
@@ -11,7 +12,7 @@ export function titleOf(name: string): string {
     asked.push(name);
     void ask();
   }
-  return titles.get(name) ?? name;
+  return roadName(name, (road) => titles.get(road));
 }
 
 async function ask(): Promise<void> {

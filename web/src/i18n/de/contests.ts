@@ -67,6 +67,7 @@ export const contests: Record<keyof typeof english, string> = {
   road_seed: "Startzahl der Strecke",
   road_seed_first: "Startzahlen von",
   road_seed_last: "bis",
+  road_seed_of: "Generator, Startzahl {seed}",
   road_seeds: "Generator, Startzahlen {first} bis {last}",
   contests_races_driven: "{count} Rennen gefahren",
   contests_state_queued: "Wartet",

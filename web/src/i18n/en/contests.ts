@@ -63,6 +63,7 @@ export const contests = {
   road_seed: "Seed of the road",
   road_seed_first: "Seeds from",
   road_seed_last: "to",
+  road_seed_of: "generator, seed {seed}",
   road_seeds: "generator, seeds {first} to {last}",
   contests_races_driven: "{count} {count|race|races} driven",
   contests_state_queued: "Waiting",
