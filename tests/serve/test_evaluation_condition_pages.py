@@ -28,7 +28,7 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visit]:
 
 def test_a_car_and_conditions_are_chosen_and_told(visit: Visit) -> None:
     page = visit.open("/models/ada/race")
-    page.get_by_text("Car: v5 · Direction: As drawn", exact=True).wait_for()
+    page.get_by_text("Car: v5, the original's last · Direction: As drawn", exact=True).wait_for()
     page.get_by_role("spinbutton", name="Laps").fill("1")
     page.get_by_role("spinbutton", name="Trials").fill("1")
     page.get_by_role("checkbox", name="Otherwise than it learned").check()

@@ -120,6 +120,39 @@ def test_a_best_lap_may_need_others_beside_it(visit: Visit) -> None:
 
 
 @needs_axe
+def test_the_facts_of_a_race_tell_its_car_and_what_is_otherwise(visit: Visit) -> None:
+    client = visit.console.client
+    own = {"vehicle": {"mass": 9.5, "speed_gain": 0.8}, "randomize": {"light": [0.8, 1]}, "track": "generated:1"}
+    for title, asked, english, german in (
+        ("Usual", {"track": "oval"}, ("v5, the original's last", "Nothing"), ("v5, das letzte dort", "Nichts")),
+        (
+            *("Otherwise", own),
+            ("own numbers: mass 9.5 · speed_gain 0.8", "own ranges: light 0.8 – 1", "generator, seed 1"),
+            ("eigene Zahlen: mass 9,5 · speed_gain 0,8", "eigene Bereiche: light 0,8 – 1", "Generator, Startzahl 1"),
+        ),
+    ):
+        made = client.post("/api/races", json={"title": title, "trials": 1, "seed": 1, **asked}).json()
+        page = visit.open(f"/races/{made['id']}")
+        for told in english:
+            page.locator(".facts").get_by_text(told, exact=True).wait_for()
+        page.get_by_role("checkbox", name="ada").check()  # opens what makes the card beside it longer
+        page.get_by_role("combobox", name="Add a ghost").wait_for()
+        card, drawing = page.locator(".facts").bounding_box(), page.locator(".facts .drawing").bounding_box()
+        assert card is not None
+        assert drawing is not None
+        assert drawing["y"] - card["y"] < 30  # not in the middle of nothing
+        visit.look("light", "de")
+        page = visit.open(f"/races/{made['id']}", width=390)
+        for told in german:
+            page.locator(".facts").get_by_text(told, exact=True).wait_for()
+        assert visit.overflow() == 0
+        visit.look("light", "en")
+    page = visit.open("/races")
+    drawn = page.locator("li", has_text="Otherwise")
+    drawn.locator(".drawing svg").wait_for()  # it is in no list of tracks
+    assert drawn.get_by_text("generator, seed 1 · ").count() == 1
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_axe_finds_nothing_in_open_forms(visit: Visit, theme: str) -> None:
     visit.look(theme)

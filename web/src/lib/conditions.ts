@@ -65,7 +65,8 @@ function entriesOf(text: string): [string, unknown][] {
 }
 
 /** A car in words. */
-export const toldCar = (car: AskedCar): string => (typeof car === "string" ? car : told("car_own", car));
+export const toldCar = (car: AskedCar): string =>
+  car === "v5" ? t("car_default") : typeof car === "string" ? car : told("car_own", car);
 
 /** What is otherwise than models know, in words. */
 export function toldRanges(ranges: AskedRanges): string {
