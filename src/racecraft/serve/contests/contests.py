@@ -266,10 +266,14 @@ class Contests:
             payload["seed"] = secrets.randbelow(2**32)
         folders = [self._garage.folder(starter.model) for starter in driving]
         contest = new_job_id()
-        keep(replays, self.folder(contest))
-        filled = self.folder(contest) if replays else None
-        cargo = self._mirror.share(*folders, tracks=payload["paths"], filled=filled)
-        return self._queue.add(kind, driving[0].model, payload, cargo=cargo, job_id=contest).id
+        try:
+            keep(replays, self.folder(contest))
+            filled = self.folder(contest) if replays else None
+            cargo = self._mirror.share(*folders, tracks=payload["paths"], filled=filled)
+            return self._queue.add(kind, driving[0].model, payload, cargo=cargo, job_id=contest).id
+        except Exception:
+            shutil.rmtree(self.folder(contest), ignore_errors=True)
+            raise
 
     def _card(self, job: Job) -> ContestCard:
         payload, result = job.payload, job.result or {}
