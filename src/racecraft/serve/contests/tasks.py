@@ -6,9 +6,11 @@ import json
 import os
 import zipfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from racecraft import system
 from racecraft.serve.contests.files import DRIVEN, MATCHES, REPLAY, VIDEO, contest_folder
 from racecraft.serve.contests.terms import terms_of
 from racecraft.serve.jobs.task import Task
@@ -101,8 +103,13 @@ def ladder(task: Task) -> dict[str, Any]:
 
     payload, folder = task.job.payload, _folder(task)
     held = terms_of(payload)
+    for left in folder.parent.glob(f"*/.{MATCHES}.*"):  # by a ladder that was killed; who lives has locked its own
+        with suppress(OSError), left.open("r+b") as dead:
+            system.lock(dead.fileno())
+            left.unlink()
     unfinished = folder / f".{MATCHES}.{os.getpid()}"  # hidden: nobody copies it while it grows
-    with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
+    with unfinished.open("wb") as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        system.lock(file.fileno())
 
         def watch(match: Match, trials: Sequence[Trial]) -> None:
             number = len(archive.namelist())
