@@ -21,11 +21,10 @@ from racecraft.sim.vehicle import PRESETS, Vehicle
 VEHICLES: Final = ("v5", "v4", "v6")
 """The usual one first."""
 
-Parameter = Annotated[float, Field(allow_inf_nan=False)]
 Name = Annotated[str, Field(max_length=40)]
-AskedVehicle = Name | dict[Name, Parameter]
+AskedVehicle = Name | dict[Name, float]
 """``v4``, ``v5``, ``v6`` or parameters of one's own, in the units of `Vehicle`; those left out are v5's."""
-AskedRanges = Name | dict[Name, tuple[Parameter, Parameter]]
+AskedRanges = Name | dict[Name, tuple[float, float]]
 """A preset, or least and most of quantities, in the units of `Randomization`; those left out do not change."""
 
 
