@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import shutil
 import ssl
 import subprocess
@@ -12,6 +13,8 @@ import sys
 import time
 from collections.abc import Iterator
 from configparser import RawConfigParser
+from ipaddress import ip_address, ip_network
+from itertools import pairwise
 from pathlib import Path
 
 import httpx
@@ -173,9 +176,17 @@ def test_the_container_serves_on_postgresql_and_tells_whether_it_is_well(
         command = [sys.executable, *(part.replace("8321", port) for part in rest)]
         return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
+    options += ["--trusted-proxy", "127.0.0.1"]  # in place of the container's network
     with running_console(tmp_path / "runs", *options, "--database", postgres.new_database()) as console:
         port = str(console.client.base_url.port)
         assert is_well(port)
+        owner = {"cookie": f"racecraft_session={secret_of(console)}", "origin": "https://racing.example.org"}
+        proxy = {"host": "racing.example.org", "x-forwarded-proto": "https", "x-forwarded-for": "10.1.2.3"}
+        url = f"http://127.0.0.1:{port}/api"
+        code = ok(httpx.post(f"{url}/invitations", json={"uses": 1}, headers={**proxy, **owner}), 201)["code"]
+        ok(httpx.post(f"{url}/door/join", json={"code": code, "name": "Ada"}, headers=proxy), 201)
+        (line,) = ok(httpx.get(f"{url}/audit?what=join", headers={**proxy, **owner}))
+        assert line["details"] == {"address": "10.1.2.3"}, "who calls from a school's own network is told apart"
     assert not is_well(port)
 
 
@@ -187,12 +198,21 @@ def test_the_composed_parts_fit_together() -> None:
         assert set(service.get("depends_on", ())) <= set(services), name
         assert {volume.split(":")[0] for volume in service.get("volumes", ())} <= set(compose["volumes"]), name
         assert "ports" not in service or name == "proxy", "only the proxy is reached from outside"
-    (inside,) = compose["networks"]["inside"]["ipam"]["config"]
+        assert service["restart"] == "always", "podman-restart starts no others with the machine"
     command = services["league"]["command"]
-    assert command[command.index("--trusted-proxy") + 1] == inside["subnet"]
+    trusted = [ip_network(value) for option, value in pairwise(command) if option == "--trusted-proxy"]
+    assert "ipam" not in (compose["networks"]["inside"] or {}), "podman-compose 1.0.3 takes no notice of it"
+    for taken in ("10.89.0.2", "172.18.0.2", "192.168.32.2"):  # what podman takes first, Docker first, and Docker later
+        assert any(ip_address(taken) in network for network in trusted), taken
+    assert not any(ip_address(FORGED) in network for network in trusted)
     address = command[command.index("--address") + 1]
     assert f"https://{services['proxy']['command'][services['proxy']['command'].index('--from') + 1]}" == address
     assert services["proxy"]["command"][-1] == f"league:{ServeSettings.port}"
+    assert "-h" in services["database"]["healthcheck"]["test"], "the server that sets the database up is not it yet"
+    health = dict(services["league"]["healthcheck"])
+    assert shlex.split(health.pop("test")) == json.loads(line_of("HEALTHCHECK"))  # a list is quoted wrongly on its way
+    told = [line for line in (DEPLOY / "Containerfile").read_text().splitlines() if line.startswith("HEALTHCHECK")]
+    assert {f"--{name.replace('_', '-')}={value}" for name, value in health.items()} < set(told[0].split())
     password = re.compile(r"\$\{POSTGRES_PASSWORD(:\?choose one)?\}")
     assert password.search(services["database"]["environment"]["POSTGRES_PASSWORD"])
     league = services["league"]["environment"]
