@@ -345,6 +345,17 @@ def test_too_little_to_calibrate(lines, tmp_path):
         calibrate(write(tmp_path / "a.csv", lines), held_out=1.0)
 
 
+def test_a_log_in_which_two_workers_write_by_turns_says_so(lines, tmp_path):
+    both = [["7", *line[1:]] for line in lines]
+    path = write(tmp_path / "both.log", [row for pair in zip(lines, both, strict=True) for row in pair], form="log")
+    with pytest.warns(UserWarning, match=r"^Motion is not compared: .* 21 rows .* as a file of its own\.$"):
+        result = replay(path, track=OVAL)
+    assert (result.to_dict()["windows"], result.rules.rows) == (0, 2 * len(lines))
+    with pytest.raises(RunError) as caught:
+        calibrate(path)
+    assert "as a file of its own" in caught.value.hint
+
+
 def test_picture(lines, tmp_path):
     from PIL import Image
 
@@ -354,8 +365,10 @@ def test_picture(lines, tmp_path):
         assert len(picture.getcolors(1 << 20)) > 100
     with pytest.raises(ConfigError, match=r"ends in '\.txt'"):
         draw_comparison(result, tmp_path / "a.txt")
+    with pytest.warns(UserWarning, match="Motion is not compared"):
+        short = replay(write(tmp_path / "b.csv", lines[:10]), track="oval")
     with pytest.raises(ConfigError, match="nothing to draw"):
-        draw_comparison(replay(write(tmp_path / "b.csv", lines[:10]), track="oval"), tmp_path / "b.png")
+        draw_comparison(short, tmp_path / "b.png")
 
 
 @pytest.mark.costly

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from racecraft.checks import check_number
 from racecraft.errors import RunError
 from racecraft.fidelity.dynamics import REPORTED_STEPS, Windows, reported_errors, windows_of
-from racecraft.fidelity.logs import Faults, Log, read_logs
+from racecraft.fidelity.logs import GIVE_APART, Faults, Log, read_logs
 from racecraft.fidelity.rules import require_length
 from racecraft.sim.vehicle import LIMITS, Vehicle, load_vehicle
 from racecraft.track import load_track
@@ -131,7 +131,7 @@ def _load(paths: Sequence[str | Path], track: Track | None) -> tuple[Windows, in
         found = 0 if windows is None else len(windows)
         raise RunError(
             f"The logs hold {found} windows of 21 rows in a row; a fit needs {2 * MIN_WINDOWS} at least.",
-            hint="Give more logs, or longer ones.",
+            hint=f"Give more logs, or longer ones. {GIVE_APART}",
         )
     return windows, sum(int(log.is_moved.sum()) for log in read)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -12,8 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.fidelity.differences import Differences
-from racecraft.fidelity.dynamics import KNOWN_ROWS, REPORTED_STEPS, Windows, errors_of, reported_errors, windows_of
-from racecraft.fidelity.logs import Faults, Log, read_logs
+from racecraft.fidelity.dynamics import (
+    KNOWN_ROWS,
+    REPORTED_STEPS,
+    WINDOW_ROWS,
+    Windows,
+    errors_of,
+    reported_errors,
+    windows_of,
+)
+from racecraft.fidelity.logs import GIVE_APART, Faults, Log, read_logs
 from racecraft.fidelity.rules import RulesAgreement, TrackRules, require_agreement, require_length
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track import load_track
@@ -153,6 +162,9 @@ def replay(
         result.errors = np.concatenate(errors)
         middle = float(np.median(result.errors[:, -1, 0]))
         result.examples = (min(typical, key=lambda example: abs(example.error - middle)), worst)
+    else:
+        told = f"Motion is not compared: nowhere do {WINDOW_ROWS} rows of one drive follow each other. {GIVE_APART}"
+        warnings.warn(told, stacklevel=2)
     result.clocks = tuple(sorted(clocks))
     return result
 

@@ -38,6 +38,7 @@ MAX_NUMBER: Final = 1e12
 MAX_NOTES: Final = 20
 FASTEST: Final = 8.0
 """m/s that no car drives: twice what the fastest is asked for. The original's logs of driving have 3.7 at the most."""
+GIVE_APART: Final = "Where several workers wrote into one log by turns, give each one's rows as a file of its own."
 _NEEDED: Final = COLUMNS[:14]  # up to track_len; tstamp is the fifteenth of all eras
 _NUMBERS: Final = ("episode", "steps", "X", "Y", "yaw", "steer", "throttle", "reward", "progress", "tstamp")
 _BRACKETS: Final = re.compile(r"\[[^\]]*\]")
