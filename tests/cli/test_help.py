@@ -72,6 +72,10 @@ def test_without_a_verb_it_shows_the_help(racecraft: Run) -> None:
     outcome = racecraft()
     assert outcome.status == 2
     assert "Commands:" in outcome.out + outcome.err
+    as_json = racecraft("--json")
+    assert as_json.status == 2
+    error = {"code": "UsageError", "message": "Missing command.", "hint": "See 'racecraft --help'."}
+    assert as_json.document == {"error": error}
 
 
 def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:

@@ -27,6 +27,7 @@ TrackOption = Annotated[str, typer.Option("--track", "-t", help="Name of a track
 
 @app.callback(invoke_without_command=True)
 def root(
+    context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the stack trace of an error.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="With --version: the build as one JSON object.")] = False,
@@ -40,6 +41,8 @@ def root(
     if version:
         typer.echo(__version__)
         raise typer.Exit
+    if context.invoked_subcommand is None:
+        context.fail("Missing command.")
 
 
 def text() -> Any:
