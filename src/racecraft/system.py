@@ -51,19 +51,23 @@ def memory_bytes() -> int | None:
 # ---- locks
 
 
-def lock(descriptor: int) -> None:
+def lock(descriptor: int, *, waits: bool = False) -> None:
     """Lock an open file for as long as the process has it open; the system drops it with the process.
+
+    Args:
+        descriptor: Of the file.
+        waits: Until nobody else has locked it, on Windows for ten seconds.
 
     Raises:
         OSError: Somebody else has locked it.
     """
     if fcntl is not None:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
         return
     import msvcrt
 
     os.lseek(descriptor, _BEHIND_TEXT, os.SEEK_SET)
-    msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
+    msvcrt.locking(descriptor, msvcrt.LK_LOCK if waits else msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
     os.lseek(descriptor, 0, os.SEEK_SET)
 
 

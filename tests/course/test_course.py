@@ -6,6 +6,8 @@ import json
 import os
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -176,6 +178,27 @@ def test_progress_is_kept() -> None:
     progress_file.record_quiz(3, 0.75)
     progress_file.record_quiz(3, 0.25)
     assert read_progress().to_dict() == {"exercises": ["1.inside"], "quizzes": {"3": 0.75}}
+
+
+def test_two_processes_keep_what_both_solve() -> None:
+    solves = "import sys; from racecraft.course.progress import record_exercise, record_quiz\n"
+    solves += "print(flush=True); input()\n"
+    solves += "for number in range(100): record_exercise(f'{number}.{sys.argv[1]}'); record_quiz(number, 0.5)"
+    both = [
+        subprocess.Popen([sys.executable, "-c", solves, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        for name in ("ada", "bob")
+    ]
+    for process in both:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "\n"
+    for process in both:
+        print(file=process.stdin, flush=True)
+    for process in both:
+        process.communicate()
+        assert process.returncode == 0
+    kept = read_progress()
+    assert len(kept.exercises) == 200
+    assert len(kept.quizzes) == 100
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"exercises": 3}', '{"exercises": [], "more": 1}', "\xff"])

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from racecraft import system
 from racecraft.errors import ConfigError
 from racecraft.json_file import MAX_BYTES, read_bytes
 from racecraft.run.atomic import write_file
@@ -58,10 +61,8 @@ def record_exercise(name: str) -> None:
         ConfigError: The file is damaged, or cannot be read.
         OSError: It cannot be written.
     """
-    progress = read_progress()
-    if name not in progress.exercises:
+    with _to_change() as progress:
         progress.exercises.add(name)
-        _write(progress)
 
 
 def record_quiz(number: int, share: float) -> None:
@@ -71,12 +72,20 @@ def record_quiz(number: int, share: float) -> None:
         ConfigError: The file is damaged, or cannot be read.
         OSError: It cannot be written.
     """
-    progress = read_progress()
-    progress.quizzes[number] = max(share, progress.quizzes.get(number, 0.0))
-    _write(progress)
+    with _to_change() as progress:
+        progress.quizzes[number] = max(share, progress.quizzes.get(number, 0.0))
 
 
-def _write(progress: Progress) -> None:
+@contextmanager
+def _to_change() -> Iterator[Progress]:
+    """What was solved so far, kept as the block leaves it; whoever else wants to change it waits."""
     path = progress_path()
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_file(path, json.dumps(progress.to_dict(), indent=1).encode() + b"\n", durable=False)
+    descriptor = os.open(path.with_suffix(".lock"), os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        system.lock(descriptor, waits=True)
+        progress = read_progress()
+        yield progress
+        write_file(path, json.dumps(progress.to_dict(), indent=1).encode() + b"\n", durable=False)
+    finally:
+        os.close(descriptor)
