@@ -152,6 +152,31 @@ def test_so_many_wait_and_so_many_are_kept(
         submit(files[3])
 
 
+def test_what_is_published_of_a_race_is_of_one_moment(
+    league: League, entries: Entries, database: Database, files: list[bytes]
+) -> None:
+    """It ends, and its only entry is judged, while it is read."""
+    number, submission = race_of(database), enter(entries, database)(files[0])
+    written: list[int] = []
+
+    def over(_: object, __: object, statement: str, *___: object) -> None:
+        if "FROM groups" in statement and not written:
+            written.append(1)
+            with database.transaction() as session:
+                session.get_one(Race, number).closes = now()
+            end(database, submission, "done")
+
+    before = league.published(number, user_id=ADA)
+    assert (before["state"], before["running"]) == ("open", 1)
+    sa.event.listen(sa.Engine, "before_cursor_execute", over)
+    try:
+        assert league.published(number, user_id=ADA) == before
+    finally:
+        sa.event.remove(sa.Engine, "before_cursor_execute", over)
+    after = league.published(number, user_id=ADA)
+    assert (written, after["state"], after["running"]) == ([1], "closed", 0)
+
+
 def test_a_change_of_a_race_changes_what_it_names_and_nothing_else(league: League, database: Database) -> None:
     number = race_of(database)
     with database.transaction() as session:

@@ -144,10 +144,7 @@ def restore(settings: ServeSettings, source: Path) -> Backup:
 def _write_rows(database: Database, to: IO[bytes]) -> dict[str, int]:
     """Every row of one moment, a line each; how many by table. Sessions stay behind."""
     counts: dict[str, int] = {}
-    isolation = "SERIALIZABLE" if database.engine.dialect.name == "sqlite" else "REPEATABLE READ"
-    with database.engine.connect().execution_options(isolation_level=isolation) as connection:
-        if database.engine.dialect.name == "sqlite":  # whose driver begins no transaction to read
-            connection.exec_driver_sql("BEGIN")
+    with database.one_moment() as connection:
         for table in Table.metadata.sorted_tables:
             counts[table.name] = 0
             if table is Session.__table__:

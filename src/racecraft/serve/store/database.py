@@ -134,6 +134,16 @@ class Database:
             yield session
 
     @contextmanager
+    def one_moment(self) -> Iterator[sa.Connection]:
+        """A connection for several questions that all see the same moment, whatever is written meanwhile."""
+        is_sqlite = self.engine.dialect.name == "sqlite"
+        isolation = "SERIALIZABLE" if is_sqlite else "REPEATABLE READ"
+        with self.engine.connect().execution_options(isolation_level=isolation) as connection:
+            if is_sqlite:  # whose driver begins no transaction to read
+                connection.exec_driver_sql("BEGIN")
+            yield connection
+
+    @contextmanager
     def asking(self) -> Iterator[sa.Connection]:
         """A connection for a question of columns that is asked all the time: a quarter of what a session costs."""
         with self.engine.connect() as connection:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Final, Literal
 
 import sqlalchemy as sa
@@ -165,11 +166,7 @@ class League:
             NotFound: It is not theirs to see.
         """
         with self._database.transaction() as session:
-            race, title, part = seen(session, race_id, user_id)
-            board = board_of(session, race, user_id=user_id, top=top)
-            waiting = sa.select(sa.func.count(Submission.id)).join(Job, Job.id == Submission.job_id)
-            waiting = waiting.where(Submission.race_id == race_id, Job.state.in_(("queued", "running")))
-            return _info(race, title, part), board, session.scalar(waiting) or 0
+            return _board(session, race_id, user_id=user_id, top=top)[1:]
 
     def medals(self, race_id: int) -> Medals | None:
         """What lap times on a race's track are worth in its car, where that is known."""
@@ -200,15 +197,14 @@ class League:
         Raises:
             NotFound: It is not theirs to see.
         """
-        announced = self.announcement(race_id, user_id=user_id).to_dict()
-        race, board, running = self.board(race_id, user_id=user_id, top=NONE)
+        with self._database.one_moment() as connection, Session(connection) as session:
+            found, race, board, running = _board(session, race_id, user_id=user_id, top=NONE)
+            is_over = race.state == "closed"
+            final = {"final": published_final(session, found)} if is_over and race.form != "alone" else {}
+        announced = replace(announcement_of(found), secret=race.secret).to_dict()
         told = {"title": race.title, "state": race.state, "running": running}
-        rows = [vars(row) for row in board.rows] if race.state == "closed" else []
-        found = {**told, **announced, "board": [{name: row[name] for name in PUBLISHED} for row in rows]}
-        if race.form == "alone" or race.state != "closed":
-            return found
-        with self._database.transaction() as session:
-            return {**found, "final": published_final(session, session.get_one(Race, race_id))}
+        rows = [vars(row) for row in board.rows] if is_over else []
+        return {**told, **announced, "board": [{name: row[name] for name in PUBLISHED} for row in rows], **final}
 
     def track(self, race_id: int) -> tuple[str, Track]:
         """A race's track by its name; it may be its maker's own."""
@@ -232,7 +228,17 @@ def seen(session: Session, race_id: int, user_id: int | None) -> tuple[Race, str
     raise NotFound(f"There is no race {race_id} in this league.")
 
 
+def _board(session: Session, race_id: int, *, user_id: int | None, top: int) -> tuple[Race, LeagueRace, Board, int]:
+    """A race, as it is and as it is told, its board, and how many submissions are not judged yet."""
+    race, title, part = seen(session, race_id, user_id)
+    board = board_of(session, race, user_id=user_id, top=top)
+    waiting = sa.select(sa.func.count(Submission.id)).join(Job, Job.id == Submission.job_id)
+    waiting = waiting.where(Submission.race_id == race_id, Job.state.in_(("queued", "running")))
+    return race, _info(race, title, part), board, session.scalar(waiting) or 0
+
+
 def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
+    state = state_of(race)
     return LeagueRace.model_validate(
         {
             **{name: getattr(race, name) for name in LeagueRace.model_fields if hasattr(race, name)},
@@ -246,7 +252,7 @@ def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
             "is_practice": "seed" in race.document,
             "laps": int(race.rules.get("laps", 1)),
             "time_limit": float(race.rules.get("time_limit", 0.0)),
-            "state": state_of(race),
-            "secret": "" if is_withheld(race) else race.secret,
+            "state": state,
+            "secret": race.secret if state == "closed" else "",
         }
     )
