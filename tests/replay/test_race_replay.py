@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 import zlib
 from dataclasses import replace
@@ -15,10 +16,11 @@ import pytest
 
 from racecraft.errors import ReplayError
 from racecraft.race import Autopilot, Evaluation, RaceRules, evaluate
-from racecraft.replay import Replay, read_replay, verify, write_replay
+from racecraft.replay import Replay, header, read_replay, verify, write_replay
 from racecraft.replay.codec import MAGIC, TYPES, VERSION, pack, pack_column, unpack, unpack_column
 from racecraft.sim import Bots, Objects, Obstacles
 from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.objects import MAX_OBJECTS
 from racecraft.track import load_track
 
 AUTOPILOT = Autopilot(speed=2.0)
@@ -413,3 +415,17 @@ def test_columns_come_back_as_they_were() -> None:
         kind, data = pack_column(values)
         assert (kind, len(data)) == (expected, len(values) * TYPES[kind])
         assert unpack_column(kind, data).astype(np.float64).tobytes() == values.tobytes()
+
+
+def test_core_program_and_tab_take_roads_and_races_of_the_same_size() -> None:
+    root = Path(__file__).parents[2]
+    names = "MAX_CARS", "MAX_LAPS", "MAX_STEPS", "MAX_WAYPOINTS"
+    limits = [*(getattr(header, name) for name in names), MAX_OBJECTS]
+    tab = (root / "web/src/tab/verify/header.ts").read_text(encoding="utf-8")
+    told = re.search(
+        r"^const \[MOST_CARS, MOST_LAPS, MOST_STEPS, MOST_WAYPOINTS, MOST_OBJECTS\] = \[(.*)\];", tab, re.M
+    )
+    assert told is not None
+    assert [int(number.replace("_", "")) for number in told[1].split(",")] == limits
+    core = (root / "native/src/bindings.cpp").read_text(encoding="utf-8")
+    assert f"A track needs 2 to {header.MAX_WAYPOINTS} waypoints" in core

@@ -22,7 +22,8 @@ from racecraft.track.track import Track
 MAX_CARS: Final = 1000
 MAX_LAPS: Final = 100_000
 MAX_STEPS: Final = 10_000_000
-MAX_WAYPOINTS: Final = 100_000
+MAX_WAYPOINTS: Final = 65_535
+"""As many as the core's tracks have."""
 
 Name = Annotated[str, Field(max_length=200)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
