@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from racecraft import _native
+from racecraft.run.checkpoint import header_of
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -52,11 +53,17 @@ def test_copies_drive_alike_and_others_do_not(tmp_path: Path) -> None:
     assert copies["most"] > strangers["most"]
 
 
-def test_a_starter_is_written_and_named_by_its_digest(tmp_path: Path) -> None:
-    small = ("--until", "512 steps", "--num-threads", "1", "-o", tmp_path)
-    made = last_object(run("starters", "steady", *small))["steady"]
-    (weights,) = tmp_path.rglob(made["file"])
+def test_a_starter_is_written_and_named_by_its_digest_twice_to_the_same_bits(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    for folder in (first, second):
+        small = ("--until", "512 steps", "--num-threads", "1", "-o", folder)
+        made = last_object(run("starters", "steady", *small))["steady"]
+    (weights,) = second.rglob(made["file"])
     assert hashlib.sha256(weights.read_bytes()).hexdigest() == made["sha256"]
+    assert {kind for kind, _ in header_of(weights)[1].values()} == {"F16"}
+    files = [path.relative_to(first) for path in first.rglob("*") if path.is_file()]
+    assert len(files) >= 6
+    assert all((first / path).read_bytes() == (second / path).read_bytes() for path in files)
 
 
 def test_a_roads_limit_is_driven_nearly_as_fast_as_it_is_computed() -> None:

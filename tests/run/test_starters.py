@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from racecraft import evaluate, generalize
 from racecraft.errors import RunError
+from racecraft.learn.learner import below
+from racecraft.race.policy import load_policy
 from racecraft.run import RunFolder
+from racecraft.run.checkpoint import header_of
 from racecraft.run.starters import FOLDER, starter_names, unpack_starter
 from racecraft.sim import Objects
 from racecraft.training.parent import open_parent
+from racecraft.training.plan import make_plan
 from racecraft.training.recipes import TRAFFIC
 
 UNSEEN = "generated:500..503,radius=0.6"
@@ -39,6 +45,36 @@ def test_a_starter_is_a_small_run_that_drives_where_it_never_was(name: str, here
     assert found.generalization.laps >= 7
     assert files(FOLDER / name) == shipped  # what is driven is written beside the run's copy
     assert open_parent(f"starter:{name}").weights.keys() >= {"policy.head.weight", "policy.head.bias"}
+
+
+@pytest.mark.parametrize("name", starter_names())
+def test_its_weights_lie_there_as_they_are_told_and_are_read_as_float32(name: str, here: Path) -> None:
+    run = RunFolder.open(f"starter:{name}")
+    saved = run.checkpoints.find()
+    stored = {kind for kind, _ in header_of(saved.path)[1].values()}
+    assert (stored, {kind for kind, _ in saved.kinds.values()}) == ({"F32" if name == "dodger" else "F16"}, {"F32"})
+    read, driving = open_parent(f"starter:{name}").weights, load_policy(run, num_threads=1)[1].learner.weights()
+    assert {array.dtype for array in read.values()} == {np.dtype(np.float32)}
+    for weight in (weight for weight in driving if weight.startswith("policy.")):
+        assert driving[weight].tobytes() == read[weight].tobytes(), weight
+
+
+def test_what_begins_from_one_is_whole(here: Path) -> None:
+    plan = make_plan("oval", parent="starter:steady", until="64 steps", num_threads=1)
+    child = plan.start(root=here / "children", name="child").parent_checkpoint
+    read = open_parent("starter:steady").weights
+    assert {kind for kind, _ in header_of(child.find().path)[1].values()} == {"F32"}
+    assert {name: array.tobytes() for name, array in below("weights/", child.load().arrays).items()} == {
+        name: array.tobytes() for name, array in read.items()
+    }
+
+
+@pytest.mark.parametrize("value", [np.nan, -np.inf, 65_520.0])
+def test_what_no_half_can_say_is_not_written(value: float) -> None:
+    halves = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "starters.py"))["halves"]
+    assert halves("policy", np.float32([65_519.0, 1 / 3])).tolist() == [65_504.0, 0.333251953125]
+    with pytest.raises(ValueError, match=r"policy has weights that are no finite numbers of 16 bits"):
+        halves("policy", np.float32([0.0, value]))
 
 
 def test_all_are_there() -> None:

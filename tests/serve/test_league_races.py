@@ -51,13 +51,17 @@ def league(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningLeague]:
 
 
 class Cup:
-    """A race with two racers."""
+    """A race of a group with two racers, who are called otherwise in every one."""
+
+    made = 0
 
     def __init__(self, league: RunningLeague) -> None:
-        self.owner, group = league.owner, league.group("Club")
+        Cup.made += 1
+        self.owner, group = league.owner, league.group(f"Club {Cup.made}")
         code = league.code(group)
         self.league = league
-        self.ada, self.bob = league.join(code, "Ada"), league.join(code, "Bob")
+        self.names = [f"Ada {Cup.made}", f"Bob {Cup.made}"]
+        self.ada, self.bob = (league.join(code, name) for name in self.names)
         self.race = ok(self.owner.post(f"/api/groups/{group}/races", json=CUP), 201)["id"]
         self.address = f"/api/league/races/{self.race}/submissions"
 
@@ -71,8 +75,14 @@ class Cup:
 
         return self.league.console.wait_for(ended)
 
+    def drives(self, client: httpx.Client, run: RunFolder) -> int:
+        """Somebody's entry, judged."""
+        number: int = ok(self.submit(client, pack_entry(run)), 202)["id"]
+        assert self.judged(client, number)["state"] == "done"
+        return number
 
-@pytest.fixture(scope="module")
+
+@pytest.fixture
 def cup(league: RunningLeague) -> Cup:
     return Cup(league)
 
@@ -127,7 +137,7 @@ def test_what_is_sent_in_is_judged_and_stands_on_the_board(cup: Cup, run: RunFol
     board = ok(cup.bob.get(f"/api/boards/{cup.race}"))
     assert (board["entrants"], board["running"], board["mine"]) == (1, 0, None)
     (row,) = board["rows"]
-    assert (row["name"], row["model"], row["is_me"]) == ("Ada", "novice", False)
+    assert (row["name"], row["model"], row["is_me"]) == (cup.names[0], "novice", False)
     assert ok(cup.ada.get(f"/api/boards/{cup.race}"))["rows"][0]["is_me"]
     refused(cup.bob.get(f"{cup.address}/{first['id']}"), 404)
 
@@ -138,7 +148,7 @@ def test_what_is_sent_in_is_judged_and_stands_on_the_board(cup: Cup, run: RunFol
     assert "secret" not in json.dumps(ok(cup.ada.get("/api/jobs")))
     with database_of(cup.league) as database, database.transaction() as session:
         race = session.get_one(Race, cup.race)
-        (job,) = session.scalars(sa.select(Job).where(Job.kind == "judge"))
+        job = session.get_one(Job, session.get_one(Submission, first["id"]).job_id)
         assert len(race.secret) == 64
         assert race.secret not in json.dumps(job.payload), "the table of jobs is read on other machines, too"
         own = {"announcement": {"secret": race.secret}}  # as a race in a console of one's own has it
@@ -191,6 +201,7 @@ def test_what_is_no_entry_is_refused_with_its_sentence(cup: Cup, run: RunFolder,
         (packed({**arrays, "optimizer/m": np.zeros(3, np.float32)}), 422, "no weight of a policy"),
         (packed({**arrays, f"{WEIGHTS}policy.extra": np.zeros(3, np.float32)}), 422, "missing in the network"),
         (packed({**arrays, name: arrays[name].astype(np.float64)}), 422, "F64"),
+        (packed({**arrays, name: arrays[name].astype(np.float16)}), 422, "F16"),
         (packed({**arrays, name: arrays[name][:1]}), 422, "does not hold the weights"),
         (packed({**arrays, name: nothing}), 422, "NaN"),
         (packed(arrays, network={**header["network"], "name": "EVIL"}), 422, "known are"),
@@ -198,12 +209,13 @@ def test_what_is_no_entry_is_refused_with_its_sentence(cup: Cup, run: RunFolder,
         (packed(arrays, model_metadata={**header["model_metadata"], "sensor": ["RADAR"]}), 422, "RADAR"),
         (packed(arrays, step="many"), 422, "step"),
     ]
+    kept = cup.league.console.runs / ".racecraft" / "submissions"
+    before = sorted(kept.glob("*"))
     found = [(refused(cup.submit(cup.bob, data), status), text) for data, status, text in cases]
     assert [(message, text) for message, text in found if text not in message] == []
     assert all("submissions/" not in message for message, _ in found), "no path of the server is told"
-    kept = cup.league.console.runs / ".racecraft" / "submissions"
-    assert ok(cup.bob.get(cup.address)) == []
-    assert len(list(kept.iterdir())) == len(ok(cup.owner.get(f"{cup.address}?everybody=true")))
+    assert ok(cup.bob.get(cup.address)) == ok(cup.owner.get(f"{cup.address}?everybody=true")) == []
+    assert sorted(kept.glob("*")) == before
     refused(cup.submit(cup.bob, good, "../../etc"), 422)
 
 
@@ -374,7 +386,8 @@ def database_of(league: RunningLeague) -> Iterator[Database]:
     database.close()
 
 
-def test_a_model_of_ones_own_garage_is_entered_like_any_other(cup: Cup, tmp_path: Path) -> None:
+def test_a_model_of_ones_own_garage_is_entered_like_any_other(cup: Cup, run: RunFolder) -> None:
+    cup.drives(cup.ada, run)
     home = cup.league.console.runs / ".racecraft" / "people" / str(cup.league.number(cup.bob))
     ok(cup.bob.get("/api/models"))
     untrained_run(home, "homemade", seed=2)
@@ -382,7 +395,7 @@ def test_a_model_of_ones_own_garage_is_entered_like_any_other(cup: Cup, tmp_path
     assert entered["seconds_left"] is None or entered["seconds_left"] > 0
     assert cup.judged(cup.bob, entered["id"])["state"] == "done"
     board = ok(cup.bob.get(f"/api/boards/{cup.race}"))
-    assert {row["name"] for row in board["rows"]} == {"Ada", "Bob"}
+    assert {row["name"] for row in board["rows"]} == set(cup.names)
     assert board["mine"] is not None
     assert board["beaten"] in (0.0, 100.0)
 
@@ -413,13 +426,17 @@ def test_the_command_line_enters_from_any_machine(cup: Cup, tmp_path: Path, monk
         assert "allowed are" in said("login", address, "--token", token)
 
 
-def test_when_it_is_over_anybody_can_check_it(cup: Cup, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_when_it_is_over_anybody_can_check_it(
+    cup: Cup, run: RunFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from typer.testing import CliRunner
 
     from racecraft.cli import every_verb
     from racecraft.race.announcement import Announcement
     from racecraft.replay import read_replay, verify
 
+    first = cup.drives(cup.ada, run)
+    cup.drives(cup.bob, untrained_run(tmp_path, "other", seed=2))
     promised = ok(cup.ada.get(f"/api/boards/{cup.race}"))["race"]["commitment"]
     moment = (now()).isoformat()
     ok(cup.owner.patch(f"/api/league/races/{cup.race}", json={"closes": moment}))
@@ -427,12 +444,12 @@ def test_when_it_is_over_anybody_can_check_it(cup: Cup, tmp_path: Path, monkeypa
     announced = Announcement.from_dict(ok(cup.ada.get(f"/api/boards/{cup.race}/race.json")))
     assert announced.commitment == promised
     assert len(announced.secret) == 64
-    (mine,) = ok(cup.ada.get(cup.address))
     path = tmp_path / "entry.replay"
-    path.write_bytes(cup.bob.get(f"/api/boards/{cup.race}/replays/{mine['id']}").content)
+    path.write_bytes(cup.bob.get(f"/api/boards/{cup.race}/replays/{first}").content)
     assert verify(read_replay(path), race=announced).is_genuine
 
     # the whole board, by the command line of somebody without an account
+    ok(cup.owner.patch(f"/api/league/races/{cup.race}", json={"is_public": True}))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     address = f"{cup.owner.base_url}/api/boards/{cup.race}"
     arguments = ["verify", "--race", address, "--commitment", promised]
@@ -441,10 +458,10 @@ def test_when_it_is_over_anybody_can_check_it(cup: Cup, tmp_path: Path, monkeypa
     assert "Genuine: starts, 2 replays and places are what the board says." in checked.output
     assert CliRunner().invoke(every_verb(), ["verify", str(path), "--race", address]).exit_code == 0
     with database_of(cup.league) as database, database.transaction() as session:
-        session.execute(sa.update(Submission).where(Submission.id == mine["id"]).values(completion=1.0))
+        session.execute(sa.update(Submission).where(Submission.id == first).values(completion=1.0))
     checked = CliRunner().invoke(every_verb(), arguments)
     assert checked.exit_code == 1
-    assert "Ada: submission 1: its distance is 1.000000 on the board" in checked.output
+    assert f"{cup.names[0]}: submission {first}: its distance is 1.000000 on the board" in checked.output
     assert "is over" in refused(cup.owner.patch(f"/api/league/races/{cup.race}", json={"closes": None}), 409)
 
 
