@@ -25,6 +25,7 @@ export const shell: Record<keyof typeof english, string> = {
   language: "Sprache",
   close: "Schließen",
   close_what: "Schließen: {name}",
+  close_message: "Meldung schließen",
   add: "Dazunehmen",
   add_hint: "Enter nimmt das Gewählte dazu.",
   add_done: "{name} ist dabei.",

@@ -23,6 +23,7 @@ export const shell = {
   language: "Language",
   close: "Close",
   close_what: "Close: {name}",
+  close_message: "Close the message",
   add: "Add",
   add_hint: "Enter adds what is chosen.",
   add_done: "{name} is added.",
