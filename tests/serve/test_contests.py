@@ -15,6 +15,7 @@ from full_consoles import full
 from running_consoles import RunningConsole
 
 from racecraft.errors import ConfigError
+from racecraft.film.ghost import Ghost
 from racecraft.race.rules import RaceRules
 from racecraft.replay import read_replay, verify
 from racecraft.serve.contests.terms import terms_of
@@ -417,16 +418,12 @@ def test_a_model_learns_against_itself_or_against_others(console: RunningConsole
     assert nobody.status_code == 404
 
 
-def test_a_ghost_is_called_as_its_model_is_now() -> None:
-    from racecraft.film.ghost import Ghost
+def standing(name: str) -> Ghost:
+    return Ghost(name, poses=np.zeros((1, 3)), steering=np.zeros(1), clock=np.zeros(1), color=(0, 0, 0))
 
-    drove: dict[str, Any] = {
-        "poses": np.zeros((1, 3)),
-        "steering": np.zeros(1),
-        "clock": np.zeros(1),
-        "color": (0, 0, 0),
-    }
-    lap, *others = (Ghost(name, **drove) for name in ("fastest lap", "oval-2026", "bob@last", "Sunday"))
+
+def test_a_ghost_is_called_as_its_model_is_now() -> None:
+    lap, *others = map(standing, ("fastest lap", "oval-2026", "bob@last", "Sunday"))
     evaluated, driving = {"model": "heron", "evaluation": "2026"}, {"model": "bob", "checkpoint": "last"}
     asked: list[str | dict[str, Any]] = ["best-lap", evaluated, driving, {"heat": "0" * 16}]
     for found, names in (([lap, *others], ["fastest lap"]), (others, [])):  # nobody may have driven a lap
@@ -435,15 +432,7 @@ def test_a_ghost_is_called_as_its_model_is_now() -> None:
 
 
 def test_ghosts_of_one_model_are_told_apart() -> None:
-    from racecraft.film.ghost import Ghost
-
-    drove: dict[str, Any] = {
-        "poses": np.zeros((1, 3)),
-        "steering": np.zeros(1),
-        "clock": np.zeros(1),
-        "color": (0, 0, 0),
-    }
-    found = [Ghost(name, **drove) for name in ("ada-old", "ada-old", "ada", "ada@last", "ada")]
+    found = [standing(name) for name in ("ada-old", "ada-old", "ada", "ada@last", "ada")]
     asked: list[str | dict[str, Any]] = [
         {"model": "ada", "evaluation": "20261128103821"},
         {"model": "ada", "evaluation": "20261128103825"},

@@ -28,7 +28,7 @@ from racecraft.serve.races import races as races_module
 from racecraft.serve.races.races import Races
 from racecraft.serve.races.replays import replay_of
 from racecraft.serve.races.schemas import Enter, NewRace, RaceChange, ReplayCar
-from racecraft.serve.store.database import MIGRATIONS, Database
+from racecraft.serve.store.database import Database, upgrade
 from racecraft.serve.store.tables import Entry, Job, Race
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.columns import ROW_COLUMNS
@@ -359,8 +359,8 @@ def test_what_an_entry_drives_by_is_what_was_announced(stewards: Stewards) -> No
 def test_races_of_before_say_so_and_take_nobody_any_more(tmp_path: Path) -> None:
     """A database of the version before, with a race that was held then."""
     database = Database(f"sqlite:///{tmp_path / 'console.db'}")
-    _upgrade_to(database, "0003")
     with database.engine.begin() as connection:
+        upgrade(connection, "0003")
         connection.execute(sa.text("INSERT INTO users (id, name, created) VALUES (1, 'you', '2025-01-01')"))
         connection.execute(
             sa.text(
@@ -386,17 +386,6 @@ def test_races_of_before_say_so_and_take_nobody_any_more(tmp_path: Path) -> None
         stewards.races.announcement(1)
     assert not stewards.races.get(stewards.race()).is_old
     stewards.database.close()
-
-
-def _upgrade_to(database: Database, revision: str) -> None:
-    from alembic import command
-    from alembic.config import Config
-
-    config = Config()
-    config.set_main_option("script_location", str(MIGRATIONS))
-    with database.engine.begin() as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, revision)
 
 
 def _row(stewards: Stewards, race: int) -> Race:
