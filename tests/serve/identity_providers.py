@@ -13,7 +13,7 @@ from urllib.parse import parse_qsl, urljoin, urlsplit
 
 import httpx
 import pytest
-from running_consoles import PATIENCE, end
+from running_consoles import end, plain_client
 
 FOLDER: Final = Path(__file__).parent / "identity_provider"
 CLIENT: Final = "league of the school"
@@ -45,7 +45,7 @@ def sign_in_there(to: str, name: str, *, browser: httpx.Client | None = None) ->
 
     The provider's cookies stay in a browser, if one is given.
     """
-    with nullcontext(browser) if browser is not None else httpx.Client(timeout=PATIENCE) as client:
+    with nullcontext(browser) if browser is not None else plain_client() as client:
         reply = client.get(to)
         for _ in range(20):
             if reply.is_redirect:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-from running_consoles import PATIENCE, RunningConsole, running_console
+from running_consoles import RunningConsole, plain_client, running_console
 
 from racecraft.agent import ModelMetadata, action_space
 from racecraft.learn import NetworkSpec, make_learner
@@ -32,7 +32,7 @@ class RunningLeague:
         return self.console.client
 
     def stranger(self) -> httpx.Client:
-        self.strangers.append(httpx.Client(base_url=self.owner.base_url, timeout=PATIENCE))
+        self.strangers.append(plain_client(self.owner.base_url))
         return self.strangers[-1]
 
     def group(self, title: str, by: httpx.Client | None = None) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import ssl
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +18,9 @@ import httpx
 from loaded_servers import Forked, started
 
 PATIENCE = 300.0  # s; the machine may be busy, and a film takes twenty of a core of its own
+
+_TRUSTS_NOBODY = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+"""Loading the certificates of a machine's authorities is 34 ms of CPU a client, and these servers speak plain HTTP."""
 
 LEISURELY = "import time\n\n\ndef reward_function(params):\n    time.sleep(0.001)\n    return 1.0\n"
 """A reward under which a training goes on and leaves most of the processor to others."""
@@ -56,6 +60,11 @@ class RunningConsole:
         return ended
 
 
+def plain_client(base_url: httpx.URL | str = "", **settings: Any) -> httpx.Client:
+    """A patient client of a server on this machine, with `settings` of `httpx.Client`."""
+    return httpx.Client(base_url=base_url, timeout=PATIENCE, verify=_TRUSTS_NOBODY, **settings)
+
+
 @contextmanager
 def running_console(runs: Path, *options: str) -> Iterator[RunningConsole]:
     process = started("serve", "--json", "--no-browser", "--port", "0", "--runs", str(runs), *options)
@@ -64,7 +73,7 @@ def running_console(runs: Path, *options: str) -> Iterator[RunningConsole]:
         line = process.stdout.readline()
         document = json.loads(line)
         link = document["link"]
-        with httpx.Client(base_url=link.split("/?")[0], timeout=PATIENCE) as client:
+        with plain_client(link.split("/?")[0]) as client:
             assert client.get(link).status_code == 303
             yield RunningConsole(process, link, client, runs)
     finally:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import httpx
 import pytest
-from running_consoles import PATIENCE, RunningConsole
+from running_consoles import PATIENCE, RunningConsole, plain_client
 
 
 @pytest.mark.costly
 def test_the_link_works_once(console: RunningConsole) -> None:
-    with httpx.Client(base_url=console.client.base_url, timeout=PATIENCE) as stranger:
+    with plain_client(console.client.base_url) as stranger:
         assert stranger.get(console.link).status_code == 303
         reply = stranger.get("/api/models")
         assert reply.status_code == 401

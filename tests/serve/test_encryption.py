@@ -13,7 +13,7 @@ from pathlib import Path
 import httpx
 import pytest
 from leagues import ok, refused
-from running_consoles import PATIENCE, RunningConsole, end, running_console
+from running_consoles import PATIENCE, RunningConsole, end, plain_client, running_console
 from running_workers import running_worker
 
 from free_ports import free_port
@@ -45,7 +45,7 @@ def make_certificate(folder: Path, name: str = "localhost") -> tuple[Path, Path]
 
 def test_a_trusted_proxy_tells_who_calls(behind: RunningConsole) -> None:
     card = {"secret": "wrong"}
-    with httpx.Client(base_url=behind.client.base_url, timeout=PATIENCE) as client:
+    with plain_client(behind.client.base_url) as client:
         for _ in range(200):
             refused(client.post("/api/door/card", json=card, headers=PROXY), 401)
         assert "too many" in refused(client.post("/api/door/card", json=card, headers=PROXY), 429)
@@ -56,7 +56,7 @@ def test_a_trusted_proxy_tells_who_calls(behind: RunningConsole) -> None:
 
 
 def test_who_comes_unencrypted_through_the_proxy_is_refused(behind: RunningConsole) -> None:
-    with httpx.Client(base_url=behind.client.base_url, timeout=PATIENCE) as client:
+    with plain_client(behind.client.base_url) as client:
         plain = {**PROXY, "x-forwarded-proto": "http"}
         for path in ("/", "/api/door", "/api/health"):
             assert "https only" in refused(client.get(path, headers=plain), 403)

@@ -7,6 +7,7 @@ from typing import Any
 import httpx
 import pytest
 from leagues import ok, untrained_run
+from running_consoles import plain_client
 from schools import RACE, School, label_of
 
 from racecraft.judging.evaluation import evaluate_run
@@ -344,9 +345,7 @@ def test_strangers_are_sent_to_the_door(school: School) -> None:
 
 def test_a_token_to_read_changes_nothing(school: School) -> None:
     secret = ok(school.people["ada"].post("/api/account/tokens", json={"scopes": ["read"]}), 201)["secret"]
-    with httpx.Client(
-        base_url=school.league.owner.base_url, headers={"authorization": f"Bearer {secret}"}, timeout=60
-    ) as program:
+    with plain_client(school.league.owner.base_url, headers={"authorization": f"Bearer {secret}"}) as program:
         for label in ROWS:
             status = request(school, program, label).status_code
             may = label.startswith("GET") and not label.startswith(("GET /api/account", "GET /api/workers"))

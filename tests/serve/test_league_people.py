@@ -13,10 +13,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from leagues import RunningLeague, ok, refused, running_league
-from running_consoles import PATIENCE, running_console
+from running_consoles import PATIENCE, plain_client, running_console
 
 from racecraft.course import find_lesson
 from racecraft.errors import ConfigError
@@ -230,9 +229,7 @@ def test_an_open_stream_ends_with_its_session(league: RunningLeague, school: dic
 def test_tokens_do_what_they_were_made_for_and_no_more(league: RunningLeague, school: dict[str, Any]) -> None:
     ada = school["ada"]
     made = ok(ada.post("/api/account/tokens", json={"scopes": ["read"], "days": 1}), 201)
-    with httpx.Client(
-        base_url=ada.base_url, headers={"authorization": f"Bearer {made['secret']}"}, timeout=60
-    ) as program:
+    with plain_client(ada.base_url, headers={"authorization": f"Bearer {made['secret']}"}) as program:
         ok(program.get("/api/models"))
         assert "not for that" in refused(program.post("/api/models", json={}), 403)
         assert "not for that" in refused(program.get("/api/account"), 403)
@@ -419,7 +416,7 @@ def test_who_leaves_takes_everything_along(league: RunningLeague, school: dict[s
 def test_one_person_alone_notices_nothing(league: RunningLeague, tmp_path: Path) -> None:
     with (
         running_console(tmp_path / "runs") as console,
-        httpx.Client(base_url=console.client.base_url, timeout=PATIENCE) as stranger,
+        plain_client(console.client.base_url) as stranger,
     ):
         assert stranger.get("/api/door").status_code == 401
         assert "not known" in refused(stranger.get("/api/models"), 401)

@@ -17,6 +17,7 @@ from identity_providers import (
     sign_out_there,
 )
 from leagues import RunningLeague, ok, refused, running_league
+from running_consoles import plain_client
 
 pytestmark = [pytest.mark.costly, needs_identity_provider]
 
@@ -115,7 +116,7 @@ def test_an_organiser_locks_out_and_lets_in_again(league: RunningLeague) -> None
 def test_who_signs_out_there_is_signed_out_here(league: RunningLeague) -> None:
     pupil = newcomer(league, "hugo", "Comet 2")
     ok(pupil.put("/api/account/password", json={"old": "", "new": "correct horse"}), 204)
-    with httpx.Client(timeout=60) as browser, league.stranger() as by_password, league.stranger() as elsewhere:
+    with plain_client() as browser, league.stranger() as by_password, league.stranger() as elsewhere:
         ok(come(pupil, "hugo", browser=browser))
         ok(come(elsewhere, "hugo"))
         ok(by_password.post("/api/door/sign-in", json={"name": "Comet 2", "password": "correct horse"}))

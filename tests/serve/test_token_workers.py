@@ -20,7 +20,7 @@ import pytest
 import sqlalchemy as sa
 from leagues import RunningLeague, ok, refused, running_league
 from postgres_servers import PostgresServer
-from running_consoles import PATIENCE, running_console
+from running_consoles import PATIENCE, plain_client, running_console
 from running_workers import RunningWorker, running_worker
 from s3_servers import S3Server
 from sqlalchemy.orm import Session
@@ -105,7 +105,7 @@ class Hand:
 
     def __init__(self, url: str, token: str) -> None:
         self.name = secrets.token_hex(8)
-        self.client = httpx.Client(base_url=url, headers={"authorization": f"Bearer {token}"}, timeout=PATIENCE)
+        self.client = plain_client(url, headers={"authorization": f"Bearer {token}"})
 
     def post(self, what: str, **body: Any) -> httpx.Response:
         return self.client.post(f"/api/workers/{self.name}/{what}", json=body)
