@@ -52,6 +52,7 @@ FORBIDDEN_EVENTS = frozenset(
     )
 )
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND  # flags of an open file
+SIGKILL = 9  # signal.SIGKILL, whose module is not built in
 PROVING_ROWS = 512  # that a compiled function gets beside the interpreter before it is believed
 PACKAGES = ("numpy", "scipy", "shapely")  # that a reward function may import where they are installed
 
@@ -271,7 +272,9 @@ def end_with(lifeline: int) -> None:
         import fcntl
 
         fcntl.fcntl(lifeline, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(lifeline, fcntl.F_SETFL, fcntl.fcntl(lifeline, fcntl.F_GETFL) | os.O_ASYNC)  # SIGIO, which ends it
+        # SIGIO, the usual one, could be put off: by the mask of a crash's handler, or by one that a sigreturn brings
+        fcntl.fcntl(lifeline, fcntl.F_SETSIG, SIGKILL)
+        fcntl.fcntl(lifeline, fcntl.F_SETFL, fcntl.fcntl(lifeline, fcntl.F_GETFL) | os.O_ASYNC)
 
 
 def load_modules(names: list[str], words: frozenset[str]) -> None:

@@ -240,9 +240,22 @@ def test_what_a_kernel_offers_is_found(monkeypatch, system, machine, version, fi
 
 # --- the end
 
+# A crash whose handler, to which no signal comes, never returns.
+DEAF = """
+    import ctypes, time
+    libc = ctypes.pythonapi
+    class Action(ctypes.Structure):
+        _fields_ = [("handler", ctypes.c_void_p), ("mask", ctypes.c_uint8 * 128), ("rest", ctypes.c_uint64 * 2)]
+    def stay(number):
+        time.sleep(60)
+    handler = ctypes.CFUNCTYPE(None, ctypes.c_int)(stay)
+    libc.sigaction(11, ctypes.byref(Action(ctypes.cast(handler, ctypes.c_void_p), (255,) * 128)), None)
+    ctypes.string_at(0)
+"""
+
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a lifeline is Linux's")
-@pytest.mark.parametrize("busy", ["while True: pass", "__import__('time').sleep(60)"])
+@pytest.mark.parametrize("busy", ["while True: pass", "__import__('time').sleep(60)", DEAF])
 @pytest.mark.parametrize("walls", [UNCONFINED, HERE], ids=["unconfined", "confined"])
 def test_a_worker_ends_with_its_trainer_whatever_it_does(busy, walls):
     trainer = (
