@@ -78,14 +78,19 @@ def record_quiz(number: int, share: float) -> None:
 
 @contextmanager
 def _to_change() -> Iterator[Progress]:
-    """What was solved so far, kept as the block leaves it; whoever else wants to change it waits."""
+    """What was solved so far, kept as the block leaves it; whoever else wants to change it waits.
+
+    What the block leaves as it was is not written again.
+    """
     path = progress_path()
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(path.with_suffix(".lock"), os.O_RDWR | os.O_CREAT, 0o644)
     try:
         system.lock(descriptor, waits=True)
         progress = read_progress()
+        before = progress.model_copy(deep=True)
         yield progress
-        write_file(path, json.dumps(progress.to_dict(), indent=1).encode() + b"\n", durable=False)
+        if progress != before:
+            write_file(path, json.dumps(progress.to_dict(), indent=1).encode() + b"\n", durable=False)
     finally:
         os.close(descriptor)
