@@ -51,15 +51,24 @@ class Database:
         self._sessions = sessionmaker(self.engine, expire_on_commit=False)
 
     def migrate(self) -> None:
-        """Bring the tables up to date; a fresh database gets them all. Of those who begin together one does it."""
+        """Bring the tables up to date; a fresh database gets them all. Of those who begin together one does it.
+
+        Where nothing is to be done nobody who writes is waited for.
+
+        Raises:
+            RunError: The database cannot be opened.
+        """
         try:
-            with self._alone() as connection:
+            with self.engine.connect() as connection:
+                if _is_ready(connection):
+                    return
+            with self._alone() as connection:  # and look again: meanwhile another may have done it
                 version = _version(connection)
                 if version == "":
                     _make(connection, _newest())
                 elif version != _newest():
                     upgrade(connection)
-                if connection.scalar(sa.select(User.id).limit(1)) is None:
+                if not _is_ready(connection):
                     connection.execute(sa.insert(User).values(name=LOCAL_USER, handle=LOCAL_USER, role="admin"))
         except SQLAlchemyError as error:
             raise RunError(f"The console's database cannot be opened: {_reason(error)}.") from error
@@ -181,6 +190,11 @@ def _version(connection: sa.Connection) -> str:
     if not sa.inspect(connection).has_table("alembic_version"):
         return ""
     return str(connection.scalar(sa.text("SELECT version_num FROM alembic_version")))
+
+
+def _is_ready(connection: sa.Connection) -> bool:
+    """Whether the tables are the newest, and somebody is there."""
+    return _version(connection) == _newest() and connection.scalar(sa.select(User.id).limit(1)) is not None
 
 
 def upgrade(connection: sa.Connection, to: str = "head") -> None:
