@@ -200,6 +200,32 @@ def test_time_stamps_of_the_next_row_are_recognised(tmp_path, lines):
     assert clock(1) == "prompt"
 
 
+@pytest.mark.parametrize("words", [("TRUE", "FALSE"), ("true", "false"), ("1", "0"), ("1.0", "0.0")])
+def test_a_yes_is_one_however_a_tool_saved_it(lines, tmp_path, words):
+    truths = dict(zip(("True", "False"), words, strict=True))
+    saved = [[truths.get(field, field) for field in fields] for fields in lines]
+    found = replay(write(tmp_path / "a.csv", saved), track="oval").to_dict()
+    assert (found["rows"], found["broken_rows"]) == (len(lines), 0)
+    assert found["all_wheels_agreement"] > 0.999
+    assert found["episode_end_agreement"] == 1.0
+
+
+def test_a_yes_or_no_that_is_neither_breaks_its_row(lines, tmp_path):
+    odd = [list(fields) for fields in lines]
+    odd[10][10], odd[20][9] = "maybe", ""
+    result = replay(write(tmp_path / "a.csv", odd), track="oval")
+    assert result.faults.notes == [
+        "a.csv, line 12: all_wheels_on_track is 'maybe', neither True nor False",
+        "a.csv, line 22: done is '', neither True nor False",
+    ]
+
+
+def test_quotes_round_every_field_are_none_of_it(lines, tmp_path):
+    quoted = [[f'"{field}"' for field in fields] for fields in lines]
+    found = replay(write(tmp_path / "a.csv", quoted), track="oval").to_dict()
+    assert (found["rows"], found["broken_rows"]) == (len(lines), 0)
+
+
 def test_broken_rows_are_counted_and_named(lines, tmp_path):
     broken = [list(fields) for fields in lines]
     broken[10][2], broken[20][3], broken[30] = "nan", "far", broken[30][:7]

@@ -41,6 +41,13 @@ FASTEST: Final = 8.0
 GIVE_APART: Final = "Where several workers wrote into one log by turns, give each one's rows as a file of its own."
 _NEEDED: Final = COLUMNS[:14]  # up to track_len; tstamp is the fifteenth of all eras
 _NUMBERS: Final = ("episode", "steps", "X", "Y", "yaw", "steer", "throttle", "reward", "progress", "tstamp")
+_TRUTHS: Final = {
+    word: truth
+    for truth, words in ((1.0, ("True", "1", "1.0")), (0.0, ("False", "0", "0.0")))
+    for known in words
+    for word in {known, known.lower(), known.upper()}
+}
+"""How logs write a yes or no: spreadsheets save TRUE, JavaScript true, tables of numbers 1.0."""
 _BRACKETS: Final = re.compile(r"\[[^\]]*\]")
 _AFTER_TRACE: Final = re.compile(r"[\t\"\\].*")
 """What may follow a row where logs were exported: other columns, or the end of a JSON string."""
@@ -211,7 +218,9 @@ def _header(line: str) -> list[str]:
 def _split(line: str) -> list[str]:
     line = line.strip()
     if "[" in line:  # a continuous action: [steering speed], by whatever it is parted
-        line = _BRACKETS.sub("0", line).replace('"', "")
+        line = _BRACKETS.sub("0", line)
+    if '"' in line:  # quotes that some tools put round every field
+        line = line.replace('"', "")
     return line.split(",")
 
 
@@ -251,7 +260,7 @@ def _convert(source: str, rows: list[tuple[int, Sequence[str]]], faults: Faults)
             return
         table = _numbers(taken)
     lines = np.array([line for line, _ in taken])
-    number, steps, x, y, yaw, steer, throttle, reward, progress, time, closest, length = table.T
+    number, steps, x, y, yaw, steer, throttle, reward, progress, time, closest, length, wheels, done = table.T
     new = np.ones(len(taken), dtype=np.bool_)
     new[1:] = (np.diff(number) != 0) | (np.diff(steps) != 1)
     status = [fields[14].strip()[:MAX_STATUS] for _, fields in taken]
@@ -277,10 +286,10 @@ def _convert(source: str, rows: list[tuple[int, Sequence[str]]], faults: Faults)
         reward=reward,
         progress=progress / 100.0,
         time=time,
-        all_wheels_on_track=np.array([fields[10].strip() in ("True", "1") for _, fields in taken]),
+        all_wheels_on_track=wheels > 0.0,
         closest_waypoint=closest.astype(np.int64),
         track_length=length,
-        done=np.array([fields[13].strip() in ("True", "1") for _, fields in taken]),
+        done=done > 0.0,
         status=status,
     )
 
@@ -294,5 +303,24 @@ def _jumps(x: NDArray[np.float64], y: NDArray[np.float64], time: NDArray[np.floa
 
 
 def _numbers(taken: list[tuple[int, Sequence[str]]]) -> NDArray[np.float64]:
-    """Numeric fields   (R, 12); a ValueError names the text that is none."""
-    return np.array([[*map(float, fields[:10]), float(fields[11]), float(fields[12])] for _, fields in taken])
+    """Numeric fields and the two truths   (R, 14); a ValueError names the text that is none."""
+    return np.array(
+        [
+            [
+                *map(float, fields[:10]),
+                float(fields[11]),
+                float(fields[12]),
+                _truth(fields[10], "all_wheels_on_track"),
+                _truth(fields[13], "done"),
+            ]
+            for _, fields in taken
+        ]
+    )
+
+
+def _truth(text: str, name: str) -> float:
+    """1.0 or 0.0; a ValueError names the text that is neither yes nor no."""
+    truth = _TRUTHS.get(text.strip())
+    if truth is None:
+        raise ValueError(f"{name} is {text.strip()[:40]!r}, neither True nor False")
+    return truth
