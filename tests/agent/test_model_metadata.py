@@ -54,7 +54,10 @@ def test_ancient_file_with_45_degrees():
     metadata = ModelMetadata.from_dict({"action_space": actions}, name="old.json")
     assert (metadata.version, metadata.sensors) == ("1", ("observation",))
     assert metadata.neural_network == "DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"
-    assert metadata.notes[0].startswith("old.json: action_space[0].steering_angle is 45, driven as 30")
+    assert metadata.notes == (
+        "old.json: action_space[0].steering_angle is 45, driven as 30: the wheels turn no further.",
+        "old.json: action_space[1].steering_angle is -45, driven as -30: the wheels turn no further.",
+    )
     with pytest.raises(ConfigError, match=r"action_space\[0\].steering_angle is 45; allowed is -30 to 30"):
         ModelMetadata.from_dict({"action_space": actions, "version": "5"})
 
@@ -198,8 +201,15 @@ def test_continuous_is_inferred_where_the_type_is_missing():
 def test_notes_for_slow_continuous_and_odd_index():
     slow = {**LIMITS, "speed": {"low": 0.1, "high": 1}}
     assert "below 0.5 m/s" in ModelMetadata.from_dict({"action_space": slow}).notes[0]
-    odd = [{**TWO[0], "index": 1}, {**TWO[1], "index": 0}]
-    assert "action_space[0].index is 1" in ModelMetadata.from_dict({"action_space": odd}).notes[0]
+    odd = [{**TWO[0], "index": 0}, {**TWO[1], "index": 2}]
+    assert "action_space[1].index is 2" in ModelMetadata.from_dict({"action_space": odd}).notes[0]
+
+
+def test_indices_that_count_from_1_are_told_once():
+    counted = [{**action, "index": index} for index, action in enumerate(TWO * 10, start=1)]
+    assert ModelMetadata.from_dict({"action_space": counted}, name="a.json").notes == (
+        "a.json: the index of 20 of 20 actions is not its place in the list, which counts.",
+    )
 
 
 @pytest.mark.parametrize(

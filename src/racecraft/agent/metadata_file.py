@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import copysign
 from typing import Any, Final, Literal, TypeVar
 
 from pydantic import Field, field_validator, model_validator
@@ -195,7 +196,14 @@ def _action_notes(actions: list[_Action], version: str, *, name: str) -> list[st
             if version not in ("1", "2"):
                 limits = f"{-MAX_STEERING:g} to {MAX_STEERING:g} degrees"
                 raise ConfigError(f"{where}; allowed is {limits} (up to {MAX_FILE_STEERING:g} only in version 1 or 2).")
-            notes.append(f"{name}: {where}, driven as {MAX_STEERING:g}: the wheels turn no further.")
-        if action.index not in (None, place):
-            notes.append(f"{name}: action_space[{place}].index is {action.index}; its place in the list counts.")
+            driven = copysign(MAX_STEERING, action.steering_angle)
+            notes.append(f"{name}: {where}, driven as {driven:g}: the wheels turn no further.")
+    odd = [(place, action.index) for place, action in enumerate(actions) if action.index not in (None, place)]
+    if len(odd) == 1:
+        (place, index), *_ = odd
+        notes.append(f"{name}: action_space[{place}].index is {index}; its place in the list counts.")
+    elif odd:  # a habit of who wrote the file, such as to count from 1
+        notes.append(
+            f"{name}: the index of {len(odd)} of {len(actions)} actions is not its place in the list, which counts."
+        )
     return notes
