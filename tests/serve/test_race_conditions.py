@@ -8,13 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import BaseModel, ValidationError
 from running_consoles import RunningConsole
 
 from racecraft.errors import ConfigError, TrackError, TrackNotFound
 from racecraft.race.recording import Recording
 from racecraft.replay import read_replay, verify
 from racecraft.serve.conditions import randomization_of, told_randomization, told_vehicle, vehicle_of
+from racecraft.serve.contests.schemas import NewHeat, NewLadder
 from racecraft.serve.contests.terms import terms_of
+from racecraft.serve.evaluations.schemas import EvaluateModel
+from racecraft.serve.models.schemas import NewModel
+from racecraft.serve.races.schemas import NewRace
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.randomization import Randomization
@@ -71,6 +76,21 @@ def test_what_is_asked_is_what_is_told() -> None:
     assert "mass" in caught.value.hint
     with pytest.raises(ConfigError, match=r"randomize has no quantity 'blurr'\."):
         randomization_of({"blurr": (0.0, 1.0)})
+
+
+@pytest.mark.parametrize("kind", [EvaluateModel, NewHeat, NewLadder, NewModel, NewRace])
+@pytest.mark.parametrize("value", ["heavy", "", None, True, {}, [1.0]])
+def test_what_is_no_number_is_refused_in_our_words(kind: type[BaseModel], value: object) -> None:
+    for asked, told in (
+        ({"vehicle": {"mass": value}}, "Vehicle parameter mass is {}; allowed is a number from 0.1 to 1000."),
+        ({"randomize": {"mass": [0.9, value]}}, "Randomization mass is {}; allowed is a number from 0.2 to 5."),
+        ({"vehicle": {"wings": value}}, "A vehicle has no parameter 'wings'."),
+        ({"randomize": {"mass": value}}, "Randomization mass is {}; allowed is two numbers, least and most."),
+    ):
+        with pytest.raises(ValidationError) as refused:
+            kind.model_validate(asked)
+        said = {str(one.get("ctx", {}).get("error")) for one in refused.value.errors()}
+        assert told.format(repr(value)) in said
 
 
 def test_jobs_from_before_cars_had_numbers_still_tell_theirs() -> None:
@@ -163,14 +183,15 @@ def test_cars_and_conditions_that_cannot_be_are_refused(
         ({"vehicle": {"mass": -1.0}}, "Vehicle parameter mass is -1.0"),
         ({"vehicle": {"mass": "NaN"}}, "Vehicle parameter mass is nan; allowed is a number from 0.1 to 1000."),
         ({"randomize": {"blur": [0.0, "Infinity"]}}, "Randomization blur is inf; allowed is a number from 0 to "),
-        ({"vehicle": {"mass": [1.0]}}, "vehicle"),
+        ({"vehicle": {"mass": "heavy"}}, "Vehicle parameter mass is 'heavy'; allowed is a number from 0.1 to 1000."),
+        ({"vehicle": {"mass": [1.0]}}, "Vehicle parameter mass is [1.0]; allowed is a number from 0.1 to 1000."),
         ({"vehicle": {"m" * 41: 1.0}}, "vehicle"),
-        ({"vehicle": None}, "vehicle"),
+        ({"vehicle": None}, "vehicle is None; allowed are v4, v5 and v6."),
         ({"randomize": "own.json"}, "randomize is 'own.json'"),
         ({"randomize": {"rain": [0.0, 1.0]}}, "randomize has no quantity 'rain'."),
         ({"randomize": {"blur": [1.0, 0.0]}}, "the first number is greater than the second"),
         ({"randomize": {"blur": [0.0, 99.0]}}, "Randomization blur"),
-        ({"randomize": {"blur": [0.0]}}, "randomize"),
+        ({"randomize": {"blur": [0.0]}}, "Randomization blur is [0.0]; allowed is two numbers, least and most."),
         ({"vehicle": {"mass": 0.2}, "randomize": {"mass": [0.2, 0.2]}}, "At an end of the randomization's ranges"),
     ):
         reply = console.client.post(f"/api/{room}", json=needed | settings)

@@ -9,22 +9,61 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, fields
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
+from racecraft.checks import check_number, require, shown
 from racecraft.errors import ConfigError, did_you_mean
+from racecraft.sim.randomization import LIMITS as MOST
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.randomization import Randomization
-from racecraft.sim.vehicle import PRESETS, Vehicle
+from racecraft.sim.vehicle import LIMITS, PRESETS, Vehicle
 
+NO_PARAMETER: Final = "A vehicle has no parameter"
+NO_QUANTITY: Final = "randomize has no quantity"
 VEHICLES: Final = ("v5", "v4", "v6")
 """The usual one first."""
 
+
+def _car_in_numbers(asked: Any) -> Any:
+    """Refuse what is neither a name nor numbers by name; Pydantic would say it in words of its own."""
+    if not isinstance(asked, str | dict):
+        raise ConfigError(f"vehicle is {shown(asked)}; allowed are v4, v5 and v6.")
+    for name, value in asked.items() if isinstance(asked, dict) else ():
+        if not _is_numeric(value):
+            _check_names([name], LIMITS, NO_PARAMETER)
+            check_number(f"Vehicle parameter {name}", value, *LIMITS[name])
+    return asked
+
+
+def _ranges_in_numbers(asked: Any) -> Any:
+    """The same of ranges."""
+    if not isinstance(asked, str | dict):
+        raise ConfigError(f"randomize is {shown(asked)}; allowed are {', '.join(RANDOMIZATIONS)}.")
+    for name, ends in asked.items() if isinstance(asked, dict) else ():
+        _check_names([name], MOST, NO_QUANTITY)
+        is_pair = isinstance(ends, list | tuple) and len(ends) == 2
+        require(f"Randomization {name}", ends, is_pair, "two numbers, least and most")
+        for number in ends:
+            if not _is_numeric(number):
+                check_number(f"Randomization {name}", number, *MOST[name])
+    return asked
+
+
+def _is_numeric(value: Any) -> bool:
+    """Whether Pydantic makes a number of it, as it does of the text of one."""
+    try:
+        float(value)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return not isinstance(value, bool)
+
+
 Name = Annotated[str, Field(max_length=40)]
-AskedVehicle = Name | dict[Name, float]
+AskedVehicle = Annotated[Name | dict[Name, float], BeforeValidator(_car_in_numbers)]
 """``v4``, ``v5``, ``v6`` or parameters of one's own, in the units of `Vehicle`; those left out are v5's."""
-AskedRanges = Name | dict[Name, tuple[float, float]]
+AskedRanges = Annotated[Name | dict[Name, tuple[float, float]], BeforeValidator(_ranges_in_numbers)]
 """A preset, or least and most of quantities, in the units of `Randomization`; those left out do not change."""
 
 
@@ -38,7 +77,7 @@ def vehicle_of(asked: AskedVehicle) -> Vehicle:
         if asked not in VEHICLES:
             raise ConfigError(f"vehicle is {asked[:40]!r}; allowed are v4, v5 and v6.")
         return PRESETS[asked]
-    _check_names(asked, (field.name for field in fields(Vehicle)), "A vehicle has no parameter")
+    _check_names(asked, (field.name for field in fields(Vehicle)), NO_PARAMETER)
     return Vehicle(**asked)
 
 
@@ -52,7 +91,7 @@ def randomization_of(asked: AskedRanges) -> Randomization:
         if asked not in RANDOMIZATIONS:
             raise ConfigError(f"randomize is {asked[:40]!r}; allowed are {', '.join(RANDOMIZATIONS)}.")
         return RANDOMIZATIONS[asked]
-    _check_names(asked, (field.name for field in fields(Randomization)), "randomize has no quantity")
+    _check_names(asked, (field.name for field in fields(Randomization)), NO_QUANTITY)
     return Randomization(**asked)
 
 
