@@ -267,4 +267,20 @@ def test_bad_calls_are_refused():
     for actions in (np.zeros(3, int), np.zeros(2), np.zeros((2, 2), int), 0):
         with pytest.raises(ShapeError, match="action"):
             envs.step(actions)
+    with pytest.raises(ShapeError, match=r"actions have shape \(3,\), expected 2 rows: one per car"):
+        envs.step(np.zeros(3, int))
     envs.close()
+
+
+def test_a_closed_environment_says_so():
+    envs = RacecraftVectorEnv("oval", num_envs=2, observation="state")
+    env = RacecraftEnv("oval", observation="state")
+    for one, actions in ((envs, np.zeros(2, int)), (env, 0)):
+        one.reset(seed=0)
+        one.close()
+        with pytest.raises(ResetNeeded):
+            one.step(actions)
+        with pytest.raises(ResetNeeded, match="is closed"):
+            one.reset()
+    with pytest.raises(ResetNeeded, match="is closed"):
+        envs.step(np.zeros(2, int))

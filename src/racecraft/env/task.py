@@ -25,7 +25,7 @@ from racecraft.env.observation import ObservationKind, Observer, check_kind
 from racecraft.env.registration import EPISODE_STEPS
 from racecraft.env.rewards import RewardFunction, open_reward
 from racecraft.env.sensor_observation import SensorObserver
-from racecraft.errors import ConfigError, did_you_mean
+from racecraft.errors import ConfigError, ResetNeeded, ShapeError, did_you_mean
 from racecraft.sim import CameraSpec, Objects, Randomization, Simulation, Start, Vehicle
 from racecraft.sim.columns import ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS
@@ -157,6 +157,7 @@ class DrivingTask:
         else:
             self.observer = Observer(self.simulation, kind=observation)
         self._lap_clock = LapClock(num_envs)
+        self._is_closed = False
         self._reward = open_reward(
             reward, tracks=self.simulation.tracks, num_envs=num_envs, num_objects=self.simulation.num_objects
         )
@@ -167,7 +168,12 @@ class DrivingTask:
         return self.simulation.terminated | self.simulation.truncated
 
     def reset(self, mask: NDArray[np.bool_], *, seeds: NDArray[np.uint64] | None = None) -> None:
-        """Start the masked cars' next episode, or with seeds their first."""
+        """Start the masked cars' next episode, or with seeds their first.
+
+        Raises:
+            ResetNeeded: It is closed.
+        """
+        self._check_open()
         self.simulation.reset(mask, seeds=seeds)
         self._lap_clock.restart(mask)
         if seeds is not None and mask.all():
@@ -186,8 +192,17 @@ class DrivingTask:
             actions: In the form of the action space.
             reset: Cars whose episode is over; they begin the next one instead of acting, with reward 0.
             paid: Cars that the reward function is called for; the others have reward 0. All without it.
+
+        Raises:
+            ResetNeeded: It is closed.
+            ShapeError: The actions have another form, or are not one per car.
         """
-        return self.drive(self.action_space.to_commands(actions), reset=reset, paid=paid)
+        commands = self.action_space.to_commands(actions)
+        if len(commands) != self.simulation.num_envs:
+            raise ShapeError(
+                f"actions have shape {np.shape(actions)}, expected {self.simulation.num_envs} rows: one per car."
+            )
+        return self.drive(commands, reset=reset, paid=paid)
 
     def drive(
         self,
@@ -197,6 +212,7 @@ class DrivingTask:
         paid: NDArray[np.bool_] | None = None,
     ) -> NDArray[np.float64]:
         """The same by commands (N, 2): steering angle in rad and speed in m/s."""
+        self._check_open()
         self.simulation.step(commands)
         if reset is not None and reset.any():
             self.reset(reset)
@@ -213,7 +229,12 @@ class DrivingTask:
 
     def close(self) -> None:
         """End the reward's process; calling again does nothing."""
+        self._is_closed = True
         self._reward.close()
+
+    def _check_open(self) -> None:
+        if self._is_closed:
+            raise ResetNeeded("The environment is closed, and with it the reward's process; make a new one.")
 
 
 def seed_key(seed: Any) -> int:
