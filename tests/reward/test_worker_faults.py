@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -194,6 +195,29 @@ def test_endless_recursion_in_c_is_told_with_its_line(track, rows):
     ):
         worker(rows)
     assert caught.value.line in (4, 6)
+
+
+@pytest.fixture
+def many_open() -> Iterator[None]:
+    """As in a server of many browsers: files get numbers that `select.select` does not take."""
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard < 1400:
+        pytest.skip("so many files cannot be open here")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1400), hard))
+    held = [os.open(os.devnull, os.O_RDONLY) for _ in range(1100)]
+    yield
+    for descriptor in held:
+        os.close(descriptor)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_a_crash_is_told_where_a_thousand_files_are_open(track, rows, many_open):
+    crash = function("import ctypes", "return ctypes.string_at(0)")
+    with running(crash, track) as worker, pytest.raises(RewardError, match="SIGSEGV") as caught:
+        worker(rows)
+    assert caught.value.line == 3
 
 
 def test_killed_from_outside(track, rows):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import select
 import subprocess
 import sys
 import time
@@ -130,7 +129,7 @@ def start_process(
 def _told(descriptor: int) -> int:
     """The process number that bubblewrap tells."""
     text, deadline = b"", time.monotonic() + 10.0
-    while time.monotonic() < deadline and select.select([descriptor], [], [], deadline - time.monotonic())[0]:
+    while system.can_be_read(descriptor, deadline - time.monotonic()):
         part = os.read(descriptor, 4096)
         if not part:
             break

@@ -367,7 +367,7 @@ class RewardWorker:
         deadline = time.monotonic() + timeout_s
         data = b""
         while time.monotonic() < deadline and len(data) < 65536:
-            if select.select([descriptor], [], [], 0.05)[0]:
+            if system.can_be_read(descriptor, 0.05):
                 part = os.read(descriptor, 65536)
                 if not part:
                     break

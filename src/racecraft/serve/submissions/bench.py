@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import shutil
 import subprocess
 import sys
@@ -122,8 +121,7 @@ def _line(pipe: IO[bytes]) -> bytes:
     """The next line, within the time there is."""
     read, deadline = b"", time.monotonic() + PATIENCE
     while not read.endswith(b"\n"):
-        ready, _, _ = select.select([pipe], [], [], max(0.0, deadline - time.monotonic()))
-        if not ready:
+        if not system.can_be_read(pipe.fileno(), deadline - time.monotonic()):
             raise TimeoutError
         if not (part := os.read(pipe.fileno(), 1 << 16)) or len(read) > MOST:
             raise ValueError("no answer")
