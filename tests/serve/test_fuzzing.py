@@ -150,6 +150,18 @@ def test_hostile_names_get_the_one_shape(console: RunningConsole, name: str) -> 
         assert set(reply.json()) == {"error"}
 
 
+@pytest.mark.parametrize("length", [300, 5000])
+def test_what_no_disk_has_a_name_for_is_not_there(console: RunningConsole, length: int) -> None:
+    name = console.create(name=f"long-{length}", track="oval", train=False)
+    stamp, file = "1" * length, f"evaluation-1/{'a' * length}.json"
+    rooms = [f"/evaluations/{stamp}{room}" for room in ("/telemetry", "/laps", "/share.html", "/share.png")]
+    paths = [f"/api/models/{name}{room}" for room in (f"/files/{file}", *rooms)]
+    for path in (*paths, f"/assets/{'a' * length}.js"):
+        reply = console.client.get(path)
+        assert reply.status_code == 404, path[:60]
+        assert set(reply.json()) == {"error"}
+
+
 @pytest.mark.parametrize("name", ["generated:0..99999999", "generated:", "generated:x", "generated:9" + "9" * 400])
 def test_a_name_cannot_ask_for_endless_work(console: RunningConsole, name: str) -> None:
     reply = console.client.get(f"/api/tracks/{quote(name)}", timeout=60)

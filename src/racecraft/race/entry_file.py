@@ -98,7 +98,8 @@ def _read(path: Path) -> EntryFile:
     try:
         header, kinds = header_of(path)
     except (ValueError, KeyError, TypeError) as error:
-        raise CheckpointError(f"{path} is no entry of Racecraft: {str(error)[:200] or 'no header'}.") from error
+        why = str(error)[:200].rstrip(".") or "no header"
+        raise CheckpointError(f"{path} is no entry of Racecraft: {why}.") from error
     if header.get("format") != FORMAT or set(header) != set(FIELDS):
         raise CheckpointError(
             f"{path} is no entry of Racecraft: its header has not exactly {', '.join(FIELDS)} of {FORMAT!r}.",

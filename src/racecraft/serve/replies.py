@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 from typing import Any, Final
 
@@ -57,6 +58,12 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(ClientDisconnect)
     async def gone(_: Request, __: ClientDisconnect) -> JSONResponse:
         return problem(400, "Disconnected", "The request broke off.")
+
+    @app.exception_handler(OSError)
+    async def too_long(_: Request, error: OSError) -> JSONResponse:
+        if error.errno != errno.ENAMETOOLONG:
+            raise error
+        return problem(404, "NotFound", "Nothing here has so long a name.")  # whatever a stranger asked for by it
 
     @app.exception_handler(Exception)
     async def broken(request: Request, error: Exception) -> JSONResponse:
