@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import json
 import os
 import shutil
+import socket
 import tarfile
+import time
 import zipfile
+from collections.abc import AsyncIterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +24,7 @@ from running_consoles import PATIENCE, RunningConsole
 from racecraft.importing import import_run
 from racecraft.run import RunFolder, archive_chunks
 from racecraft.serve.app import create_app
+from racecraft.serve.models import archives
 from racecraft.serve.models.archives import UPLOADS
 from racecraft.serve.settings import ServeSettings
 
@@ -238,6 +244,34 @@ def test_a_huge_upload_is_refused_before_it_comes(console: RunningConsole) -> No
             ]
             connection.sendall("\r\n".join([*lines, "", "x"]).encode())
             assert connection.recv(100).split()[1] in (b"413", b"400")
+
+
+def test_one_persons_uploads_come_two_at_a_time(console: RunningConsole) -> None:
+    """Of a gigabyte each, ten that never end would fill the disk."""
+    host, port = console.client.base_url.host, console.client.base_url.port
+    cookie = console.client.cookies["racecraft_session"]
+    head = f"POST /api/models/import?filename=x.tar HTTP/1.1\r\nHost: {host}:{port}\r\n"
+    head += f"Cookie: racecraft_session={cookie}\r\nContent-Length: 1000000\r\n\r\nbegun"
+    folder = console.runs / ".racecraft" / "uploads"
+    with ExitStack() as stack:
+        for _ in range(6):
+            stack.enter_context(socket.create_connection((host, port))).sendall(head.encode())
+        console.wait_for(lambda: len(list(folder.glob("*/x.tar"))) >= 2)
+        time.sleep(1.0)  # for those who do not wait
+        assert len(list(folder.glob("*/x.tar"))) == 2
+    console.wait_for(lambda: not list(folder.glob("*")))
+
+
+def test_a_file_that_never_arrives_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Slow:
+        async def stream(self) -> AsyncIterator[bytes]:
+            while True:
+                yield b"x"
+                await asyncio.sleep(0.01)
+
+    monkeypatch.setattr(archives, "ARRIVES_S", 0.1)
+    with pytest.raises(TimeoutError):
+        asyncio.run(archives._take_in(Slow(), tmp_path / "x.tar"))  # type: ignore[arg-type]
 
 
 def test_archives_hold_no_links(console: RunningConsole) -> None:

@@ -120,6 +120,11 @@ class Consoles:
         """Where large files arrive."""
         return Desks()
 
+    @cached_property
+    def imports(self) -> Desks:
+        """Where archives arrive, which may be larger and take longer."""
+        return Desks()
+
     @property
     def provider(self) -> Provider:
         """Through whom people sign in.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import shutil
 import tempfile
@@ -28,6 +29,8 @@ router = APIRouter(prefix="/api/models", tags=["archives"])
 ENDINGS: Final = (".tar.gz", ".tgz", ".tar", ".zip", ".py")
 UPLOADS: Final = "uploads"  # inside the state folder
 ABANDONED: Final = 3600.0  # s without a byte after which an upload is one of a server that was killed
+ARRIVES_S: Final = 1800.0
+"""A gigabyte at 5 Mbit/s; who sends a byte now and then keeps no part of the disk for longer."""
 RESERVE: Final = 1_000_000_000  # bytes of the disk that uploads leave to everybody else
 
 
@@ -60,19 +63,33 @@ async def import_model(
         context.garage.require_new(name)
     uploads = context.settings.state / UPLOADS
     uploads.mkdir(exist_ok=True)
-    place = Path(tempfile.mkdtemp(dir=uploads))
-    try:
-        with (place / plain).open("xb") as file:
+    async with consoles.imports.place(user):  # a few at a time, or slow ones of one person would fill the disk
+        place = Path(tempfile.mkdtemp(dir=uploads))
+        try:
+            await _take_in(request, place / plain)
+            async with consoles.quotas.turn(user):  # not before: a body may take minutes to come
+                await run_in_threadpool(consoles.quotas.require, user, "models")
+                return await run_in_threadpool(_import, context, place / plain, name, track)
+        except TimeoutError as error:
+            raise RunError(f"The file took more than {ARRIVES_S:.0f} s to arrive.", hint="Send it again.") from error
+        except OSError as error:
+            raise RunError(f"The file cannot be kept: {error.strerror or error}.", hint="Free disk space.") from error
+        finally:
+            await run_in_threadpool(shutil.rmtree, place, ignore_errors=True)
+
+
+async def _take_in(request: Request, path: Path) -> None:
+    """Write what comes, as it comes.
+
+    Raises:
+        TimeoutError: It took too long.
+        Conflict: Little is left of the disk.
+    """
+    with path.open("xb") as file:
+        async with asyncio.timeout(ARRIVES_S):
             async for chunk in request.stream():
-                require_disk(place)
+                require_disk(path.parent)
                 await run_in_threadpool(file.write, chunk)
-        async with consoles.quotas.turn(user):  # not before: a body may take minutes to come
-            await run_in_threadpool(consoles.quotas.require, user, "models")
-            return await run_in_threadpool(_import, context, place / plain, name, track)
-    except OSError as error:
-        raise RunError(f"The file cannot be kept: {error.strerror or error}.", hint="Free disk space.") from error
-    finally:
-        await run_in_threadpool(shutil.rmtree, place, ignore_errors=True)
 
 
 def remove_abandoned_uploads(settings: ServeSettings) -> None:
