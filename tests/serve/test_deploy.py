@@ -90,7 +90,6 @@ def through_caddy(service: tuple[RunningConsole, str], tmp_path: Path) -> Iterat
     example = (DEPLOY / "Caddyfile").read_text()
     assert "racing.example.org {\n" in example
     own = example.replace("racing.example.org {\n", f"{address} {{\n\ttls internal\n")
-    own = own.replace("127.0.0.1:8321 {", f"{console.client.base_url.netloc.decode()} {{")
     path = tmp_path / "Caddyfile"
     ours = ("grace_period 1s", "admin off", "auto_https disable_redirects", "skip_install_trust")
     path.write_text("\n\t".join(["{", *ours]) + "\n}\n" + own)
@@ -99,6 +98,7 @@ def through_caddy(service: tuple[RunningConsole, str], tmp_path: Path) -> Iterat
         "HOME": str(tmp_path),
         "XDG_DATA_HOME": str(tmp_path),
         "XDG_CONFIG_HOME": str(tmp_path),
+        "LEAGUE": console.client.base_url.netloc.decode(),
     }
     root = tmp_path / "caddy" / "pki" / "authorities" / "local" / "root.crt"
     with (tmp_path / "log").open("w") as log:
@@ -155,12 +155,21 @@ def secret_of(console: RunningConsole) -> str:
 
 
 @pytest.mark.skipif(CADDY is None, reason="Caddy is not installed: apt-get install caddy")
-def test_caddy_takes_the_example_as_it_is() -> None:
+@pytest.mark.parametrize("place", ["machine", "composed"])
+def test_caddy_takes_the_example_as_it_is(place: str) -> None:
+    proxy = yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"]["proxy"]
+    own = {"LEAGUE": ""} if place == "machine" else proxy["environment"]
     command = [str(CADDY), "adapt", "--config", str(DEPLOY / "Caddyfile"), "--adapter", "caddyfile"]
-    told = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    environment = {name: value for name, value in {**os.environ, **own}.items() if value}
+    told = json.loads(subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout)
     (server,) = told["apps"]["http"]["servers"].values()
     assert server["listen"] == [":443"]
-    assert server["routes"][0]["match"] == [{"host": ["racing.example.org"]}]
+    (route,) = server["routes"]
+    assert route["match"] == [{"host": ["racing.example.org"]}]
+    handlers = {one["handler"]: one for inner in route["handle"][0]["routes"] for one in inner["handle"]}
+    assert handlers["headers"]["response"]["set"] == {"Strict-Transport-Security": ["max-age=31536000"]}
+    dial = "127.0.0.1:8321" if place == "machine" else f"league:{ServeSettings.port}"
+    assert handlers["reverse_proxy"]["upstreams"] == [{"dial": dial}]
 
 
 def test_the_container_serves_on_postgresql_and_tells_whether_it_is_well(
@@ -196,7 +205,8 @@ def test_the_composed_parts_fit_together() -> None:
     services = compose["services"]
     for name, service in services.items():
         assert set(service.get("depends_on", ())) <= set(services), name
-        assert {volume.split(":")[0] for volume in service.get("volumes", ())} <= set(compose["volumes"]), name
+        for volume in (volume.split(":")[0] for volume in service.get("volumes", ())):
+            assert volume in compose["volumes"] or (volume.startswith("./") and (DEPLOY / volume).is_file()), name
         assert "ports" not in service or name == "proxy", "only the proxy is reached from outside"
         assert service["restart"] == "always", "podman-restart starts no others with the machine"
     command = services["league"]["command"]
@@ -206,8 +216,9 @@ def test_the_composed_parts_fit_together() -> None:
         assert any(ip_address(taken) in network for network in trusted), taken
     assert not any(ip_address(FORGED) in network for network in trusted)
     address = command[command.index("--address") + 1]
-    assert f"https://{services['proxy']['command'][services['proxy']['command'].index('--from') + 1]}" == address
-    assert services["proxy"]["command"][-1] == f"league:{ServeSettings.port}"
+    read = services["proxy"]["command"][services["proxy"]["command"].index("--config") + 1]
+    assert f"./Caddyfile:{read}:ro" in services["proxy"]["volumes"]
+    assert f"{address.removeprefix('https://')} {{" in (DEPLOY / "Caddyfile").read_text().splitlines()
     assert "-h" in services["database"]["healthcheck"]["test"], "the server that sets the database up is not it yet"
     health = dict(services["league"]["healthcheck"])
     assert shlex.split(health.pop("test")) == json.loads(line_of("HEALTHCHECK"))  # a list is quoted wrongly on its way
