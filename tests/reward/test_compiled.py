@@ -79,6 +79,8 @@ def test_keys_that_are_not_numbers_are_those_of_objects():
         (body("print(params['x'])", "return 1.0"), "prints"),
         (body("return random.random()", top="import random\n"), "random"),
         ("reward_function = lambda params: params['x']", "plain function"),
+        ("def reward_function(params, k=2.0):\n    return k * params['x']", "more than params"),
+        ("def reward_function(params, /):\n    return params['x']", "more than params"),
         (load_preset("object_avoidance"), "as a whole"),
     ],
 )

@@ -87,6 +87,7 @@ def test_modules_are_read_from_the_source():
     ]
     assert {"params", "reward_function", "deque"} - set(used_words(source)) == {"params", "reward_function"}
     assert "fft" in used_words("getattr(np, 'fft')")
+    assert needed_modules("größe = 1.0") == ["unicodedata"]  # what Python's compiler asks when it meets the name
     for broken in ("def", "\0", "(" * 10_000):
         assert needed_modules(broken) == used_words(broken) == []
 

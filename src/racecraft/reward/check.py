@@ -153,9 +153,10 @@ def _names_at_top(tree: ast.Module) -> set[str]:
 
 
 def _check_signature(function: Function) -> Iterator[Problem]:
+    """AWS calls it with the dict and nothing else: further parameters need a default."""
     arguments = function.args
     positional = [*arguments.posonlyargs, *arguments.args]
-    if len(positional) != 1 or arguments.vararg or arguments.kwonlyargs or arguments.kwarg:
+    if not positional or len(positional) - len(arguments.defaults) > 1 or None in arguments.kw_defaults:
         count = len(positional) + len(arguments.kwonlyargs) + bool(arguments.vararg) + bool(arguments.kwarg)
         yield _at(
             function,

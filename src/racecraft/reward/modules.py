@@ -35,6 +35,8 @@ def needed_modules(source: str) -> list[str]:
         return []
     found = [name for node in ast.walk(tree) for name in _imported(node)]
     found += [name for word in _words(tree) for name in LOADED_LATE.get(word, ())]
+    if not source.isascii():
+        found.append("unicodedata")  # Python's own compiler asks it for names such as ``größe``
     return sorted({name for name in found if name.partition(".")[0] in (*sys.stdlib_module_names, *PACKAGES)})
 
 

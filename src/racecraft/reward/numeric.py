@@ -44,6 +44,8 @@ def numeric_source(source: str) -> str:
         raise NotNumeric("reward_function is not a plain function")
     if any(isinstance(node, ast.Name) and node.id == "print" for node in ast.walk(tree)):
         raise NotNumeric("it prints")
+    if sum(isinstance(node, ast.arg) for node in ast.walk(main.args)) != 1 or not main.args.args:
+        raise NotNumeric("it takes more than params")
     name = main.args.args[0].arg
     rewriter = _Rewriter(name)
     main.body = [rewriter.visit(statement) for statement in main.body]
