@@ -120,6 +120,13 @@ def printable_lines(text: str) -> str:
     return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 
+def typed(path: object) -> str:
+    """A path or a name as it is typed into a shell: in quotes where it has spaces or other signs that a shell reads."""
+    import shlex  # which few commands need
+
+    return shlex.quote(str(path))
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A suggestion such as ``Did you mean 'oval'?`` for a misspelt name, or an empty string.
 

@@ -57,14 +57,16 @@ def test_train_against_itself_and_against_the_run_that_came_of_it(racecraft: Run
 
 @pytest.mark.costly
 def test_train_tells_people_how_it_goes_and_how_to_go_on(racecraft: Run) -> None:
-    outcome = racecraft("train", *SMALL, "--until", "1024 steps", "--name", "mine")
+    outcome = racecraft("train", *SMALL, "--until", "1024 steps", "--name", "mine", "--runs", "my runs")
     assert outcome.status == 0
     assert len([line for line in outcome.err.splitlines() if "of 5 laps" in line]) == 2
     assert "All steps are done" in outcome.out
-    assert "racecraft train --resume runs/mine" in outcome.out
-    resumed = racecraft("train", "--resume", "runs/mine", "--until", "1536 steps", "--json")
+    assert "Run folder: my runs/mine\n" in outcome.out
+    assert "racecraft train --resume 'my runs/mine'\n" in outcome.out  # as a shell takes it
+    assert "racecraft evaluate 'my runs/mine'\n" in outcome.out
+    resumed = racecraft("train", "--resume", "my runs/mine", "--until", "1536 steps", "--json")
     assert (resumed.status, resumed.document["steps"]) == (0, 1536)
-    taken = racecraft("train", *SMALL, "--name", "mine", "--json")
+    taken = racecraft("train", *SMALL, "--name", "mine", "--runs", "my runs", "--json")
     assert taken.document["error"]["code"] == "RunError"
     assert "--resume" in taken.document["error"]["hint"]
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from racecraft.analysis.report_page import page, section
 from racecraft.analysis.share_page import LANGUAGES, Shown, line_of, number, proof, script, stage, words_of
 from racecraft.analysis.share_picture import draw_line, finish_picture
-from racecraft.errors import RunError
+from racecraft.errors import RunError, typed
 from racecraft.json_file import read_json_object
 from racecraft.limits import known_limit
 from racecraft.race.recording import Recording
@@ -39,7 +39,9 @@ def write_share(run: str | Path, path: str | Path | None = None, *, stamp: str =
     if not stamp:
         found = sorted(folder.path.glob("evaluation-*/evaluation.json"))
         if not found:
-            raise RunError(f"{folder.name} has no evaluation to share.", hint=f"racecraft evaluate {folder.path}")
+            raise RunError(
+                f"{folder.name} has no evaluation to share.", hint=f"racecraft evaluate {typed(folder.path)}"
+            )
         stamp = found[-1].parent.name.removeprefix("evaluation-")
     target = Path(path) if path is not None else folder.path / "share.html"
     text = share(folder, stamp, language=language)

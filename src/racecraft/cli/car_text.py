@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.text import Text
 
 from racecraft.agent.action_space import MAX_SPEED
+from racecraft.errors import typed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,4 +40,6 @@ def say_calibrated(car: CarCalibration, path: Path) -> None:
     console = Console()
     for line in lines:
         console.print(Text(line), soft_wrap=True)
-    console.print(Text.assemble("Drive with it: ", (f"racecraft evaluate RUN --as {path}", "bold")), soft_wrap=True)
+    console.print(
+        Text.assemble("Drive with it: ", (f"racecraft evaluate RUN --as {typed(path)}", "bold")), soft_wrap=True
+    )

@@ -13,6 +13,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from racecraft.errors import typed
 from racecraft.training.terminal import MAX_WIDTH, curve
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def say_learned(learned: Learned, film: Path | None) -> None:
     if film is not None:
         say_film(film)
     else:
-        _say(console, "Watch it:   ", (f"racecraft learn --resume {learned.run} --watch", "bold"))
+        _say(console, "Watch it:   ", (f"racecraft learn --resume {typed(learned.run)} --watch", "bold"))
 
 
 def say_film(film: Path) -> None:

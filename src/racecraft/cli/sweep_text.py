@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from racecraft.errors import typed
+
 if TYPE_CHECKING:
     from racecraft.sweeping import Board, Figure
     from racecraft.tuning.trial import Report
@@ -56,7 +58,10 @@ def say_board(name: str, board: Board, *, runs: Path) -> None:
     ranges = "Means over seeds, with the range that holds the true mean with 95 %."
     tied = " Tied may be as good as the first: train more seeds." if any(row.is_tied for row in board.places) else ""
     console.print(Text(ranges + tied, style="dim"), soft_wrap=True)
-    console.print(Text.assemble("Go on:  ", (f"racecraft sweep --resume {name} --runs {runs}", "bold")), soft_wrap=True)
+    console.print(
+        Text.assemble("Go on:  ", (f"racecraft sweep --resume {typed(name)} --runs {typed(runs)}", "bold")),
+        soft_wrap=True,
+    )
 
 
 def _shown(figure: Figure, form: str, seeds: int) -> str:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from racecraft.errors import printable, printable_lines
+from racecraft.errors import printable, printable_lines, typed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -77,9 +77,9 @@ def say_trained(result: TrainResult) -> None:
     if (prints := RunFolder(result.run).reward_log).exists():
         _say(console, "Prints:     ", (str(prints), "bold"))
     if result.reason not in ("laps", "no_better_lap"):
-        _say(console, "Continue:   ", (f"racecraft train --resume {result.run}", "bold"))
+        _say(console, "Continue:   ", (f"racecraft train --resume {typed(result.run)}", "bold"))
     if result.reason != "interrupted":
-        _say(console, "Race it:    ", (f"racecraft evaluate {result.run}", "bold"))
+        _say(console, "Race it:    ", (f"racecraft evaluate {typed(result.run)}", "bold"))
 
 
 def say_imported(result: ImportedRun) -> None:
@@ -388,7 +388,7 @@ def say_calibrated(result: Calibration, output: Path) -> None:
     _say_errors(console, {"started from": found["preset"], "fitted": found["held_out"]})
     _say_moved(console, result.moved)
     _say(console, "Vehicle file: ", (str(output), "bold"))
-    _say(console, "Drive it:     ", (f"racecraft train --vehicle {output}", "bold"))
+    _say(console, "Drive it:     ", (f"racecraft train --vehicle {typed(output)}", "bold"))
 
 
 def _say_moved(console: Console, moved: int) -> None:

@@ -9,6 +9,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from racecraft.errors import typed
+
 if TYPE_CHECKING:
     from racecraft.tuning import Outcome, TrialOutcome
 
@@ -48,9 +50,11 @@ def say_tuned(outcome: Outcome) -> None:
             line.append(_state(baseline, outcome.goal))
         console.print(line, soft_wrap=True)
         console.print(Text.assemble("Run folder: ", (best.run, "bold")), soft_wrap=True)
-        console.print(Text.assemble("Train on:   ", (f"racecraft train --from {best.run}", "bold")), soft_wrap=True)
+        console.print(
+            Text.assemble("Train on:   ", (f"racecraft train --from {typed(best.run)}", "bold")), soft_wrap=True
+        )
     console.print(
-        Text.assemble("Continue:   ", (f"racecraft tune --resume {outcome.folder} --minutes 10", "bold")),
+        Text.assemble("Continue:   ", (f"racecraft tune --resume {typed(outcome.folder)} --minutes 10", "bold")),
         soft_wrap=True,
     )
 

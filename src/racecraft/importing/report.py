@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from racecraft.errors import typed
 from racecraft.importing.layout import Role, role
 from racecraft.importing.source import SourceFile
 
@@ -43,7 +44,7 @@ class ImportedRun:
     @property
     def next_command(self) -> str:
         """What trains it."""
-        return f"racecraft train --resume {_quoted(self.run)}"
+        return f"racecraft train --resume {typed(self.run)}"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
@@ -77,9 +78,3 @@ def unused_files(files: Iterable[SourceFile], root: str) -> dict[str, str]:
 
 def _size(count: int) -> str:
     return f"{count / 1e6:,.1f} MB" if count >= 100_000 else f"{count:,} bytes"
-
-
-def _quoted(path: Path) -> str:
-    import shlex
-
-    return shlex.quote(str(path))

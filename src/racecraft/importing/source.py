@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from racecraft.errors import ConfigError, SourceError
+from racecraft.errors import ConfigError, SourceError, typed
 from racecraft.importing.archive import DEFAULT_LIMITS, read_archive
 from racecraft.importing.archive_guard import CHUNK, Limits
 from racecraft.importing.layout import (
@@ -107,7 +107,8 @@ def open_source(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> Iterato
         yield _single(path)
     elif path.name in PLACES or path.suffix in (".json", ".yaml", ".env", ".csv", ".log", ".pb", ".index"):
         raise SourceError(
-            f"{path.name} alone is no model.", hint=f"Import the folder it lies in: racecraft import {path.parent}"
+            f"{path.name} alone is no model.",
+            hint=f"Import the folder it lies in: racecraft import {typed(path.parent)}",
         )
     else:
         with tempfile.TemporaryDirectory(prefix="racecraft-import-") as folder:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import ConfigError, printable
+from racecraft.errors import ConfigError, printable, typed
 from racecraft.extras import needed_for
 from racecraft.film.encoding import FRAME_RATE
 from racecraft.replay.replay import read_replay
@@ -104,7 +104,9 @@ def _pictures_of(path: Path) -> Iterator[Picture]:
     if (path / "run.json").is_file():
         replays = sorted(path.glob("evaluation-*/evaluation.replay"))
         if not replays:
-            raise ConfigError(f"Run {_named(path)} was never evaluated.", hint=f"First racecraft evaluate {path}")
+            raise ConfigError(
+                f"Run {_named(path)} was never evaluated.", hint=f"First racecraft evaluate {typed(path)}"
+            )
         yield from _from_replay(replays[-1])
     elif path.is_dir():
         files = [file for file in path.iterdir() if file.suffix.lower() in PICTURES and file.is_file()]

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.agent import ModelMetadata
-from racecraft.errors import CheckpointError, RacecraftError, RewardError
+from racecraft.errors import CheckpointError, RacecraftError, RewardError, typed
 from racecraft.run import CheckpointWarning, RunFolder
 from racecraft.scoped_warnings import scoped_warnings
 from racecraft.training.interruption import interruptible
@@ -92,7 +92,9 @@ class Training:
                 error.hint = error.hint or self.way_on(error)
                 raise
             except KeyboardInterrupt:
-                self.reporter.note(f"Stopped at once. Continue with: racecraft train --resume {self.folder.path}")
+                self.reporter.note(
+                    f"Stopped at once. Continue with: racecraft train --resume {typed(self.folder.path)}"
+                )
                 raise
 
     def stop(self) -> None:
@@ -227,7 +229,7 @@ class Training:
 
     def way_on(self, error: RacecraftError) -> str:
         """What to do after an error, as a hint for the command line; who trains otherwise says something else."""
-        resume = f"racecraft train --resume {self.folder.path}"
+        resume = f"racecraft train --resume {typed(self.folder.path)}"
         repair = f"Correct {self.folder.reward_function}, then: " if isinstance(error, RewardError) else ""
         with scoped_warnings("ignore", CheckpointWarning), suppress(CheckpointError):
             if self.folder.checkpoints.last is not None:

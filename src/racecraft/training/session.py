@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from racecraft.agent import Hyperparameters, ModelMetadata
-from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
+from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError, typed
 from racecraft.learn import Algorithm, Learner, NetworkSpec
 from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import (
@@ -279,8 +279,9 @@ def _require_its_network(saved: Checkpoint, asked: NetworkSpec, folder: RunFolde
         if had != (list(value) if isinstance(value, tuple) else value):
             raise ConfigError(
                 f"The run's network has {name} {str(had)[:60]}, and its files now ask for {str(value)[:60]}.",
-                hint=f"Undo the change. With other actions racecraft train --from {folder.path} --model-metadata FILE "
-                "begins a new run with these weights.",
+                hint="Undo the change. With other actions "
+                f"racecraft train --from {typed(folder.path)} --model-metadata FILE begins a new run "
+                "with these weights.",
             )
 
 
