@@ -119,6 +119,15 @@ def test_a_bug_is_told_as_one(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -
     assert racecraft("doctor", "--json").document["error"]["code"] == "ZeroDivisionError"
 
 
+def test_an_interrupt_before_the_verb_begins_is_no_stack_trace(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("racecraft.cli.entry.application", interrupted)
+    outcome = racecraft("tracks")
+    assert (outcome.status, outcome.out, outcome.err) == (130, "", "")
+
+
 def test_what_an_error_says_is_no_markup(racecraft: Run, tmp_path: Path) -> None:
     assert "[bold]x[/bold]" in racecraft("train", "--critic", "[bold]x[/bold]").err
 

@@ -111,7 +111,7 @@ def main() -> None:
             print_error("UsageError", usage.format_message(), f"See '{verb} --help'.")
         usage.show()
         sys.exit(2)
-    except typer.Abort:
+    except (typer.Abort, KeyboardInterrupt):  # the latter while the verbs are still being built
         sys.exit(INTERRUPTED)
     except Exception as error:
         told = _known(error) or error
