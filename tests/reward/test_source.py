@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from racecraft.errors import RewardError
+from racecraft.errors import ConfigError, RewardError
 from racecraft.reward.source import MAX_CHARACTERS, load_preset, load_reward, preset_names
 
 
@@ -36,6 +36,11 @@ def test_misspelt_presets(load):
     with pytest.raises(RewardError, match="Did you mean 'centerline'") as caught:
         load("centreline")
     assert "stay_inside" in caught.value.hint
+
+
+def test_a_function_is_none_of_them():
+    with pytest.raises(ConfigError, match=r"reward is <built-in function max>; .* only environments take a function"):
+        load_reward(max)
 
 
 def test_files(tmp_path, monkeypatch):

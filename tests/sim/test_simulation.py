@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from racecraft import _native
+from racecraft.errors import ConfigError
 from racecraft.sim import CONTROL_DT, ROW_COLUMNS, STATUS_NAMES, Simulation, Start, Vehicle
 from racecraft.sim.columns import STATE_COLUMNS
 from racecraft.track import Track, load_track
@@ -366,3 +367,10 @@ def test_the_mask_of_a_reset_may_be_what_it_clears():
     simulation.reset(simulation.terminated)
     assert not simulation.terminated.any()
     assert simulation.column("episode").tolist() == [1.0, 1.0, 1.0]
+
+
+def test_a_column_that_does_not_exist_is_told_with_the_nearest_that_does():
+    simulation = Simulation(OVAL, num_envs=1, camera=None)
+    with pytest.raises(ConfigError, match="There is no column 'progres'; allowed are episode, steps, x") as told:
+        simulation.column("progres")
+    assert told.value.hint == "Did you mean 'progress'?"

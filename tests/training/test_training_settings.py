@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import inspect
 import json
 from dataclasses import fields, replace
 from pathlib import Path
@@ -239,6 +240,13 @@ def test_ppo_can_be_given_whole_but_not_beside_hyperparameters() -> None:
 def test_an_unknown_setting_is_refused_with_the_nearest() -> None:
     with pytest.raises(ConfigError, match=r"'num_env'.*Did you mean 'num_envs'"):
         make_settings(metadata=DISCRETE, num_env=4)
+
+
+def test_a_misspelt_argument_of_train_is_told_its_name() -> None:
+    arguments = set(inspect.signature(train).parameters) - {"settings"}
+    assert arguments <= {*settings_module.ARGUMENTS, *(field.name for field in fields(TrainSettings))}
+    with pytest.raises(ConfigError, match=r"There is no setting 'rewrd'\. Did you mean 'reward'"):
+        train("oval", rewrd="racing")
 
 
 @pytest.mark.parametrize(("kind", "num_actions"), [("default", None), ("continuous", 2)])

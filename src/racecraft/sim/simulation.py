@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from racecraft import _native
 from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, require
-from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
+from racecraft.errors import ConfigError, NonFiniteAction, ShapeError, did_you_mean
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS, Objects, native_objects
@@ -251,7 +251,16 @@ class Simulation:
         return int(self._engine.num_bytes)
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """One column of `rows` by name, a view (N,)."""
+        """One column of `rows` by name, a view (N,).
+
+        Raises:
+            ConfigError: There is no such column.
+        """
+        if name not in ROW_COLUMNS:
+            raise ConfigError(
+                f"There is no column {name!r}; allowed are {', '.join(ROW_COLUMNS)}.",
+                hint=did_you_mean(str(name), ROW_COLUMNS),
+            )
         return self.rows[:, ROW_COLUMNS.index(name)]
 
     def object_column(self, name: str) -> NDArray[np.float64]:

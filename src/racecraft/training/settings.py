@@ -35,6 +35,11 @@ from racecraft.training.regimes import (
 from racecraft.training.stop import Until
 
 DEFAULT_TRACK: Final = "reinvent_2018"
+ARGUMENTS: Final = (
+    *("reward", "actions", "sensors", "model_metadata", "hyperparameters", "parent", "root", "name", "reporter"),
+    *("aws_log", "started", "recipe", "num_envs"),
+)
+"""Of `racecraft.train`, beside the settings: who misspells one is told."""
 VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
 _ADDED: Final = ("algorithm", "opponents", "sac", "distill", "sb3", "device", "camera")
 """Fields that runs of earlier versions lack."""
@@ -254,7 +259,7 @@ def make_settings(
     known = [setting.name for setting in fields(TrainSettings)]
     for name in settings:
         if name not in known:
-            raise ConfigError(f"There is no setting {name!r}. {did_you_mean(name, [*known, 'num_envs'])}".rstrip())
+            raise ConfigError(f"There is no setting {name!r}. {did_you_mean(name, [*known, *ARGUMENTS])}".rstrip())
     if not isinstance(vehicle, Vehicle):
         vehicle = load_vehicle(vehicle or VEHICLE_OF_VERSION[metadata.version])
     if not isinstance(randomize, Randomization):
