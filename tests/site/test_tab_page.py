@@ -295,6 +295,22 @@ def write(page: Page, source: str) -> None:
     page.get_by_label("The reward in Python").fill(source)
 
 
+KEPT = (
+    "['indexedDB', 'caches', 'navigator', 'fetch', 'Worker', 'BroadcastChannel'].filter((name) => name in globalThis)"
+)
+
+
+def test_where_python_runs_nothing_is_left_of_what_the_browser_keeps_for_the_page(page: Page) -> None:
+    """A reward from a link may find its way to JavaScript; to the models of who opened it there is none."""
+    page.reload()
+    page.get_by_role("button", name="Train", exact=True).wait_for()
+    assert len(page.workers[0].evaluate(KEPT)) == 6
+    with page.expect_worker() as found:
+        write(page, "def reward_function(params):\n    return params['speed']\n")
+    page.get_by_text("The function is fine.").wait_for()
+    assert found.value.evaluate(KEPT) == []
+
+
 def test_a_reward_of_ones_own_is_checked_and_trains(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("oval")
     write(page, "import numpy\ndef reward_function(params):\n    return params['sped']\n")

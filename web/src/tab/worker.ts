@@ -1,5 +1,6 @@
 /** The thread beside the page in which cars drive and learn, with Python where it is asked for; it is ended by ending the
  * worker. */
+import { leaveAlone } from "./alone";
 import { momentsAmong, type Among } from "./among";
 import type { RewardPainting, RewardVerdict } from "../api/client";
 import type { Drive, DriveState, Settings } from "../api/drives";
@@ -331,6 +332,7 @@ async function load({ site, hasPython, isTeam }: Load): Promise<Loaded> {
     import(/* @vite-ignore */ address) as Promise<{ rewards: Record<string, Reward> }>,
     hasPython ? Python.load(site) : undefined,
   ]);
+  if (python) leaveAlone();
   return { site, core, presets: rewards, python };
 }
 
