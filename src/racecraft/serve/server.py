@@ -12,6 +12,7 @@ import uvicorn
 from racecraft.checks import check_whole
 from racecraft.errors import ConfigError
 from racecraft.serve.app import create_app
+from racecraft.serve.door.prompt import PromptProtocol
 from racecraft.serve.settings import ServeSettings
 
 ADDRESS = "127.0.0.1"
@@ -49,6 +50,7 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
         access_log=False,
         server_header=False,
         timeout_graceful_shutdown=2,
+        http=PromptProtocol,
         proxy_headers=bool(settings.trusted_proxies),  # else by default of whoever is on this machine
         forwarded_allow_ips=list(settings.trusted_proxies),
         **encryption,
