@@ -224,6 +224,19 @@ def test_what_is_no_race_is_refused(folder: Path, tmp_path: Path) -> None:
         verify_race(folder)
 
 
+def test_a_runs_folder_is_no_race_and_its_replay_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"holds no race: race\.json is missing") as told:
+        verify_race(tmp_path)
+    assert told.value.hint == ""
+    for stamp in ("20260101000000", "20260102000000"):
+        replay = tmp_path / f"evaluation-{stamp}" / "evaluation.replay"
+        replay.parent.mkdir()
+        replay.touch()
+    with pytest.raises(ConfigError, match="holds no race") as told:
+        verify_race(tmp_path)
+    assert told.value.hint == f"Its last evaluation's replay: racecraft verify {replay}"
+
+
 def test_a_race_under_the_old_rules_says_so(models: list[Path], folder: Path) -> None:
     """As written until there were announcements: one trial from the line, in whatever car, results without scores."""
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 from racecraft.contest.classification import classify
 from racecraft.contest.contest import result_rows
 from racecraft.contest.terms import TOGETHER
-from racecraft.errors import ConfigError, ReplayError
+from racecraft.errors import ConfigError, ReplayError, typed
 from racecraft.json_file import parse_json_object, read_bytes
 from racecraft.judging.race import FORMAT, RESULTS
 from racecraft.race.announcement import Announcement
@@ -112,7 +112,13 @@ def published(race: str) -> Announcement | str:
 
 
 def _results_of(path: Path) -> Path:
-    return path / RESULTS if path.is_dir() else path
+    if not path.is_dir():
+        return path
+    if not (results := path / RESULTS).exists():
+        replays = sorted(path.glob("evaluation-*/evaluation.replay"))  # it may be a run's folder
+        hint = f"Its last evaluation's replay: racecraft verify {typed(replays[-1])}" if replays else ""
+        raise ConfigError(f"{path} holds no race: {RESULTS} is missing.", hint=hint)
+    return results
 
 
 def _read(path: Path) -> dict[str, Any]:
