@@ -25,6 +25,9 @@ export const contests: Record<keyof typeof english, string> = {
   contests_last: "letzter",
   contests_few:
     "Wähl mindestens zwei. Ein Modell darf gegen sich selbst fahren, etwa sein bester gegen seinen letzten Stand.",
+  contests_choose: "Zwei oder mehr Modelle wählen",
+  contests_many_heat: "Ein Lauf hat höchstens {most}",
+  contests_many_ladder: "Ein Turnier hat höchstens {most}",
   contests_go_heat: "Lauf mit {count} starten",
   contests_go_ladder: "Turnier von {count} starten",
   contests_by: "Sie fahren",
@@ -50,6 +53,8 @@ export const contests: Record<keyof typeof english, string> = {
   contests_ghost_evaluations: "Der beste Versuch einer Auswertung",
   contests_ghost_no_lap: "keine ganze Runde",
   contests_ghost_heats: "Das beste Auto eines früheren Laufs",
+  contests_ghost_heat: "Das beste Auto des Laufs {name} ({when})",
+  contests_ghost_heat_gone: "Das beste Auto eines früheren Laufs, der gelöscht ist",
   contests_ghost_leave: "Den Geist herausnehmen: {name}",
   contests_schedule: "Wer gegen wen",
   contests_schedule_round_robin: "Jeder gegen jeden",
