@@ -54,7 +54,7 @@ def test_a_car_and_conditions_are_chosen_and_told(visit: Visit) -> None:
 
     told = page.locator("summary", has_text="Car: own numbers: mass 9.5 · speed_gain 0.6 · Direction: The other way")
     told.wait_for()
-    assert "Otherwise than it knows: Light, friction and camera, a little" in told.inner_text()
+    assert "Otherwise than it knows: Light, grip, camera: a little" in told.inner_text()
     assert "On the road: Boxes: 2" in told.inner_text()
     told.click()
     assert page.get_by_text("own numbers: mass 9.5 · speed_gain 0.6", exact=True).is_visible()

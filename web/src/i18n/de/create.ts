@@ -53,7 +53,7 @@ export const create: Record<keyof typeof english, string> = {
   randomize_add: "Noch eine Größe",
   randomize_lead: "Wer mehr erlebt hat, fährt auch anderswo, lernt aber länger.",
   randomize_none: "Nichts",
-  randomize_light: "Licht, Reibung und Kamera, ein wenig",
+  randomize_light: "Licht, Haftung, Kamera: wenig",
   randomize_strong: "Viel von allem",
   randomize_real: "Wie mit einem echten Auto",
   randomize_aws: "Wie das Original",

@@ -51,7 +51,7 @@ export const create = {
   randomize_add: "One more quantity",
   randomize_lead: "A policy that has met more drives elsewhere, too, but learns longer.",
   randomize_none: "Nothing",
-  randomize_light: "Light, friction and camera, a little",
+  randomize_light: "Light, grip, camera: a little",
   randomize_strong: "Much of everything",
   randomize_real: "As with a real car",
   randomize_aws: "As the original",
