@@ -143,12 +143,15 @@ export function toldObjects(objects: Record<string, unknown>): string {
 
 const cost = (value: unknown) => withUnit(Number(value), "s");
 
+export const toldDirection = (rules: Record<string, unknown>): string =>
+  t(rules["direction"] === "reverse" ? "reverse" : "forward");
+
 /** The rules that something was driven under, as labels and values. */
 export function toldRules(rules: Record<string, unknown>): [string, string][] {
   const mercy = Number(rules["mercy_after"]);
   return [
     [t("laps"), plain(Number(rules["laps"]))],
-    [t("direction"), t(rules["direction"] === "reverse" ? "reverse" : "forward")],
+    [t("direction"), toldDirection(rules)],
     [t("races_offtrack_told"), cost(rules["offtrack_penalty"])],
     [t("races_collision_told"), cost(rules["collision_penalty"])],
     [t("races_resets"), plain(Number(rules["max_resets"]))],
