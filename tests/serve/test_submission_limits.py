@@ -87,6 +87,13 @@ def folders(tmp_path: Path) -> list[str]:
     return sorted(path.name for path in (tmp_path / "state" / "submissions").iterdir())
 
 
+def test_a_race_tells_which_way_round_it_goes(league: League, database: Database) -> None:
+    assert [race.direction for race in league.races(ADA)] == ["forward"]  # one from before there was a choice
+    with database.transaction() as session:
+        session.scalars(sa.select(Race)).one().rules = {"direction": "reverse"}
+    assert [race.direction for race in league.races(ADA)] == ["reverse"]
+
+
 def test_what_was_cancelled_yesterday_and_is_sent_again_is_todays_attempt(
     entries: Entries, database: Database, files: list[bytes], tmp_path: Path
 ) -> None:

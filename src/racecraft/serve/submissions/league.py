@@ -252,6 +252,7 @@ def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
             "is_practice": "seed" in race.document,
             "laps": int(race.rules.get("laps", 1)),
             "time_limit": float(race.rules.get("time_limit", 0.0)),
+            "direction": race.rules.get("direction", "forward"),
             "state": state,
             "secret": race.secret if state == "closed" else "",
         }

@@ -45,6 +45,8 @@ class LeagueRace(Message):
     laps: int
     time_limit: float
     """s on the clock after which a trial is over; 0 for none, as in races that were made before there was one."""
+    direction: str
+    """``forward`` or ``reverse``."""
     ranking: Ranking
     minimum_laps: int
     trials: int
