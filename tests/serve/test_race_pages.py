@@ -333,7 +333,7 @@ def test_models_race_on_one_road_and_are_rated(visit: Visit) -> None:
     page = visit.open("/races")
     page.get_by_role("link", name="New heat or ladder").click()
     add = page.get_by_role("combobox", name="Add a model")
-    assert page.get_by_role("button", name="Start the heat").is_disabled()
+    assert page.get_by_role("button", name="Choose two or more models").is_disabled()
     for name in ("ada", "bob", "ada"):
         add.select_option(name)
     page.get_by_role("combobox", name="Checkpoint of ada").nth(1).select_option("last")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from racecraft.checks import check_type
-from racecraft.errors import RewardError, did_you_mean
+from racecraft.errors import ConfigError, RewardError, did_you_mean
 
 MAX_CHARACTERS = 140_000  # longest source that AWS accepts
 _PRESETS = Path(__file__).with_name("presets")
@@ -41,9 +40,9 @@ def load_reward(name_or_path: str | Path) -> str:
         ConfigError: It is a function: only the environments take one, as a training's runs in a process of its own.
         RewardError: It is neither, or the file is not UTF-8 text of 1 to 140,000 characters.
     """
-    check_type(
-        "reward", name_or_path, (str, Path), "use a preset's name or a file's path; only environments take a function"
-    )
+    if not isinstance(name_or_path, str | Path):  # checked here, as a browser's tab has no `racecraft.checks`
+        advice = "use a preset's name or a file's path; only environments take a function"
+        raise ConfigError(f"reward is {repr(name_or_path)[:100]}; {advice}.")
     if str(name_or_path) in preset_names():
         return load_preset(str(name_or_path))
     path = Path(name_or_path).expanduser()
