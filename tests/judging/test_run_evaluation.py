@@ -129,6 +129,7 @@ def test_a_folder_with_a_file_in_the_way_is_an_error_of_ours(tmp_path: Path) -> 
         evaluate(run, **{**QUICK, "video": True})
 
 
+@pytest.mark.costly
 def test_two_evaluations_at_once_have_a_film_each_and_one_without_still_counts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -154,6 +154,7 @@ def _trained(root: Path, until: str, **settings: object) -> Path:
     return train("oval", until=until, network=PERCEPTION, root=root, name="beliefs", num_threads=1, **settings).run  # type: ignore[arg-type]
 
 
+@pytest.mark.costly
 def test_it_goes_on_in_the_bits_of_a_training_that_was_never_broken_off(tmp_path: Path) -> None:
     whole = RunFolder.open(_trained(tmp_path / "a", "2048 steps", evaluate_every=1024))
     broken = RunFolder.open(_trained(tmp_path / "b", "1024 steps", evaluate_every=1024))
@@ -162,6 +163,7 @@ def test_it_goes_on_in_the_bits_of_a_training_that_was_never_broken_off(tmp_path
     assert all((first[name] == second[name]).all() for name in first if name.startswith("policy."))
 
 
+@pytest.mark.costly
 def test_a_loaded_policy_drives_as_the_one_that_was_trained(tmp_path: Path, frames: np.ndarray) -> None:
     run = RunFolder.open(_trained(tmp_path, "1024 steps"))
     _, policy = load_policy(run, checkpoint="last")

@@ -78,6 +78,7 @@ ladder(SimpleNamespace(job=job, runs=Path(sys.argv[1])))
 """
 
 
+@pytest.mark.costly
 def test_the_next_ladder_clears_what_a_killed_one_left_and_nothing_of_one_that_drives(tmp_path: Path) -> None:
     def begun(name: str) -> subprocess.Popen[str]:
         arguments: list[Any] = [sys.executable, "-c", LADDER, tmp_path, name]

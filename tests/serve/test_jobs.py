@@ -112,10 +112,12 @@ def opened_together(urls: Sequence[str]) -> None:
         assert process.returncode == 0
 
 
+@pytest.mark.costly
 def test_two_servers_that_make_a_database_at_the_same_moment_make_one(tmp_path: Path) -> None:
     opened_together([f"sqlite:///{tmp_path / f'{number}.db'}" for number in range(20)])
 
 
+@pytest.mark.costly
 def test_two_servers_bring_an_old_database_up_to_date_once(database_url: str) -> None:
     database = Database(database_url)
     with database._alone() as connection:

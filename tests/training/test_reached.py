@@ -35,6 +35,7 @@ def trains(folder: RunFolder, until: Until) -> bool:
     return bool(recorder.iterations)
 
 
+@pytest.mark.costly
 def test_files_tell_what_the_training_would(driven: RunFolder, tmp_path: Path) -> None:
     changed = RunFolder.open(shutil.copytree(driven.path, tmp_path / "changed"))
     change_reward(changed, OTHER)
