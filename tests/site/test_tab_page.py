@@ -33,7 +33,7 @@ from racecraft.training.evaluator import SEED
 from until_true import until_true
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Page, Worker
 
 THREADS = "crossOriginIsolated ? Math.min(navigator.hardwareConcurrency, 8) : 1"
 FADED = """new Promise(requestAnimationFrame)
@@ -282,9 +282,7 @@ def test_somebody_drives_a_lap_and_then_against_it(page: Page) -> None:
 def test_what_runs_in_the_page_reaches_no_other_site(page: Page) -> None:
     other = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Files)
     ask = f"fetch('http://127.0.0.1:{other.server_port}/', {{mode: 'no-cors'}}).then(() => 'there', () => 'refused')"
-    page.reload()  # its worker is no longer one that was just ended
-    page.get_by_role("button", name="Train", exact=True).wait_for()
-    found = page.workers[0].evaluate(ask)  # the others are its helpers, who hear of nothing
+    found = reloaded(page).evaluate(ask)
     other.server_close()
     assert found == "refused"
 
@@ -295,6 +293,14 @@ def write(page: Page, source: str) -> None:
     page.get_by_label("The reward in Python").fill(source)
 
 
+def reloaded(page: Page) -> Worker:
+    """The worker of the page's cars, which begins anew: one of before ends with its page, and never answers."""
+    with page.expect_worker() as first:  # the others are its helpers, who hear of nothing
+        page.reload()
+    page.get_by_role("button", name="Train", exact=True).wait_for()
+    return first.value
+
+
 KEPT = (
     "['indexedDB', 'caches', 'navigator', 'fetch', 'Worker', 'BroadcastChannel'].filter((name) => name in globalThis)"
 )
@@ -302,9 +308,7 @@ KEPT = (
 
 def test_where_python_runs_nothing_is_left_of_what_the_browser_keeps_for_the_page(page: Page) -> None:
     """A reward from a link may find its way to JavaScript; to the models of who opened it there is none."""
-    page.reload()
-    page.get_by_role("button", name="Train", exact=True).wait_for()
-    assert len(page.workers[0].evaluate(KEPT)) == 6
+    assert len(reloaded(page).evaluate(KEPT)) == 6
     with page.expect_worker() as found:
         write(page, "def reward_function(params):\n    return params['speed']\n")
     page.get_by_text("The function is fine.").wait_for()
