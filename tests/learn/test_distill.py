@@ -11,16 +11,20 @@ from scheduled_world import ScheduledWorld
 from stripe_world import StripeWorld
 
 from racecraft.errors import CheckpointError, ConfigError
-from racecraft.learn import NetworkSpec, distill, distributions, make_learner
+from racecraft.learn import Learner, NetworkSpec, distill, distributions, make_learner
 from racecraft.learn.distill import ANSWER_STD, Distill, DistillConfig, sure_answers
 
 CONFIG = DistillConfig(num_envs=8, num_steps=8, teacher_steps=1, minibatch_size=32, buffer_size=512)
 
 
+def open_teacher(teacher: Learner) -> StripeWorld:
+    return StripeWorld(16, seed=4)
+
+
 def make(config: DistillConfig = CONFIG, *, is_discrete: bool = True, seed: int = 0) -> Distill:
     spec = NetworkSpec(num_actions=3 if is_discrete else 1, is_discrete=is_discrete, state_size=2)
     learner = make_learner(spec, seed=seed, num_threads=1)
-    return Distill(config, learner, StripeWorld(config.num_envs), StripeWorld(16, seed=4), seed=seed)
+    return Distill(config, learner, StripeWorld(config.num_envs), open_teacher, seed=seed)
 
 
 def mean_reward(trained: Distill) -> float:
@@ -122,17 +126,14 @@ def test_the_same_seed_gives_the_same_bits_and_a_resumed_run_has_them() -> None:
 
 @pytest.mark.parametrize("is_discrete", [True, False])
 def test_after_its_lessons_the_student_goes_on_with_the_reward_and_its_teachers_critic(is_discrete: bool) -> None:
-    trained = make(replace(CONFIG, student_steps=128), is_discrete=is_discrete)
+    trained = make(replace(CONFIG, student_steps=128, refining_rate=0.0), is_discrete=is_discrete)
     for _ in range(3):
         trained.iterate()
     assert (trained.refining, trained.is_refining) == (None, True)
     student, critic = trained.driving_weights, trained.teacher.learner.weights()
     taught = {name: array.copy() for name, array in student.items() if name.startswith("critic.")}
 
-    monkeyed = replace(distill.REFINING_PPO, learning_rate=0.0)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(distill, "REFINING_PPO", monkeyed)
-        stats = trained.iterate()
+    stats = trained.iterate()
     assert stats.total_steps == trained.total_steps == 128 + stats.num_steps
     for name, array in trained.driving_weights.items():
         if name.startswith("critic."):
@@ -162,7 +163,7 @@ def test_the_students_returns_and_lengths_are_those_of_the_episodes_that_ended()
     world.reset(np.ones(2, bool))
     config = replace(CONFIG, num_envs=2)
     learner = make_learner(NetworkSpec(num_actions=3, state_size=2), num_threads=1)
-    trained = Distill(config, learner, world, StripeWorld(16, seed=4))
+    trained = Distill(config, learner, world, open_teacher)
     trained.iterate()  # the teacher
     first, second = trained.iterate(), trained.iterate()
     assert (first.episodes, first.mean_return, first.mean_length) == (3, (3 + 4 + 3) / 3, (3 + 4 + 6) / 3)
@@ -173,9 +174,7 @@ def test_the_students_returns_and_lengths_are_those_of_the_episodes_that_ended()
 def test_a_student_whose_critic_sees_the_camera_only_learns_from_its_teacher() -> None:
     spec = NetworkSpec(num_actions=3, is_discrete=True, state_size=0)
     config = replace(CONFIG, student_steps=64)
-    trained = Distill(
-        config, make_learner(spec, seed=0, num_threads=1), StripeWorld(8), StripeWorld(16, seed=4), seed=0
-    )
+    trained = Distill(config, make_learner(spec, seed=0, num_threads=1), StripeWorld(8), open_teacher, seed=0)
     for _ in range(4):
         trained.iterate()
     assert trained.refining is None
@@ -183,11 +182,12 @@ def test_a_student_whose_critic_sees_the_camera_only_learns_from_its_teacher() -
 
 
 def test_a_student_that_refines_resumes_to_the_bit() -> None:
-    config = replace(CONFIG, student_steps=64)
+    config = replace(CONFIG, student_steps=64, refining_rate=2e-3, refining_rate_steps=700)
     first, second = make(config), make(config, seed=3)
     for _ in range(3):
         first.iterate()
     assert first.refining is not None
+    assert (first.refining.config.learning_rate, first.refining.config.rate_steps) == (2e-3, 700)
     second.load_state(first.state())
     assert second.refining is not None
     assert (second.total_steps, second.iteration) == (first.total_steps, first.iteration)
@@ -205,6 +205,8 @@ def test_a_student_that_refines_resumes_to_the_bit() -> None:
         ({"minibatch_size": 1.5}, "minibatch_size is 1.5"),
         ({"teacher_rate_steps": -1}, "teacher_rate_steps is -1; allowed is a whole number from 0"),
         ({"rate_steps": -1}, "rate_steps is -1; allowed is a whole number from 0"),
+        ({"refining_rate": 2.0}, "refining_rate is 2.0"),
+        ({"refining_rate_steps": -1}, "refining_rate_steps is -1; allowed is a whole number from 0"),
         ({"student_steps": 0.5}, "student_steps is 0.5; allowed is a whole number from 0"),
     ],
 )

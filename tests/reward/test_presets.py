@@ -138,7 +138,7 @@ def test_dodge_pays_less_the_nearer_and_the_more_squarely_an_object_is_ahead(ahe
     assert reward("dodge", **{**objects, "is_crashed": True}) == -1.0
 
 
-@pytest.mark.parametrize(("name", "mistake"), [("lap_time", -1.0), ("duel", -4.0)])
+@pytest.mark.parametrize(("name", "mistake"), [("lap_time", -1.0), ("duel", -8.0)])
 def test_the_metres_gained_since_the_last_step_of_the_same_episode_are_paid_for(name, mistake):
     namespace: dict = {}
     exec(compile(load_preset(name), name, "exec"), namespace)
@@ -154,6 +154,50 @@ def test_the_metres_gained_since_the_last_step_of_the_same_episode_are_paid_for(
     assert rewards == pytest.approx([0, 0.2, -0.1, mistake, 0, 0, 0])
     crash = TEMPLATE | ROAD | {"steps": 91.0, "progress": 50.5, "is_crashed": True}
     assert namespace["reward_function"](crash) == mistake
+
+
+RIVALS = {"track_length": 20.0, "closest_objects": [1, 0], "is_crashed": False}
+
+
+def duel(*steps: tuple[float, float, float, float], **params) -> list[float]:
+    """What is paid for steps: progress in percent of 20 m, m from the start, and where two others are, in m."""
+    namespace: dict = {}
+    exec(compile(load_preset("duel"), "duel", "exec"), namespace)
+    return [
+        namespace["reward_function"](
+            TEMPLATE
+            | ROAD
+            | RIVALS
+            | {"steps": 2.0 + number, "progress": progress, "projection_distance": here, "objects_distance": [one, two]}
+            | params
+        )
+        for number, (progress, here, one, two) in enumerate(steps)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("steps", "paid"),
+    [
+        (((1, 0.2, 1.2, 15), (2, 0.4, 1.3, 15)), 0.2 + 3 * 0.1),  # it gains on the car ahead
+        (((1, 0.2, 1.2, 15), (2, 0.4, 1.5, 15)), 0.2 - 3 * 0.1),  # and loses on it
+        (((1, 0.2, 6.0, 18.9), (2, 0.4, 6.1, 19.2)), 0.2 - 3 * 0.1),  # the one behind is nearer, across the line
+        (((1, 19.9, 0.9, 10), (2, 0.1, 1.0, 10)), 0.2 + 3 * 0.1),  # the line is between them
+        (((1, 0.2, 3.0, 15), (2, 0.4, 3.1, 15)), 0.2),  # too far ahead
+        (((1, 0.2, 1.2, 15), (2, 0.4, 2.0, 15)), 0.2),  # put somewhere else
+        (((1, 0.2, 1.2, 15), (2, 0.4, 0.9, 15)), 0.2),  # back, for a mistake
+        (((1, 0.2, 1.2, 19.1), (2, 0.4, 1.7, 19.2)), 0.2),  # the other one is nearest now
+    ],
+)
+def test_a_duel_pays_for_metres_three_times_more_where_they_are_won_from_somebody_near(steps, paid):
+    first, second = duel(*steps)
+    assert first == 0.0
+    assert second == pytest.approx(paid)
+    assert duel(*steps, is_crashed=True) == [-8.0, -8.0]
+
+
+def test_a_duels_new_episode_wins_nothing_from_where_the_others_were():
+    first, again = duel((1, 0.2, 1.2, 15), (2, 0.4, 1.0, 15), steps=2.0)
+    assert (first, again) == (0.0, 0.0)
 
 
 def test_touring_pays_for_metres_and_not_for_haste_in_a_bend():

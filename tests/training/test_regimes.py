@@ -38,7 +38,7 @@ def test_the_last_row_decides_everything() -> None:
     ("circumstances", "expected"),
     [
         ({"objects": BOTS}, {"reward": OBJECTS, "start": TIME_TRIAL, "ppo": OBJECTS, "good": OBJECTS}),
-        ({"opponents": RIVALS}, {"reward": DUEL, "start": DUEL, "ppo": DUEL, "critic": DUEL, "good": TIME_TRIAL}),
+        ({"opponents": RIVALS}, {"reward": DUEL, "start": DUEL, "distill": DUEL, "critic": DUEL, "good": TIME_TRIAL}),
         ({"objects": BOTS, "opponents": RIVALS}, {"reward": OBJECTS, "start": DUEL, "ppo": OBJECTS, "critic": DUEL}),
         ({"num_tracks": 2}, {"reward": TIME_TRIAL, "start": MANY_TRACKS, "evaluation_trials": MANY_TRACKS}),
         ({"num_tracks": 2, "objects": BOTS}, {"reward": OBJECTS, "ppo": MANY_TRACKS, "evaluate_every": MANY_TRACKS}),
@@ -62,7 +62,7 @@ def test_the_most_particular_row_decides(circumstances: dict[str, Any], expected
     ("settings", "sentence"),
     [
         ({"device": "cuda:1", "algorithm": "sac"}, "algorithm is 'sac'; device 'cuda:1' trains 'ppo' only."),
-        ({"opponents": RIVALS, "algorithm": "distill"}, "algorithm is 'distill'; among other cars only ppo learns"),
+        ({"opponents": RIVALS, "algorithm": "sac"}, "algorithm is 'sac'; among other cars only ppo and distill learn"),
         ({"opponents": RIVALS, "device": "cuda"}, "device is 'cuda'; races of several cars are driven on the cpu."),
     ],
 )

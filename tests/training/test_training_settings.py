@@ -355,6 +355,20 @@ def test_a_child_of_a_taught_model_among_objects_has_a_teacher_and_no_lessons(tm
     assert make_plan(parent=alone, objects=boxes).settings.algorithm == "ppo"
 
 
+@pytest.mark.costly
+def test_a_racers_child_has_a_teacher_and_no_lessons(tmp_path: Path) -> None:
+    settings: dict[str, Any] = {"num_envs": 8, "evaluation_trials": 1, "num_threads": 1, "root": tmp_path}
+    parent = train("oval", opponents=Opponents(), until="64 steps", name="parent", **settings).run
+    for plan in (make_plan(parent=parent), make_plan(parent=parent, opponents=Opponents(drivers=(str(parent),)))):
+        assert (plan.settings.algorithm, plan.settings.critic) == ("distill", "lap")
+        assert plan.settings.distill.student_steps == 1
+        assert plan.settings.distill.refining_rate == DUEL.distill.refining_rate
+    child = train(parent=parent, opponents=Opponents(drivers=(str(parent),)), until="128 steps", **settings)
+    assert child.steps >= 128
+    assert make_plan(parent=parent, ppo=PPOConfig()).settings.algorithm == "ppo"
+    assert make_plan(parent=parent, opponents=None).settings.algorithm == "ppo"  # alone again
+
+
 def test_who_is_taught_to_be_fast_trains_until_no_lap_is_better() -> None:
     fast = make_plan(algorithm="distill", actions="continuous").settings
     assert fast.until == Until(no_better_lap=True, seconds=600)
@@ -370,14 +384,33 @@ def test_against_other_models_training_takes_its_time() -> None:
     settings = make_settings(metadata=CONTINUOUS, opponents=rivals)
     assert DUEL.ppo is not None
     assert (settings.ppo, settings.evaluate_every) == (replace(DUEL.ppo, ent_coef=0.0), DUEL.evaluate_every)
+    assert (settings.algorithm, settings.distill) == ("distill", DUEL.distill)
     chosen = make_settings(metadata=CONTINUOUS, opponents=rivals, ppo=PPOConfig(), evaluate_every=7)
-    assert (chosen.ppo, chosen.evaluate_every) == (PPOConfig(), 7)
+    assert (chosen.ppo, chosen.evaluate_every, chosen.algorithm) == (PPOConfig(), 7, "ppo")
     alone = make_settings(metadata=CONTINUOUS)
     assert (alone.ppo, alone.evaluate_every) == (PPOConfig(ent_coef=0.0), 4096)
     plan = make_plan(opponents=rivals)
     assert (plan.settings.until, plan.metadata.action_space) == (Until(seconds=600), action_space("continuous"))
     assert plan.reward == load_reward("duel")
     assert plan.settings.critic == "lap"
+
+
+@pytest.mark.parametrize(
+    ("until", "steps"),
+    [
+        ("10 minutes", 3_000_000),
+        ("1 minutes", 600_000),
+        ("0.00001 seconds", 1),
+        ("5 laps", 3_000_000),
+        ("1000 steps", 5_000),
+        ("100000 steps or 10 seconds", 100_000),
+    ],
+)
+def test_a_short_race_training_leaves_its_student_time(until: str, steps: int) -> None:
+    settings = make_settings(metadata=CONTINUOUS, opponents=Opponents(), until=Until.parse(until))
+    assert settings.distill == replace(DUEL.distill, teacher_steps=steps)
+    alone = make_settings(metadata=CONTINUOUS, algorithm="distill", until=Until.parse("1 minutes"))
+    assert alone.distill.teacher_steps > 600_000  # its teacher is quicker
 
 
 def test_a_training_among_objects_has_the_reward_and_the_actions_of_its_race(tmp_path: Path) -> None:

@@ -118,7 +118,7 @@ describe("another race", () => {
       sensors: ["FRONT_FACING_CAMERA", "LIDAR"],
       until: "10 minutes",
       critic: "lap",
-      algorithm: "ppo",
+      algorithm: "distill",
     });
     const { source, sensors, until, critic, algorithm } = wishes;
     const alone = suited({ from: "head-to-head", to: "time-trial" }, { ...wishes, ...raced }, all);

@@ -13,6 +13,7 @@ What a camera sees of the state does not allow to drive as near the edge as a te
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -32,9 +33,7 @@ from racecraft.learn.ppo import PPO, Environment, IterationStats, PPOConfig
 TEACHER_PPO = PPOConfig(num_envs=128, num_steps=32, minibatch_size=512, update_epochs=4, learning_rate=1.5e-3)
 """How a teacher learns: rollouts are cheap, so they may be large."""
 
-REFINING_PPO = PPOConfig(
-    num_envs=64, num_steps=32, minibatch_size=512, learning_rate=5e-4, rate_steps=600_000, ent_coef=0.0
-)
+REFINING_PPO = PPOConfig(num_envs=64, num_steps=32, minibatch_size=512, ent_coef=0.0)
 """How a student goes on with the reward: in small steps, from large rollouts."""
 
 REFINING_STD = 0.12
@@ -68,6 +67,10 @@ class DistillConfig:
     """Adam's step size of the student."""
     rate_steps: int = 40_000
     """Camera steps after which it is a half of learning_rate, after twice as many a third; 0: never."""
+    refining_rate: float = 5e-4
+    """Adam's step size of PPO, as which the student goes on."""
+    refining_rate_steps: int = 600_000
+    """Camera steps after which it is a half of that, after twice as many a third; 0: never."""
     minibatch_size: int = 128
     """Samples of one gradient step."""
     updates_per_iteration: int = 12
@@ -86,9 +89,10 @@ class DistillConfig:
             "buffer_size",
         ):
             check_whole(name, getattr(self, name), 1, is_plain=True)
-        for name in ("teacher_rate_steps", "student_steps", "rate_steps"):
+        for name in ("teacher_rate_steps", "student_steps", "rate_steps", "refining_rate_steps"):
             check_whole(name, getattr(self, name), 0, is_plain=True)
-        check_number("learning_rate", self.learning_rate, 0.0, 1.0, is_plain=True)
+        for name in ("learning_rate", "refining_rate"):
+            check_number(name, getattr(self, name), 0.0, 1.0, is_plain=True)
         samples = self.num_envs * self.num_steps
         is_enough = self.buffer_size >= samples
         require("buffer_size", self.buffer_size, is_enough, f"at least num_envs x num_steps = {samples}")
@@ -133,7 +137,7 @@ class Distill:
         config: Settings.
         learner: The student's network.
         environment: The student's cars, with a camera.
-        teacher_environment: The teacher's cars; they need none.
+        open_teacher: Makes the teacher's cars, which need none; it is given the teacher, as others may race against it.
         seed: Decides all sampling, together with the number of the iteration.
         num_threads: Of the teacher's learner; 0 takes every core. Results are the same for any number.
     """
@@ -143,7 +147,7 @@ class Distill:
         config: DistillConfig,
         learner: Learner,
         environment: Environment,
-        teacher_environment: Environment,
+        open_teacher: Callable[[Learner], Environment],
         *,
         seed: int = 0,
         num_threads: int = 0,
@@ -153,11 +157,12 @@ class Distill:
         self.config, self.learner, self.environment, self.seed = config, learner, environment, seed
         self.state_size = environment.observe()[1].shape[1]
         teacher_spec = replace(learner.spec, state_size=self.state_size)
-        ppo = replace(TEACHER_PPO, num_envs=teacher_environment.num_envs, rate_steps=config.teacher_rate_steps)
+        teacher = NativeStateLearner(teacher_spec, seed=seed, num_threads=num_threads)
+        cars = open_teacher(teacher)
+        ppo = replace(TEACHER_PPO, num_envs=cars.num_envs, rate_steps=config.teacher_rate_steps)
         if not learner.spec.is_discrete:
             ppo = replace(ppo, ent_coef=0.0)
-        teacher = NativeStateLearner(teacher_spec, seed=seed, num_threads=num_threads)
-        self.teacher = PPO(ppo, teacher, StateWorld(teacher_environment), seed=seed)
+        self.teacher = PPO(ppo, teacher, StateWorld(cars), seed=seed)
         self.refining: PPO | None = None
         """What the student goes on with, from the end of its lessons on."""
         self.total_steps = 0
@@ -324,6 +329,8 @@ class Distill:
         config = replace(
             REFINING_PPO,
             num_envs=self.config.num_envs,
+            learning_rate=self.config.refining_rate,
+            rate_steps=self.config.refining_rate_steps,
             minibatch_size=min(REFINING_PPO.minibatch_size, samples),
         )
         ppo = PPO(config, self.learner, self.environment, seed=self.seed)

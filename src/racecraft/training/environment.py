@@ -24,6 +24,7 @@ from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.track import Track
 from racecraft.training.lap_view import NOTHING, LapTeller, LapView
+from racecraft.training.rival_view import tell_rivals
 from racecraft.training.settings import TrainSettings
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class TrainingEnvironment:
             who drives on, and neither camera nor state says how far it is, so an end there would only look like
             chance: with this a lap's end cuts the episode, and the critic's value stands for what follows.
         lap_view: What of its lap the privileged state ends in.
+        tells_rivals: Whether it tells of the other cars of the race behind that.
         on_step: Called after every step, for who looks at the cars.
     """
 
@@ -67,6 +69,7 @@ class TrainingEnvironment:
         opponents: OpponentPool | None = None,
         goes_on: bool = False,
         lap_view: LapView = NOTHING,
+        tells_rivals: bool = False,
         on_step: Callable[[], None] = lambda: None,
     ) -> None:
         self.simulation = simulation
@@ -79,6 +82,7 @@ class TrainingEnvironment:
         self.opponents = opponents
         self.goes_on = goes_on
         self._lap = LapTeller(lap_view, simulation) if lap_view.size else None
+        self._tells_rivals = tells_rivals
         self._on_step = on_step
         self._own: slice | NDArray[np.intp] = slice(None) if opponents is None else opponents.own
         self.reward_seconds = 0.0
@@ -101,9 +105,17 @@ class TrainingEnvironment:
         return self.sensors.read(self.simulation)[self._own], self.tell_state()
 
     def tell_state(self) -> NDArray[np.float32]:
-        """The privileged state alone; what it ends in of the lap is of the last judged step."""
-        state = self.simulation.state[self._own]
-        return state if self._lap is None else np.concatenate([state, self._lap()[self._own]], axis=1)
+        """The privileged state alone; what it ends in of the lap and of rivals is of the last judged step."""
+        return self.tell_states()[self._own]
+
+    def tell_states(self) -> NDArray[np.float32]:
+        """The same of all cars, those of opponents, too."""
+        told = [self.simulation.state]
+        if self._lap is not None:
+            told.append(self._lap())
+        if self._tells_rivals:
+            told.append(tell_rivals(self.simulation))
+        return told[0] if len(told) == 1 else np.concatenate(told, axis=1)
 
     def step(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Drive one step: rewards, terminated, truncated, each (N,), the caller's to keep.

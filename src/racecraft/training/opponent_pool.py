@@ -6,7 +6,7 @@ learner's weights --now and then--> pool --drawn for every car and race--> comma
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.errors import CheckpointError
-from racecraft.learn import Algorithm
+from racecraft.learn import Algorithm, Learner
 from racecraft.learn.learner import Weights
 from racecraft.race.policy import NetworkPolicy, load_driver
 from racecraft.race.seeing import learner_of
@@ -43,6 +43,7 @@ class OpponentPool:
         policy: The one that learns.
         seed: With the number of a race it decides who drives in it.
         num_threads: Of the policies.
+        make_learner: Makes a past self's network, of the spec, with its weights to be loaded.
 
     Raises:
         RunError: A run does not exist.
@@ -58,11 +59,13 @@ class OpponentPool:
         *,
         seed: int,
         num_threads: int = 0,
+        make_learner: Callable[..., Learner] = learner_of,
     ) -> None:
         self._settings = opponents
         self._simulation = simulation
         self._seed = seed
         self._num_threads = num_threads
+        self._make_learner = make_learner
         size = simulation.cars_per_race
         races = np.arange(simulation.num_envs // size)
         self.own: NDArray[np.intp] = races * size + races % size
@@ -127,22 +130,29 @@ class OpponentPool:
     # ---- past selves
 
     def learn_from(self, algorithm: Algorithm, *, step: int) -> None:
-        """Take a snapshot of the policy where one is due, and make room when there are too many.
+        """Take a snapshot of what is to drive, where one is due.
 
         Args:
             algorithm: What improves it.
             step: Camera steps of training so far.
         """
-        if not self._settings.is_self or step < (self._steps[-1] if self._steps else 0) + self._interval:
-            return
+        if self.is_due(step):
+            with algorithm.driving():
+                self.keep(step)
+
+    def is_due(self, step: int) -> bool:
+        """Whether there is to be a snapshot now."""
+        return self._settings.is_self and step >= (self._steps[-1] if self._steps else 0) + self._interval
+
+    def keep(self, step: int) -> None:
+        """Take it of the weights that the policy has, and make room when there are too many."""
         if len(self._steps) == self._settings.pool_size:
             self._thin()
-        with algorithm.driving():
-            self._add(self._current.learner.weights(), step)
+        self._add(self._current.learner.weights(), step)
 
     def _add(self, weights: Weights, step: int) -> None:
         current = self._current
-        learner = learner_of(current.learner.spec, seed=None, num_threads=self._num_threads)
+        learner = self._make_learner(current.learner.spec, seed=None, num_threads=self._num_threads)
         blank = learner.weights()
         learner.load_weights({**blank, **{name: weights[name] for name in weights if name.startswith(_POLICY)}})
         self._policies.append(NetworkPolicy(learner, current.action_space, sensors=current.sensors))

@@ -10,7 +10,7 @@ from typing import Any
 from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_space
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
-from racecraft.sim.objects import NO_OBJECTS, Objects
+from racecraft.sim.objects import NO_OBJECTS
 from racecraft.training.parent import Parent, open_parent
 from racecraft.training.regimes import METHODS, TIME_TRIAL, regime_of
 from racecraft.training.settings import DEFAULT_TRACK, TrainSettings, make_settings, of_the_files
@@ -120,7 +120,9 @@ def make_plan(
             inherited.pop("vehicle")  # the file's version decides
         of_the_parent = inherited.pop("track")
         track = of_the_parent if track is None else track
-        is_taught = not algorithm and _is_taught(before, metadata, objects, {"hyperparameters": parameters, **settings})
+        is_crowded = objects != NO_OBJECTS or opponents is not None
+        said = {"hyperparameters": parameters, **settings}
+        is_taught = not algorithm and is_crowded and _is_taught(before, metadata, said)
         if is_taught:
             del inherited["distill"]
         settings = {**inherited, **settings}
@@ -152,13 +154,11 @@ def _with_algorithm(metadata: ModelMetadata, algorithm: str) -> ModelMetadata:
     return replace(metadata, training_algorithm="sac" if is_sac else "clipped_ppo")
 
 
-def _is_taught(
-    before: TrainSettings | None, metadata: ModelMetadata, objects: Objects, said: Mapping[str, Any]
-) -> bool:
-    """Whether a child of a taught model gets a teacher as well: among objects, where PPO's step needs its critic."""
-    is_told = any(said.get(name) for name in ("hyperparameters", "ppo", "distill", "critic", "device", "opponents"))
+def _is_taught(before: TrainSettings | None, metadata: ModelMetadata, said: Mapping[str, Any]) -> bool:
+    """Whether a child of a taught model gets a teacher as well, where others are about: PPO's step needs its critic."""
+    is_told = any(said.get(name) for name in ("hyperparameters", "ppo", "distill", "critic", "device"))
     was_taught = before is not None and before.algorithm == "distill"
-    return was_taught and objects != NO_OBJECTS and not is_told and of_the_files(metadata) == "ppo"
+    return was_taught and not is_told and of_the_files(metadata) == "ppo"
 
 
 def _inherited(folder: RunFolder, metadata: ModelMetadata, *, is_new_track: bool, follows_aws: bool) -> dict[str, Any]:

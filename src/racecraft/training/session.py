@@ -206,8 +206,9 @@ def open_session(
                 num_threads=settings.num_threads,
                 device=settings.device,
             )
-            from racecraft.training.algorithms import make_algorithm, teacher_environment
+            from racecraft.training.algorithms import make_algorithm
             from racecraft.training.evaluator import Evaluator
+            from racecraft.training.teacher import teacher_environment
 
             simulation = open_cars() if cars_to_be is None else cars_to_be.result()
         if begun is not None:
@@ -223,8 +224,8 @@ def open_session(
                 settings,
                 learner,
                 environment,
-                open_teacher=lambda: teacher_environment(
-                    settings, run.source, run.tracks, metadata.action_space, stack, foreign=run.is_foreign
+                open_teacher=lambda teacher: teacher_environment(
+                    settings, run.source, run.tracks, metadata.action_space, stack, teacher, foreign=run.is_foreign
                 ),
             ),
             evaluator=Evaluator(_policy(run, learner), run.tracks, settings),
@@ -397,5 +398,6 @@ def _make_environment(
         opponents=opponents,
         goes_on=settings.algorithm == "distill" or opponents is not None,
         lap_view=settings.lap_view,
+        tells_rivals=settings.tells_rivals,
         on_step=on_step,
     )

@@ -27,11 +27,13 @@ from racecraft.training.regimes import (
     LONG_ROAD,
     LONG_SECONDS,
     METHODS,
+    RACED_STEPS,
     TIME_TRIAL,
     AlgorithmConfig,
     check_regimes,
     regime_of,
 )
+from racecraft.training.rival_view import RIVAL_COLUMNS
 from racecraft.training.stop import Until
 
 DEFAULT_TRACK: Final = "reinvent_2018"
@@ -178,7 +180,7 @@ class TrainSettings:
         """Columns of state that the critic sees; 0 where it sees the camera alone."""
         if self.critic == "camera":
             return 0
-        return state_width(self.num_objects) + self.lap_view.size
+        return state_width(self.num_objects) + self.lap_view.size + len(RIVAL_COLUMNS) * self.tells_rivals
 
     @property
     def lap_view(self) -> LapView:
@@ -186,6 +188,11 @@ class TrainSettings:
         if self.critic != "lap":
             return NOTHING
         return TEACHERS_VIEW if self.algorithm == "distill" else CRITICS_VIEW
+
+    @property
+    def tells_rivals(self) -> bool:
+        """Whether a teacher, and its student's critic, is told of the other cars of its race."""
+        return self.opponents is not None and self.algorithm == "distill"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON, for run.json."""
@@ -280,7 +287,7 @@ def make_settings(
     method, is_continuous = METHODS[algorithm], metadata.action_space.kind == "continuous"
     is_fast = algorithm == "distill" and is_continuous
     regime = regime_of(**circumstances, is_fast_distill=is_fast, lessons=_lessons(roads, until))
-    lessons = _as_long_as(until, regime.distill)
+    lessons = _as_long_as(until, regime.distill, is_raced=circumstances["opponents"] is not None)
     usual = {"start": regime.start, "evaluation_trials": regime.evaluation_trials, "distill": lessons}
     settings = {**usual, **settings}
     if settings.get("evaluate_every", 0) == 0:
@@ -333,11 +340,19 @@ def _lessons(roads: Sequence[Track], until: Until | None) -> str:
     return "long" if seconds >= LONG_SECONDS else "brisk" if seconds >= BRISK_SECONDS else "short"
 
 
-def _as_long_as(until: Until | None, distill: DistillConfig | None) -> DistillConfig | None:
-    """The same lessons, for a training of few steps by a teacher of few: at most five to one of the student's."""
-    if not isinstance(until, Until) or not until.steps or distill is None:
+def _as_long_as(until: Until | None, distill: DistillConfig | None, *, is_raced: bool) -> DistillConfig | None:
+    """The same lessons, for a training of few steps by a teacher of few: at most five to one of the student's.
+
+    A race's teacher is slow, as it drives every car, so of a short training it gets about a fifth of the time.
+    """
+    if not isinstance(until, Until) or distill is None:
         return distill
-    return replace(distill, teacher_steps=min(distill.teacher_steps, 5 * until.steps))
+    most = [distill.teacher_steps]
+    if until.steps:
+        most.append(5 * until.steps)
+    if until.seconds and is_raced:
+        most.append(max(1, round(RACED_STEPS * until.seconds)))
+    return replace(distill, teacher_steps=min(most))
 
 
 def _with_num_envs(ppo: PPOConfig, num_envs: int, *, most: int) -> PPOConfig:

@@ -53,7 +53,7 @@ const AMONG: Usual = {
 };
 const RACED: Usual = {
   ...{ reward: "duel", space: "continuous", sensors: ["FRONT_FACING_CAMERA", "LIDAR"] },
-  ...{ until: "10 minutes", critic: "lap", algorithm: "ppo" },
+  ...{ until: "10 minutes", critic: "lap", algorithm: "distill" },
 };
 const usualOf = (race: string): Usual =>
   race === "head-to-head" ? RACED : ["object-avoidance", "head-to-bot"].includes(race) ? AMONG : ALONE;

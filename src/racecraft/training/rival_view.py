@@ -1,0 +1,43 @@
+"""What a teacher, and the critic it leaves behind, is told of the other cars of its race, behind the privileged state.
+
+The privileged state tells of what is ahead along the road. Who is to race must know of the car beside it, too, and of
+the one that comes from behind: a pass begins with the first and ends with the second.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from racecraft.sim import Simulation
+
+RIVAL_COLUMNS: Final = (
+    "rival_closeness",  # of the nearest other car along the road: 1 / (1 + m between them)
+    "rival_place",  # hyperbolic tangent of how many `PLACE` it is ahead; negative behind
+    "rival_offset",  # how much farther to the left it is, over half the width of the road
+    "rival_speed",  # how much faster it is, over 4 m/s
+)
+PLACE: Final = 0.5
+"""m: about a car and a half."""
+
+
+def tell_rivals(simulation: Simulation) -> NDArray[np.float32]:
+    """`RIVAL_COLUMNS` of every car of races of two and more, at the last judged step  (N, 4)."""
+    size = simulation.cars_per_race
+    place, length, offset, speed, width = (
+        simulation.column(name).reshape(-1, size)
+        for name in ("projection_distance", "track_length", "offset", "actual_speed", "track_width")
+    )
+    ahead = place[:, None, :] - place[:, :, None]  # m: race, car, other car
+    length = length[:, :, None]
+    ahead = (ahead + 0.5 * length) % length - 0.5 * length  # the shorter way round
+    apart = np.abs(ahead)
+    apart[:, np.arange(size), np.arange(size)] = np.inf
+    nearest = apart.argmin(axis=2)
+
+    gap = np.take_along_axis(ahead, nearest[:, :, None], axis=2)[:, :, 0]
+    left, faster = (np.take_along_axis(values, nearest, axis=1) - values for values in (offset, speed))
+    columns = (1.0 / (1.0 + np.abs(gap)), np.tanh(gap / PLACE), left / (0.5 * width), faster / 4.0)
+    return np.stack(columns, axis=-1).reshape(-1, len(columns)).astype(np.float32)
