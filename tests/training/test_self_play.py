@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from tiny_runs import Recorder, Train, assert_same, logs, weights
 
 from racecraft import training
 from racecraft.errors import CheckpointError, ConfigError, RunError
+from racecraft.learn import DistillConfig
 from racecraft.run import RunFolder
 from racecraft.sim import Simulation
 from racecraft.sim.objects import NO_OBJECTS, Objects, Obstacles
@@ -55,6 +57,27 @@ def test_a_run_against_itself_killed_at_any_iteration_resumes_as_if_it_never_was
     other = tiny(name="alone", until="768 steps", evaluate_every=192)
     name = "learning/policy.head.weight"
     assert (weights(other.run)[name] != weights(result.run)[name]).any()
+
+
+@pytest.mark.costly
+def test_a_taught_run_resumes_as_if_it_never_was_once_its_lessons_are_over(tiny: Train, tmp_path: Path) -> None:
+    copies: dict[int, Path] = {}
+
+    def copy(step: int) -> None:
+        if step not in copies:  # a teacher's steps are none
+            copies[step] = tmp_path / "killed" / str(step)
+            shutil.copytree(tmp_path / "runs" / "undisturbed", copies[step])
+
+    lessons = DistillConfig(num_envs=8, num_steps=8, teacher_steps=8192, student_steps=64, minibatch_size=32)
+    settings: dict[str, Any] = {"opponents": replace(SELF, cars=2), "algorithm": "distill", "distill": lessons}
+    result = tiny(name="undisturbed", reporter=Recorder(copy), until="1000 steps", evaluate_every=64, **settings)
+    steps = [step for step in copies if 64 < step < result.steps]
+    assert len(steps) >= 2
+    for step in steps:
+        resumed = resume(copies[step])
+        assert resumed.steps == result.steps
+        assert_same(copies[step], result.run)
+    assert weights(result.run)["teacher/learning/policy.head.weight"].any()
 
 
 def test_the_pool_spans_the_training_evenly(tiny: Train) -> None:
