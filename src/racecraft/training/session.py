@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from racecraft.training.cuda_environment import CudaTrainingEnvironment
     from racecraft.training.evaluator import Evaluator
     from racecraft.training.opponent_pool import OpponentPool
+    from racecraft.training.teacher import TeachersEnvironment
 
     Environment = TrainingEnvironment | CudaTrainingEnvironment
 
@@ -208,7 +209,6 @@ def open_session(
             )
             from racecraft.training.algorithms import make_algorithm
             from racecraft.training.evaluator import Evaluator
-            from racecraft.training.teacher import teacher_environment
 
             simulation = open_cars() if cars_to_be is None else cars_to_be.result()
         if begun is not None:
@@ -224,9 +224,7 @@ def open_session(
                 settings,
                 learner,
                 environment,
-                open_teacher=lambda teacher: teacher_environment(
-                    settings, run.source, run.tracks, metadata.action_space, stack, teacher, foreign=run.is_foreign
-                ),
+                open_teacher=partial(_open_teacher, run, stack),
             ),
             evaluator=Evaluator(_policy(run, learner), run.tracks, settings),
             logs=logs,
@@ -358,6 +356,13 @@ def _open_logs(run: _Run, stack: ExitStack, *, aws_log: str | Path | None) -> Lo
         prints=stack.enter_context(PrintLog(folder.reward_log)),
         aws=aws,
     )
+
+
+def _open_teacher(run: _Run, stack: ExitStack, teacher: Learner) -> TeachersEnvironment:
+    from racecraft.training.teacher import teacher_environment  # few trainings have one
+
+    space = run.metadata.action_space
+    return teacher_environment(run.settings, run.source, run.tracks, space, stack, teacher, foreign=run.is_foreign)
 
 
 def _policy(run: _Run, learner: Learner) -> NetworkPolicy:
