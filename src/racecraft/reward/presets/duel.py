@@ -1,4 +1,4 @@
-"""Race head to head: be paid for every metre really gained, and three times more for what is gained on a car nearby.
+"""Race head to head: be paid for every metre really gained, and three more where it is won from a car nearby.
 
 Alone a car is fast for its own sake. In a race the same metre is worth more where it is won from somebody: without that
 a pass, a metre or two of gain, is never worth its danger, and whoever is behind follows to the line. A mistake costs a
