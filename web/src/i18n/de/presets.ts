@@ -6,7 +6,8 @@ export const presets: Record<keyof typeof english, string> = {
   preset_centerline: "Der Mittellinie folgen: je näher, desto besser. Das ist die übliche Belohnung des Originals.",
   preset_dodge:
     "Zwischen Kisten und anderen Autos fahren: Jeder Meter zählt, weniger, je mehr das nächste Hindernis im Weg steht.",
-  preset_duel: "Zu zweit fahren: Es zählt jeder wirklich gewonnene Meter, mehr, wo er einem nahen Auto abgenommen ist; Fehler sind teuer.",
+  preset_duel:
+    "Zu zweit fahren: Es zählt jeder wirklich gewonnene Meter, mehr, wo er einem nahen Auto abgenommen ist; Fehler sind teuer.",
   preset_heading:
     "Das Auto entlang der Strecke ausrichten: Bei mehr als zehn Grad Abweichung geht die halbe Belohnung verloren.",
   preset_lap_time:

@@ -4,7 +4,8 @@ export const presets = {
   preset_centerline: "Follow the centre line: the closer, the better. This is the platform's default reward.",
   preset_dodge:
     "Race among boxes and other cars: pay for every metre, less the more squarely the next object stands in the way.",
-  preset_duel: "Race head to head: pay for every metre really gained, more where it is won from a car nearby; mistakes are dear.",
+  preset_duel:
+    "Race head to head: pay for every metre really gained, more where it is won from a car nearby; mistakes are dear.",
   preset_heading: "Point the car along the track: half of the reward is lost when it looks more than ten degrees away.",
   preset_lap_time:
     "Race against the clock: pay for every metre of the lap that the car really gained since the last step.",
