@@ -58,6 +58,9 @@ def test_a_run_is_as_any_other(tiny: Train, algorithm: str) -> None:
     last = folder.checkpoints.load("last")
     assert last.metadata["network"]["is_squashed"] == (algorithm in ("sac", "sb3:sac", "sb3:td3"))
     assert recorder.evaluations
+    lessons = [report.lesson for report in recorder.iterations if report.lesson is not None]
+    assert len(lessons) == (1 if algorithm == "distill" else 0)
+    assert all((lesson.needed, lesson.share) == (1, 1.0) for lesson in lessons)
     assert sum(len(path.read_text().splitlines()) - 1 for path in folder.training_simtrace.iterdir()) > 0
 
     raced = evaluate(result.run, laps=1, num_trials=2, checkpoint="last", video=False).evaluation

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import io
 import math
+import re
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -11,7 +13,7 @@ from rich.console import Console
 
 from racecraft.learn import IterationStats, UpdateStats
 from racecraft.learn.ledger import Ended
-from racecraft.training.progress import EvaluationReport, IterationReport
+from racecraft.training.progress import EvaluationReport, IterationReport, Lesson
 from racecraft.training.terminal import TerminalReporter, curve
 
 LOSSES = UpdateStats(policy_loss=0.0, value_loss=0.0, entropy=1.5, approx_kl=0.0, clip_fraction=0.0, grad_norm=0.0)
@@ -109,6 +111,57 @@ def test_a_pipe_gets_plain_lines() -> None:
         "Resumed at step 5.",
         " 1234.6 s   1,234,567 steps  3 of 5 laps   70 %  best lap 9.50 s  (best so far)",
         " 2345.7 s   2,345,678 steps  0 of 5 laps   25 %",
+    ]
+
+
+def taught(steps: int, *, seconds: float, pace: float = 81_234.0) -> IterationReport:
+    """An iteration of a teacher's."""
+    lesson = Lesson(steps=steps, needed=3_000_000, steps_per_second=pace)
+    nothing_driven = replace(iteration(0).stats, num_steps=0)
+    return replace(iteration(0, completion=math.nan), stats=nothing_driven, seconds=seconds, lesson=lesson)
+
+
+@pytest.mark.parametrize("width", [40, 80])
+def test_the_panel_tells_how_far_a_teacher_is(width: int) -> None:
+    console = Console(file=io.StringIO(), width=width, force_terminal=True, color_system=None)
+    reporter = TerminalReporter(title="mine", console=console)
+    for number in range(1, 21):
+        reporter.iteration(taught(number * 61_700, seconds=0.5 * number))
+    with console.capture() as capture:
+        console.print(reporter._picture())
+    text = capture.get()
+    assert re.search(r"teacher learned +41 % │", text)
+    assert "81,234" in text
+    assert len(text.rstrip("\n").split("\n")) == len(picture(width))  # it keeps its height when the student begins
+    reporter.iteration(taught(3_002_368, seconds=40.0))
+    with console.capture() as capture:
+        console.print(reporter._picture())
+    assert re.search(r"teacher learned +100 % │", capture.get())
+
+
+def test_a_teachers_iterations_are_no_part_of_the_curve() -> None:
+    def drawn(*reports: IterationReport) -> str:
+        console = Console(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
+        reporter = TerminalReporter(title="mine", console=console)
+        for report in reports:
+            reporter.iteration(report)
+        reporter.evaluation(evaluation(1024, laps=5))
+        return reporter._graph(50).plain
+
+    driven = [iteration(512 * number, completion=0.1 * number) for number in range(1, 5)]
+    lessons = [taught(4096 * number, seconds=0.1 * number) for number in range(1, 50)]
+    assert drawn(*lessons, *driven) == drawn(*driven)
+
+
+def test_a_pipe_hears_of_a_teacher_every_ten_seconds() -> None:
+    stream = io.StringIO()
+    with TerminalReporter(title="x", console=Console(file=stream, width=40)) as reporter:
+        for number in range(1, 101):
+            reporter.iteration(taught(number * 30_000, seconds=1.25 + 0.25 * number))
+        reporter.iteration(iteration(512))
+    assert stream.getvalue().splitlines() == [
+        "   11.5 s  the teacher has learned 41 % of its 3,000,000 steps, 81,234 a second",
+        "   21.5 s  the teacher has learned 81 % of its 3,000,000 steps, 81,234 a second",
     ]
 
 

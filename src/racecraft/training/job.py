@@ -19,6 +19,7 @@ from typing import Any
 
 from racecraft.agent import ModelMetadata
 from racecraft.errors import CheckpointError, RacecraftError, RewardError, typed
+from racecraft.learn import Algorithm, Distill, IterationStats
 from racecraft.run import CheckpointWarning, RunFolder
 from racecraft.scoped_warnings import scoped_warnings
 from racecraft.training.interruption import interruptible
@@ -121,7 +122,7 @@ class Training:
             for episode in (finished := session.environment.take_finished()):
                 session.logs.metrics.add(episode)
             meter.add(finished)
-            report = meter.report(stats, episodes=session.logs.counter.number)
+            report = meter.report(stats, episodes=session.logs.counter.number, taught=_taught(algorithm, stats))
             self.reporter.iteration(report)
             session.logs.events.add_scalars(report.scalars(), step=algorithm.total_steps)
             session.logs.history.add_iteration(report.point())
@@ -269,3 +270,10 @@ class Training:
         # The signal may have come in the middle of a line that this thread is printing.
         text = "Stopping after this iteration; a checkpoint is saved. Ctrl-C again stops at once."
         threading.Thread(target=self.reporter.note, args=(text,), daemon=True).start()
+
+
+def _taught(algorithm: Algorithm, stats: IterationStats) -> tuple[int, int] | None:
+    """Where an iteration was a teacher's, its steps so far, and how many it is to have."""
+    if not isinstance(algorithm, Distill) or stats.num_steps:
+        return None
+    return algorithm.teacher.total_steps, algorithm.config.teacher_steps

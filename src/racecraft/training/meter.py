@@ -12,12 +12,30 @@ from numpy.typing import NDArray
 
 from racecraft.learn import IterationStats
 from racecraft.run import Episode
-from racecraft.training.progress import IterationReport
+from racecraft.training.progress import IterationReport, Lesson
 from racecraft.training.stop import Until
 
 RECENT: Final = 100  # episodes that the curves average over
 PACE: Final = 20  # iterations that steps per second are averaged over
 PARTS: Final = ("start", "simulator", "reward", "log", "policy", "learner", "evaluation", "checkpoint")
+
+
+class _Pace:
+    """Steps per second over the last iterations."""
+
+    def __init__(self) -> None:
+        self._points: deque[tuple[float, int]] = deque(maxlen=PACE)  # s, steps
+
+    def begin(self, steps: int) -> None:
+        """Count from here on."""
+        self._points.clear()
+        self._points.append((time.monotonic(), steps))
+
+    def add(self, steps: int) -> float:
+        """Steps per second, now that there were so many; NaN where nothing was counted before."""
+        self._points.append((time.monotonic(), steps))
+        (then, steps_then), (now, _) = self._points[0], self._points[-1]
+        return (steps - steps_then) / (now - then) if now > then else float("nan")
 
 
 class Meter:
@@ -36,7 +54,8 @@ class Meter:
         self.parts = dict.fromkeys(PARTS, 0.0)
         """Seconds by part."""
         self._recent: deque[tuple[float, float]] = deque(maxlen=RECENT)  # reward, progress
-        self._pace: deque[tuple[float, int]] = deque(maxlen=PACE)  # s, camera steps
+        self._pace = _Pace()  # of camera steps
+        self._lesson_pace = _Pace()  # of a teacher's
 
     @property
     def seconds(self) -> float:
@@ -57,18 +76,27 @@ class Meter:
     def begin(self, *, steps: int) -> None:
         """Training begins now, at so many camera steps."""
         self.parts["start"] = time.monotonic() - self.started
-        self._pace.append((time.monotonic(), steps))
+        self._pace.begin(steps)
 
     def add(self, episodes: Iterable[Episode]) -> None:
         """Count episodes of training."""
         self._recent.extend((episode.reward, episode.progress) for episode in episodes)
 
-    def report(self, stats: IterationStats, *, episodes: int) -> IterationReport:
-        """The figures after an iteration; `episodes` of the run have ended."""
-        now, steps = time.monotonic(), stats.total_steps
-        self._pace.append((now, steps))
-        then, steps_then = self._pace[0]
-        pace = (steps - steps_then) / (now - then) if now > then else float("nan")
+    def report(self, stats: IterationStats, *, episodes: int, taught: tuple[int, int] | None = None) -> IterationReport:
+        """The figures after an iteration.
+
+        Args:
+            stats: What it did.
+            episodes: Of the run, that have ended.
+            taught: Where the iteration was a teacher's, its steps so far, and how many it is to have.
+        """
+        steps, lesson = stats.total_steps, None
+        if taught is None:
+            pace = self._pace.add(steps)
+        else:
+            lesson = Lesson(steps=taught[0], needed=taught[1], steps_per_second=self._lesson_pace.add(taught[0]))
+            self._pace.begin(steps)  # what the student takes for its steps begins after it
+            pace = 0.0
         left = []
         if self.until.seconds:
             left.append(self.until.seconds - self.seconds)
@@ -82,6 +110,7 @@ class Meter:
             mean_reward=self.mean_reward,
             completion=self.completion,
             remaining=max(0.0, min(left)) if left else None,
+            lesson=lesson,
         )
 
     def state(self) -> NDArray[np.float64]:

@@ -68,6 +68,23 @@ class EvaluationReport:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Lesson:
+    """How far a teacher is, which learns before the first camera step."""
+
+    steps: int
+    """It has learned from so far; no camera sees them."""
+    needed: int
+    """Steps after which its student begins."""
+    steps_per_second: float
+    """Of the teacher lately; NaN before there are two iterations."""
+
+    @property
+    def share(self) -> float:
+        """Of what it is to learn, 0 to 1."""
+        return min(self.steps / self.needed, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
 class IterationReport:
     """One iteration of training."""
 
@@ -84,6 +101,8 @@ class IterationReport:
     """Mean fraction of a lap in the last 100 training episodes; NaN before the first."""
     remaining: float | None
     """Estimated seconds until a limit of steps or seconds; None when only laps count."""
+    lesson: Lesson | None = None
+    """Where the iteration was a teacher's; there were no camera steps in it."""
 
     def point(self) -> dict[str, Any]:
         """For the run's history; NaN is what is not known yet."""

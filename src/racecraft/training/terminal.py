@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import TYPE_CHECKING, Final, Self
 
@@ -12,7 +13,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from racecraft.training.progress import EvaluationReport, IterationReport
+from racecraft.training.progress import EvaluationReport, IterationReport, Lesson
 
 if TYPE_CHECKING:
     from racecraft.race.policy import NetworkPolicy
@@ -24,6 +25,7 @@ NUMBERS_WIDTH: Final = 30  # characters
 CURVE_ROWS: Final = 7
 EVALUATIONS: Final = 5  # that are listed
 NOTES: Final = 2
+LESSON_PAUSE: Final = 10.0  # s between two lines about a teacher, where there is no panel
 REFRESH: Final = 4  # pictures per second; each takes some milliseconds from the training
 AXIS: Final = ("100 %", "", "", " 50 %", "", "", "  0 %")
 # Braille cells: one bit per dot, columns left and right, rows from the bottom up.
@@ -56,7 +58,8 @@ def curve(values: list[float], *, width: int, rows: int) -> list[str]:
 class TerminalReporter:
     """Redraws a panel while training goes on; a context manager.
 
-    Without a terminal (a pipe, a log file) it prints one line per evaluation instead.
+    Without a terminal (a pipe, a log file) it prints one line per evaluation instead, and one every ten seconds while a
+    teacher learns, which nobody evaluates.
 
     Args:
         title: What is trained.
@@ -70,6 +73,8 @@ class TerminalReporter:
         self._evaluations: list[EvaluationReport] = []
         self._notes: deque[str] = deque(maxlen=NOTES)
         self._latest: IterationReport | None = None
+        self._first = 0  # camera steps before this session
+        self._told = -math.inf  # s, when the last line about a teacher was printed
         self._live: Live | None = None
         if self.console.is_terminal:
             self._live = Live(get_renderable=self._picture, console=self.console, refresh_per_second=REFRESH)
@@ -102,8 +107,13 @@ class TerminalReporter:
         """Nothing: the panel has a pace of its own."""
 
     def iteration(self, report: IterationReport) -> None:
-        """Move the curve on."""
+        """Move the curve on, or tell how far a teacher is."""
         self._latest = report
+        if report.lesson is not None:
+            self._tell_lesson(report.lesson, report.seconds)
+            return
+        if not self._completions:
+            self._first = report.stats.total_steps - report.stats.num_steps
         self._completions.append(report.completion)
 
     def evaluation(self, report: EvaluationReport) -> None:
@@ -115,6 +125,18 @@ class TerminalReporter:
                 f"{report.seconds:7.1f} s {report.step:>11,} steps  {_laps(report):>10}  "
                 f"{100 * report.completion:3.0f} %{lap}{'  (best so far)' if report.is_best else ''}"
             )
+
+    def _tell_lesson(self, lesson: Lesson, seconds: float) -> None:
+        """A line, where there is no panel to show it and the last one is long ago."""
+        if self._live is not None or seconds < self._told + LESSON_PAUSE:
+            return
+        if not math.isinf(self._told):
+            pace = _figure(lesson.steps_per_second, ",.0f")
+            self._print(
+                f"{seconds:7.1f} s  the teacher has learned {_percent(lesson)} of its {lesson.needed:,} steps, "
+                f"{pace} a second"
+            )
+        self._told = seconds
 
     def _print(self, line: str) -> None:
         self.console.print(line, highlight=False, markup=False, soft_wrap=True)
@@ -140,10 +162,9 @@ class TerminalReporter:
         curve_width = width - len(AXIS[0]) - 1
         lines = curve(self._completions, width=curve_width, rows=CURVE_ROWS)
         steps = self._latest.stats.total_steps if self._latest is not None else 0
-        first = steps - (self._latest.stats.num_steps * len(self._completions) if self._latest is not None else 0)
         dots: dict[tuple[int, int], str] = {}
         for report in self._evaluations:
-            share = (report.step - first) / max(steps - first, 1)
+            share = (report.step - self._first) / max(steps - self._first, 1)
             column = round(min(max(share, 0.0), 1.0) * (curve_width - 1))
             row = round((1.0 - report.completion) * (CURVE_ROWS - 1))
             dots[row, column] = "bold green" if report.laps_completed == len(report.completions) else "bold yellow"
@@ -156,7 +177,7 @@ class TerminalReporter:
                 style = dots.get((row, column))
                 graph.append("●" if style else cell, style=style or "cyan")
             graph.append("\n")
-        left, right = f"{max(first, 0):,}", f"{steps:,} steps"
+        left, right = f"{self._first:,}", f"{steps:,} steps"
         graph.append(f"{'':6}{left}{right:>{max(curve_width - len(left), 0)}}", style="dim")
         return graph
 
@@ -170,8 +191,13 @@ class TerminalReporter:
             return numbers
         numbers.add_row("time", _clock(report.seconds))
         numbers.add_row("left", "–" if report.remaining is None else _clock(report.remaining))
-        numbers.add_row("camera steps", f"{report.stats.total_steps:,}")
-        numbers.add_row("steps per second", _figure(report.steps_per_second, ",.0f"))
+        pace = report.steps_per_second
+        if report.lesson is None:
+            numbers.add_row("camera steps", f"{report.stats.total_steps:,}")
+        else:
+            pace = report.lesson.steps_per_second
+            numbers.add_row("teacher learned", _percent(report.lesson))
+        numbers.add_row("steps per second", _figure(pace, ",.0f"))
         numbers.add_row("episodes", f"{report.episodes:,}")
         numbers.add_row("reward per episode", _figure(report.mean_reward, ",.2f"))
         numbers.add_row("entropy", _figure(report.stats.losses.entropy, ".2f"))
@@ -209,6 +235,10 @@ def _rank(report: EvaluationReport) -> tuple[float, float]:
 
 def _laps(report: EvaluationReport) -> str:
     return f"{report.laps_completed} of {len(report.completions)} laps"
+
+
+def _percent(lesson: Lesson) -> str:
+    return f"{math.floor(100 * lesson.share)} %"
 
 
 def _figure(value: float, form: str) -> str:
