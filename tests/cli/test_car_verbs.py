@@ -42,6 +42,14 @@ def test_a_wrong_option_writes_nothing(racecraft: Run, trained: Path, arguments:
     assert not list(Path().iterdir())
 
 
+def test_an_exported_checkpoint_may_be_named_as_for_races(racecraft: Run, trained: Path) -> None:
+    document = racecraft("export", f"{trained}@64", "-o", "floor.tar.gz", "--json").document
+    assert (document["run"], document["step"]) == (str(trained), 64)
+    outcome = racecraft("export", f"{trained}@64", "--checkpoint", "best")
+    assert outcome.status == 2
+    assert "names a checkpoint, and so does --checkpoint best" in " ".join(outcome.err.split())
+
+
 @pytest.mark.costly
 def test_a_car_is_measured_and_driven(racecraft: Run, trained: Path) -> None:
     measured = ["--circle-left", "0.8", "--servo", "1.7,1.45,1.25", "--speed", "60=1.9", "--speed", "30=0.7"]

@@ -68,6 +68,24 @@ def test_a_wrong_option_of_evaluate_writes_nothing(racecraft: Run, trained: Path
     assert set(trained.rglob("*")) == before
 
 
+@pytest.mark.parametrize(
+    ("at", "options", "status", "says"),
+    [
+        ("@best", ["--laps", "0"], 1, "laps is 0"),
+        ("@last", ["--tracks", "ovla"], 1, "Did you mean 'oval'?"),
+        ("@77", [], 1, "has no checkpoint of step 77"),
+        ("@bets", [], 1, "Checkpoint 'bets' of"),
+        ("@last", ["--checkpoint", "last"], 2, "and so does --checkpoint last; give one of them."),
+    ],
+)
+def test_a_checkpoint_may_be_named_as_for_races(
+    racecraft: Run, trained: Path, at: str, options: list[str], status: int, says: str
+) -> None:
+    outcome = racecraft("evaluate", f"{trained}{at}", *options, "--json")
+    assert outcome.status == status
+    assert says in outcome.document["error"]["message"] + outcome.document["error"]["hint"]
+
+
 @pytest.mark.costly
 def test_many_tracks_have_no_film_which_may_be_said(racecraft: Run, trained: Path) -> None:
     arguments = ("evaluate", str(trained), "--tracks", "oval", "--trials", "1")

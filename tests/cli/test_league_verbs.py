@@ -23,6 +23,7 @@ class Answers:
         ]
 
     def submit(self, run: RunFolder, race: int, *, checkpoint: str) -> dict[str, Any]:
+        self.checkpoint = checkpoint
         return self._answers.pop(0)
 
     def submission(self, race: int, number: int) -> dict[str, Any]:
@@ -36,10 +37,12 @@ def test_who_drives_like_somebody_else_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, told: dict[str, Any], is_said: bool
 ) -> None:
     monkeypatch.setattr("time.sleep", lambda _: None)
-    monkeypatch.setattr(RunFolder, "open", lambda path: None)
+    opened: list[Path] = []
+    monkeypatch.setattr(RunFolder, "open", opened.append)
     answers = Answers({"state": "queued"}, {"state": "done", **told})
     monkeypatch.setattr(league, "remembered_league", lambda: answers)
-    output = CliRunner().invoke(every_verb(), ["submit", str(tmp_path), "--race", "1"]).output
+    output = CliRunner().invoke(every_verb(), ["submit", f"{tmp_path}@64", "--race", "1"]).output
+    assert (opened, answers.checkpoint) == ([tmp_path], "64")
     assert "Submission 7: 9.500 s." in output
     sentence = "It drives like somebody else's entry, so a person looks at it; it counts meanwhile."
     assert (sentence in output) == is_said

@@ -14,8 +14,8 @@ from racecraft.film.ghost_source import check_sources, load_ghosts
 from racecraft.film.overlay import INSET
 from racecraft.film.video import frames
 from racecraft.race import Autopilot, RaceRules, evaluate
-from racecraft.race.entry import split_model
 from racecraft.replay import Replay, write_replay
+from racecraft.run.checkpoint import split_model
 from racecraft.track import load_track
 
 OVAL = load_track("oval")

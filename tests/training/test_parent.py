@@ -178,10 +178,10 @@ def test_another_network_or_other_sensors_are_refused(parent: Path, tmp_path: Pa
     ("text", "error", "match"),
     [
         ("nowhere", RunError, "There is no run"),
-        ("{parent}@first", CheckpointError, "'first'"),
+        ("{parent}@first", ConfigError, "'first' of .* is none; allowed are best, last"),
         ("{parent}@77", CheckpointError, "no checkpoint of step 77"),
-        ("{parent}@", CheckpointError, "''"),
-        ("{parent}@²", CheckpointError, "²"),
+        ("{parent}@", ConfigError, "''"),
+        ("{parent}@²", ConfigError, "²"),
     ],
 )
 def test_what_is_no_checkpoint_is_refused(parent: Path, text: str, error: type[Exception], match: str) -> None:

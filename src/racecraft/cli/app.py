@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -21,6 +22,8 @@ app = typer.Typer(
 INTERRUPTED = 130  # 128 + SIGINT, as shells say it
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout instead of text.")]
+OneModel = Annotated[Path, typer.Argument(help="Run folder, or RUN@CHECKPOINT.")]
+Checkpoint = Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")]
 AwsLog = Annotated[str, typer.Option("--aws-log", help="File for the log lines that AWS's tools read; - for stdout.")]
 TrackOption = Annotated[str, typer.Option("--track", "-t", help="Name of a track, or path of a track file.")]
 
@@ -43,6 +46,20 @@ def root(
         raise typer.Exit
     if context.invoked_subcommand is None:
         context.fail("Missing command.")
+
+
+def model_of(context: typer.Context, run: Path, checkpoint: str) -> tuple[Path, str]:
+    """The run and its checkpoint, named as ``RUN@CHECKPOINT`` or with ``--checkpoint``, and not in both ways.
+
+    Raises:
+        ConfigError: What follows the @ names no checkpoint.
+    """
+    from racecraft.run.checkpoint import split_model
+
+    path, named = split_model(run)
+    if named and is_given(context, "checkpoint"):
+        context.fail(f"{run} names a checkpoint, and so does --checkpoint {checkpoint}; give one of them.")
+    return Path(path), named or checkpoint
 
 
 def text() -> Any:

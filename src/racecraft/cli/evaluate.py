@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import AwsLog, Json, app, is_given, print_json, text
+from racecraft.cli.app import AwsLog, Checkpoint, Json, OneModel, app, is_given, model_of, print_json, text
 
 RACE_ONLY: Final = ("as_what", "track", "laps", "rules", "offtrack_penalty", "max_resets", "video", "aws_log", "ghost")
 
@@ -17,7 +17,7 @@ RACE_ONLY: Final = ("as_what", "track", "laps", "rules", "offtrack_penalty", "ma
 @app.command()
 def evaluate(
     context: typer.Context,
-    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    run: OneModel,
     track: Annotated[str, typer.Option("--track", "-t", help="Track; by default the one it was trained on.")] = "",
     tracks: Annotated[
         list[str] | None,
@@ -33,7 +33,7 @@ def evaluate(
     rules: Annotated[
         str, typer.Option("--rules", help="drfc, worker, droa or live; by default the run's own, else drfc.")
     ] = "",
-    checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
+    checkpoint: Checkpoint = "best",
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "",
     direction: Annotated[
         str, typer.Option("--direction", help="forward or reverse; by default as it was trained.")
@@ -63,6 +63,7 @@ def evaluate(
 
     By default among the objects it was trained with. With --tracks it tries one lap on each of many tracks, both ways.
     """
+    run, checkpoint = model_of(context, run, checkpoint)
     if tracks:
         _generalize(
             context,

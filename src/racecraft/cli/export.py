@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from racecraft.cli.app import Json, app, print_json
+from racecraft.cli.app import Checkpoint, Json, OneModel, app, model_of, print_json
 
 
 @app.command()
 def export(
-    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    context: typer.Context,
+    run: OneModel,
     to: Annotated[str, typer.Option("--to", help="What for: car, onnx, tflite or openvino.")] = "car",
-    checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
+    checkpoint: Checkpoint = "best",
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="File to write; by default it is called like the run and lies in it."),
@@ -25,6 +26,7 @@ def export(
     from racecraft.car import export_run
     from racecraft.cli import car_text
 
+    run, checkpoint = model_of(context, run, checkpoint)
     exported = export_run(run, to=to, output=output, checkpoint=checkpoint)
     if as_json:
         print_json(exported.to_dict())

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from racecraft.cli.app import Json, app, print_json
+from racecraft.cli.app import Checkpoint, Json, OneModel, app, model_of, print_json
 
 if TYPE_CHECKING:
     from racecraft.judging.league import League
@@ -64,9 +63,10 @@ def races(as_json: Json = False) -> None:
 
 @app.command()
 def submit(
-    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    context: typer.Context,
+    run: OneModel,
     race: Annotated[int, typer.Option("--race", help="Number of the race, as racecraft races lists it.")],
-    checkpoint: Annotated[str, typer.Option("--checkpoint", help="best, last or a step.")] = "best",
+    checkpoint: Checkpoint = "best",
     wait: Annotated[bool, typer.Option("--wait/--no-wait", help="Until it is judged.")] = True,
     as_json: Json = False,
 ) -> None:
@@ -74,6 +74,7 @@ def submit(
     from racecraft.judging.league import LeagueRefused, remembered_league
     from racecraft.run import RunFolder
 
+    run, checkpoint = model_of(context, run, checkpoint)
     league = remembered_league()
     found = league.submit(RunFolder.open(run), race, checkpoint=checkpoint)
     shown = None

@@ -5,7 +5,6 @@ An entry is what drives, and nothing else: a race never asks a run how it was tr
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import SensorSuite
-from racecraft.errors import ConfigError, NonFiniteAction
+from racecraft.errors import NonFiniteAction
 from racecraft.race.policy import NetworkPolicy, load_policy
-from racecraft.run.checkpoint import is_step
+from racecraft.run.checkpoint import split_model
 from racecraft.run.folder import MAX_NAME, RunFolder
 
 
@@ -77,18 +76,6 @@ def load_entries(models: Sequence[str | Path], *, num_threads: int = 0) -> list[
             name, number = f"{entry.name}-{number}", number + 1
         entries.append(replace(entry, name=name))
     return entries
-
-
-def split_model(model: str | Path) -> tuple[str, str]:
-    """``RUN@CHECKPOINT`` as path and checkpoint; the checkpoint is empty where none is named."""
-    path, _, checkpoint = str(model).rpartition("@")
-    if not path and not checkpoint:
-        raise ConfigError("A model has no name; give the path of a run folder.")
-    if not path or "/" in checkpoint or os.path.exists(model):
-        return str(model), ""
-    if checkpoint not in ("best", "last") and not is_step(checkpoint):
-        raise ConfigError(f"Checkpoint {checkpoint!r} of {path} is none; allowed are best, last and a number of steps.")
-    return path, checkpoint
 
 
 def _shown(name: str) -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 import re
 import stat
 import time
@@ -27,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.checks import is_number
-from racecraft.errors import CheckpointError, did_you_mean
+from racecraft.errors import CheckpointError, ConfigError, did_you_mean
 from racecraft.json_file import parse_json_object
 from racecraft.run.atomic import TEMPORARY, write_file, write_json
 from racecraft.run.tensor_file import is_storable, tensor_file
@@ -363,6 +364,18 @@ class CheckpointStore:
 def is_step(text: str) -> bool:
     """Whether a text names a checkpoint by its camera steps."""
     return _STEP.fullmatch(text) is not None
+
+
+def split_model(model: str | Path) -> tuple[str, str]:
+    """``RUN@CHECKPOINT`` as path and checkpoint; the checkpoint is empty where none is named."""
+    path, _, checkpoint = str(model).rpartition("@")
+    if not path and not checkpoint:
+        raise ConfigError("A model has no name; give the path of a run folder.")
+    if not path or "/" in checkpoint or os.path.exists(model):
+        return str(model), ""
+    if checkpoint not in ("best", "last") and not is_step(checkpoint):
+        raise ConfigError(f"Checkpoint {checkpoint!r} of {path} is none; allowed are best, last and a number of steps.")
+    return path, checkpoint
 
 
 def _rank(entry: Entry) -> tuple[float, ...]:

@@ -21,7 +21,7 @@ from racecraft.learn import Learner, NetworkSpec
 from racecraft.learn.learner import below
 from racecraft.learn.networks import weight_shapes
 from racecraft.run import Checkpoint, RunFolder
-from racecraft.run.checkpoint import StoredCheckpoint
+from racecraft.run.checkpoint import StoredCheckpoint, split_model
 
 WEIGHTS: Final = "weights/"
 HEADS: Final = ("policy.head.weight", "policy.head.bias", "policy.log_std")
@@ -95,14 +95,12 @@ def open_parent(text: str | Path) -> Parent:
 
     Raises:
         RunError: There is no such run.
+        ConfigError: What follows the @ names no checkpoint.
         CheckpointError: It has no such checkpoint, or it is damaged.
     """
-    path, which = str(text), "best"
-    if "@" in path and not Path(path).is_dir():
-        path, which = path.rsplit("@", 1)
+    path, which = split_model(text)
     folder = RunFolder.open(path)
-    saved = folder.checkpoints.load(which)
-    return Parent(folder, saved)
+    return Parent(folder, folder.checkpoints.load(which or "best"))
 
 
 def fitting(weights: Mapping[str, NDArray[Any]], spec: NetworkSpec) -> Arrays:
