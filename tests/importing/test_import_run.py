@@ -135,6 +135,18 @@ def test_a_reward_function_alone_and_with_files_beside_it(tmp_path: Path) -> Non
     assert (settings.track, settings.direction, settings.network) == ("oval", "reverse", "RACECRAFT_SMALL")
 
 
+def test_a_reward_function_is_read_in_the_encoding_that_it_says(tmp_path: Path) -> None:
+    folder = models.as_folder(models.MODEL, tmp_path / "a")
+    file = folder / "reward_function.py"
+    file.write_bytes(f"# Größe\n{models.REWARD}".encode("latin-1"))
+    with pytest.raises(RacecraftError, match=r"^reward_function\.py is not UTF-8 text: byte 4 is 0xf6"):
+        import_run(folder)
+    assert nothing_was_made()
+    file.write_bytes(f"# coding: latin-1, Größe\n{models.REWARD}".encode("latin-1"))
+    found = import_run(folder)
+    assert RunFolder.open(found.run).read_reward_function() == f"# coding: utf-8, Größe\n{models.REWARD}"
+
+
 def test_a_model_without_weights_needs_a_reward(tmp_path: Path) -> None:
     archive = models.as_tar({"model_metadata.json": models.METADATA}, tmp_path / "model.tar.gz")
     with pytest.raises(SourceError, match=r"has no reward_function\.py") as caught:

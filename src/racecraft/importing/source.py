@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -29,7 +29,8 @@ from racecraft.importing.layout import (
     is_plain,
     role,
 )
-from racecraft.json_file import read_text
+from racecraft.json_file import decode_text, read_bytes, read_text
+from racecraft.reward.source import decode_reward
 
 MAX_FILES: Final = 100_000
 MAX_DEPTH: Final = 20
@@ -75,14 +76,19 @@ class Source:
     """Name of the reward function where the user named a single file."""
 
     def text(self, name: str) -> str:
-        """A settings file's text.
+        """A settings file's text, or a reward function's.
 
         Raises:
-            ConfigError: Not readable, too large, or not UTF-8.
+            ConfigError: Not readable, too large, or not UTF-8, nor what `decode_reward` takes of Python's.
         """
         path, limit = self.files[name].path, MAX_BYTES["settings"]
         if path is None or self.files[name].size > limit:
             raise ConfigError(f"{name} is larger than {limit:,} bytes, too large for a file of its kind.")
+        if name.endswith(".py"):
+            data = read_bytes(path, max_bytes=limit, name=name)
+            with suppress(UnicodeDecodeError):
+                return decode_reward(data)
+            return decode_text(data, name=name)  # which says what is wrong
         return read_text(path, max_bytes=limit, name=name)
 
 
