@@ -343,6 +343,18 @@ def test_what_is_no_log_says_so(text, message, tmp_path):
         replay(path, track="oval")
 
 
+@pytest.mark.parametrize("separator", [(";", "semicolons"), ("\t", "tabs")])
+@pytest.mark.parametrize("has_header", [True, False])
+def test_a_table_that_a_spreadsheet_separated_otherwise_is_told_so(separator, has_header, tmp_path, lines):
+    path = tmp_path / "a.csv"
+    mark, name = separator
+    table = [list(COLUMNS)] * has_header + [[field.replace(".", ",") for field in fields] for fields in lines]
+    path.write_text("\n".join(mark.join(fields) for fields in table))
+    with pytest.raises(RunError, match=rf"^a\.csv has {name} between its columns; a sim-trace has commas") as caught:
+        replay(path, track="oval")
+    assert "as it was logged" in caught.value.hint
+
+
 def test_files_that_cannot_be_read(tmp_path, lines):
     with pytest.raises(RunError, match="cannot be read"):
         replay(tmp_path / "none.csv", track="oval")

@@ -170,6 +170,8 @@ def _batches(source: str, file: TextIO, rows: list[tuple[int, Sequence[str]]], f
             order = _order(names)
             continue
         else:
+            if "episode" in line or number == 1:
+                _require_commas(source, line)
             if names is None and number > 1:
                 continue  # some other line of a larger log
             fields = _split(line)
@@ -213,6 +215,21 @@ def _lines(file: TextIO) -> Iterator[tuple[int, str]]:
 def _header(line: str) -> list[str]:
     names = [name.strip(' "') for name in line.strip().split(",")]
     return [_SYNONYMS.get(name, name) for name in names]
+
+
+def _require_commas(source: str, line: str) -> None:
+    """Refuse a header, or a first row, that is whole but for what stands between its columns.
+
+    A spreadsheet that writes no commas there reads none either, and so may have taken a number's point for something
+    else: 3.141 for three thousand, or for a day. The numbers of such a file are not to be trusted.
+    """
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        names = [part.strip(' "') for part in line.strip().split(separator)]
+        if {"episode", "steps"} <= set(names) or (len(names) in READABLE and names[0].isdecimal()):
+            raise RunError(
+                f"{source} has {name} between its columns; a sim-trace has commas there, and points in its numbers.",
+                hint="Give the file as it was logged: a spreadsheet that saves it so may have changed numbers, too.",
+            )
 
 
 def _split(line: str) -> list[str]:
