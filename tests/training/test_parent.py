@@ -13,12 +13,12 @@ from tiny_runs import Recorder, Train, assert_same, logs, weights
 
 from racecraft.agent import ModelMetadata, action_space
 from racecraft.errors import CheckpointError, ConfigError, RunError
-from racecraft.learn import DistillConfig, NetworkSpec, initial_weights
+from racecraft.learn import DistillConfig, NetworkSpec, initial_weights, make_learner
 from racecraft.race.evaluation import Completion
 from racecraft.run import RunFolder
 from racecraft.run.history import read_history
 from racecraft.training import EvaluationReport, evaluator, resume
-from racecraft.training.parent import fitting, open_parent
+from racecraft.training.parent import begin_from, fitting, open_parent
 from racecraft.training.plan import make_plan
 from racecraft.training.start import read_settings
 
@@ -187,6 +187,29 @@ def test_another_network_or_other_sensors_are_refused(parent: Path, tmp_path: Pa
 def test_what_is_no_checkpoint_is_refused(parent: Path, text: str, error: type[Exception], match: str) -> None:
     with pytest.raises(error, match=match):
         open_parent(text.format(parent=parent))
+
+
+@pytest.mark.parametrize("name", ["policy.conv2.weight", "critic.dense1.bias"])
+def test_a_weight_that_is_no_number_begins_nothing(parent: Path, tmp_path: Path, name: str) -> None:
+    broken = tmp_path / "broken"
+    shutil.copytree(parent, broken)
+    store = RunFolder.open(broken).checkpoints
+    saved = store.load("last")
+    saved.arrays[f"weights/{name}"].flat[1] = np.inf
+    store.save(saved.step + 1, saved.arrays, metadata=saved.metadata)
+    with pytest.raises(CheckpointError, match=rf"has weights that are NaN or infinite: {name}\.$"):
+        make_plan(parent=f"{broken}@last").start(root=tmp_path / "children")
+    assert not (tmp_path / "children").exists()
+    child = make_plan(parent=parent, until="64 steps").start(root=tmp_path / "children")
+    copied = child.parent_checkpoint.load()
+    copied.arrays[f"weights/{name}"].flat[1] = np.nan
+    with pytest.raises(CheckpointError, match=rf"has weights that are NaN or infinite: {name}\.$"):
+        begin_from(make_learner(read_settings(child).network_spec(child.read_model_metadata())), copied)
+    for head in ("policy.head.bias", "policy.head.weight"):  # other actions have a head of their own
+        saved.arrays[f"weights/{head}"].flat[0] = np.nan
+    saved.arrays[f"weights/{name}"].flat[1] = 0.0
+    store.save(saved.step + 2, saved.arrays, metadata=saved.metadata)
+    make_plan(parent=f"{broken}@last", actions="continuous").start(root=tmp_path / "children")
 
 
 def test_a_damaged_copy_of_the_weights_is_refused(parent: Path, tmp_path: Path) -> None:

@@ -68,6 +68,7 @@ class Parent:
 
         Raises:
             ConfigError: Other sensors, or another network.
+            CheckpointError: A weight is NaN or infinite.
         """
         theirs = self.folder.read_model_metadata()
         if set(theirs.sensors) != set(metadata.sensors):
@@ -84,7 +85,9 @@ class Parent:
                 "from another keeps its network.",
                 hint=f"Give --network {name}, or leave out --from.",
             )
-        return _sentences(fitting(self.weights, spec), spec)
+        kept = fitting(self.weights, spec)
+        _require_finite(self.saved, kept)
+        return _sentences(kept, spec)
 
 
 def open_parent(text: str | Path) -> Parent:
@@ -141,13 +144,21 @@ def begin_from(learner: Learner, saved: Checkpoint) -> None:
     """Give a learner with fresh weights those of a parent that fit it.
 
     Raises:
-        CheckpointError: The copy of the parent's weights is not of this network.
+        CheckpointError: The copy of the parent's weights is not of this network, or one is NaN or infinite.
     """
     try:
         kept = fitting(below(WEIGHTS, saved.arrays), learner.spec)
     except ConfigError as error:
         raise CheckpointError(f"{saved.path} cannot be begun from: {error}") from error
+    _require_finite(saved, kept)
     learner.load_weights({**learner.weights(), **kept})
+
+
+def _require_finite(saved: Checkpoint, kept: Arrays) -> None:
+    """Refuse weights of which no training comes; those that are left behind do no harm."""
+    for name, array in kept.items():
+        if not np.isfinite(array).all():
+            raise CheckpointError(f"{saved.path} has weights that are NaN or infinite: {name}.")
 
 
 def _sentences(kept: Arrays, spec: NetworkSpec) -> list[str]:
