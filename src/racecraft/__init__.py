@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from racecraft.version import VERSION
 
+TYPE_CHECKING = False  # `typing` would take two thirds of this import, which nobody can interrupt without a stack trace
 __version__ = VERSION
 
 _HOME = {
@@ -52,6 +52,8 @@ _HOME = {
 """Where each public name lives below ``racecraft``, and after a colon what it is called there."""
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from racecraft.agent import Hyperparameters as Hyperparameters
     from racecraft.agent import ModelMetadata as ModelMetadata
     from racecraft.agent import action_space as action_space

@@ -1,5 +1,3 @@
 """Which Racecraft this is; ``pyproject.toml`` says the same."""
 
-from typing import Final
-
-VERSION: Final = "0.1.0"
+VERSION = "0.1.0"

@@ -128,6 +128,21 @@ def test_an_interrupt_before_the_verb_begins_is_no_stack_trace(racecraft: Run, m
     assert (outcome.status, outcome.out, outcome.err) == (130, "", "")
 
 
+def test_an_interrupt_while_the_command_line_is_imported_is_no_stack_trace(tmp_path: Path) -> None:
+    script = """if True:
+        import sys
+        class Pressed:
+            def find_spec(name, *_):
+                if name == "typer":
+                    raise KeyboardInterrupt
+        sys.meta_path.insert(0, Pressed)
+        from racecraft.cli import main
+        sys.exit(main())
+    """
+    done = subprocess.run([sys.executable, "-c", script, "tracks"], capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
 def test_what_an_error_says_is_no_markup(racecraft: Run, tmp_path: Path) -> None:
     assert "[bold]x[/bold]" in racecraft("train", "--critic", "[bold]x[/bold]").err
 

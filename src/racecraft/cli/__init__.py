@@ -7,6 +7,33 @@ A file holds the verbs of one subject. Everything heavy is imported inside the v
 what people read is in `text`.
 """
 
-from racecraft.cli.entry import every_verb, main
+from __future__ import annotations
+
+import sys
+
+TYPE_CHECKING = False  # without `typing`, see `racecraft`
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from racecraft.cli.entry import every_verb as every_verb
 
 __all__ = ["every_verb", "main"]
+
+
+def main() -> None:
+    """Run the command line, see `racecraft.cli.entry.main`; Ctrl-C while it is being imported ends it quietly, too."""
+    try:
+        from racecraft.cli import entry  # a tenth of a second, in which somebody may think better of it
+    except KeyboardInterrupt:
+        sys.exit(130)  # as of every later one
+    entry.main()
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for beside `main` on first use."""
+    if name == "every_verb":
+        from racecraft.cli.entry import every_verb
+
+        return every_verb
+    raise AttributeError(f"module 'racecraft.cli' has no attribute {name!r}")
