@@ -15,7 +15,8 @@ SOURCES = ROOT / "src/racecraft"
 GERMAN = ROOT / "web/src/i18n/de/errors.json"
 
 PLACES = (
-    *("serve", "reward/check.py", "reward/imports.py", "reward/worker_process.py", "checks.py", "track/validate.py"),
+    *("serve", "reward/aside.py", "reward/check.py", "reward/imports.py", "reward/worker_process.py", "checks.py"),
+    "track/validate.py",
     *("track/sketch.py", "track/readers.py", "track/generator.py", "agent/model_metadata.py"),
     *("importing", "sim/objects.py", "training/stop.py", "training/parent.py", "training/start.py"),
     *("training/settings.py", "learn/ppo.py", "learn/sac.py", "learn/distill.py", "learn/saliency.py"),

@@ -19,13 +19,13 @@ from racecraft.reward.imports import ImportRules
 from racecraft.reward.keys import missing_keys
 from racecraft.reward.names import bound_names, undefined_names
 from racecraft.reward.params import TEMPLATE
+from racecraft.reward.reading import reads
 from racecraft.reward.source import MAX_CHARACTERS
 from racecraft.reward.worker_process import FILENAME
 from racecraft.scoped_warnings import scoped_warnings
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
-# A stranger's source is looked at by a server that others wait for.
 MAX_PROBLEMS: Final = 1000
 MAX_PARTS: Final = 100
 """Of a dotted name: Python's own parser takes seconds for an import of 46,000."""
@@ -52,6 +52,7 @@ class Problem:
         return f"{FILENAME}, line {self.line}, column {self.column}: {self.message}{hint}"
 
 
+@reads
 def check_reward(source: str) -> list[Problem]:
     """The problems that can be seen in the source, in the order of its lines; of very many the first that are found."""
     try:

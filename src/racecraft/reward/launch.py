@@ -105,7 +105,7 @@ def start_process(
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             cwd="/",
-            env=_environment(),
+            env=bare_environment(),
             # Ctrl-C is the trainer's affair, and one kill ends the whole group
             **system.apart(shared_memory, end, *([tells] if bubblewrap else [])),
         )
@@ -142,7 +142,7 @@ def _told(descriptor: int) -> int:
         ) from None
 
 
-def _environment() -> dict[str, str]:
+def bare_environment() -> dict[str, str]:
     """Fixed hash seed, so that sets iterate alike in every run; one thread, as a worker gets one core."""
     environment = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     environment |= {"PYTHONHASHSEED": "0", "LC_ALL": "C.UTF-8", "PATH": "/usr/bin:/bin"}

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from typing import Final
 
+from racecraft.reward.reading import reads
 from racecraft.reward.worker_process import PACKAGES
 
 _TRACES: Final = ("ast", "linecache", "tokenize", "traceback", "unicodedata")
@@ -28,6 +29,7 @@ LOADED_LATE: Final = {
 """What the standard library itself imports only when the thing of this name is used."""
 
 
+@reads
 def needed_modules(source: str) -> list[str]:
     """Dotted names of modules to load, the most general first; some may not exist."""
     tree = _parse(source)
@@ -40,6 +42,7 @@ def needed_modules(source: str) -> list[str]:
     return sorted({name for name in found if name.partition(".")[0] in (*sys.stdlib_module_names, *PACKAGES)})
 
 
+@reads
 def used_words(source: str) -> list[str]:
     """Every name and attribute in the source, and texts that could be one: a part of a package may be among them."""
     tree = _parse(source)

@@ -11,6 +11,7 @@ import ast
 from collections.abc import Iterator
 from typing import Final
 
+from racecraft.reward.reading import reads
 from racecraft.scoped_warnings import scoped_warnings
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
@@ -44,6 +45,7 @@ IMMUTABLE: Final = (ast.Constant, ast.JoinedStr, ast.Lambda)
 ASSIGNMENTS: Final = (ast.Assign, ast.AnnAssign, ast.NamedExpr)
 
 
+@reads
 def keeps_state(source: str) -> bool:
     """Whether the source remembers something between calls.
 

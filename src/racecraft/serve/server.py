@@ -11,6 +11,8 @@ import uvicorn
 
 from racecraft.checks import check_whole
 from racecraft.errors import ConfigError
+from racecraft.reward.aside import Aside
+from racecraft.reward.reading import read_by
 from racecraft.serve.app import create_app
 from racecraft.serve.door.prompt import PromptProtocol
 from racecraft.serve.settings import ServeSettings
@@ -58,7 +60,8 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
     listener.listen(128)
     at = settings.address.rstrip("/") if settings.certificate else f"http://{ADDRESS}:{port}"
     on_ready(f"{at}/?ticket={app.state.guard.ticket()}")
-    _Server(config, on_stop=app.state.context.supervisor.news.end).run(sockets=[listener])
+    with read_by(Aside()):
+        _Server(config, on_stop=app.state.context.supervisor.news.end).run(sockets=[listener])
 
 
 class _Server(uvicorn.Server):

@@ -38,7 +38,7 @@ SHIPPED: Final = (
     "errors.py",
     "scoped_warnings.py",
     *(f"reward/{name}.py" for name in ("check", "failure", "imports", "keys", "names", "params", "rehearsal")),
-    *(f"reward/{name}.py" for name in ("source", "state", "worker_process")),
+    *(f"reward/{name}.py" for name in ("reading", "source", "state", "worker_process")),
     "site/calls.py",
 )
 """Files below `racecraft` that the page brings."""
