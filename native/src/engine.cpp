@@ -374,6 +374,11 @@ const char* Engine::find_fault() const {
             track_choice_[env] >= 0 && static_cast<size_t>(track_choice_[env]) < num_tracks() &&
             episode.track == episodes_[env - env % static_cast<size_t>(batch_.cars_per_race)].track;
         if (!has_tracks) return "names a track that this simulation lacks.";
+        // The row tells the length of the track that it was driven on, which tells most tracks apart. To a
+        // micrometre: another machine may have summed it up otherwise.
+        const double length = tracks_[static_cast<size_t>(episode.track)].geometry().length;
+        if (!(std::abs(rows_[env * row_width() + kRow_track_length] - length) < 1e-6))
+            return "was saved on another track.";
         const int status = static_cast<int>(episode.status);
         if (status < 0 || status > static_cast<int>(Status::park))
             return "holds a status that does not exist.";

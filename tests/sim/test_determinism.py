@@ -179,14 +179,26 @@ def test_foreign_bytes_are_refused_and_change_nothing(choose, record):
         assert record(simulation) == before
 
 
+def test_the_bytes_of_another_track_are_refused_and_change_nothing(choose, record):
+    simulation = Simulation([OVAL, octagon()], num_envs=2, camera=SMALL)
+    simulation.step(choose(0, np.arange(2)))
+    before = record(simulation)
+    for tracks in ([octagon(), OVAL], [moved(OVAL, 0.0, (0.0, 0.0), scale=1.001), octagon()]):
+        with pytest.raises(ShapeError, match="was saved on another track"):
+            simulation.load(Simulation(tracks, num_envs=2, camera=SMALL).save())
+        assert record(simulation) == before
+
+
 # --- symmetry
 
 
-def moved(track: Track, angle: float, shift: tuple[float, float], *, mirrored: bool = False) -> Track:
+def moved(
+    track: Track, angle: float, shift: tuple[float, float], *, mirrored: bool = False, scale: float = 1.0
+) -> Track:
     rotation = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     flip = np.array([1.0, -1.0 if mirrored else 1.0])
     return Track(
-        "moved", *((line * flip) @ rotation.T + shift for line in (track.centerline, track.inner, track.outer))
+        "moved", *((scale * line * flip) @ rotation.T + shift for line in (track.centerline, track.inner, track.outer))
     )
 
 

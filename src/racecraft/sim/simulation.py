@@ -382,7 +382,7 @@ class Simulation:
         """Continue from what `save` gave.
 
         Raises:
-            ShapeError: The bytes are not from a simulation of this shape.
+            ShapeError: The bytes are not from a simulation of this shape, or from tracks of other lengths.
         """
         try:
             self._engine.load(np.ascontiguousarray(saved, dtype=np.uint8))
