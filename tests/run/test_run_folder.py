@@ -83,6 +83,10 @@ def test_open_says_what_is_missing_and_guesses(tmp_path):
     with pytest.raises(RunError, match="There is no run") as error:
         RunFolder.open(tmp_path / "ovla-1")
     assert error.value.hint == "Did you mean 'oval-1'?"
+    RunFolder.create(tmp_path, name="b").write_info(RunInfo(seed=1, track="oval", track_digest=""))
+    with pytest.raises(RunError, match="There is no run") as error:
+        RunFolder.open(tmp_path / "b@20480000")
+    assert error.value.hint == "Did you mean 'b'?"
     with pytest.raises(RunError, match=r"run.json is missing"):
         RunFolder.open(tmp_path / "empty")
 

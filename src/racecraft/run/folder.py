@@ -124,7 +124,8 @@ class RunFolder:
         path = place_of(path)
         if not path.is_dir():
             siblings = [run.path.name for run in list_runs(path.parent)]
-            raise RunError(f"There is no run {str(path)!r}.", hint=did_you_mean(path.name, siblings))
+            meant = path.name.partition("@")[0]  # a whole run is asked for where somebody names a checkpoint
+            raise RunError(f"There is no run {str(path)!r}.", hint=did_you_mean(meant, siblings))
         if not (path / "run.json").is_file():
             raise RunError(f"{path} holds no run: run.json is missing.")
         return cls(path)
