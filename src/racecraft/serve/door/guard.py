@@ -20,9 +20,9 @@ from urllib.parse import urlsplit
 from fastapi import Request, Response
 from fastapi.responses import RedirectResponse
 from starlette.datastructures import MutableHeaders
-from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from racecraft.serve.door.bodies import Body, too_large
 from racecraft.serve.jobs.line import MAX_OBJECT
 from racecraft.serve.jobs.remote import ROOM
 from racecraft.serve.people.keys import WORKER, Keys
@@ -83,13 +83,6 @@ def most_bytes(path: str) -> int:
     return MAX_SUBMISSION if SUBMIT.fullmatch(path) else LARGE.get(path, MAX_BODY)
 
 
-def too_large(most: int) -> str:
-    """What to say of a request that holds more."""
-    return (
-        f"A request may have at most {most >> 20} MB." if most >= 1 << 20 else f"It may have at most {most >> 10} kB."
-    )
-
-
 class Guard:
     """Lets the right browsers in.
 
@@ -126,8 +119,7 @@ class Guard:
                 await app(scope, receive, send)
                 return
             is_api = scope["path"].startswith("/api/")
-            most = most_bytes(scope["path"])
-            taken = 0
+            body = Body(receive, most_bytes(scope["path"]))
 
             async def send_with_headers(message: Message) -> None:
                 if message["type"] == "http.response.start":
@@ -137,25 +129,19 @@ class Guard:
                     headers.setdefault("Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'")
                     if is_api:
                         headers.setdefault("Cache-Control", "no-store")
+                    if body.is_given_up:
+                        headers["Connection"] = "close"
                 await send(message)
-
-            async def receive_so_much() -> Message:
-                nonlocal taken
-                message = await receive()
-                taken += len(message.get("body", b""))
-                if taken > most:
-                    raise HTTPException(413, too_large(most))
-                return message
 
             answer = self._refuse(Request(scope)) or app
             if self._is_league and scope["path"].startswith(STREAMS) and answer is app:
-                stream = Listening(receive_so_much, may_stay=self._may_stay(Request(scope)))
+                stream = Listening(body.receive, may_stay=self._may_stay(Request(scope)))
                 with self._listeners.one_more(Request(scope).cookies.get(COOKIE)):
                     await app(scope, stream.receive, send_with_headers)
                 if stream.has_left:
                     await send({"type": "http.response.body", "body": b"", "more_body": False})
             else:
-                await answer(scope, receive_so_much, send_with_headers)
+                await answer(scope, body.receive, send_with_headers)
 
         return guarded
 

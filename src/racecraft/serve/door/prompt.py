@@ -1,4 +1,4 @@
-"""Connections on which no request comes: who opens a thousand and says nothing takes them from nobody for long."""
+"""Connections on which no request comes, or the rest of one that was answered: a thousand keep nobody out for long."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 PATIENCE: Final = 20.0
-"""s in which the lines before a request's body have to be there; a proxy's connection that waits is closed before."""
+"""s in which the lines before a request's body have to be there, or the rest of a body whose request was refused; a
+proxy's connection that waits is closed before."""
 
 
 class PromptProtocol(H11Protocol):
@@ -38,7 +39,7 @@ class PromptProtocol(H11Protocol):
         self._wait()
 
     def _wait(self) -> None:
-        if self.conn.their_state is not h11.IDLE or self.transport.is_closing():
+        if not self._has_nothing_to_do() or self.transport.is_closing():
             self._wait_no_more()
         elif self._giving_up is None:
             self._giving_up = self.loop.call_later(PATIENCE, self._give_up)
@@ -50,5 +51,10 @@ class PromptProtocol(H11Protocol):
 
     def _give_up(self) -> None:
         self._giving_up = None
-        if self.conn.their_state is h11.IDLE and not self.transport.is_closing():
+        if self._has_nothing_to_do() and not self.transport.is_closing():
             self.transport.close()
+
+    def _has_nothing_to_do(self) -> bool:
+        """Whether there is no request, or only the rest of a body that nobody reads: it was answered."""
+        is_answered = self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
+        return is_answered or self.conn.their_state is h11.IDLE
