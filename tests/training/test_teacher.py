@@ -12,10 +12,11 @@ from racecraft.agent import action_space
 from racecraft.learn import NetworkSpec
 from racecraft.learn.native_state_learner import NativeStateLearner
 from racecraft.reward import load_reward
+from racecraft.sim import Simulation, Start
 from racecraft.sim.columns import STATE_COLUMNS, STATUS_NAMES
-from racecraft.track import load_track
+from racecraft.track import Sketch, draw_road, load_track
 from racecraft.training.opponents import Opponents
-from racecraft.training.rival_view import RIVAL_COLUMNS
+from racecraft.training.rival_view import RIVAL_COLUMNS, tell_rivals
 from racecraft.training.settings import TrainSettings
 from racecraft.training.teacher import TeachersEnvironment, teacher_environment
 
@@ -79,6 +80,18 @@ def test_it_is_told_of_the_nearest_other_car(race: TeachersEnvironment) -> None:
     expected = [[1 / 1.5, np.tanh(-1.0), -0.3 / (width / 2), 0.25], [1 / 1.5, np.tanh(1.0), 0.3 / (width / 2), -0.25]]
     np.testing.assert_allclose(told[:2], expected, atol=0.02)
     np.testing.assert_allclose(told[2], [1 / 4.0, -1.0, 0.1 / (width / 2), 0.25], atol=0.02)
+
+
+def test_on_an_open_road_nobody_is_told_of_a_way_round() -> None:
+    sketch = Sketch(points=((0, 0), (4, 0), (8, 0)), widths=(0.8, 0.8, 0.8), is_closed=False)
+    road = draw_road(sketch, name="road")
+    cars = Simulation([load_track("oval"), road], num_envs=4, cars_per_race=2, start=Start(spread=True))
+    for race, length in enumerate(track.length for track in cars.tracks):
+        cars.place(2 * race, 0.1 * length, offset=0.0, speed=1.0)
+        cars.place(2 * race + 1, 0.8 * length, offset=0.0, speed=1.0)
+    cars.step(np.zeros((4, 2), np.float32))
+    places = tell_rivals(cars)[:, RIVAL_COLUMNS.index("rival_place")]
+    assert (np.sign(places) == [-1.0, 1.0, 1.0, -1.0]).all()
 
 
 def test_a_completed_lap_cuts_the_episode_and_leaving_the_road_ends_it() -> None:

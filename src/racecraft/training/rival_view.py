@@ -32,7 +32,10 @@ def tell_rivals(simulation: Simulation) -> NDArray[np.float32]:
     )
     ahead = place[:, None, :] - place[:, :, None]  # m: race, car, other car
     length = length[:, :, None]
-    ahead = (ahead + 0.5 * length) % length - 0.5 * length  # the shorter way round
+    is_closed = np.array([track.is_closed for track in simulation.tracks])
+    index = simulation.column("track_index").reshape(-1, size, 1).astype(np.intp) % len(is_closed)
+    nearer = (ahead + 0.5 * length) % length - 0.5 * length  # the shorter way round
+    ahead = np.where(is_closed[index], nearer, ahead)
     apart = np.abs(ahead)
     apart[:, np.arange(size), np.arange(size)] = np.inf
     nearest = apart.argmin(axis=2)
