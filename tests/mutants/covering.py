@@ -157,9 +157,9 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "course/pictures/charts.py": (2, ("tests/course/test_course.py", "-k", "chart or picture")),
     "serve/lessons/studies.py": (3, ("tests/serve/test_lessons_api.py",)),
     # what comes from outside, what is shown
-    "importing/archive_guard.py": (5, ("tests/importing/test_archive.py",)),
-    "importing/tar_reader.py": (4, ("tests/importing/test_archive.py",)),
-    "importing/zip_reader.py": (3, ("tests/importing/test_archive.py",)),
+    "importing/archive_guard.py": (5, ("tests/importing/test_archive.py", "tests/importing/test_damaged_archives.py")),
+    "importing/tar_reader.py": (4, ("tests/importing/test_archive.py", "tests/importing/test_damaged_archives.py")),
+    "importing/zip_reader.py": (3, ("tests/importing/test_archive.py", "tests/importing/test_damaged_archives.py")),
     "importing/env_file.py": (3, ("tests/importing/test_env_file.py",)),
     "importing/crc32c.py": (1, ("tests/importing/test_crc32c.py",)),
     "importing/drfc.py": (4, ("tests/importing/test_imported_settings.py", "tests/importing/test_import_run.py")),
