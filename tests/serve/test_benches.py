@@ -57,19 +57,23 @@ def asked(seconds: float, trials: int) -> Told:
 
 @pytest.mark.costly
 @pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
-def test_a_judge_ends_with_its_worker_however_that_ends(entry: bytes, tmp_path: Path) -> None:
+@pytest.mark.parametrize("killed", [0, 1], ids=["the worker", "the judge"])
+def test_a_judge_ends_with_its_worker_and_its_child_with_both(entry: bytes, tmp_path: Path, killed: int) -> None:
+    """However they end; of a worker that stands still, the judge's child knows nothing."""
     (tmp_path / ENTRY).write_bytes(entry)
     command = [sys.executable, "-c", WORKER, json.dumps(asked(600.0, trials=50)), str(tmp_path)]
     found: list[int] = []
     with subprocess.Popen(command) as worker:
         try:
-            for parent in (worker.pid, None):
-                found.append(until(lambda of=parent or found[0]: next(iter(children_of(of)), None)))  # type: ignore[misc]
-            worker.send_signal(signal.SIGKILL)
-            worker.wait()
-            killed = time.monotonic()
+            found.append(until(lambda: next(iter(children_of(worker.pid)), None)))
+            until(lambda: len(list(tmp_path.glob(f"{RESULTS}*/*"))) or None)  # children before only try the walls
+            found.append(until(lambda: next(iter(children_of(found[0])), None)))
+            if killed:
+                worker.send_signal(signal.SIGSTOP)
+            os.kill((worker.pid, found[0])[killed], signal.SIGKILL)
+            begun = time.monotonic()
             while any(map(lives, found)):
-                assert time.monotonic() - killed < GONE, "it drives on for nobody"
+                assert time.monotonic() - begun < GONE, "it drives on for nobody"
                 time.sleep(0.02)
         finally:
             worker.kill()
@@ -83,7 +87,7 @@ def test_a_judge_waits_for_no_child_that_nobody_asks_for(is_silent: bool, monkey
     asker, end = os.pipe()
     children: list[int] = []
 
-    def drive(told: Told, pen: int, *, number: int) -> int:
+    def drive(told: Told, pen: int, lifeline: int, *, number: int) -> int:
         os.close(end)  # a child of the real judge has none: the bench starts it as a new program
         if is_silent:
             os.close(pen)

@@ -12,7 +12,8 @@ It has no environment, no database and no key, and never reads an entry itself. 
 thread and one with two, each within walls (`racecraft.serve.submissions.walls`): a file that got the better of one
 would find nothing, and die with it. The judge compares what they drove, to the bit. What all of them need is loaded
 once. When nobody is at the other end of its standard input any more, the process ends, and the child that drives with
-it: whoever asked is gone, and another worker may have the same entry judged by now.
+it: whoever asked is gone, and another worker may have the same entry judged by now. A judge that is killed takes its
+child along, too.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft import system
+from racecraft.reward.worker_process import end_with
 from racecraft.serve.quick import loading
 
 ENTRY: Final = "entry.safetensors"
@@ -88,22 +90,27 @@ def judge(told: dict[str, Any], *, asker: int | None = None) -> tuple[int, str]:
 def _by_a_child(told: dict[str, Any], *, number: int, asker: int | None = None) -> tuple[int, str]:
     """How the first or second child ended, which drives a submission, and what it said; `FAILED` where it was ended."""
     mouth, pen = os.pipe()
+    lifeline, held = os.pipe()
     if (child := os.fork()) == 0:
         status = FAILED
         try:
-            status = _drive_alone(told, pen, number=number)
+            os.close(held)
+            end_with(lifeline)
+            if not system.can_be_read(lifeline, 0.0):  # or the judge was gone before
+                status = _drive_alone(told, pen, lifeline, number=number)
         finally:
             os._exit(status)
-    os.close(pen)
+    for file in (pen, lifeline):
+        os.close(file)
     heard = b""
-    with open(mouth, "rb", buffering=0) as pipe:
+    with open(mouth, "rb", buffering=0) as pipe, open(held, "wb", buffering=0):  # the child ends with the second
         while len(heard) < MOST_SAID:
             _wait(child, asker, mouth=mouth)
             if not (part := pipe.read(MOST_SAID - len(heard))):
                 break
             heard += part
-    while not (gone := os.waitpid(child, os.WNOHANG))[0]:  # it may drive on, having closed its pipe
-        _wait(child, asker)
+        while not (gone := os.waitpid(child, os.WNOHANG))[0]:  # it may drive on, having closed its pipe
+            _wait(child, asker)
     said, status = heard.decode(errors="replace"), os.waitstatus_to_exitcode(gone[1])
     if status not in (DROVE, REFUSED):
         why = system.end_of(status) or "an error"
@@ -125,7 +132,7 @@ def _wait(child: int, asker: int | None, *, mouth: int | None = None) -> None:
         sys.exit(FAILED)
 
 
-def _drive_alone(told: dict[str, Any], pen: int, *, number: int) -> int:
+def _drive_alone(told: dict[str, Any], pen: int, lifeline: int, *, number: int) -> int:
     """In the child: nothing is open to it but its way to answer, the entry to read, and a file for what it drove."""
     from racecraft.errors import RacecraftError
     from racecraft.serve.submissions.walls import lock_in
@@ -139,7 +146,7 @@ def _drive_alone(told: dict[str, Any], pen: int, *, number: int) -> int:
         os.chdir("/")
         system.limit(seconds=MOST_CPU, written=MOST_WRITTEN)
         terms, grid = _terms(told), _grid(told)
-        lock_in(entries=[path for path, _ in grid], kept=(0, 1, 2, pen, written), written=MOST_WRITTEN)
+        lock_in(entries=[path for path, _ in grid], kept=(0, 1, 2, pen, lifeline, written), written=MOST_WRITTEN)
         try:
             said, driven = _drive(told, grid, terms, number=number)
         except RacecraftError as error:
