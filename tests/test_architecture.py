@@ -53,6 +53,7 @@ CONSOLE = (
     "provider_settings",
     "settings",
     "schemas",
+    "naming",
     "road",
     "conditions",
     "compression",

@@ -10,12 +10,13 @@ from pydantic import Field
 from racecraft.contest.terms import MAX_GRID
 from racecraft.film.ghost import MAX_GHOSTS
 from racecraft.serve.conditions import AskedRanges, AskedVehicle
+from racecraft.serve.naming import PLAIN
 from racecraft.serve.races.ghost_schemas import Ghost, Starter
 from racecraft.serve.races.schemas import RaceKind, RaceSettings, RankedSettings, Ranking
 from racecraft.serve.schemas import Message
 from racecraft.sim.objects import MAX_OBJECTS
 
-Title = Annotated[str, Field(max_length=100)]
+Title = Annotated[str, Field(max_length=100), PLAIN]
 Among = Literal["none", "boxes", "bots"]
 
 

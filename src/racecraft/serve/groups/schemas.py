@@ -9,17 +9,18 @@ from pydantic import Field
 
 from racecraft.serve.groups.groups import Part
 from racecraft.serve.models.schemas import ModelCard
+from racecraft.serve.naming import PLAIN
 from racecraft.serve.people.schemas import LoginCard, Name
 from racecraft.serve.schemas import Message, RunName
 
-RealName = Annotated[str, Field(max_length=100)]
+RealName = Annotated[str, Field(max_length=100), PLAIN]
 Hours = Annotated[int, Field(ge=1, le=24 * 365)]
 
 
 class NewGroup(Message):
     """A class, a club, an event."""
 
-    title: str = Field(min_length=1, max_length=100, pattern=r"\S")
+    title: Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S"), PLAIN]
 
 
 class GroupCard(Message):

@@ -6,10 +6,9 @@ import unicodedata
 from typing import Final
 
 from racecraft.errors import ConfigError
+from racecraft.serve.naming import plain_text
 
 MAX_NAME: Final = 32
-FILLERS: Final = frozenset("\u115f\u1160\u3164\uffa0")
-"""Letters of Hangul that nobody sees."""
 ALIKE: Final = ("LATIN", "CYRILLIC", "GREEK")
 """Scripts whose letters are taken for each other: no name has those of two."""
 
@@ -18,14 +17,13 @@ def checked_name(name: str) -> str:
     """A name as it is shown: composed, with single spaces.
 
     Raises:
-        ConfigError: It is empty, too long, mixes scripts, or has signs that cannot be seen or turn the text around.
+        ConfigError: It is empty, too long, mixes scripts, or is no plain text (`racecraft.serve.naming`).
     """
-    shown = " ".join(unicodedata.normalize("NFC", name).split())
-    is_plain = all(unicodedata.category(sign)[0] in "LMNPSZ" and sign not in FILLERS for sign in shown)
+    shown = plain_text(name)
     scripts = {unicodedata.name(sign, "").split(" ")[0] for sign in shown if sign.isalpha()}
     if len(scripts.intersection(ALIKE)) > 1:
         raise ConfigError(f"A name has letters of one script; {name[:40]!r} has some that are taken for others.")
-    if not 1 <= len(shown) <= MAX_NAME or not is_plain or not any(sign.isalnum() for sign in shown):
+    if not 1 <= len(shown) <= MAX_NAME or not any(sign.isalnum() for sign in shown):
         raise ConfigError(f"A name has 1 to {MAX_NAME} letters, digits and ordinary signs; {name[:40]!r} is none.")
     return shown
 

@@ -10,6 +10,7 @@ from pydantic import AwareDatetime, Field
 from racecraft.film.ghost import MAX_GHOSTS
 from racecraft.serve.conditions import AskedRanges, AskedVehicle
 from racecraft.serve.evaluations.schemas import RoadObject
+from racecraft.serve.naming import PLAIN
 from racecraft.serve.races.ghost_schemas import CheckpointChoice, Ghost
 from racecraft.serve.road import OnRoad, Seconds
 from racecraft.serve.schemas import Message, RunName
@@ -19,7 +20,7 @@ from racecraft.sim.objects import MAX_OBJECTS
 RaceKind = Literal["time-trial", "object-avoidance", "head-to-bot"]
 Ranking = Literal["total", "best", "average"]
 RaceState = Literal["upcoming", "open", "closed"]
-Title = Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S")]
+Title = Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S"), PLAIN]
 
 MAX_CARS: Final = 12
 """Of a replay."""
