@@ -20,9 +20,9 @@ def test_pages_of_a_league_have_titles_of_their_own(tmp_path: Path) -> None:
 
     with running_league(tmp_path / "runs") as league, sync_playwright() as playwright:
         group = league.group("Class 9b")
-        race = ok(
-            league.owner.post(f"/api/groups/{group}/races", json={"title": "Spring cup", "track": "oval"}), 201
-        )["id"]
+        race = ok(league.owner.post(f"/api/groups/{group}/races", json={"title": "Spring cup", "track": "oval"}), 201)[
+            "id"
+        ]
         browser = launched(playwright)
         try:
             for locale, ours in (("en-GB", ("League", "Audit log")), ("de-DE", ("Liga", "Protokoll"))):
