@@ -131,6 +131,7 @@ def in_the_tab(seeds: int) -> dict[str, Any]:
     """Press Train on the page as it opens, once a seed."""
     with browsing() as (browser, address):
         page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.set_default_timeout(PATIENCE)
         page.add_init_script(COUNT_FRAMES)
         opened = time.monotonic()
         page.goto(address)
@@ -208,6 +209,7 @@ def in_a_worker(kind: type[Files], steps: int) -> Iterator[Callable[[int, bool],
     worker = next((SITE / "assets").glob("worker-*.js")).name
     with browsing(kind) as (browser, address):
         page = browser.new_page()
+        page.set_default_timeout(PATIENCE)
         page.goto(f"{address}docs/index.html")  # a page of the site on which nothing moves
 
         def train(seed: int, is_team: bool) -> tuple[float, int]:
@@ -221,6 +223,7 @@ def slowly() -> dict[str, Any]:
     """From Train to 5 of 5 laps where all of the browser's processes get a quarter of their time."""
     with browsing() as (browser, address):
         page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.set_default_timeout(PATIENCE)
         page.goto(address)
         button = page.get_by_role("button", name="Train", exact=True)
         button.wait_for()

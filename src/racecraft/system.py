@@ -119,7 +119,7 @@ def end_of(status: int) -> str:
     return next((known.name for known in signal.Signals if known == -status), f"signal {-status}")
 
 
-def limit(*, seconds: int, written: int) -> None:
+def limit(*, seconds: int, written: int, memory: int | None = None) -> None:
     """Have the system end this process, and what it starts, beyond hard limits; and leave no image of it behind.
 
     Limits that are lower already, as those of a service, stay.
@@ -127,6 +127,7 @@ def limit(*, seconds: int, written: int) -> None:
     Args:
         seconds: Of a core.
         written: Bytes of any file.
+        memory: Bytes of its address space; None for as many as there are.
 
     Raises:
         RacecraftError: This system limits nothing.
@@ -135,7 +136,10 @@ def limit(*, seconds: int, written: int) -> None:
         import resource
     except ImportError:
         raise RacecraftError("This system limits no process.", hint="Use WSL.") from None
-    for kind, most in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_FSIZE, written), (resource.RLIMIT_CORE, 0)):
+    limits = {resource.RLIMIT_CPU: seconds, resource.RLIMIT_FSIZE: written, resource.RLIMIT_CORE: 0}
+    if memory is not None:
+        limits[resource.RLIMIT_AS] = memory
+    for kind, most in limits.items():
         hard = resource.getrlimit(kind)[1]
         least = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(kind, (least, least))

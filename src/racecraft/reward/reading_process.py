@@ -19,21 +19,6 @@ from typing import Any, Final
 MOST_MEMORY: Final = 1 << 30  # bytes
 
 
-def limit(seconds: int) -> None:
-    """Have the system end this process beyond that; where it limits nothing, whoever asks waits only so long."""
-    with suppress(ImportError, ValueError, OSError):
-        import resource
-
-        for kind, most in (
-            (resource.RLIMIT_CPU, seconds),
-            (resource.RLIMIT_AS, MOST_MEMORY),
-            (resource.RLIMIT_CORE, 0),
-        ):
-            hard = resource.getrlimit(kind)[1]
-            least = most if hard == resource.RLIM_INFINITY else min(most, hard)
-            resource.setrlimit(kind, (least, least))
-
-
 def read(source: str) -> dict[str, Any]:
     """What is found, as JSON has it."""
     from dataclasses import astuple
@@ -52,9 +37,15 @@ def read(source: str) -> dict[str, Any]:
 
 def main() -> None:
     """Read the source that waits."""
-    limit(int(sys.argv[1]))
     here = Path(__file__).resolve().parent
     sys.path.insert(0, str(here.parents[1]))
+    from racecraft import system
+    from racecraft.errors import RacecraftError
+
+    with suppress(
+        RacecraftError, ValueError, OSError
+    ):  # where the system limits nothing, whoever asks waits only so long
+        system.limit(seconds=int(sys.argv[1]), written=0, memory=MOST_MEMORY)
     package = ModuleType("racecraft.reward")  # its own beginning loads NumPy and the simulator
     package.__path__ = [str(here)]
     sys.modules[package.__name__] = package
