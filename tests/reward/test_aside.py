@@ -66,6 +66,7 @@ def test_constants_are_found_and_rewritten_by_what_a_child_says() -> None:
         find_constants("def")
 
 
+@pytest.mark.costly
 @pytest.mark.usefixtures("aside")
 def test_seven_hundred_characters_that_keep_the_compiler_for_hours_keep_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     """A child is over its time or its memory, whichever comes first; what is asked later needs no other child."""
@@ -80,6 +81,7 @@ def test_seven_hundred_characters_that_keep_the_compiler_for_hours_keep_nobody(m
     assert time.thread_time() - begun < 2.0, "this process has read it itself, which takes seven seconds"
 
 
+@pytest.mark.costly
 @pytest.mark.usefixtures("aside")
 def test_a_source_that_takes_too_much_memory_is_refused() -> None:
     tests = "".join("  if p: return 0\n" for _ in range(4000))

@@ -98,6 +98,7 @@ def test_the_rest_of_a_request_that_is_refused_at_once_is_not_waited_for(tmp_pat
     assert asyncio.run(ask()).startswith("HTTP/1.1 401")
 
 
+@pytest.mark.costly
 @pytest.mark.usefixtures("impatient")
 def test_a_slow_line_gets_everything_through(tmp_path: Path) -> None:
     """It takes several times the pause, at ten times the least rate."""
