@@ -138,17 +138,17 @@ def in_the_tab(seeds: int) -> dict[str, Any]:
         button = page.get_by_role("button", name="Train", exact=True)
         button.wait_for()
         usable = time.monotonic() - opened
-        page.get_by_text("It has learned already").wait_for(timeout=PATIENCE)
+        page.get_by_text("It has learned already").wait_for()
         driving = time.monotonic() - opened
         wall, frames = [], []
         before: list[str] = []
         for _ in range(seeds):
             began = time.monotonic()
             button.click()
-            page.get_by_text("64 cars learning at once").wait_for(timeout=PATIENCE)
+            page.get_by_text("64 cars learning at once").wait_for()
             before = before or list(dict.fromkeys(Files.asked))
             learning, drawn = time.monotonic(), page.evaluate("drawnFrames")
-            page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+            page.get_by_text("It drives 5 of 5 laps").wait_for()
             wall.append(time.monotonic() - began)
             frames.append((page.evaluate("drawnFrames") - drawn) / (time.monotonic() - learning))
         version = browser.version
@@ -230,7 +230,7 @@ def slowly() -> dict[str, Any]:
         with slowed_down(descendants(os.getpid(), "--type=")):
             began = time.monotonic()
             button.click()
-            page.get_by_text("It drives 5 of 5 laps").wait_for(timeout=PATIENCE)
+            page.get_by_text("It drives 5 of 5 laps").wait_for()
             seconds = time.monotonic() - began
     print(f"5 of 5 laps after {seconds:.1f} s with a processor {SLOWER} times slower")
     return {"slow_five_laps": {"wall_seconds": [seconds]}}

@@ -367,7 +367,11 @@ def is_step(text: str) -> bool:
 
 
 def split_model(model: str | Path) -> tuple[str, str]:
-    """``RUN@CHECKPOINT`` as path and checkpoint; the checkpoint is empty where none is named."""
+    """``RUN@CHECKPOINT`` as path and checkpoint; the checkpoint is empty where none is named.
+
+    Raises:
+        ConfigError: There is no name, or what follows the @ names no checkpoint.
+    """
     path, _, checkpoint = str(model).rpartition("@")
     if not path and not checkpoint:
         raise ConfigError("A model has no name; give the path of a run folder.")
