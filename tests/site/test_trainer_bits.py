@@ -22,8 +22,10 @@ from racecraft.run import RunFolder
 from racecraft.run.archive import archive_chunks
 from racecraft.run.checkpoint import Checkpoint
 from racecraft.sim.objects import objects_for_race
+from racecraft.sim.saved_state import unseal
 from racecraft.site.javascript import javascript
 from racecraft.site.plan import packed, plan, track_file
+from racecraft.track import load_track
 from racecraft.training import resume
 
 pytestmark = pytest.mark.slow
@@ -109,7 +111,7 @@ def bits(saved: Checkpoint) -> dict[str, Any]:
         "steps": saved.step,
         "learning": digest(join_weights(below("learning/", saved.arrays), spec)),
         "average": digest(join_weights(below("average/", saved.arrays), spec)),
-        "simulation": digest(saved.arrays["simulation"]),
+        "simulation": digest(unseal(saved.arrays["simulation"], [load_track(TRACK)])),
         "totals": digest(saved.arrays["ppo/episode_returns"]),
         "lengths": digest(saved.arrays["ppo/episode_lengths"]),
         "returnScale": digest(saved.arrays["ppo/return_scale"]),

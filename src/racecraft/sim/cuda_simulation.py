@@ -20,6 +20,7 @@ from racecraft.checks import check_whole
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.gpu import Device, open_device
 from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.saved_state import seal
 from racecraft.sim.simulation import VEHICLE_FIELDS, Simulation
 from racecraft.track.track import Track
 
@@ -205,13 +206,14 @@ class CudaSimulation:
 
     def save(self) -> NDArray[np.uint8]:
         """Everything the next step depends on, the bytes that a `Simulation` of the same settings gives and takes."""
-        return np.concatenate([self.device.read(self._addresses[name], self._sizes[name]) for name in SAVED])
+        parts = [self.device.read(self._addresses[name], self._sizes[name]) for name in SAVED]
+        return seal(np.concatenate(parts), self.tracks)
 
     def load(self, saved: NDArray[np.uint8]) -> None:
         """Continue from what `save` gave, here or on the CPU.
 
         Raises:
-            ShapeError: The bytes are not from a simulation of this shape, or damaged.
+            ShapeError: The bytes are not from a simulation of this shape and of these tracks, or damaged.
         """
         camera = self.camera  # its pictures' age is part of what is saved, its pictures are not
         small = None if camera is None or camera.age == 0.0 else replace(camera, width=8, height=8)

@@ -25,6 +25,7 @@ from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.sim.objects import NO_OBJECTS, Objects, native_objects
 from racecraft.sim.randomization import Randomization, load_randomization
+from racecraft.sim.saved_state import seal, unseal
 from racecraft.sim.vehicle import Vehicle, load_vehicle
 from racecraft.track.track import Track
 
@@ -375,17 +376,17 @@ class Simulation:
         self._engine.freeze(env, steps)
 
     def save(self) -> NDArray[np.uint8]:
-        """Everything the next step depends on, as bytes (B,), for `load` of an equal simulation."""
-        return self._engine.save()
+        """Everything the next step depends on, and which roads it is of, as bytes (B,), for `load` of an equal one."""
+        return seal(self._engine.save(), self.tracks)
 
     def load(self, saved: NDArray[np.uint8]) -> None:
         """Continue from what `save` gave.
 
         Raises:
-            ShapeError: The bytes are not from a simulation of this shape, or from tracks of other lengths.
+            ShapeError: The bytes are not from a simulation of this shape and of these tracks.
         """
         try:
-            self._engine.load(np.ascontiguousarray(saved, dtype=np.uint8))
+            self._engine.load(unseal(np.ascontiguousarray(saved, dtype=np.uint8), self.tracks))
         except (TypeError, ValueError) as error:
             raise ShapeError(f"{error}") from error
 
