@@ -137,6 +137,8 @@ def test_everything_asked_of_a_heat_is_what_it_is_driven_under(
         **{"objects": "bots", "bot_speed": 0.7, "lane_changes": True, "positions": [[0.25, 1], [0.75, -1]]},
     }
     heat = started(console, "heats", models=[cars[0] | {"checkpoint": kept["step"]}, cars[1]], track="oval", **asked)
+    listed = {one["id"]: one["direction"] for one in console.client.get("/api/contests").json()}
+    assert listed[heat["id"]] == "reverse"  # by which a page knows whose ghosts it may have
     assert heat["models"] == [f"ada@{kept['step']}", "bob@last"] == [row["name"] for row in by_car(heat["heat"])]
     path = tmp_path / "heat.replay"
     path.write_bytes(console.client.get(f"/api/contests/{heat['id']}/replay.file").content)
@@ -320,6 +322,8 @@ def test_the_best_trial_of_an_evaluation_is_a_ghost(
     (listed,) = console.client.get("/api/contests/ghosts?track=oval").json()
     assert {name: listed[name] for name in evaluation} == evaluation
     assert console.client.get("/api/contests/ghosts?track=bowtie").json() == []
+    assert console.client.get("/api/contests/ghosts?track=oval&direction=forward").json() == [listed]
+    assert console.client.get("/api/contests/ghosts?track=oval&direction=reverse").json() == []  # it is refused there
     assert console.client.get("/api/contests/ghosts?track=nowhere").status_code == 404
 
     settings: dict[str, Any] = {"models": cars, "track": "oval", "seed": 5, "max_resets": 0}

@@ -202,7 +202,8 @@ def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> 
     asked = {"models": models, "title": "Before", "seed": 1, "max_resets": 1}  # beginners: the film is short
     before = client.post("/api/contests/heats", json=asked).json()["id"]
     away = client.post("/api/contests/heats", json=asked | {"title": "Away", "track": "oval"}).json()["id"]
-    for heat in (before, away):
+    back = client.post("/api/contests/heats", json=asked | {"title": "Back", "direction": "reverse"}).json()["id"]
+    for heat in (before, away, back):
         assert console.wait_for(console.job_ended(heat))["state"] == "done"
     page = visit.open("/contests/new")
     for name in ("ada", "bob"):
@@ -215,6 +216,13 @@ def test_a_heat_has_a_secret_and_ghosts_as_on_the_command_line(visit: Visit) -> 
     ghost = page.get_by_role("combobox", name="Add a ghost")
     ghost.locator("option", has_text="Before").wait_for(state="attached")
     assert ghost.locator("option", has_text="Away").count() == 0  # on another road
+    assert ghost.locator("option", has_text="Back").count() == 0  # the other way round: it would be refused
+    ghost.select_option(f"heat {before}")
+    page.get_by_label("Direction").select_option("reverse")
+    page.get_by_role("button", name="Take out the ghost: Before").wait_for(state="detached")
+    ghost.locator("option", has_text="Back").wait_for(state="attached")
+    assert ghost.locator("option", has_text="Before").count() == 0
+    page.get_by_label("Direction").select_option("forward")
     for choice in ("model bob", "lap", f"heat {before}", "model ada"):
         ghost.select_option(choice)
     page.get_by_role("combobox", name="Checkpoint of bob").nth(1).select_option("last")

@@ -9,12 +9,14 @@ export type ContestDetail = Schemas["ContestDetail"];
 export type LadderMatch = Schemas["LadderMatch"];
 export type { Ghost, Starter };
 export type EvaluatedCard = Schemas["EvaluatedCard"];
+export type Direction = NonNullable<Schemas["NewHeat"]["direction"]>;
 export type NewHeat = Partial<Schemas["NewHeat"]> & { models: Starter[] };
 export type NewLadder = Partial<Schemas["NewLadder"]> & { models: Starter[]; tracks: string[] };
 
 export const contestApi = {
   list: () => ask<ContestCard[]>("GET", "/contests"),
-  evaluated: (track: string) => ask<EvaluatedCard[]>("GET", `/contests/ghosts?track=${encodeURIComponent(track)}`),
+  evaluated: (track: string, direction: Direction) =>
+    ask<EvaluatedCard[]>("GET", `/contests/ghosts?track=${encodeURIComponent(track)}&direction=${direction}`),
   get: (id: string) => ask<ContestDetail>("GET", `/contests/${id}`),
   heat: (heat: NewHeat) => ask<ContestDetail>("POST", "/contests/heats", heat),
   ladder: (ladder: NewLadder) => ask<ContestDetail>("POST", "/contests/ladders", ladder),

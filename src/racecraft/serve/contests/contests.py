@@ -143,9 +143,9 @@ class Contests:
         payload = request.model_dump() | {"paths": paths, "planned": planned}
         return self._add("ladder", payload, request.models, settle(request))
 
-    def evaluated(self, track: str) -> list[EvaluatedCard]:
-        """Evaluations on a track that may be ghosts of a heat there."""
-        return evaluated(self._garage.runs, self._courses.load(track))
+    def evaluated(self, track: str, direction: str) -> list[EvaluatedCard]:
+        """Evaluations on a track that may be ghosts of a heat there, in that direction."""
+        return evaluated(self._garage.runs, self._courses.load(track), direction)
 
     def cards(self) -> list[ContestCard]:
         """All of them, newest first."""
@@ -167,7 +167,6 @@ class Contests:
             commitment=payload.get("commitment", ""),
             secret=payload.get("secret", "") if job.state in ENDED else "",
             ghosts=payload.get("ghosts", []),
-            direction=terms.rules.direction,
             ranking=ranking,
             minimum_laps=payload.get("minimum_laps") or laps_needed(ranking, payload["laps"]),
             schedule=payload.get("schedule", ""),
@@ -285,6 +284,7 @@ class Contests:
             kind=payload["kind"],
             title=payload["title"],
             tracks=payload["tracks"],
+            direction=payload.get("terms", {}).get("rules", payload).get("direction", "forward"),
             models=[entry_name(one) for one in payload["models"]],
             state=job.state,  # type: ignore[arg-type]
             created=job.created,

@@ -51,9 +51,13 @@ def start_ladder(request: NewLadder, context: InContext) -> ContestDetail:
 
 
 @router.get("/ghosts")
-def list_evaluated(track: Annotated[str, Query(max_length=200)], context: InContext) -> list[EvaluatedCard]:
-    """Evaluations on a track whose best trial may be a ghost of a heat there, model by model, the newest first."""
-    return context.contests.evaluated(track)
+def list_evaluated(
+    track: Annotated[str, Query(max_length=200)],
+    context: InContext,
+    direction: Literal["forward", "reverse"] = "forward",
+) -> list[EvaluatedCard]:
+    """Evaluations whose best trial may be a ghost on a track in a direction, model by model, the newest first."""
+    return context.contests.evaluated(track, direction)
 
 
 @router.get("/{contest}")

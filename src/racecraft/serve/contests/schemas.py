@@ -117,6 +117,8 @@ class ContestCard(Message):
     title: str
     tracks: list[str]
     """As they were asked for."""
+    direction: str
+    """In which they are driven."""
     models: list[str]
     """With the checkpoint where it is not the best: ``heron@last``."""
     state: Literal["queued", "running", "done", "failed", "cancelled"]
@@ -147,7 +149,6 @@ class ContestDetail(ContestCard):
     """64 hexadecimal digits, told when the heat is over; empty until then, and where there is none."""
     ghosts: list[Ghost]
     """Of a heat's film."""
-    direction: str
     ranking: Ranking
     """Of a heat: what places go by."""
     minimum_laps: int

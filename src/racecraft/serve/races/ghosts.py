@@ -56,17 +56,17 @@ def ghost_file(number: int) -> str:
     return f"ghosts/{number}.replay"
 
 
-def evaluated(runs: Path, track: Track) -> list[EvaluatedCard]:
-    """Evaluations on a track that have a replay, model by model, the newest first; of the newest `MAX_READ` of all.
+def evaluated(runs: Path, track: Track, direction: str = "forward") -> list[EvaluatedCard]:
+    """Evaluations on a track, driven that way round, that have a replay; model by model, the newest first.
 
-    Of those whose files do not tell their road only its name is known here; a replay itself is looked at by who asks
-    for it as a ghost.
+    They are of the newest `MAX_READ` of all. Of those whose files do not tell their road or direction only the track's
+    name is known here; a replay itself is looked at by who asks for it as a ghost.
     """
     folders = list_runs(runs)
     stamps = [(stamp, number) for number, folder in enumerate(folders) for stamp in _stamps(folder)]
     found: list[list[EvaluatedCard]] = [[] for _ in folders]
     for stamp, number in heapq.nlargest(MAX_READ, stamps):
-        if len(found[number]) < NEWEST and (card := _card(folders[number], stamp, track)) is not None:
+        if len(found[number]) < NEWEST and (card := _card(folders[number], stamp, track, direction)) is not None:
             found[number].append(card)
     return list(chain.from_iterable(found))[:MAX_LISTED]
 
@@ -78,7 +78,7 @@ def _stamps(folder: RunFolder) -> list[str]:
     return []
 
 
-def _card(folder: RunFolder, stamp: str, track: Track) -> EvaluatedCard | None:
+def _card(folder: RunFolder, stamp: str, track: Track, direction: str) -> EvaluatedCard | None:
     if not folder.evaluation_replay(stamp).is_file():
         return None
     try:
@@ -87,6 +87,11 @@ def _card(folder: RunFolder, stamp: str, track: Track) -> EvaluatedCard | None:
         return None
     if summary.get("track") != track.name or summary.get("track_digest", track.digest) != track.digest:
         return None
+    try:
+        if summary["conditions"]["rules"]["direction"] != direction:
+            return None
+    except (KeyError, TypeError):
+        pass  # from before that was told
     from racecraft.serve.races.ghost_schemas import EvaluatedCard  # jobs do without messages
 
     best = summary.get("best_lap_seconds")
