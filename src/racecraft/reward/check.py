@@ -21,7 +21,7 @@ from racecraft.reward.names import bound_names, undefined_names
 from racecraft.reward.params import TEMPLATE
 from racecraft.reward.reading import reads
 from racecraft.reward.source import MAX_CHARACTERS
-from racecraft.reward.worker_process import FILENAME
+from racecraft.reward.worker_process import FILENAME, POSITIONS
 from racecraft.scoped_warnings import scoped_warnings
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -141,9 +141,10 @@ def _check_reward_function(tree: ast.Module) -> Iterator[Problem]:
     if isinstance(function, ast.AsyncFunctionDef):
         yield _at(function, "'reward_function' is 'async', expected a plain function.", "Remove 'async'.")
         return
-    yield from _check_signature(function)
+    if not _is_by_position(function):
+        yield from _check_signature(function)
+        yield from _check_keys(tree, function)
     yield from _check_returns(function)
-    yield from _check_keys(tree, function)
 
 
 def _names_at_top(tree: ast.Module) -> set[str]:
@@ -164,6 +165,14 @@ def _check_signature(function: Function) -> Iterator[Problem]:
             f"'reward_function' has {count} parameters, expected exactly one.",
             "Write 'def reward_function(params):' and read params['speed'] and the others from the dict.",
         )
+
+
+def _is_by_position(function: Function) -> bool:
+    """Whether it takes twelve values instead of the dict, as AWS gave them in 2018."""
+    given = function.args
+    names = [argument.arg for argument in (*given.posonlyargs, *given.args)]
+    is_more = bool(given.defaults) or None in given.kw_defaults
+    return not is_more and len(names) == len(POSITIONS) + 1 and tuple(names[:-1]) == POSITIONS
 
 
 def _check_returns(function: Function) -> Iterator[Problem]:

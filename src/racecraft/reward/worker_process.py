@@ -36,9 +36,14 @@ REPLY = struct.Struct("<BIiI")  # status, row, line (-1 unknown), bytes of text
 READY, REWARDS, FAILED, LOCKED = 1, 2, 3, 4  # statuses of a reply; LOCKED comes first, READY once all is loaded
 SIZE = struct.Struct("<Q")  # bytes of the setup message; also the count of printed bytes that heads the ring
 
+PI = 3.141592653589793
 FILENAME = "reward_function.py"  # what the user's source is called in every traceback
 STEPS = 1  # column of a row that counts the episode's steps from 1, the prepare step
 REWARD_LIMIT = 1e5  # largest magnitude that AWS accepts
+POSITIONS = (  # parameters of a function of 2018 and early 2019, and behind them the closest waypoint
+    *("on_track", "x", "y", "distance_from_center", "car_orientation", "progress", "steps", "throttle", "steering"),
+    *("track_width", "waypoints"),
+)
 
 # Events of sys.addaudithook that a reward function has no use for. The kernel refuses them; refusing them here as well
 # says it in words.
@@ -357,8 +362,32 @@ def load_functions(source: str, *, seed: int, num_cars: int) -> list[Reward]:
         function = module.__dict__.get("reward_function")
         if not callable(function):
             raise BadRewardError("has no function 'reward_function(params)'")
-        functions.append(function)
+        functions.append(by_position(function))
     return functions
+
+
+def by_position(function: Any) -> Reward:
+    """A function of 2018, which takes twelve values in radians instead of a dict, as one of `params`; others as is."""
+    code = getattr(function, "__code__", None) if type(function) is type(by_position) else None
+    if code is None or code.co_argcount != 12 or code.co_varnames[:11] != POSITIONS or function.__defaults__:
+        return function  # type: ignore[no-any-return]
+
+    def reward_function(params: dict[str, Any]) -> object:
+        if params["is_offtrack"]:
+            return 1e-8  # what AWS paid then, without asking
+        x, y, waypoints = params["x"], params["y"], params["waypoints"]
+        before, after = params["closest_waypoints"]
+        to_before, to_after = [
+            (waypoints[index][0] - x) ** 2 + (waypoints[index][1] - y) ** 2 for index in (before, after)
+        ]
+        return function(
+            *(params["all_wheels_on_track"], x, y, params["distance_from_center"], params["heading"] * PI / 180.0),
+            *(params["progress"], int(params["steps"]) - 1),  # AWS's first step had no number then
+            *(params["speed"], params["steering_angle"] * PI / 180.0, params["track_width"]),
+            *(waypoints, after if to_after < to_before else before),
+        )
+
+    return reward_function
 
 
 def guard(event: str, arguments: tuple[object, ...]) -> None:
