@@ -83,7 +83,20 @@ def write(path, lines, *, columns: int = 19, form: str = "csv"):
     return path
 
 
-@pytest.mark.parametrize("columns", [15, 17, 18, 19])
+def test_angles_of_2019_are_in_radians(lines, tmp_path):
+    yaw, steer = COLUMNS.index("yaw"), COLUMNS.index("steer")
+    in_radians = [
+        [repr(math.radians(float(text))) if place in (yaw, steer) else text for place, text in enumerate(fields)]
+        for fields in lines
+    ]
+    for columns in (15, 17):  # younger logs never are
+        (log,) = read_logs([write(tmp_path / "a.log", in_radians, columns=columns, form="log")], Faults())
+        (told,) = read_logs([write(tmp_path / "b.log", lines, columns=columns, form="log")], Faults())
+        for name in ("heading", "steering_angle"):
+            assert np.allclose(getattr(log, name), getattr(told, name), atol=1e-9) == (columns == 15)
+
+
+@pytest.mark.parametrize("columns", [15, 16, 17, 18, 19])
 @pytest.mark.parametrize(("form", "name"), [("csv", "a.csv"), ("bare", "a.csv"), ("log", "a.log"), ("csv", "a.csv.gz")])
 def test_our_own_drive_comes_back_in_every_form(lines, tmp_path, columns, form, name):
     found = replay(write(tmp_path / name, lines, columns=columns, form=form), track="oval").to_dict()

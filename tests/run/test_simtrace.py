@@ -306,7 +306,7 @@ def test_reader_takes_every_era(path, columns, rows, tmp_path):
     ("text", "words"),
     [
         ("", "is empty"),
-        ("a,b\n", "has 2 columns, a sim-trace has 15, 17, 18 or 19"),
+        ("a,b\n", "has 2 columns, a sim-trace has 15 to 19"),
         (",".join(WRITTEN) + "\n1,2\n", "has 2 columns in line 2, expected 18"),
         (",".join(WRITTEN) + "\n" + ",".join(["x"] * 18), "is not a sim-trace"),
         (

@@ -38,6 +38,8 @@ MAX_NUMBER: Final = 1e12
 MAX_NOTES: Final = 20
 FASTEST: Final = 8.0
 """m/s that no car drives: twice what the fastest is asked for. The original's logs of driving have 3.7 at the most."""
+MOVED: Final = 0.01
+"""m between two rows: a car that drives, and so looks about where it goes."""
 GIVE_APART: Final = "Where several workers wrote into one log by turns, give each one's rows as a file of its own."
 _NEEDED: Final = COLUMNS[:14]  # up to track_len; tstamp is the fifteenth of all eras
 _NUMBERS: Final = ("episode", "steps", "X", "Y", "yaw", "steer", "throttle", "reward", "progress", "tstamp")
@@ -134,7 +136,7 @@ def _read_file(path: Path, faults: Faults) -> Iterator[Log]:
     broken = faults.count - broken_before
     if good == 0 and broken == 0:
         raise RunError(
-            f"{path} holds no sim-trace: neither rows of {', '.join(map(str, READABLE))} columns nor {MARK} lines.",
+            f"{path} holds no sim-trace: neither rows of {READABLE[0]} to {READABLE[-1]} columns nor {MARK} lines.",
             hint="A training's sim-traces lie in training-simtrace/, an evaluation's in evaluation-*/.",
         )
     if broken > good:
@@ -159,7 +161,7 @@ def _batches(source: str, file: TextIO, rows: list[tuple[int, Sequence[str]]], f
         if line.startswith(MARK):
             fields = _split(_AFTER_TRACE.sub("", line[len(MARK) :].rstrip()))
             if len(fields) not in READABLE:
-                faults.add(source, number, f"{len(fields)} columns, a sim-trace has 15, 17, 18 or 19")
+                faults.add(source, number, f"{len(fields)} columns, a sim-trace has 15 to 19")
                 continue
             pick = _ORDERS[len(fields)]
         elif "episode" in line and {"episode", "steps"} <= set(header := _header(line)):
@@ -286,6 +288,8 @@ def _convert(source: str, rows: list[tuple[int, Sequence[str]]], faults: Faults)
     is_moved = _jumps(x, y, time) & ~new
     for told in (is_prepare, is_paused):
         is_moved[told] = is_moved[1:][told[:-1]] = False
+    if not any(status) and _is_in_radians(x, y, yaw, new):
+        yaw, steer = np.degrees(yaw), np.degrees(steer)
     yield Log(
         source=source,
         lines=lines,
@@ -309,6 +313,17 @@ def _convert(source: str, rows: list[tuple[int, Sequence[str]]], faults: Faults)
         done=done > 0.0,
         status=status,
     )
+
+
+def _is_in_radians(
+    x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64], new: NDArray[np.bool_]
+) -> bool:
+    """Whether the way that was driven says so of the angles, as in logs of 2019; later ones have degrees."""
+    dx, dy = np.diff(x), np.diff(y)
+    moved = (np.hypot(dx, dy) > MOVED) & ~new[1:]
+    way, logged = np.arctan2(dy, dx)[moved], yaw[:-1][moved]
+    in_radians, in_degrees = (np.abs(np.exp(1j * angle) - np.exp(1j * way)) for angle in (logged, np.radians(logged)))
+    return len(way) > 0 and bool(np.median(in_radians) < np.median(in_degrees))
 
 
 def _jumps(x: NDArray[np.float64], y: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -47,7 +47,7 @@ COLUMNS = (
     "wall_clock",
 )
 WRITTEN = COLUMNS[:18]  # what simulator versions from 5.3 to 5 write; version 6 adds wall_clock
-READABLE = (15, 17, 18, 19)  # columns of the four eras
+READABLE = (15, 16, 17, 18, 19)  # columns of the five eras
 MAX_EPISODE_ROWS = 20_000  # 22 simulated minutes; the middle of a longer episode is left out
 MAX_BYTES = 1 << 31  # of all files of a run; beyond it every other iteration is removed
 MAX_FILES = 4096  # the same for their number
@@ -356,7 +356,7 @@ def read_simtrace(path: str | Path, *, max_rows: int = MAX_READ_ROWS) -> dict[st
     """The columns of a sim-trace file of any era, by name.
 
     Args:
-        path: A CSV file with 15, 17, 18 or 19 columns; the header may be missing.
+        path: A CSV file with 15 to 19 columns; the header may be missing.
         max_rows: Longer files are refused.
 
     Returns:
@@ -375,7 +375,7 @@ def read_simtrace(path: str | Path, *, max_rows: int = MAX_READ_ROWS) -> dict[st
                 if names is None:
                     names = row if row[:1] == ["episode"] else list(COLUMNS[: len(row)])
                     if len([name for name in names if name in COLUMNS]) not in READABLE:
-                        raise RunError(f"{path} has {len(row)} columns, a sim-trace has 15, 17, 18 or 19.")
+                        raise RunError(f"{path} has {len(row)} columns, a sim-trace has 15 to 19.")
                     if names is row:
                         continue
                 if len(row) != len(names):
