@@ -53,6 +53,14 @@ def test_unknown_fields_are_reported_and_kept():
     assert settings.to_dict()["learning_rate"] == 1
 
 
+def test_noise_of_sac_is_taken():
+    settings = Hyperparameters.from_dict({"exploration_type": "Additive_noise", "sac_alpha": "0.2"}, name="h.json")
+    assert (settings.exploration_type, settings.sac_alpha) == ("categorical", 0.2)
+    assert settings.notes == (
+        "h.json: exploration_type 'additive_noise' is what SAC does anyway, and 'categorical' elsewhere.",
+    )
+
+
 @pytest.mark.parametrize(
     ("field", "value", "allowed"),
     [

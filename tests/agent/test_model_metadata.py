@@ -72,6 +72,13 @@ def test_version_may_be_a_number(version):
     assert ModelMetadata.from_dict({"action_space": TWO, "version": version}).version == "5"
 
 
+def test_words_may_have_capital_letters():
+    document = {"action_space": LIMITS, "action_space_type": " Continuous", "training_algorithm": "SAC"}
+    metadata = ModelMetadata.from_dict(document)
+    assert isinstance(metadata.action_space, ContinuousActionSpace)
+    assert metadata.training_algorithm == "sac"
+
+
 def test_continuous_and_lidar_round_trip():
     document = {
         "action_space": LIMITS,

@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
+from racecraft.agent.metadata_words import plain
 from racecraft.json_file import read_json_object, write_json_object
 
 if TYPE_CHECKING:  # `file_model` knows these names: pydantic is for whom a file is there
@@ -18,6 +19,7 @@ if TYPE_CHECKING:  # `file_model` knows these names: pydantic is for whom a file
 BATCH_SIZES = (32, 64, 128, 256, 512)  # those of AWS's console
 GAE_LAMBDA = 0.95  # AWS's, fixed
 CLIP_COEF = 0.2  # AWS's, fixed
+SAC_NOISE: Final = "additive_noise"
 
 CONSOLE: Final[Mapping[str, tuple[float, ...]]] = {
     "batch_size": BATCH_SIZES,
@@ -34,9 +36,9 @@ def _words(allowed: tuple[float, ...]) -> str:
     return f"{', '.join(others)} or {last}" if len(others) > 1 else f"{others[0]} to {last}"
 
 
-def _plain(value: object) -> object:
-    """A name in small letters, as AWS's code reads it."""
-    return value.strip().lower() if isinstance(value, str) else value
+def _exploration(value: object) -> object:
+    """A plain name; AWS's notebooks for SAC, which reads none of them, name the noise that SAC draws."""
+    return "categorical" if plain(value) == SAC_NOISE else plain(value)
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class Hyperparameters:
     """What a reward one step later is worth now."""
     loss_type: Annotated[
         Literal["huber", "mean squared error"],
-        BeforeValidator(_plain),
+        BeforeValidator(plain),
         Field(description="'huber' or 'mean squared error'"),
     ] = "mean squared error"
     """Loss of the value head."""
@@ -69,7 +71,7 @@ class Hyperparameters:
     """Episodes of a rollout, which ends after 10,000 steps at the latest."""
     exploration_type: Annotated[
         Literal["categorical", "e-greedy"],
-        BeforeValidator(_plain),
+        BeforeValidator(_exploration),
         Field(description="'categorical' or 'e-greedy'"),
     ] = "categorical"
     """Sample the policy, or take its best action except for a share of random ones; continuous actions are sampled
@@ -118,6 +120,10 @@ class Hyperparameters:
         notes = list(unknown_fields(checked, name=name))
         if "stack_size" in document and document["stack_size"] not in (1, "1"):
             notes.append(f"{name}: stack_size {document['stack_size']} has no effect, the network sees one frame.")
+        if plain(document.get("exploration_type")) == SAC_NOISE:
+            notes.append(
+                f"{name}: exploration_type '{SAC_NOISE}' is what SAC does anyway, and 'categorical' elsewhere."
+            )
         values = {field: getattr(checked, field) for field in _file().model_fields}
         for setting, allowed in CONSOLE.items():
             value = values[setting]

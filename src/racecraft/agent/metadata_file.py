@@ -20,7 +20,7 @@ from racecraft.agent.action_space import (
     DiscreteActionSpace,
 )
 from racecraft.agent.aws_file import AwsModel, Number, Whole, unknown_fields, validate
-from racecraft.agent.metadata_words import CONFIGURED, NEURAL_NETWORKS, VERSIONS, NeuralNetwork
+from racecraft.agent.metadata_words import CONFIGURED, NEURAL_NETWORKS, VERSIONS, NeuralNetwork, plain
 from racecraft.agent.sensors import LIDAR_RAYS, LidarConfig, check_sensors
 from racecraft.errors import ConfigError
 
@@ -94,6 +94,11 @@ class _Common(AwsModel):
     action_space_type: Literal["discrete", "continuous"] = Field("discrete", description="'discrete' or 'continuous'")
     version: str = Field("1", description="'1' to '6'")
     lidar_config: _Lidar | None = Field(None, description="an object with num_sectors, num_values_per_sector, ...")
+
+    @field_validator("training_algorithm", "action_space_type", mode="before")
+    @classmethod
+    def _plain_words(cls, value: object) -> object:
+        return plain(value)
 
     @field_validator("version", mode="before")
     @classmethod

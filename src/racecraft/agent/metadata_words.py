@@ -15,3 +15,8 @@ NEURAL_NETWORKS: Final[tuple[NeuralNetwork, ...]] = get_args(NeuralNetwork)
 VERSIONS: Final = ("1", "2", "3", "4", "5", "6")
 CONFIGURED: Final = "DISCRETIZED_SECTOR_LIDAR"
 """The one sensor that ``lidar_config`` is for."""
+
+
+def plain(value: object) -> object:
+    """A word in small letters, without spaces around it, as AWS's code reads it; anything else as it is."""
+    return value.strip().lower() if isinstance(value, str) else value
