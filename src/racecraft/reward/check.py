@@ -144,6 +144,7 @@ def _check_reward_function(tree: ast.Module) -> Iterator[Problem]:
     if not _is_by_position(function):
         yield from _check_signature(function)
         yield from _check_keys(tree, function)
+        yield from _check_first_step(tree)
     yield from _check_returns(function)
 
 
@@ -207,6 +208,25 @@ def _check_keys(tree: ast.Module, function: Function) -> Iterator[Problem]:
     for where, name, key, is_sure in missing_keys(tree, function, set(TEMPLATE)):
         hint = did_you_mean(key, TEMPLATE) or f"The keys are {', '.join(TEMPLATE)}."
         yield _at(where, f"{name} has no key '{key}'.", hint, "error" if is_sure else "warning")
+
+
+def _check_first_step(tree: ast.Module) -> Iterator[Problem]:
+    """Functions of 2019 begin anew at step 0, those of 2020 at step 1, which no call sees any more."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Compare(left=left, ops=[op], comparators=[ast.Constant(value=int() | float() as number)]):
+                unseen = number if isinstance(op, (ast.Eq, ast.LtE)) else number - 1 if isinstance(op, ast.Lt) else 2
+                if unseen in (0, 1) and _is_steps(left):
+                    told = "This is never true: an episode's first call has steps 2, as at AWS in its last years."
+                    yield _at(node, told, "Compare with 2.", "warning")
+
+
+def _is_steps(node: ast.expr) -> bool:
+    match node:
+        case ast.Name(id="steps") | ast.Attribute(attr="steps") | ast.Subscript(slice=ast.Constant(value="steps")):
+            return True
+        case _:
+            return False
 
 
 def _completes(body: list[ast.stmt]) -> bool:

@@ -1,4 +1,4 @@
-"""Functions of 2018, which take twelve values instead of a dict, are called as AWS called them."""
+"""Functions of 2018 take twelve values instead of a dict, as AWS called them; what those of 2019 wait for is told."""
 
 from __future__ import annotations
 
@@ -83,6 +83,25 @@ def test_other_parameters_are_refused():
     for names in (NAMES[:-1], ("params", *NAMES[1:]), (*NAMES, "closest_waypoint", "speed")):
         problems = check_reward(f"def reward_function({', '.join(names)}, last):\n    return 1.0\n")
         assert "parameters, expected exactly one" in problems[0].message
+
+
+def asking(test: str) -> str:
+    return f"steps = 5\ndef reward_function(params, self=None):\n    if {test}:\n        return 2.0\n    return 1.0\n"
+
+
+@pytest.mark.parametrize("test", ["steps == 0", "params['steps'] == 1", "steps <= 1.0", "self.steps < 2", "steps < 1"])
+def test_a_step_that_no_call_sees_is_told(test: str):
+    (problem,) = check_reward(asking(test))
+    assert (problem.severity, problem.line, problem.column) == ("warning", 3, 8)
+    assert "an episode's first call has steps 2" in problem.message
+    assert "steps 2" not in str(check_reward(source_of(f"1.0 if {test} else 0.0", "self")))  # there it has steps 1
+
+
+@pytest.mark.parametrize(
+    "test", ["steps == 2", "steps > 1", "steps < 3", "steps <= 2", "steps % 9 == 0", "self.laps == 0"]
+)
+def test_a_step_that_a_call_sees_is_not_told(test: str):
+    assert check_reward(asking(test)) == []
 
 
 def test_an_error_has_its_line():
