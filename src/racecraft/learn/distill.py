@@ -61,6 +61,8 @@ class DistillConfig:
     """Steps of the teacher before the student begins; they render no camera and do not count as camera steps."""
     teacher_rate_steps: int = 700_000
     """Of its steps, after as many its step size is a half of what it was, after twice as many a third; 0: never."""
+    gamma: float = PPOConfig.gamma
+    """Discount per step of the teacher, and of PPO as which the student goes on with the critic it leaves."""
     student_steps: int = 150_000
     """Camera steps after which the student goes on with PPO and the reward itself; 0: never."""
     learning_rate: float = 1.5e-3
@@ -91,7 +93,7 @@ class DistillConfig:
             check_whole(name, getattr(self, name), 1, is_plain=True)
         for name in ("teacher_rate_steps", "student_steps", "rate_steps", "refining_rate_steps"):
             check_whole(name, getattr(self, name), 0, is_plain=True)
-        for name in ("learning_rate", "refining_rate"):
+        for name in ("learning_rate", "refining_rate", "gamma"):
             check_number(name, getattr(self, name), 0.0, 1.0, is_plain=True)
         samples = self.num_envs * self.num_steps
         is_enough = self.buffer_size >= samples
@@ -159,7 +161,7 @@ class Distill:
         teacher_spec = replace(learner.spec, state_size=self.state_size)
         teacher = NativeStateLearner(teacher_spec, seed=seed, num_threads=num_threads)
         cars = open_teacher(teacher)
-        ppo = replace(TEACHER_PPO, num_envs=cars.num_envs, rate_steps=config.teacher_rate_steps)
+        ppo = replace(TEACHER_PPO, num_envs=cars.num_envs, rate_steps=config.teacher_rate_steps, gamma=config.gamma)
         if not learner.spec.is_discrete:
             ppo = replace(ppo, ent_coef=0.0)
         self.teacher = PPO(ppo, teacher, StateWorld(cars), seed=seed)
@@ -331,6 +333,7 @@ class Distill:
             num_envs=self.config.num_envs,
             learning_rate=self.config.refining_rate,
             rate_steps=self.config.refining_rate_steps,
+            gamma=self.config.gamma,
             minibatch_size=min(REFINING_PPO.minibatch_size, samples),
         )
         ppo = PPO(config, self.learner, self.environment, seed=self.seed)

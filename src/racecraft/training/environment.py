@@ -24,6 +24,7 @@ from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.track import Track
 from racecraft.training.lap_view import NOTHING, LapTeller, LapView
+from racecraft.training.nearby_view import NearbyTeller
 from racecraft.training.rival_view import tell_rivals
 from racecraft.training.settings import TrainSettings
 
@@ -52,6 +53,7 @@ class TrainingEnvironment:
             who drives on, and neither camera nor state says how far it is, so an end there would only look like
             chance: with this a lap's end cuts the episode, and the critic's value stands for what follows.
         lap_view: What of its lap the privileged state ends in.
+        tells_nearby: Whether it tells of the nearest object behind that.
         tells_rivals: Whether it tells of the other cars of the race behind that.
         on_step: Called after every step, for who looks at the cars.
     """
@@ -69,6 +71,7 @@ class TrainingEnvironment:
         opponents: OpponentPool | None = None,
         goes_on: bool = False,
         lap_view: LapView = NOTHING,
+        tells_nearby: bool = False,
         tells_rivals: bool = False,
         on_step: Callable[[], None] = lambda: None,
     ) -> None:
@@ -82,6 +85,7 @@ class TrainingEnvironment:
         self.opponents = opponents
         self.goes_on = goes_on
         self._lap = LapTeller(lap_view, simulation) if lap_view.size else None
+        self._nearby = NearbyTeller(simulation) if tells_nearby else None
         self._tells_rivals = tells_rivals
         self._on_step = on_step
         self._own: slice | NDArray[np.intp] = slice(None) if opponents is None else opponents.own
@@ -113,6 +117,8 @@ class TrainingEnvironment:
         told = [self.simulation.state]
         if self._lap is not None:
             told.append(self._lap())
+        if self._nearby is not None:
+            told.append(self._nearby())
         if self._tells_rivals:
             told.append(tell_rivals(self.simulation))
         return told[0] if len(told) == 1 else np.concatenate(told, axis=1)

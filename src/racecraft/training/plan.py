@@ -164,7 +164,7 @@ def _is_taught(before: TrainSettings | None, metadata: ModelMetadata, said: Mapp
 def _inherited(folder: RunFolder, metadata: ModelMetadata, *, is_new_track: bool, follows_aws: bool) -> dict[str, Any]:
     """The settings of a parent that its child has as well, unless the user says otherwise."""
     theirs = read_settings(folder)
-    left_out = {"until", "seed", "algorithm", *(_OF_THE_TRACK if is_new_track else ())}
+    left_out = {"until", "seed", "algorithm", "tells_nearby", *(_OF_THE_TRACK if is_new_track else ())}
     values = {setting.name: getattr(theirs, setting.name) for setting in fields(theirs) if setting.name not in left_out}
     is_same_kind = folder.read_model_metadata().action_space.kind == metadata.action_space.kind
     if follows_aws:

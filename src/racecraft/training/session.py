@@ -403,6 +403,7 @@ def _make_environment(
         opponents=opponents,
         goes_on=settings.algorithm == "distill" or opponents is not None,
         lap_view=settings.lap_view,
+        tells_nearby=settings.tells_nearby,
         tells_rivals=settings.tells_rivals,
         on_step=on_step,
     )

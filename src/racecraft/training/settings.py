@@ -21,6 +21,7 @@ from racecraft.sim.objects import NO_OBJECTS, Objects
 from racecraft.sim.simulation import DIRECTIONS
 from racecraft.track import Track, join_names, load_tracks
 from racecraft.training.lap_view import CRITICS_VIEW, NOTHING, TEACHERS_VIEW, LapView
+from racecraft.training.nearby_view import NEARBY_COLUMNS
 from racecraft.training.opponents import Opponents
 from racecraft.training.regimes import (
     BRISK_SECONDS,
@@ -43,7 +44,7 @@ ARGUMENTS: Final = (
 )
 """Of `racecraft.train`, beside the settings: who misspells one is told."""
 VEHICLE_OF_VERSION: Final = {"1": "v4", "2": "v4", "3": "v4", "4": "v4", "5": "v5", "6": "v6"}
-_ADDED: Final = ("algorithm", "opponents", "sac", "distill", "sb3", "device", "camera")
+_ADDED: Final = ("algorithm", "opponents", "sac", "distill", "sb3", "device", "camera", "tells_nearby")
 """Fields that runs of earlier versions lack."""
 _DROPPED: Final = (("growth_steps", 0),)
 """Settings of PPO that runs of earlier versions have, with the value that meant nothing."""
@@ -87,6 +88,8 @@ class TrainSettings:
     """How SAC does it."""
     distill: DistillConfig = field(default_factory=DistillConfig)
     """How distillation does it."""
+    tells_nearby: bool = False
+    """Whether a teacher among boxes and bots, and the critic it leaves behind, is told of the nearest of them."""
     sb3: SB3Config = field(default_factory=SB3Config)
     """How Stable-Baselines3 does it."""
     evaluate_every: int = TIME_TRIAL.evaluate_every
@@ -180,7 +183,8 @@ class TrainSettings:
         """Columns of state that the critic sees; 0 where it sees the camera alone."""
         if self.critic == "camera":
             return 0
-        return state_width(self.num_objects) + self.lap_view.size + len(RIVAL_COLUMNS) * self.tells_rivals
+        near = len(NEARBY_COLUMNS) * self.tells_nearby + len(RIVAL_COLUMNS) * self.tells_rivals
+        return state_width(self.num_objects) + self.lap_view.size + near
 
     @property
     def lap_view(self) -> LapView:
@@ -288,7 +292,12 @@ def make_settings(
     is_fast = algorithm == "distill" and is_continuous
     regime = regime_of(**circumstances, is_fast_distill=is_fast, lessons=_lessons(roads, until))
     lessons = _as_long_as(until, regime.distill, is_raced=circumstances["opponents"] is not None)
-    usual = {"start": regime.start, "evaluation_trials": regime.evaluation_trials, "distill": lessons}
+    usual = {
+        "start": regime.start,
+        "evaluation_trials": regime.evaluation_trials,
+        "distill": lessons,
+        "tells_nearby": algorithm == "distill" and circumstances["objects"] != NO_OBJECTS,
+    }
     settings = {**usual, **settings}
     if settings.get("evaluate_every", 0) == 0:
         settings["evaluate_every"] = regime.evaluate_every

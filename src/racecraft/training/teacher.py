@@ -126,6 +126,7 @@ def teacher_environment(
         opponents=opponents,
         goes_on=True,
         lap_view=settings.lap_view,
+        tells_nearby=settings.tells_nearby,
         tells_rivals=settings.tells_rivals,
     )
     return environment
