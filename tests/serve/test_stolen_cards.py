@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import socket
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import count
+from typing import Any
 
 import httpx
 import pytest
 from leagues import RunningLeague, ok, refused, running_league
+
+from racecraft.serve.door.bodies import SOON
 
 pytestmark = pytest.mark.costly
 
@@ -169,3 +175,39 @@ def test_strangers_say_little(league: RunningLeague, path: str) -> None:
             yield b"x" * 1000
 
     refused(stranger.post(path, content=drip()), 413)
+
+
+class Pending:
+    """A request of somebody who was let in, of which all but the end has come."""
+
+    def __init__(self, client: httpx.Client, method: str, path: str, asked: dict[str, Any]) -> None:
+        whole = json.dumps(asked).encode().rjust(2000)
+        assert client.base_url.port is not None
+        self._socket = socket.create_connection((client.base_url.host, client.base_url.port))
+        head = client.build_request(method, path, headers={"Content-Type": "application/json", "Connection": "close"})
+        lines = [f"{method} {path} HTTP/1.1", *(f"{name}: {value}" for name, value in head.headers.items())]
+        lines = [line for line in lines if not line.lower().startswith("content-length")]
+        self._socket.sendall("\r\n".join([*lines, f"Content-Length: {len(whole)}", "", ""]).encode() + whole[:1000])
+        self._rest = whole[1000:]
+
+    def status(self) -> int:
+        """Of the answer to all of it."""
+        with self._socket:
+            self._socket.sendall(self._rest)
+            answer = self._socket.makefile("rb").read()
+        return int(answer.split()[1])
+
+
+def test_a_thief_who_keeps_a_request_back_is_given_no_key_once_shut_out(pupil: Pupil) -> None:
+    thief = pupil.by_card()
+    token = {"title": "", "scopes": ["read"], "days": 7}
+    kept_back = [
+        Pending(thief, "PUT", "/api/account/password", {"old": "", "new": PASSWORD}),
+        Pending(thief, "POST", "/api/account/tokens", token),
+        Pending(thief, "POST", "/api/models", {"track": "oval", "until": "64 steps"}),
+    ]
+    time.sleep(2 * SOON)
+    ok(pupil.teacher("revoke"), 204)
+    assert [one.status() for one in kept_back] == [401] * 3
+    assert "that password" in refused(pupil.by_password(), 401)
+    assert not pupil.row["has_password"]

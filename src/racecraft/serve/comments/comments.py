@@ -8,6 +8,7 @@ from typing import Final
 import sqlalchemy as sa
 
 from racecraft.serve.comments.schemas import CommentInfo
+from racecraft.serve.people.keys import hold_account
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Comment, User
@@ -30,6 +31,7 @@ class Comments:
         """
         count = sa.select(sa.func.count(Comment.id)).where(Comment.owner_id == owner_id)
         with self._database.transaction() as session:
+            hold_account(session, owner_id)  # two at the same moment count each other
             if (session.scalar(count) or 0) >= MAX_COMMENTS:
                 raise Conflict(f"There are {MAX_COMMENTS} comments on their models already.", hint="Take some back.")
             row = Comment(owner_id=owner_id, model=model, author_id=author_id, text=text.strip())

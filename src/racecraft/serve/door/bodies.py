@@ -9,12 +9,17 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Awaitable, Callable
 from typing import Final
 
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
+from racecraft.serve.people.keys import OUT
+
 LEAST_RATE: Final = 1000.0  # bytes a second
+SOON: Final = 0.5
+"""s within which a body is there whose sender is not looked at again."""
 PAUSE: Final = 30.0
 """s without any of it that are waited for, at the beginning and where it came faster meanwhile."""
 
@@ -37,10 +42,14 @@ class Body:
     Args:
         receive: What the browser says.
         most: Bytes that it may have.
+        is_still_in: Asks whether who sent it would still be let in, once it is there; None for who need not be.
     """
 
-    def __init__(self, receive: Receive, most: int) -> None:
-        self._receive, self._most = receive, most
+    def __init__(
+        self, receive: Receive, most: int, *, is_still_in: Callable[[], Awaitable[bool]] | None = None
+    ) -> None:
+        self._receive, self._most, self._is_still_in = receive, most, is_still_in
+        self._begun = time.monotonic()
         self._taken = 0
         self._patience = PAUSE
         self._is_whole = False
@@ -51,7 +60,7 @@ class Body:
         """What comes next.
 
         Raises:
-            HTTPException: It is too large (413), or comes too slowly (408).
+            HTTPException: It is too large (413), comes too slowly (408), or who sent it was shut out meanwhile (401).
         """
         if self._is_whole:  # whoever is gone is waited for without an end
             return await self._receive()
@@ -68,4 +77,7 @@ class Body:
             raise HTTPException(413, too_large(self._most))
         self._patience = min(PAUSE, self._patience - (time.monotonic() - begun) + size / LEAST_RATE)
         self._is_whole = not message.get("more_body", False)
+        took_long = self._taken > 0 and time.monotonic() - self._begun > SOON
+        if self._is_whole and took_long and self._is_still_in is not None and not await self._is_still_in():
+            raise HTTPException(401, OUT)
         return message

@@ -119,7 +119,14 @@ class Guard:
                 await app(scope, receive, send)
                 return
             is_api = scope["path"].startswith("/api/")
-            body = Body(receive, most_bytes(scope["path"]))
+
+            async def is_still_in() -> bool:
+                request = Request(scope)
+                before = getattr(request.state, "user_id", None)
+                return before is None or await asyncio.to_thread(self._user, request) == before
+
+            changes = self._is_league and scope["method"] not in SAFE
+            body = Body(receive, most_bytes(scope["path"]), is_still_in=is_still_in if changes else None)
 
             async def send_with_headers(message: Message) -> None:
                 if message["type"] == "http.response.start":

@@ -108,14 +108,19 @@ def take_token(request: Request, body: TakeToken, consoles: InLeague) -> TakenTo
     """The token of a program that was let in; empty while it waits."""
     try:
         taken = consoles.devices.take(body.secret)
-        if taken is not None and not consoles.keys.is_open(taken[1]):
-            raise NotLetIn("Whoever typed the code has signed out.", hint="Begin again.")
     except NotLetIn:
         fail(request, consoles)
         raise
     if taken is None:
         return TakenToken(token="")
-    made = consoles.keys.make_token(taken[0], title="racecraft login", scopes=["read", "submit"], days=90)
+    user, asked_in = taken
+    try:
+        made = consoles.keys.make_token(
+            user, title="racecraft login", scopes=["read", "submit"], days=90, asked_in=asked_in
+        )
+    except NotLetIn as error:
+        fail(request, consoles)
+        raise NotLetIn("Whoever typed the code has signed out.", hint="Begin again.") from error
     return TakenToken(token=made[1])
 
 

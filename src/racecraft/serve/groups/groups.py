@@ -17,7 +17,7 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session, aliased
 
 from racecraft.serve.people.identities import add_identity
-from racecraft.serve.people.keys import SIGNS, plain_code
+from racecraft.serve.people.keys import SIGNS, hold_account, plain_code
 from racecraft.serve.people.names import checked_name
 from racecraft.serve.people.people import Person, Role, add_person, use_invitation
 from racecraft.serve.problems import Conflict, NotFound
@@ -79,6 +79,7 @@ class Groups:
         if not by.may_organise:
             raise NotFound("Only organisers make groups.")
         with self._database.transaction() as session:
+            hold_account(session, by.id)  # two at the same moment count each other
             count = session.scalar(sa.select(sa.func.count()).where(Member.user_id == by.id)) or 0
             if count >= MAX_GROUPS:
                 raise Conflict(f"You are in {MAX_GROUPS} groups already.")
@@ -330,6 +331,8 @@ def _needs_home(session: Session, user_id: int) -> bool:
 
 
 def _require_room(session: Session, group_id: int, more: int) -> None:
+    """Refuse more members than a group may have; nobody else comes in until the transaction ends."""
+    session.execute(sa.update(Group).where(Group.id == group_id).values(title=Group.title))
     count = session.scalar(sa.select(sa.func.count()).where(Member.group_id == group_id)) or 0
     if count + more > MAX_MEMBERS:
         raise Conflict(f"A group has at most {MAX_MEMBERS} members; this one has {count}.")

@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
+from racecraft.serve.people.keys import require_still_in
 from racecraft.serve.problems import Conflict, NotFound, NotLetIn
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Card, Identity, User
@@ -43,13 +44,21 @@ class Identities:
             raise NotLetIn("You are locked out.", hint="Ask whoever holds your group.")
         return None if found is None else found[0]
 
-    def link(self, user_id: int, issuer: str, subject: str) -> None:
+    def link(self, user_id: int, issuer: str, subject: str, *, asked_in: str = "") -> None:
         """From now on somebody comes in through a provider, too.
+
+        Args:
+            user_id: Who.
+            issuer: The provider.
+            subject: Its name for them.
+            asked_in: The digest of the session in which they ask for it.
 
         Raises:
             Conflict: Somebody else does so with that account of the provider, or they do with another one.
+            NotLetIn: That session is over.
         """
         with self._database.transaction() as session:
+            require_still_in(session, user_id, asked_in)
             mine = session.scalars(_of(user_id, issuer)).first()
             if mine is not None and mine.subject != subject:
                 raise Conflict("You come in with another account there already.", hint="Unlink that one first.")

@@ -16,7 +16,7 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session as Transaction
 
 from racecraft.errors import RunError
-from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.problems import Conflict, NotFound, NotLetIn
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Card, Identity, Reset, Session, Token, User, now
 
@@ -34,6 +34,7 @@ CARD_LENGTH: Final = 26
 """26 of 31 signs hold 128 bits."""
 OPENERS: Final = (Card, Reset, Session, Token)
 """Tables of what opens the door by itself."""
+OUT: Final = "You are not signed in."
 TOKEN_MARK: Final = "rc_"
 """What tokens begin with, so that whoever finds one knows what it is."""
 # what every request asks is put together once, as that takes longer than the answer
@@ -111,11 +112,6 @@ class Keys:
         with self._database.asking() as connection:
             found: int | None = connection.scalar(_SESSION, {"digest": digest_of(secret), "moment": now()})
         return found
-
-    def is_open(self, digest: str) -> bool:
-        """Whether a session is good of which only the digest is known."""
-        is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
-        return self._user(sa.select(Session.user_id).where(Session.digest == digest, is_valid)) is not None
 
     def open_sessions(self, secrets: Collection[str]) -> set[str]:
         """Those of some cookies that are somebody's, by one question."""
@@ -213,6 +209,7 @@ class Keys:
             user_id: int | None = session.scalar(sa.select(Reset.user_id).where(is_it))
             if user_id is None or session.execute(sa.delete(Reset).where(is_it)).rowcount != 1:  # type: ignore[attr-defined]
                 return None
+            hold_account(session, user_id)
             revoke_all(session, user_id)
             user = session.get_one(User, user_id)
             user.password, user.is_locked = password, False
@@ -221,6 +218,7 @@ class Keys:
     def revoke(self, user_id: int) -> None:
         """All that opens the door to somebody: cards, sessions, tokens; provider and password do so no longer."""
         with self._database.transaction() as session:
+            hold_account(session, user_id)
             for table in OPENERS:
                 session.execute(sa.delete(table).where(table.user_id == user_id))
             session.execute(sa.update(Identity).where(Identity.user_id == user_id).values(is_locked=True))
@@ -233,17 +231,28 @@ class Keys:
             session.execute(sa.update(Identity).where(Identity.user_id == user_id).values(is_locked=False))
             session.get_one(User, user_id).is_locked = False
 
-    def make_token(self, user_id: int, *, title: str, scopes: list[Scope], days: int) -> tuple[int, str]:
+    def make_token(
+        self, user_id: int, *, title: str, scopes: list[Scope], days: int, asked_in: str = ""
+    ) -> tuple[int, str]:
         """A token's number and secret, which is shown once.
+
+        Args:
+            user_id: Whose.
+            title: Of it.
+            scopes: What it is for.
+            days: That it is good.
+            asked_in: The digest of the session in which somebody asks for it; empty for the command line.
 
         Raises:
             Conflict: There are too many.
+            NotLetIn: That session is over.
             RunError: It is for a worker, and for something else, too, or not an admin's.
         """
         if WORKER in scopes and len(set(scopes)) > 1:
             raise RunError("A worker's token is for nothing else.", hint="Make another one for that.")
         secret = TOKEN_MARK + secrets.token_urlsafe(32)
         with self._database.transaction() as session:
+            require_still_in(session, user_id, asked_in)
             if WORKER in scopes and session.get_one(User, user_id).role != "admin":
                 raise RunError("Only whoever holds the league makes tokens for workers.")
             session.execute(sa.delete(Token).where(Token.expires < now()))
@@ -298,6 +307,32 @@ class Keys:
         with self._database.transaction() as session:
             found: int | None = session.scalar(query)
         return found
+
+
+def hold_account(session: Transaction, user_id: int) -> None:
+    """Keep others from giving somebody keys, or taking them, until the transaction ends, in either database."""
+    session.execute(sa.update(User).where(User.id == user_id).values(name=User.name))
+
+
+def require_still_in(session: Transaction, user_id: int, asked_in: str) -> None:
+    """Hold an account in which something is to be kept that opens the door, and look once more who asked for it.
+
+    A request that was let in may take long: its body comes slowly, a password is hashed, a provider is asked. Whoever
+    is shut out meanwhile must not find a key in hand.
+
+    Args:
+        session: A transaction that has read nothing yet of the account.
+        user_id: Whose account.
+        asked_in: The digest of the session of the request; empty where it has none, as on the command line.
+
+    Raises:
+        NotLetIn: That session is over.
+    """
+    hold_account(session, user_id)
+    is_valid = sa.or_(Session.expires.is_(None), Session.expires > now())
+    is_it = sa.and_(Session.digest == asked_in, Session.user_id == user_id, is_valid)
+    if asked_in and session.scalar(sa.select(Session.user_id).where(is_it)) is None:
+        raise NotLetIn(OUT)
 
 
 def revoke_all(session: Transaction, user_id: int) -> None:

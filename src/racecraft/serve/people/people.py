@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
-from racecraft.serve.people.keys import revoke_all
+from racecraft.serve.people.keys import hold_account, require_still_in, revoke_all
 from racecraft.serve.people.names import checked_name, handle_of
 from racecraft.serve.people.passwords import hash_password, is_password
 from racecraft.serve.problems import Conflict, NotFound, NotLetIn
@@ -91,18 +91,29 @@ class People:
             user.name, user.handle = checked_name(name), handle_of(checked_name(name))
             _flush(session, user.name)
 
-    def set_password(self, user_id: int, password: str, *, old: str) -> bool:
+    def set_password(self, user_id: int, password: str, *, old: str, asked_in: str = "") -> bool:
         """A first password, or another one, which makes a card worthless; False where `old` is not the one there is.
+
+        Args:
+            user_id: Whose.
+            password: The new one.
+            old: The one that there is; empty where there is none.
+            asked_in: The digest of the session in which somebody asks for it.
 
         Raises:
             ConfigError: It is too short.
+            NotLetIn: That session is over.
         """
         kept = self.kept_password(user_id)
         if kept and not is_password(old, kept):
             return False
         hashed = hash_password(password)
         with self._database.transaction() as session:
-            session.get_one(User, user_id).password = hashed
+            require_still_in(session, user_id, asked_in)
+            user = session.get_one(User, user_id)
+            if user.password != kept:  # somebody was quicker: the old one is another now
+                return False
+            user.password = hashed
             if kept:  # who changes it fears that others can come in
                 session.execute(sa.delete(Card).where(Card.user_id == user_id))
         return True
@@ -148,6 +159,7 @@ class People:
         if user_id == OWNER:
             raise Conflict("Whoever starts the server cannot be removed.")
         with self._database.transaction() as session:
+            hold_account(session, user_id)
             user = session.get_one(User, user_id)
             user.name, user.handle, user.password = f"(gone {user_id})", None, ""
             user.role, user.deleted = "racer", now()

@@ -51,7 +51,7 @@ def change_account(request: AccountChange, consoles: InConsoles, person: InPerso
 def set_password(body: NewPassword, request: Request, consoles: InConsoles, person: InPerson) -> Response:
     """A first password, or another one, which ends a card; wrong old ones count like wrong ones at the door."""
     with consoles.tries.attempt(account=f"password {person.id}") as attempt:
-        if not consoles.people.set_password(person.id, body.new, old=body.old):
+        if not consoles.people.set_password(person.id, body.new, old=body.old, asked_in=_session(request)):
             attempt.fail()
             raise ConfigError("That is not your password.")
     response = Response(status_code=204)
@@ -87,7 +87,7 @@ def let_device_in(body: LetIn, request: Request, consoles: InConsoles, person: I
     """A program that shows this code gets a token of one's own."""
     with consoles.tries.attempt(account=f"device {person.id}") as attempt:
         try:
-            consoles.devices.confirm(body.code, person.id, session=digest_of(request.cookies.get(COOKIE, "")))
+            consoles.devices.confirm(body.code, person.id, session=_session(request))
         except NotFound:
             attempt.fail()
             raise
@@ -132,9 +132,11 @@ def list_tokens(consoles: InConsoles, person: InPerson) -> list[TokenInfo]:
 
 
 @router.post("/tokens", status_code=201)
-def make_token(request: NewToken, consoles: InConsoles, person: InPerson) -> MadeToken:
+def make_token(body: NewToken, request: Request, consoles: InConsoles, person: InPerson) -> MadeToken:
     """A token for a program; its secret is shown this once."""
-    number, secret = consoles.keys.make_token(person.id, title=request.title, scopes=request.scopes, days=request.days)
+    number, secret = consoles.keys.make_token(
+        person.id, title=body.title, scopes=body.scopes, days=body.days, asked_in=_session(request)
+    )
     return MadeToken(id=number, secret=secret)
 
 
@@ -159,3 +161,8 @@ def remove_account(consoles: InConsoles, person: InPerson, body: Farewell | None
     shutil.rmtree(console.settings.runs, ignore_errors=True)
     console.mirror.forget_all()
     return Response(status_code=204)
+
+
+def _session(request: Request) -> str:
+    """The digest of the session in which somebody asks."""
+    return digest_of(request.cookies.get(COOKIE, ""))

@@ -14,12 +14,13 @@ from fastapi.concurrency import run_in_threadpool
 from racecraft.serve.context import Consoles, InLeague
 from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.door.routes import fail, let_in, write_down
+from racecraft.serve.people.keys import digest_of
 from racecraft.serve.people.links import address_of
 from racecraft.serve.people.schemas import Arrived, FromProvider, Me, Newcomer, ToProvider, me_of
 from racecraft.serve.problems import NotLetIn
 from racecraft.serve.provider.visits import SECONDS
 from racecraft.serve.replies import problem
-from racecraft.serve.settings import PROVIDER_COOKIE, PROVIDER_PAGE
+from racecraft.serve.settings import COOKIE, PROVIDER_COOKIE, PROVIDER_PAGE
 
 router = APIRouter(prefix="/api/door/provider", tags=["door"])
 
@@ -46,7 +47,8 @@ def sign_in_by_provider(request: Request, body: FromProvider, response: Response
     try:
         whom, is_link = provider.arrive(Answer(**body.model_dump()), browser=browser, user_id=here)
         if is_link:
-            consoles.identities.link(here, whom.issuer, whom.subject)
+            asked_in = digest_of(request.cookies.get(COOKIE, ""))
+            consoles.identities.link(here, whom.issuer, whom.subject, asked_in=asked_in)
             consoles.audit.note(here, "link_provider", request.url.path, address=caller(request))
             return Arrived(me=me_of(consoles.people.get(here)), is_linked=True)
         user = consoles.identities.user(whom.issuer, whom.subject)

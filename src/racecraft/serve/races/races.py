@@ -28,6 +28,7 @@ from racecraft.race.rules import RaceRules
 from racecraft.serve.jobs.cargo import Cargo
 from racecraft.serve.jobs.queue import JobQueue, new_job, new_job_id
 from racecraft.serve.models.garage import Garage
+from racecraft.serve.people.keys import hold_account
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.ghost_schemas import Ghost, Starter
 from racecraft.serve.races.ghosts import keep
@@ -123,6 +124,7 @@ class Races:
         terms = _terms(request, track, final, rules)
         announced = terms.announcement
         with self._database.transaction() as session:
+            hold_account(session, user_id)  # two at the same moment count each other
             held = sa.and_(Race.owner_id == user_id, Race.deleted.is_(None))
             if (session.scalar(sa.select(sa.func.count(Race.id)).where(held)) or 0) >= MAX_RACES:
                 raise Conflict(f"There are {MAX_RACES} races already.", hint="Delete some first.")
