@@ -107,6 +107,11 @@ def test_hostile_npy(write, content: bytes, words: str) -> None:
         load_track(write(content))
 
 
+def test_no_refusal_tells_where_an_object_lies_in_memory(write) -> None:
+    with pytest.raises(TrackError, match=r"malformed node or string on line 1: <ast\.BinOp object>\.$"):
+        load_track(write(header(GOOD.replace("(100, 6)", "(10**9, 6)"))))
+
+
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
@@ -240,8 +245,9 @@ def test_a_border_that_folds_inside_a_tight_bend_is_pulled_straight(write) -> No
         ("1,2,0.5,0.5\n" * 20, "repeats 19"),
         ("0,0,1,1\n1,0,1,1\n", "2 waypoints"),
         ("0,0,1,1\n1,0,1,1\n1,1,1,1\n1,1.0000001,1,1\n", "different"),
-        (table().replace("0.6000000", "nan"), "finite"),
-        (table().replace("0.6000000", "-0.6"), "not negative"),
+        (table().replace("0.6000000", "nan"), "has nan m .* 0 to 100 m"),
+        (table().replace("0.6000000", "-0.6"), "has -0.6 m .* 0 to 100 m"),
+        (table().replace("0.6000000", "1e308"), "has 1e\\+308 m .* 0 to 100 m"),
         (table().replace("0.6000000", "0").replace("0.4000000", "0"), "0 m wide"),
         (table().replace("5.0000000", "inf"), "finite"),
         (table().replace("5.0000000", "5e9"), "within 10,000"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,11 +20,12 @@ from racecraft.json_file import open_regular
 from racecraft.scoped_warnings import scoped_warnings
 from racecraft.track.polyline import Floats, signed_area
 from racecraft.track.track import CLOSED_GAP, Track
-from racecraft.track.validate import MAX_WAYPOINTS, MIN_WAYPOINTS, check_rows, validate
+from racecraft.track.validate import MAX_WAYPOINTS, MAX_WIDTH, MIN_WAYPOINTS, check_rows, validate
 
 MAX_FILE_BYTES = 2_000_000  # AWS's largest route has 19 kB; 10,000 waypoints of text fit in well
 MAX_FOLD_ROWS = 64  # longest loop of a border that is cut off, waypoints
 MAX_HEADER_BYTES = 1_000  # of an .npy file; numpy writes 118
+ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 ROUTE_COLUMNS = ("centerline", "inner", "outer")
 CSV_COLUMNS = ("x_m", "y_m", "w_tr_right_m", "w_tr_left_m")
 
@@ -57,11 +59,11 @@ def read_centerline_csv(path: str | Path) -> Track:
     path = Path(path)
     rows = _parse_csv(_read_bytes(path), path)
     check_rows({"centerline": rows[:, :2]}, name=path.stem)
-    if (bad := np.flatnonzero(~((rows[:, 2:] >= 0.0) & np.isfinite(rows[:, 2:])).all(axis=1))).size:
+    if (bad := np.flatnonzero(~((rows[:, 2:] >= 0.0) & (rows[:, 2:] <= MAX_WIDTH)).all(axis=1))).size:
         right, left = rows[bad[0], 2:]
         raise TrackError(
             f"{path.name}: waypoint {bad[0]} has {right:g} m of road to the right, {left:g} m to the left; "
-            "widths are finite and not negative."
+            f"allowed is 0 to {MAX_WIDTH:g} m."
         )
     rows = rows[np.concatenate(([True], np.hypot(*np.diff(rows[:, :2], axis=0).T) > CLOSED_GAP))]
     if len(rows) < MIN_WAYPOINTS:
@@ -152,7 +154,9 @@ def _parse_npy(content: bytes, path: Path) -> Floats:
             )
             shape, is_fortran, dtype = read_header(file, max_header_size=MAX_HEADER_BYTES)
     except Exception as error:  # numpy raises whatever its literal parser does on a hostile header
-        raise TrackError(f"{path.name} is not a readable .npy file: {str(error).splitlines()[0][:120]}.") from None
+        # of Python's own objects it says where they lie in memory, which is nobody's business
+        why = ADDRESS.sub("", str(error).splitlines()[0] if str(error) else type(error).__name__)[:120].rstrip(". ")
+        raise TrackError(f"{path.name} is not a readable .npy file: {why}.") from None
     if dtype.hasobject or dtype.kind != "f" or dtype.itemsize not in (4, 8):
         raise TrackError(f"{path.name} holds {str(dtype)[:60]!r} values; a route is float64 or float32.")
     if len(shape) != 2 or shape[1] != 2 * len(ROUTE_COLUMNS):
