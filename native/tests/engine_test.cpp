@@ -326,7 +326,7 @@ TEST(actions_are_clipped) {
     engine->step(actions.data());
     const auto row = [&](size_t car, int column) { return engine->rows()[car * kNumRowColumns + column]; };
     CHECK_EQUAL(row(0, kRow_steering_angle), static_cast<double>(kMaxSteeringCommand));
-    CHECK_EQUAL(row(0, kRow_speed), 4.0);
+    CHECK_EQUAL(row(0, kRow_speed), static_cast<double>(kMostSpeedCommand));
     CHECK_EQUAL(row(1, kRow_steering_angle), -static_cast<double>(kMaxSteeringCommand));
     CHECK_EQUAL(row(1, kRow_speed), static_cast<double>(kMinSpeedCommand));
     CHECK_EQUAL(row(2, kRow_speed), static_cast<double>(kMinSpeedCommand));

@@ -55,6 +55,18 @@ def test_steering_of_45_degrees_is_commanded_and_drives_as_30():
     np.testing.assert_array_equal(cars.vehicles[:, :2], cars.vehicles[:, 2:])
 
 
+def test_nine_metres_a_second_are_commanded_and_drive_as_four():
+    space = DiscreteActionSpace.from_aws([{"steering_angle": 0, "speed": speed} for speed in (9, 12, 4, 4)])
+    cars = Simulation(load_track("oval"), num_envs=4, camera=None, num_threads=1)
+    waypoints = waypoints_of(cars.tracks)
+    for _ in range(20):
+        cars.step(space.to_commands(np.arange(4)))
+        seen = [make_params(row, waypoints) for row in cars.rows.tolist()]
+        assert [params["speed"] for params in seen] == [9.0, 12.0, 4.0, 4.0]
+    np.testing.assert_array_equal(cars.vehicles[:, :2], cars.vehicles[:, 2:])
+    assert 1.0 < cars.vehicles[3].max() < 4.5
+
+
 def test_grid_is_the_console_generator():
     space = DiscreteActionSpace.grid(30, steering_granularity=5, max_speed=1, speed_granularity=2)
     assert space.to_degrees() == [(a, s) for a in (-30, -15, 0, 15, 30) for s in (0.5, 1.0)]
@@ -96,7 +108,7 @@ def test_grid_refuses_what_the_console_refuses(change, words):
         ([[0.0, 1.0, 2.0]] * 3, ShapeError),
         ([["left", "fast"]] * 3, ShapeError),
         ([[0.0, math.nan], [0.0, 1.0]], ConfigError),
-        ([[0.0, 5.0], [0.0, 1.0]], ConfigError),
+        ([[0.0, 13.0], [0.0, 1.0]], ConfigError),
         ([[1.0, 1.0], [0.0, 1.0]], ConfigError),
     ],
 )

@@ -62,6 +62,15 @@ def test_ancient_file_with_45_degrees():
         ModelMetadata.from_dict({"action_space": actions, "version": "5"})
 
 
+def test_file_of_2019_with_nine_metres_a_second():
+    actions = [{"steering_angle": angle, "speed": speed} for angle, speed in ((-30, 5), (0, 9), (0, 12.0), (30, 4))]
+    metadata = ModelMetadata.from_dict({"action_space": actions}, name="old.json")
+    assert [action["speed"] for action in metadata.to_dict()["action_space"]] == [5, 9, 12, 4]
+    assert metadata.notes == ("old.json: 3 of 4 actions ask for more than 4 m/s, driven as that.",)
+    with pytest.raises(ConfigError, match=r"\[1\].speed is 40; allowed is 0.1 to 4 m/s \(files of 2019 up to 12\)"):
+        ModelMetadata.from_dict({"action_space": [actions[0], {"steering_angle": 0, "speed": 40}]})
+
+
 def test_missing_version_depends_on_the_sensor():
     assert ModelMetadata.from_dict({"action_space": TWO, "sensor": CAMERA}).version == "2"
     assert ModelMetadata.from_dict({"action_space": TWO}).version == "1"
@@ -238,8 +247,8 @@ def test_indices_that_count_from_1_are_told_once():
             "action_space[2].speed is 0; allowed is 0.1 to 4 m/s",
         ),
         (
-            {"action_space": [*TWO, {"steering_angle": 1, "speed": 4.5}]},
-            "speed is 4.5; allowed is 0.1 to 4 m/s",
+            {"action_space": [*TWO, {"steering_angle": 1, "speed": 40}]},
+            "speed is 40; allowed is 0.1 to 4 m/s",
         ),
         (
             {"action_space": [*TWO, {"steering_angle": -31, "speed": 4}]},

@@ -45,9 +45,9 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 def command(action: tuple[float, float]) -> tuple[float, float]:
-    """What the car is told to do: up to ±45°, and 0.1 to 4 m/s or a stop."""
+    """What the car is told to do: up to ±45°, and 0.1 to 12 m/s or a stop."""
     steering, speed = action
-    return clip(steering, -math.pi / 4, math.pi / 4), 0.0 if speed == 0.0 else clip(speed, 0.1, 4.0)
+    return clip(steering, -math.pi / 4, math.pi / 4), 0.0 if speed == 0.0 else clip(speed, 0.1, 12.0)
 
 
 def saturated(wanted: float, limit: float) -> float:
@@ -108,7 +108,7 @@ def move(
 ) -> Pose:
     """One control step of classic Runge-Kutta of fourth order, or with sim_dt so many substeps of that."""
     steering, speed = command(action)
-    steering = clip(steering, -math.pi / 6, math.pi / 6)  # the wheels turn no further
+    steering, speed = clip(steering, -math.pi / 6, math.pi / 6), min(speed, 4.0)  # no further, and no faster
     state, dt = pose.array(), DT / substeps if sim_dt is None else sim_dt
     for _ in range(substeps):
         k1 = rates(car, state, steering, speed)

@@ -181,7 +181,8 @@ def test_randomised_cars_move_as_the_reference_says(preset):
 
 
 def test_commands_are_clipped():
-    assert command((9.0, 9.0)) == (math.pi / 4, 4.0)
+    assert command((9.0, 9.0)) == (math.pi / 4, 9.0)
+    assert command((0.1, 90.0)) == (0.1, 12.0)
     assert command((-9.0, -9.0)) == (-math.pi / 4, 0.1)
     assert command((0.1, 0.0)) == (0.1, 0.0)
 

@@ -53,9 +53,9 @@ RC_HD bool judge_car(const Batch& batch, int32_t env, float steering_angle, floa
     commands.is_moving[i] = 0.0f;
     if (is_over(batch, env)) return false;
     const float steering = clamp(steering_angle, -kMaxSteeringCommand, kMaxSteeringCommand);
-    const float wanted = speed == 0.0f ? 0.0f : clamp(speed, kMinSpeedCommand, kMaxSpeedCommand);
+    const float wanted = speed == 0.0f ? 0.0f : clamp(speed, kMinSpeedCommand, kMostSpeedCommand);
     commands.steering[i] = clamp(steering, -kMaxSteering, kMaxSteering);
-    commands.speed[i] = wanted;
+    commands.speed[i] = clamp(wanted, 0.0f, kMaxSpeedCommand);
     const TrackGeometry& track = track_of(batch, env);
     const VehicleState car = load_vehicle(batch, env);
     Episode& episode = batch.episodes[env];

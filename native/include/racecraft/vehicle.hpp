@@ -29,7 +29,8 @@ constexpr float kMaxSteering = 0.523598776f;         // rad, 30 degrees: no comm
 constexpr float kMaxSteeringCommand = 0.785398163f;  // rad, 45 degrees: commands of 2018, which rows tell
 constexpr float kMostSteering = 0.9f;                // rad, more than any command and bias turn the wheels
 constexpr float kMinSpeedCommand = 0.1f;             // m/s; a command of exactly 0 (stop) is allowed below it
-constexpr float kMaxSpeedCommand = 4.0f;             // m/s
+constexpr float kMaxSpeedCommand = 4.0f;             // m/s, no command drives the car faster
+constexpr float kMostSpeedCommand = 12.0f;           // m/s, commands of 2019, which rows tell
 // Drive and brakes give at most this many times what the slipperier axle gives across: a car that is pushed
 // harder than it can be held gains speed sideways.
 constexpr float kMaxDriveOverFriction = 3.0f;

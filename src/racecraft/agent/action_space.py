@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 MAX_STEERING = 30.0  # degrees; the car's front wheels turn no further
 MAX_FILE_STEERING = 45.0  # degrees; files of 2018 have it: rewards and logs say so, the wheels stop at 30
 MIN_SPEED, MAX_SPEED = 0.1, 4.0  # m/s
+MAX_FILE_SPEED = 12.0  # m/s; files of 2019 have more than 4: rewards and logs say so, the car drives 4
 MIN_ACTIONS, MAX_ACTIONS = 2, 30
 STEERING_GRANULARITIES = (3, 5, 7)
 SPEED_GRANULARITIES = (1, 2, 3)
@@ -54,7 +55,8 @@ class DiscreteActionSpace:
                 MAX_FILE_STEERING,
                 "degrees",
             )
-            _check(f"action_space[{index}].speed", speed, MIN_SPEED, MAX_SPEED, "m/s")
+            if not MIN_SPEED <= speed <= MAX_FILE_SPEED:
+                _check(f"action_space[{index}].speed", speed, MIN_SPEED, MAX_SPEED, "m/s")
         self._commands = self.table.astype(np.float32)
 
     @classmethod
@@ -122,6 +124,11 @@ class DiscreteActionSpace:
     def size(self) -> int:
         """Number of actions A: the width of the policy's output."""
         return len(self.table)
+
+    @property
+    def most_speed(self) -> float:
+        """The fastest action's, m/s."""
+        return float(self.table[:, 1].max())
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
@@ -218,6 +225,11 @@ class ContinuousActionSpace:
         share = (np.clip(values, -1.0, 1.0) + 1.0) * 0.5
         commands: NDArray[np.float32] = (self.low * (1.0 - share) + self.high * share).astype(np.float32)
         return commands
+
+    @property
+    def most_speed(self) -> float:
+        """m/s."""
+        return float(self.high[1])
 
     @property
     def space(self) -> gymnasium.spaces.Box:

@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from racecraft.agent.action_space import (
     MAX_ACTIONS,
+    MAX_FILE_SPEED,
     MAX_FILE_STEERING,
     MAX_SPEED,
     MAX_STEERING,
@@ -37,7 +38,11 @@ class _Action(AwsModel):
         le=MAX_FILE_STEERING,
         description=f"{-MAX_STEERING:g} to {MAX_STEERING:g} degrees",
     )
-    speed: Number = Field(ge=MIN_SPEED, le=MAX_SPEED, description=f"{MIN_SPEED:g} to {MAX_SPEED:g} m/s")
+    speed: Number = Field(
+        ge=MIN_SPEED,
+        le=MAX_FILE_SPEED,
+        description=f"{MIN_SPEED:g} to {MAX_SPEED:g} m/s (files of 2019 up to {MAX_FILE_SPEED:g})",
+    )
     index: Whole | None = Field(None, description="the action's place in the list")
 
 
@@ -203,6 +208,8 @@ def _action_notes(actions: list[_Action], version: str, *, name: str) -> list[st
                 raise ConfigError(f"{where}; allowed is {limits} (up to {MAX_FILE_STEERING:g} only in version 1 or 2).")
             driven = copysign(MAX_STEERING, action.steering_angle)
             notes.append(f"{name}: {where}, driven as {driven:g}: the wheels turn no further.")
+    if fast := sum(action.speed > MAX_SPEED for action in actions):
+        notes.append(f"{name}: {fast} of {len(actions)} actions ask for more than {MAX_SPEED:g} m/s, driven as that.")
     odd = [(place, action.index) for place, action in enumerate(actions) if action.index not in (None, place)]
     if len(odd) == 1:
         (place, index), *_ = odd

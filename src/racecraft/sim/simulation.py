@@ -317,7 +317,7 @@ class Simulation:
 
         Args:
             actions: Steering angle in radians (left positive; the wheels stop at ±30°, rows tell up to ±45°) and speed
-                in m/s (clipped to 0.1 to 4; exactly 0 asks the car to stop), (N, 2).
+                in m/s (the car drives 0.1 to 4, rows tell up to 12; exactly 0 asks the car to stop), (N, 2).
 
         Raises:
             ShapeError: Wrong shape.
