@@ -131,6 +131,21 @@ def test_a_wrong_setting_of_objects_leaves_no_run(lines: str, says: str, tmp_pat
     assert not Path("runs/x").exists()
 
 
+def test_settings_lie_above_a_folder_of_custom_files(tmp_path: Path) -> None:
+    """As deepracer-on-the-spot keeps several models, with the prefix of one of them in run.env."""
+    folder = "custom_files/oval/second"
+    files = {
+        "run.env": f"DR_WORLD_NAME=oval\nDR_EVAL_NUMBER_OF_TRIALS=7\nDR_LOCAL_S3_CUSTOM_FILES_PREFIX={folder}\n",
+        "system.env": "DR_WORKERS=2\n",
+        f"{folder}/reward_function.py": models.REWARD,
+        f"{folder}/model_metadata.json": models.METADATA,
+    }
+    found = import_run(models.as_folder(files, tmp_path / "racer"), name="mine")
+    assert any("track oval" in value for value in found.used.values())
+    assert any("DR_WORKERS" in name for name in found.unused)
+    assert not any("No file names a track" in note for note in found.notes)
+
+
 def test_the_page_names_every_setting_that_is_known() -> None:
     page = DOCS.read_text(encoding="utf-8")
     table = page[page.index("## Settings of deepracer-for-cloud") :]

@@ -83,7 +83,10 @@ class _Model:
         places = PLACES[name]
         if self.drfc is not None and name in self.drfc.files:
             places = (f"{CUSTOM_FILES}/{self.drfc.files[name]}", *places)
-        found = [self.root + place for place in places if self.root + place in self.source.files]
+        roots = [self.root]
+        if name in (RUN_ENV, SYSTEM_ENV) and CUSTOM_FILES in (parts := self.root.split("/")):  # one model of several
+            roots.append("".join(f"{part}/" for part in parts[: parts.index(CUSTOM_FILES)]))
+        found = [root + place for root in roots for place in places if root + place in self.source.files]
         return found[0] if found else ""
 
     def shown(self, name: str) -> str:
