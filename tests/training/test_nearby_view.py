@@ -16,7 +16,7 @@ from racecraft.track import Sketch, draw_road, load_track
 from racecraft.training import train
 from racecraft.training.nearby_view import DRIFT, NEARBY_COLUMNS, REACH, NearbyTeller
 from racecraft.training.plan import make_plan
-from racecraft.training.regimes import OBJECTS
+from racecraft.training.regimes import FAST_OBJECTS, OBJECTS
 from racecraft.training.settings import TrainSettings
 from racecraft.training.start import read_settings
 
@@ -99,6 +99,8 @@ def test_a_training_among_objects_with_a_teacher_is_told() -> None:
     settings = make_plan("oval", objects=BOTS).settings
     assert settings.tells_nearby
     assert settings.distill == OBJECTS.distill
+    for actions in ("default", "continuous"):
+        assert make_plan("oval", objects=BOTS, actions=actions).settings.distill == FAST_OBJECTS.distill
     assert not make_plan("oval", objects=BOTS, algorithm="ppo").settings.tells_nearby
     assert not make_plan("oval").settings.tells_nearby
 

@@ -16,6 +16,7 @@ from racecraft.training.regimes import (
     CUDA,
     DUEL,
     FAST_DISTILL,
+    FAST_OBJECTS,
     LONG_FAST_DISTILL,
     MANY_TRACKS,
     METHODS,
@@ -38,6 +39,8 @@ def test_the_last_row_decides_everything() -> None:
     ("circumstances", "expected"),
     [
         ({"objects": BOTS}, {"reward": OBJECTS, "start": TIME_TRIAL, "ppo": OBJECTS, "good": OBJECTS}),
+        ({"objects": BOTS, "most_speed": 1.0}, {"distill": OBJECTS, "ppo": OBJECTS}),
+        ({"objects": BOTS, "most_speed": 1.4}, {"distill": FAST_OBJECTS, "ppo": OBJECTS, "good": OBJECTS}),
         ({"opponents": RIVALS}, {"reward": DUEL, "start": DUEL, "distill": DUEL, "critic": DUEL, "good": TIME_TRIAL}),
         ({"objects": BOTS, "opponents": RIVALS}, {"reward": OBJECTS, "start": DUEL, "ppo": OBJECTS, "critic": DUEL}),
         ({"num_tracks": 2}, {"reward": TIME_TRIAL, "start": MANY_TRACKS, "evaluation_trials": MANY_TRACKS}),

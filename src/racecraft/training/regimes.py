@@ -80,6 +80,12 @@ OBJECTS: Final = Regime(
     evaluation_trials=20,  # the places differ from lap to lap: five would say little
     good=0.6,
 )
+WALK: Final = 1.0
+"""m/s; who drives faster than that among objects learns as `FAST_OBJECTS` says."""
+FAST_OBJECTS: Final = Regime(
+    # What a car at 1 m/s must know of the next object happens within a second; a faster one turns in earlier.
+    distill=DistillConfig(teacher_steps=1_500_000, gamma=0.97, student_steps=100_000, buffer_size=64_000),
+)
 DUEL: Final = Regime(
     # Pace, with dearer mistakes; time to find it; a LIDAR that sees who is beside.
     reward="duel",
@@ -170,6 +176,7 @@ def regimes_of(
     objects: Objects = NO_OBJECTS,
     opponents: Opponents | None = None,
     num_tracks: int = 1,
+    most_speed: float = 0.0,
     device: str = "cpu",
     is_fast_distill: bool = False,
     lessons: str = "short",
@@ -178,6 +185,7 @@ def regimes_of(
     rows = (
         (CUDA, device != "cpu"),
         (MANY_TRACKS, num_tracks > 1),
+        (FAST_OBJECTS, objects != NO_OBJECTS and most_speed > WALK),
         (OBJECTS, objects != NO_OBJECTS),
         (DUEL, opponents is not None),
         (LONG_FAST_DISTILL, is_fast_distill and lessons == "long"),

@@ -280,6 +280,7 @@ def make_settings(
         "objects": settings.get("objects", NO_OBJECTS),
         "opponents": settings.get("opponents"),
         "num_tracks": len(roads),
+        "most_speed": metadata.action_space.most_speed,
         "device": settings.get("device", "cpu"),
     }
     network = network or metadata.neural_network
