@@ -10,6 +10,7 @@ from fastapi.routing import APIRoute
 
 from racecraft.serve.context import Computes, TakesPlace
 from racecraft.serve.desks import EACH, TOGETHER, Desks
+from racecraft.serve.driving import routes as driving
 from racecraft.serve.evaluations import analysis, beliefs
 from racecraft.serve.models import archives
 from racecraft.serve.models import routes as models
@@ -18,6 +19,7 @@ from racecraft.serve.problems import Conflict
 from racecraft.serve.rewards import routes as rewards
 from racecraft.serve.store.database import Database
 from racecraft.serve.submissions import routes as submissions
+from racecraft.serve.tracks import routes as tracks
 
 SLOW = (
     "POST /api/rewards/check",
@@ -31,6 +33,15 @@ SLOW = (
     "GET /api/models/{name}/maps",
     "GET /api/models/{name}/report",
     "GET /api/boards/{race_id}/film",
+    "POST /api/drives",
+    "GET /api/tracks",
+    "POST /api/tracks/validate",
+    "POST /api/tracks/import",
+    "GET /api/tracks/{name}",
+    "GET /api/tracks/{name}/sketch",
+    "GET /api/tracks/{name}/route.npy",
+    "PUT /api/tracks/{name}",
+    "POST /api/tracks/{name}/restore",
 )
 """What is computed, or unpacked from many files, while somebody waits."""
 
@@ -91,7 +102,7 @@ def test_who_gives_up_waiting_takes_no_place() -> None:
 
 
 def test_what_is_computed_in_a_request_takes_a_place_and_a_film_of_it_a_job() -> None:
-    routers = (rewards, models, beliefs, analysis, submissions)
+    routers = (rewards, models, beliefs, analysis, submissions, driving, tracks)
     needs = {
         f"{method} {route.path}": [dependency.dependency for dependency in route.dependencies]
         for module in routers

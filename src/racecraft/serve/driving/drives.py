@@ -12,6 +12,7 @@ from __future__ import annotations
 import secrets
 import threading
 import time
+from collections import Counter
 from typing import Final
 
 import numpy as np
@@ -130,22 +131,30 @@ class Drives:
         self._lock = threading.Lock()
 
     def begin(self, track: Track, *, vehicle: str, direction: str, user_id: int) -> tuple[str, DrivenCar]:
-        """Give a driver a car; their oldest one is taken when there are many.
+        """Give a driver a car; when there are many, their oldest one is taken, or that of who has most.
 
         Raises:
-            Conflict: Too many others are driving.
+            Conflict: Too many others are driving, each one car.
         """
         with self._lock:
-            now = time.monotonic()
-            self._cars = {key: (at, car) for key, (at, car) in self._cars.items() if now - at < IDLE}
-            if len(self._cars) >= MAX_DRIVES:
-                mine = [(at, key) for key, (at, car) in self._cars.items() if car.user_id == user_id]
-                if not mine:
-                    raise Conflict(f"{MAX_DRIVES} cars are being driven already.", hint="Try again in a minute.")
-                del self._cars[min(mine)[1]]
-            key, car = secrets.token_hex(8), DrivenCar(track, vehicle=vehicle, direction=direction, user_id=user_id)
-            self._cars[key] = (now, car)
+            self._make_room(user_id)
+        # a road of somebody's own can take half a minute, in which all others drive on
+        key, car = secrets.token_hex(8), DrivenCar(track, vehicle=vehicle, direction=direction, user_id=user_id)
+        with self._lock:
+            self._make_room(user_id)
+            self._cars[key] = (time.monotonic(), car)
             return key, car
+
+    def _make_room(self, user_id: int) -> None:
+        now = time.monotonic()
+        self._cars = {key: (at, car) for key, (at, car) in self._cars.items() if now - at < IDLE}
+        if len(self._cars) < MAX_DRIVES:
+            return
+        theirs = Counter(car.user_id for _, car in self._cars.values())
+        most = user_id if theirs[user_id] else max(theirs, key=lambda user: theirs[user])
+        if most != user_id and theirs[most] == 1:
+            raise Conflict(f"{MAX_DRIVES} cars are being driven already.", hint="Try again in a minute.")
+        del self._cars[min((at, key) for key, (at, car) in self._cars.items() if car.user_id == most)[1]]
 
     def car(self, key: str, *, user_id: int) -> DrivenCar:
         """A driver's car.

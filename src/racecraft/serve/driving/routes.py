@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 from racecraft.errors import ConfigError
 from racecraft.limits import known_limit
-from racecraft.serve.context import InContext, InUser
+from racecraft.serve.context import Computes, InContext, InUser
 from racecraft.serve.driving.schemas import (
     Controls,
     Directions,
@@ -29,7 +29,7 @@ router = APIRouter(prefix="/api", tags=["drives"])
 Track = Annotated[str, Query(max_length=200)]
 
 
-@router.post("/drives", status_code=201)
+@router.post("/drives", status_code=201, dependencies=[Computes])
 def begin_drive(request: NewDrive, context: InContext, user: InUser) -> Drive:
     """Sit down in a car at the start of a track."""
     if request.sketch is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from fastapi import APIRouter, Body, Query, Response
 
 from racecraft.errors import TrackError
-from racecraft.serve.context import InContext
+from racecraft.serve.context import Computes, InContext
 from racecraft.serve.schemas import Problem
 from racecraft.serve.tracks.courses import geometry
 from racecraft.serve.tracks.schemas import SketchVerdict, TrackFacts, TrackGeometry, TrackSketch
@@ -18,13 +18,13 @@ from racecraft.track import Track, draw_road, find_corners, track_names, validat
 router = APIRouter(prefix="/api/tracks", tags=["tracks"])
 
 
-@router.get("")
+@router.get("", dependencies=[Computes])
 def list_tracks(context: InContext) -> list[TrackFacts]:
     """The library's tracks, then the user's own."""
     return [*(context.courses.facts(name) for name in track_names()), *context.courses.own_facts()]
 
 
-@router.post("/validate")
+@router.post("/validate", dependencies=[Computes])
 def validate_sketch(sketch: TrackSketch) -> SketchVerdict:
     """Whether a drawing can be driven, as it is drawn; nothing is kept."""
     try:
@@ -38,7 +38,7 @@ def validate_sketch(sketch: TrackSketch) -> SketchVerdict:
     return SketchVerdict(ok=True, **_described(track))
 
 
-@router.post("/import", status_code=201)
+@router.post("/import", status_code=201, dependencies=[Computes])
 def import_track(
     context: InContext,
     content: bytes = Body(media_type="application/octet-stream", max_length=2_000_000),
@@ -49,26 +49,26 @@ def import_track(
     return context.courses.take_in(content, file_name=file, name=name)
 
 
-@router.get("/{name}")
+@router.get("/{name}", dependencies=[Computes])
 def get_track(name: str, context: InContext) -> TrackGeometry:
     """A track's lines."""
     return geometry(name, context.courses.load(name))
 
 
-@router.get("/{name}/sketch")
+@router.get("/{name}/sketch", dependencies=[Computes])
 def get_sketch(name: str, context: InContext) -> TrackSketch:
     """A track's control points, for the editor."""
     return context.courses.sketch(name)
 
 
-@router.get("/{name}/route.npy", response_class=Response)
+@router.get("/{name}/route.npy", response_class=Response, dependencies=[Computes])
 def get_route(name: str, context: InContext) -> Response:
     """A track as an AWS route file."""
     content = context.courses.route(name)
     return Response(content, media_type="application/octet-stream")
 
 
-@router.put("/{name}")
+@router.put("/{name}", dependencies=[Computes])
 def save_track(name: str, sketch: TrackSketch, context: InContext, replace: bool = False) -> TrackFacts:
     """Keep a drawing as one of the user's own tracks."""
     return context.courses.save(name, sketch, replace=replace)
@@ -81,7 +81,7 @@ def delete_track(name: str, context: InContext) -> Response:
     return Response(status_code=204)
 
 
-@router.post("/{name}/restore")
+@router.post("/{name}/restore", dependencies=[Computes])
 def restore_track(name: str, context: InContext) -> TrackFacts:
     """Bring a deleted track back."""
     return context.courses.restore(name)
