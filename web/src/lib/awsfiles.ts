@@ -1,6 +1,7 @@
 /** The three files of a model of AWS's, given to a new model: what each says, in the words of the page. */
 import type { Action, ActionPreset } from "../api/client";
 import type { Key } from "../i18n/en";
+import { textOf } from "./filetext";
 import type { Numbers } from "./newmodel";
 
 export interface Said {
@@ -20,7 +21,7 @@ export class Unreadable extends Error {
   }
 }
 
-const MOST = 1 << 20; // characters
+const MOST = 1 << 20; // characters or bytes
 const CAMERA_ONLY = "FRONT_FACING_CAMERA";
 
 type Entries = Record<string, unknown>;
@@ -28,8 +29,11 @@ const isEntries = (value: unknown): value is Entries =>
   value !== null && typeof value === "object" && !Array.isArray(value);
 
 /** What a file says, told by what is in it rather than by its name. */
-export function saidBy(name: string, text: string): Said {
-  if (text.length > MOST) throw new Unreadable("aws_file_large");
+export function saidBy(name: string, data: string | ArrayBuffer): Said {
+  const size = typeof data === "string" ? data.length : data.byteLength;
+  if (size > MOST) throw new Unreadable("aws_file_large");
+  const text = typeof data === "string" ? data : textOf(data);
+  if (text === undefined) throw new Unreadable("file_no_text");
   if (/\.py$/i.test(name)) {
     if (!/\bdef\s+reward_function\b/.test(text)) throw new Unreadable("aws_file_no_reward");
     return { source: text };

@@ -38,7 +38,7 @@ export const de: Record<TabKey, string> = {
   drop_here: "Loslassen, um ein Modell, eine Belohnung oder Aktionen zu holen oder ein Replay zu prüfen",
   drop_left: "Nicht genommen: {names}. Platz ist für je eine Belohnung, eine Datei mit Aktionen und ein Replay.",
   drop_unknown:
-    "{name} ist nichts, was diese Seite nimmt: ein Modell (.tar.gz), ein Replay (.replay), eine Belohnung (.py, höchstens 140 KB) oder die Aktionen einer model_metadata.json.",
+    "{name} ist nichts, was diese Seite nimmt: ein Modell (.tar.gz), ein Replay (.replay), eine Belohnung (.py in UTF-8, höchstens 140 KB) oder die Aktionen einer model_metadata.json.",
   dropped: "{name} ist gelöscht.",
   model_taken: "Ein Modell namens {name} gibt es schon.",
   arrive: "Ein Modell holen",

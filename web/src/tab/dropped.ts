@@ -1,5 +1,6 @@
 /** What files are that somebody dropped onto the page, by their names: nobody reads more of one that this page has no use for. */
 import type { ActionPreset } from "../api/client";
+import { textOf } from "../lib/filetext";
 
 const MOST_BYTES = 140_000; // of a text, the most that AWS accepts of a reward
 
@@ -20,7 +21,8 @@ export async function droppedOf(file: File): Promise<Dropped | undefined> {
   if (name.endsWith(".replay")) return { kind: "replay" };
   if (!/\.(py|json)$/.test(name) || file.size > MOST_BYTES) return undefined;
   try {
-    const text = new TextDecoder("utf-8", { fatal: true }).decode(await file.arrayBuffer());
+    const text = textOf(await file.arrayBuffer());
+    if (text === undefined) return undefined;
     if (name.endsWith(".py")) return { kind: "reward", source: text.replaceAll("\r\n", "\n") };
     const { actionsOf } = await import("./arrive");
     return { kind: "actions", space: actionsOf(text) };

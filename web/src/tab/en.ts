@@ -37,7 +37,7 @@ export const en = {
   drop_here: "Let go to bring a model, a reward or actions, or to check a replay",
   drop_left: "Left: {names}. There is a place for one reward, one file of actions and one replay at a time.",
   drop_unknown:
-    "{name} is nothing that this page takes: a model (.tar.gz), a replay (.replay), a reward (.py, at most 140 KB), or the actions of a model_metadata.json.",
+    "{name} is nothing that this page takes: a model (.tar.gz), a replay (.replay), a reward (.py in UTF-8, at most 140 KB), or the actions of a model_metadata.json.",
   model_taken: "There is a model called {name} already.",
   arrive: "Bring a model",
   arrive_judging: "{name} drives its evaluation …",

@@ -119,6 +119,7 @@ export const create: Record<keyof typeof english, string> = {
   aws_files_drop: "model_metadata.json, hyperparameters.json oder reward_function.py hier ablegen",
   aws_file_taken: "{file} wurde übernommen.",
   aws_file_partly: "{file} wurde übernommen, bis auf hier Unbekanntes: {names}.",
+  file_no_text: "Das ist kein Text in UTF-8: Speichere ihn im Editor als UTF-8 und wähle ihn noch einmal.",
   aws_file_large: "Das ist größer als 1 MB; so groß ist keine Datei von AWS.",
   aws_file_no_reward: "Darin steht keine Funktion reward_function(params).",
   aws_file_no_json: "Das ist kein JSON.",

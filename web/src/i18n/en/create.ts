@@ -116,6 +116,7 @@ export const create = {
   aws_files_drop: "Drop model_metadata.json, hyperparameters.json or reward_function.py",
   aws_file_taken: "{file} was taken over.",
   aws_file_partly: "{file} was taken over, but for what is not known here: {names}.",
+  file_no_text: "This is not text in UTF-8: save it as UTF-8 in your editor, then choose it again.",
   aws_file_large: "This is larger than 1 MB; none of AWS's files is.",
   aws_file_no_reward: "There is no function reward_function(params) in it.",
   aws_file_no_json: "This is not JSON.",
