@@ -366,3 +366,10 @@ def test_a_strangers_source_is_looked_at_soon(source: str) -> None:
     begun = time.process_time()
     assert check_reward(source)
     assert time.process_time() - begun < 1.0
+
+
+def test_a_name_of_another_function_is_not_what_was_meant():
+    source = body("def paid(bonus):", "    return 2 * bonus", "return paid(bonus)")
+    (problem,) = check_reward(source)
+    assert (problem.line, problem.message) == (4, "The name 'bonus' is not defined.")
+    assert "'bonus'" not in problem.hint

@@ -67,7 +67,9 @@ def undefined_names(source: str, tree: ast.Module) -> Iterator[tuple[ast.Name, s
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id in missing:
             missing.remove(node.id)
-            yield node, node.id, candidates if num_missing - len(missing) <= GUESSED else []
+            is_guessed = num_missing - len(missing) <= GUESSED
+            others = (name for name in candidates if is_guessed and name != node.id)  # a name of another function
+            yield node, node.id, list(others)
 
 
 def _scopes(table: symtable.SymbolTable) -> Iterator[symtable.SymbolTable]:
