@@ -164,7 +164,8 @@ def test_what_is_sent_in_is_judged_and_stands_on_the_board(cup: Cup, run: RunFol
     with cup.league.stranger() as stranger:
         refused(stranger.get(f"/api/boards/{cup.race}"), 404)
         ok(cup.owner.patch(f"/api/league/races/{cup.race}", json={"is_public": True}))
-        assert ok(stranger.get(f"/api/boards/{cup.race}"))["race"]["part"] == "spectator"
+        told = ok(stranger.get(f"/api/boards/{cup.race}"))["race"]
+        assert (told["part"], told["track"], told["track_title"]) == ("spectator", "oval", "Paperclip")
         refused(stranger.post(f"{cup.address}?model=x", content=data), 401)
 
     # a reason, and back again

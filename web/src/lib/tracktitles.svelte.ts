@@ -5,14 +5,18 @@ import { roadName } from "./roads";
 let titles = $state.raw<ReadonlyMap<string, string>>(new Map());
 const asked: string[] = []; // names that were looked for: one that is gone is not looked for again
 let isAsking = false;
+let hasAnswer = $state(false); // perhaps that there is none
 
-/** The title of a track; its name until that is known, and where it has none. */
+/** Stands where titles are not known yet: a name would jump. */
+const SOON = "…";
+
+/** The title of a track; its name where it has none, or where titles cannot be had. */
 export function titleOf(name: string): string {
   if (name && !titles.has(name) && !asked.includes(name)) {
     asked.push(name);
     void ask();
   }
-  return roadName(name, (road) => titles.get(road));
+  return roadName(name, (road) => titles.get(road) ?? (hasAnswer ? undefined : SOON));
 }
 
 async function ask(): Promise<void> {
@@ -23,5 +27,6 @@ async function ask(): Promise<void> {
   } catch {
     asked.length = 0; // the names stand there meanwhile
   }
+  hasAnswer = true;
   isAsking = false;
 }

@@ -28,7 +28,7 @@ from racecraft.serve.submissions.board import NONE, Board
 from racecraft.serve.submissions.finalists import board_of, published_final
 from racecraft.serve.submissions.schemas import LeagueRace, LeagueRaceChange, NewLeagueRace, Stage
 from racecraft.serve.submissions.stages import announced_final, final_of, let_follow, require_alone
-from racecraft.serve.tracks.courses import Courses
+from racecraft.serve.tracks.courses import Courses, track_title
 from racecraft.track import Track
 
 Part = Literal["organiser", "racer", "spectator"]
@@ -246,6 +246,7 @@ def _info(race: Race, group_title: str, part: Part) -> LeagueRace:
             "group": race.group_id,
             "after": race.after_id,
             "group_title": group_title,
+            "track_title": track_title(race.track),
             "part": part,
             "is_public": race.visibility == "public",
             "form": (race.document.get("final") or {}).get("form", "alone"),

@@ -42,6 +42,8 @@ class LeagueRace(Message):
     is_practice: bool
     """Whether everybody knows where it starts."""
     track: str
+    track_title: str
+    """What people call it, also who may not see the list of tracks."""
     laps: int
     time_limit: float
     """s on the clock after which a trial is over; 0 for none, as in races that were made before there was one."""

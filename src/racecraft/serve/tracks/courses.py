@@ -227,6 +227,11 @@ class Courses:
         os.replace(source / f"{name}.npy", target / f"{name}.npy")
 
 
+def track_title(name: str) -> str:
+    """What people call a track; its name where it is none of the library's."""
+    return course(name).display_name if name in track_names() else name
+
+
 def _is_selection(name: str) -> bool:
     return name in ("library", "all") or (name.startswith(GENERATED) and ".." in name and JOINT not in name)
 
@@ -237,7 +242,7 @@ def _facts(name: str, path_or_name: str, is_own: bool, mark: int) -> TrackFacts:
     center = track.centerline[:: max(1, len(track.centerline) // OUTLINE)]
     return TrackFacts(
         name=name,
-        title=course(name).display_name if name in track_names() else name,
+        title=track_title(name),
         length=round(track.length, 3),
         mean_width=round(track.mean_width, 3),
         min_radius=round(track.min_radius, 3) if np.isfinite(track.min_radius) else None,
