@@ -55,7 +55,7 @@ RECIPES: Final[Mapping[str, Mapping[str, Any]]] = {
         "until": "15 minutes",
         "evaluate_every": 150_000,
         "evaluation_trials": 48,
-        "distill": DistillConfig(teacher_steps=1_500_000, student_steps=300_000, buffer_size=64_000),
+        "distill": DistillConfig(teacher_steps=4_000_000, gamma=0.9, student_steps=300_000, buffer_size=64_000),
     },
 }
 """Arguments of `racecraft.training.train`, by name."""

@@ -70,10 +70,12 @@ OBJECTS: Final = Regime(
     actions="steady",
     sensors=("FRONT_FACING_CAMERA", "LIDAR"),
     until="20 laps or 10 minutes",
-    # A teacher that is told where they stand learns the way round in seconds; its student begins where PPO alone comes
-    # after minutes, if at all, and PPO then makes one lap in three nearly all: docs/log/among-objects.md.
+    # A teacher that is told where they stand learns the way round in seconds, and its student most of it in lessons
+    # whose steps stay large for long; PPO alone comes there after minutes, if at all: docs/log/among-objects.md.
     algorithm="distill",
-    distill=DistillConfig(teacher_steps=1_500_000, gamma=0.9, student_steps=100_000, buffer_size=64_000),
+    distill=DistillConfig(
+        teacher_steps=1_500_000, gamma=0.9, student_steps=300_000, rate_steps=100_000, buffer_size=64_000
+    ),
     # Without one, boxes and other cars take ten times the steps of a lap on a free road.
     ppo=PPOConfig(num_envs=128, minibatch_size=256, learning_rate=7e-4, rate_steps=250_000, ent_coef=0.005),
     evaluate_every=25_000,
