@@ -185,7 +185,7 @@ def spellings(command: Any) -> dict[str, str]:
 
 
 def test_every_option_is_typed_somewhere() -> None:
-    root = get_command(cli.entry.every_verb())  # type: ignore[attr-defined]
+    root = get_command(cli.every_verb())  # type: ignore[attr-defined]
     called = spellings(root)
     typed = {
         (verb, called.get(word, word)) for verb, lines in COMMANDS.items() for line in lines for word in line.split()
