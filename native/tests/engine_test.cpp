@@ -108,7 +108,8 @@ void choose_action(size_t car, int step, float* action) {
     const RandomBlock random =
         philox(99, static_cast<uint32_t>(car), 0, static_cast<uint32_t>(step / 4), static_cast<Purpose>(7));
     action[0] = symmetric_of(random.words[0]) * (car % 3 == 0 ? 1.0f : 0.3f);
-    action[1] = car % 5 == 4 ? 0.0f : 5.0f * uniform_of(random.words[1]) - 0.5f;
+    const float speed = std::min(5.0f * uniform_of(random.words[1]) - 0.5f, kMaxSpeedCommand);
+    action[1] = car % 5 == 4 ? 0.0f : speed;
 }
 
 uint64_t mix(uint64_t hash, const void* data, size_t size) {
