@@ -101,7 +101,9 @@ def test_a_training_among_objects_with_a_teacher_is_told() -> None:
     assert settings.distill == OBJECTS.distill
     for actions in ("default", "continuous"):
         assert make_plan("oval", objects=BOTS, actions=actions).settings.distill == FAST_OBJECTS.distill
-    assert not make_plan("oval", objects=BOTS, algorithm="ppo").settings.tells_nearby
+    alone = [make_plan("oval", objects=BOTS, algorithm="ppo", actions=name).settings for name in ("steady", "default")]
+    assert not any(settings.tells_nearby for settings in alone)
+    assert alone[0].to_dict() == alone[1].to_dict()  # a teacher's settings do not follow the actions of who has none
     assert not make_plan("oval").settings.tells_nearby
 
 

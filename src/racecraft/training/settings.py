@@ -280,7 +280,6 @@ def make_settings(
         "objects": settings.get("objects", NO_OBJECTS),
         "opponents": settings.get("opponents"),
         "num_tracks": len(roads),
-        "most_speed": metadata.action_space.most_speed,
         "device": settings.get("device", "cpu"),
     }
     network = network or metadata.neural_network
@@ -291,6 +290,7 @@ def make_settings(
     _check_actions(algorithm, metadata)
     method, is_continuous = METHODS[algorithm], metadata.action_space.kind == "continuous"
     is_fast = algorithm == "distill" and is_continuous
+    circumstances["most_speed"] = metadata.action_space.most_speed if algorithm == "distill" else 0.0
     regime = regime_of(**circumstances, is_fast_distill=is_fast, lessons=_lessons(roads, until))
     lessons = _as_long_as(until, regime.distill, is_raced=circumstances["opponents"] is not None)
     usual = {
