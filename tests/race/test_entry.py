@@ -123,7 +123,7 @@ LIMITS = {"steering_angle": {"low": -30, "high": 30}, "speed": {"low": 0.5, "hig
 @pytest.mark.parametrize(
     "change",
     [
-        lambda document: document["action_space"][0].update(speed=9.0),
+        lambda document: document["action_space"][0].update(speed=12.5),
         lambda document: document["action_space"][0].update(speed=-4.0),
         lambda document: document["action_space"][0].update(speed=float("nan")),
         lambda document: document["action_space"][0].update(speed=1e308),
