@@ -30,7 +30,8 @@ def choose() -> Callable[..., np.ndarray]:
         actions = np.empty((len(cars), 2), dtype=np.float32)
         for i, car in enumerate(cars.tolist()):
             draw = np.random.default_rng((seed, car, step // 4)).uniform(-1.0, 1.0, 2)
-            actions[i] = draw[0] * (0.6 if car % 3 == 0 else 0.2), 0.0 if car % 5 == 4 else 2.0 + 2.5 * draw[1]
+            speed = min(2.0 + 2.5 * draw[1], 4.0)  # rows tell higher ones as they are
+            actions[i] = draw[0] * (0.6 if car % 3 == 0 else 0.2), 0.0 if car % 5 == 4 else speed
         return actions
 
     return choose

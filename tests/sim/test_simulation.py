@@ -58,10 +58,10 @@ def test_the_prepare_step_is_part_of_the_reset(status):
 
 def test_commands_are_clipped_and_a_stop_is_a_stop():
     simulation = Simulation(OVAL, num_envs=4, camera=None, start=FIXED)
-    simulation.step([[9, 9], [-9, -9], [0.2, 0.05], [0.2, 0.0]])
+    simulation.step([[9, 90], [-9, -9], [0.2, 0.05], [0.2, 0.0]])
     limit = float(np.float32(math.pi / 4))  # the wheels stop at 30°, see test_reference.py
     assert simulation.column("steering_angle")[:2].tolist() == [limit, -limit]
-    assert simulation.column("speed").tolist() == [4.0, float(np.float32(0.1)), float(np.float32(0.1)), 0.0]
+    assert simulation.column("speed").tolist() == [12.0, float(np.float32(0.1)), float(np.float32(0.1)), 0.0]
 
 
 # --- starts
