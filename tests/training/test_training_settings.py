@@ -22,6 +22,7 @@ from racecraft.training.regimes import (
     BRISK_FAST_DISTILL,
     DUEL,
     FAST_DISTILL,
+    FAST_OBJECTS,
     LONG_FAST_DISTILL,
     MANY_TRACKS,
     OBJECTS,
@@ -289,9 +290,9 @@ def test_among_objects_training_takes_its_time(objects: Objects) -> None:
 @pytest.mark.parametrize("objects", [Objects(obstacles=Obstacles(count=2)), Objects(bots=Bots(count=1))])
 def test_among_objects_a_teacher_comes_first_unless_it_is_said_how_to_learn(objects: Objects) -> None:
     plain = make_settings(metadata=DISCRETE, objects=objects)
-    assert (plain.algorithm, plain.distill) == ("distill", OBJECTS.distill)
+    assert (plain.algorithm, plain.distill) == ("distill", FAST_OBJECTS.distill)
     several = make_settings(metadata=DISCRETE, objects=objects, track=["oval", "kidney"], critic="privileged")
-    assert (several.algorithm, several.distill) == ("distill", OBJECTS.distill)
+    assert (several.algorithm, several.distill) == ("distill", FAST_OBJECTS.distill)
     said: list[dict[str, Any]] = [
         {"algorithm": "ppo"},
         {"ppo": PPOConfig()},
