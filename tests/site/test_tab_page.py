@@ -312,6 +312,7 @@ def test_where_python_runs_nothing_is_left_of_what_the_browser_keeps_for_the_pag
     with page.expect_worker() as found:
         write(page, "def reward_function(params):\n    return params['speed']\n")
     page.get_by_text("The function is fine.").wait_for()
+    assert found.value in page.workers  # one that has gone would be waited for without an end
     assert found.value.evaluate(KEPT) == []
 
 
