@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import ssl
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import uvicorn
@@ -16,6 +17,7 @@ from racecraft.reward.reading import read_by
 from racecraft.serve.app import create_app
 from racecraft.serve.door.prompt import PromptProtocol
 from racecraft.serve.settings import ServeSettings
+from racecraft.serve.store.sole import sole_server
 
 ADDRESS = "127.0.0.1"
 
@@ -29,7 +31,7 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
 
     Raises:
         ConfigError: The port is taken, or the certificate cannot be used.
-        RunError: A folder or the database cannot be opened.
+        RunError: A folder or the database cannot be opened, or another server of the same league does not stop.
     """
     check_whole("others", settings.other_slots, 1, 64)  # races and copies of runs are made here and nowhere else
     encryption = _encryption(settings)
@@ -44,6 +46,28 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
             f"Port {settings.port} of {settings.host} cannot be used: {error.strerror}.",
             hint="Choose another with --port.",
         ) from error
+    servers: list[_Server] = []
+
+    def end() -> None:
+        for server in servers:
+            server.end()
+
+    with listener, _alone(settings, on_loss=end):
+        _serve(settings, listener, encryption, servers, on_ready)
+
+
+def _alone(settings: ServeSettings, on_loss: Callable[[], None]) -> AbstractContextManager[None]:
+    """What a league counts in memory two servers would count twice; who is alone at a console counts nothing."""
+    return sole_server(settings.database_url, on_loss=on_loss) if settings.league else nullcontext()
+
+
+def _serve(
+    settings: ServeSettings,
+    listener: socket.socket,
+    encryption: dict[str, Any],
+    servers: list[_Server],
+    on_ready: Callable[[str], None],
+) -> None:
     port = listener.getsockname()[1]
     app = create_app(settings, hosts={f"{name}:{port}" for name in (ADDRESS, "localhost", settings.host)})
     config = uvicorn.Config(
@@ -61,7 +85,8 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
     at = settings.address.rstrip("/") if settings.certificate else f"http://{ADDRESS}:{port}"
     on_ready(f"{at}/?ticket={app.state.guard.ticket()}")
     with read_by(Aside()):
-        _Server(config, on_stop=app.state.context.supervisor.news.end).run(sockets=[listener])
+        servers.append(_Server(config, on_stop=app.state.context.supervisor.news.end))
+        servers[0].run(sockets=[listener])
 
 
 class _Server(uvicorn.Server):
@@ -70,6 +95,10 @@ class _Server(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, *, on_stop: Callable[[], None]) -> None:
         super().__init__(config)
         self._on_stop = on_stop
+
+    def end(self) -> None:
+        """Stop soon; from any thread."""
+        self.should_exit = True
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop."""
